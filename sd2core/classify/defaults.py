@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args
 
 from sd2core.options.bounds import Bounds
 
 if TYPE_CHECKING:
     from sd2core.runs.pace import Kind
 
-MODELS = ("lstm", "s4", "kernel")
+Model = Literal["lstm", "s4", "kernel"]
+MODELS: tuple[Model, ...] = get_args(Model)
 """The paper's network, one of the denoiser's S4 layers, and one in closed form for few data."""
+
+FeatureKind = Literal["columns", "peak"]
+"""What is seen of a frame, see :mod:`sd2core.classify.features`."""
 
 WIDTH = 32
 """Units or channels of every layer (the paper's: 16)."""

@@ -24,16 +24,16 @@ take, as :func:`sd2core.denoise.metrics.stands_out` has it, is not known while l
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, get_args
+from typing import NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.classify.defaults import FeatureKind
 from sd2core.errors import Sd2Error
 from sd2core.sensor import VelocityAxis
 
-Kind = Literal["peak", "columns"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
+KINDS: tuple[FeatureKind, ...] = get_args(FeatureKind)
 
 STANDS_OUT = 10.0
 """How far above the noise a target is, as a ratio of energies."""
@@ -63,7 +63,7 @@ SILENCE = Heard(np.zeros(0), -np.inf)
 class Features:
     """Conversion of frames to features."""
 
-    kind: Kind
+    kind: FeatureKind
     axis: VelocityAxis
     null_bins: tuple[int, ...]  # ignored
     frame_rate_hz: float

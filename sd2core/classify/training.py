@@ -16,8 +16,8 @@ from torch.nn import functional
 
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.data import UNKNOWN, Clip, ClipSet, frame_counts, some_noisy
-from sd2core.classify.defaults import DELAY_S, DELAYS_S, WIDTH, WIDTHS
-from sd2core.classify.features import Features, Kind
+from sd2core.classify.defaults import DELAY_S, DELAYS_S, WIDTH, WIDTHS, FeatureKind
+from sd2core.classify.features import Features
 from sd2core.classify.live import TrainedClassifier
 from sd2core.classify.metrics import confusion_of, mean_recall
 from sd2core.classify.models import Classifier, build, options, parameter_groups
@@ -36,7 +36,7 @@ class TrainOptions:
     """Options of a training."""
 
     model: str = "lstm"
-    features: Kind = "columns"
+    features: FeatureKind = "columns"
     delay_s: float = DELAY_S  # part after a frame that is seen before it is answered
     options: Mapping[str, Any] = field(default_factory=dict)  # of the model, in place of its own
     noisy_share: float = 0.5

@@ -287,12 +287,12 @@ def _keywords(option: Option) -> dict[str, Any]:
     if place.many == "again":
         about |= {"action": "append", "default": None}
     elif place.many:
-        about["nargs"] = "+" if required else "*"
+        about["nargs"] = "+" if required or not place.argument else "*"
     elif place.bare is not None:
         about |= {"nargs": "?", "const": place.bare}
     elif place.argument:
         about["nargs"] = None if required else "?"
-    elif required:
+    if required and not place.argument:
         about["required"] = True
     return about
 

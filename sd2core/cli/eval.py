@@ -3,34 +3,63 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from sd2core.cli.command_parser import Options, add_command
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
+from sd2core.options.records import ARGUMENTS, Place
+from sd2core.options.shared import Figure, Json
 
 if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser
 
 
+@dataclass(frozen=True, kw_only=True)
+class Judging(Figure, Json):
+    """Whom an evaluation judges, on which maps, and the picture of its result.
+
+    Parameters
+    ----------
+    subjects : LIST
+        people to evaluate on, separated by commas, or `all` (default: those kept for the test)
+    placements
+        evaluate on maps from all places of the sensor, or the first only
+    """
+
+    subjects: str | None = None
+    placements: Literal["all", "first"] = "first"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluate(Judging):
+    """Options of ``sd2 eval``.
+
+    Parameters
+    ----------
+    models : MODEL
+        a run, a model file, or the name of a model that is installed
+    data : PAIRS
+        stores of pairs
+    subjects : LIST
+        people to evaluate on, separated by commas, or `all` (default: those that the first
+        model's run kept for the test, or all)
+    figure : FILE
+        draw the errors, as .png, .svg or .pdf
+    markdown : FILE.md
+        write the tables
+    """
+
+    models: Annotated[tuple[str, ...], ARGUMENTS]
+    data: Annotated[tuple[Path, ...], Place(many="together")]
+    markdown: Annotated[Path | None, Place(endings=(".md",))] = None
+
+
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``eval``."""
-    parser = add_command(commands, "eval", handler=_eval)
-    text = "a run, a model file, or the name of a model that is installed"
-    parser.add_value("models", str, "MODEL", text, nargs="+")
-    parser.add_value("--data", Path, "PAIRS", "stores of pairs", nargs="+", required=True)
-    add_judging(parser, "those that the first model's run kept for the test, or all", "the errors")
-    parser.add_file("--markdown", "FILE.md", "write the tables", ".md")
-
-
-def add_judging(parser: Options, usual_subjects: str, drawn: str) -> None:
-    """Add whom an evaluation judges on which maps, and the files of its result."""
-    text = f"people to evaluate on, separated by commas, or `all` (default: {usual_subjects})"
-    parser.add_value("--subjects", str, "LIST", text)
-    parser.add_placements_used("evaluate on maps from", "first")
-    parser.add_figure_output(drawn)
-    parser.add_json()
+    add_command(commands, "eval", options=Evaluate, handler=_eval)
 
 
 def named_subjects(text: str, everybody: tuple[str, ...]) -> tuple[str, ...]:
@@ -38,7 +67,7 @@ def named_subjects(text: str, everybody: tuple[str, ...]) -> tuple[str, ...]:
     return everybody if text == "all" else tuple(name for name in text.split(",") if name)
 
 
-def _eval(options: argparse.Namespace) -> None:
+def _eval(options: Evaluate) -> None:
     """Measure denoisers on people that they have not learnt from.
 
     Denoises whole takes and compares them with the radar's: the velocity of the

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
-from sd2core.cli.command_parser import Options
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
@@ -19,19 +16,6 @@ if TYPE_CHECKING:
 
 MapName = Literal["synthetic", "denoised", "radar"]
 MAP_NAMES: tuple[MapName, ...] = get_args(MapName)
-
-
-def add_labelled_recording(parser: Options) -> None:
-    """Add a recording, which of its maps, and labels in place of its own."""
-    parser.add_value("recording", Path, "RECORDING", "a recording (.sd2)")
-    text = f"some of {', '.join(MAP_NAMES)} (default: those of its mesh and its radar)"
-    parser.add_value("--maps", str, "LIST", text)
-    parser.add_value("--labels", Path, "FILE", "other labels than the recording's own")
-
-
-def chosen_maps(options: argparse.Namespace, recording: Recording) -> tuple[MapName, ...]:
-    """Maps of ``--maps``, or the usual ones."""
-    return parsed_maps(options.maps) if options.maps else usual_maps(recording)
 
 
 def usual_maps(recording: Recording) -> tuple[MapName, ...]:

@@ -3,35 +3,55 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import duration, print_facts, print_json, print_rows
 from sd2core.errors import Sd2Error
+from sd2core.options.records import ARGUMENT, Place
+from sd2core.options.shared import Json
 
 if TYPE_CHECKING:
     from sd2core.train.folder import RunStatus, TrainingFolder
 
 
+Word = Literal["pause", "resume", "stop", "cancel"]
+WORDS: tuple[Word, ...] = get_args(Word)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Runs(Json):
+    """Options of ``sd2 runs``.
+
+    Parameters
+    ----------
+    folder : FOLDER
+        a run, or a folder of runs (default: this one)
+    pause
+        keep a checkpoint and wait
+    resume
+        go on after --pause
+    stop
+        end it, and keep the best model and a checkpoint
+    cancel
+        end it, and delete what it made
+    """
+
+    folder: Annotated[Path, ARGUMENT] = Path()
+    pause: Annotated[bool, Place(one_of="word")] = False
+    resume: Annotated[bool, Place(one_of="word")] = False
+    stop: Annotated[bool, Place(one_of="word")] = False
+    cancel: Annotated[bool, Place(one_of="word")] = False
+
+
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``runs``."""
-    parser = add_command(commands, "runs", handler=_runs)
-    text = "a run, or a folder of runs (default: this one)"
-    parser.add_value("folder", Path, "FOLDER", text, Path(), nargs="?")
-    what = parser.add_mutually_exclusive_group()
-    for word, about in (
-        ("pause", "keep a checkpoint and wait"),
-        ("resume", "go on after --pause"),
-        ("stop", "end it, and keep the best model and a checkpoint"),
-        ("cancel", "end it, and delete what it made"),
-    ):
-        what.add_argument(f"--{word}", action="store_const", const=word, dest="word", help=about)
-    parser.add_json()
+    add_command(commands, "runs", options=Runs, handler=_runs)
 
 
-def _runs(options: argparse.Namespace) -> None:
+def _runs(options: Runs) -> None:
     """List training runs, and pause, stop or cancel one.
 
     Lists the runs of `sd2 train` in a folder: how far they are, how good, and whether
@@ -46,9 +66,10 @@ def _runs(options: argparse.Namespace) -> None:
     """
     from sd2core.train.folder import TrainingFolder, runs_in
 
-    if options.word is not None:
-        _steer(TrainingFolder(options.folder), options.word)
-        return
+    for word in WORDS:
+        if getattr(options, word):
+            _steer(TrainingFolder(options.folder), word)
+            return
     runs = runs_in(options.folder)
     if options.json:
         print_json({"runs": [{"path": str(run.path), **asdict(run.status())} for run in runs]})
@@ -58,7 +79,7 @@ def _runs(options: argparse.Namespace) -> None:
         _print_table(runs)
 
 
-def _steer(run: TrainingFolder, word: Literal["pause", "resume", "stop", "cancel"]) -> None:
+def _steer(run: TrainingFolder, word: Word) -> None:
     state = run.state()
     if word == "cancel" and state in ("stopped", "died", "failed"):
         lock = run.lock()

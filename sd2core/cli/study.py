@@ -7,35 +7,56 @@ import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import positive_int
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_event, print_json, progress_bar
+from sd2core.options.kinds import Count
+from sd2core.options.records import ARGUMENT, Place
+from sd2core.options.shared import JsonAndProgress
 
 if TYPE_CHECKING:
     from sd2core.progress import Progress
     from sd2core.study.plan import StudyPlan
 
 
+@dataclass(frozen=True, kw_only=True)
+class Running(JsonAndProgress):
+    """Where a study runs, and what it prints.
+
+    Parameters
+    ----------
+    workers : N
+        processes on this machine (default: one per core)
+    scheduler : ADDRESS
+        use the workers of this dask-scheduler
+    """
+
+    workers: Annotated[Count | None, Place(one_of="where")] = None
+    scheduler: Annotated[str | None, Place(one_of="where")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study(Running):
+    """Options of ``sd2 study``.
+
+    Parameters
+    ----------
+    plan : STUDY.toml
+        plan of the study
+    """
+
+    plan: Annotated[Path, ARGUMENT]
+
+
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``study``."""
-    parser = add_command(commands, "study", handler=_study)
-    parser.add_value("plan", Path, "STUDY.toml", "plan of the study")
-    add_running(parser)
+    add_command(commands, "study", options=Study, handler=_study)
 
 
-def add_running(parser: Options) -> None:
-    """Add the options for where a study runs, and what it prints."""
-    where = parser.add_mutually_exclusive_group()
-    text = "processes on this machine (default: one per core)"
-    where.add_value("--workers", positive_int, "N", text)
-    where.add_value("--scheduler", str, "ADDRESS", "use the workers of this dask-scheduler")
-    parser.add_json_and_progress()
-
-
-def _study(options: argparse.Namespace) -> None:
+def _study(options: Study) -> None:
     """Find out whether synthetic data help a classifier on a real radar.
 
     Every ordered pair of people makes a fold: one is judged, of another there is only
@@ -56,7 +77,7 @@ def _study(options: argparse.Namespace) -> None:
     make_study(read_study(options.plan), options)
 
 
-def make_study(plan: StudyPlan, options: argparse.Namespace) -> None:
+def make_study(plan: StudyPlan, options: Running) -> None:
     """Run a study, write its page, and print what it found."""
     from sd2core.study.report import findings_of, write_report
     from sd2core.study.run import run_study

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from sd2core.classify.data import ClipSet, clips_of_map
+from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.datasets.reading import open_dataset
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import RADAR_MAP_SUFFIXES, kind_of
@@ -24,21 +25,6 @@ ONE_PERSON = "one person"
 """Subject of a radar file that does not name one."""
 
 _EXPECTED = "a campaign or other pairs, a data set, a labelled recording, or a labelled radar file"
-
-
-class LabelledSource(NamedTuple):
-    """Labelled data and its subject, empty where none was given."""
-
-    path: Path
-    subject: str = ""
-
-    @classmethod
-    def parsed(cls, text: str) -> LabelledSource:
-        """Parse ``PATH`` or ``PERSON=PATH``."""
-        name, sign, path = text.partition("=")
-        if sign and name and path and "/" not in name and not Path(text).exists():
-            return cls(Path(path), name)
-        return cls(Path(text))
 
 
 class Grid(NamedTuple):

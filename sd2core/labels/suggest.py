@@ -10,7 +10,6 @@ of values see docs/decisions/0032 and 0051.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +19,7 @@ from sd2core.errors import Sd2Error
 from sd2core.labels.spans import Span
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
+from sd2core.options.suggesting import SuggestOptions
 from sd2core.timebase import Timebase
 
 TRACK = "Suggestions"
@@ -39,45 +39,6 @@ _SMOOTHING_S = 0.1
 _PAUSE_FRAMES, _PAUSE_S = 3.0, 0.2
 """A step of more typical frame durations and of more time is a pause in the recording."""
 _ROUNDING_S = 1e-6
-
-
-@dataclass(frozen=True)
-class SuggestOptions:
-    """Thresholds and margins for suggesting spans.
-
-    Parameters
-    ----------
-    high_db : float
-        Energy over the quiet level that the peak of a span must reach.
-    low_db : float
-        Energy over the quiet level that a span never falls below, up to `high_db`.
-    min_duration_s : float
-        Least duration, before the margins are added.
-    merge_gap_s : float
-        Quiet up to this long does not end a span.
-    margin_s : float
-        Added on both sides, but no more than a third of the quiet up to a neighbour: a
-        gesture begins and ends more slowly than energy shows.
-    hold_s : float
-        Added to the margin at the end: a hand is held still before it is let go.
-    """
-
-    high_db: float = 7.0
-    low_db: float = 5.0
-    min_duration_s: float = 0.2
-    merge_gap_s: float = 0.1
-    margin_s: float = 0.2
-    hold_s: float = 0.2
-
-    def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
-            if not (math.isfinite(value) and value >= 0):
-                raise Sd2Error(f"{name} is {value}", "a finite number from 0 on")
-        if not 0 < self.low_db <= self.high_db:
-            raise Sd2Error(
-                f"low_db is {self.low_db:g} and high_db {self.high_db:g}",
-                "a low threshold above 0 dB and not above the high one",
-            )
 
 
 def motion_energy_db(doppler: DopplerMap) -> NDArray[np.float64]:

@@ -2,8 +2,9 @@
 
 A record is a frozen dataclass. Type, bounds and default of an option stand at its field; its words
 are in the docstring's ``Parameters``, with what a value is called after the name, and without the
-default where that is a number or a choice. A command of ``sd2`` is such a record, and takes options
-from others by inheriting from them; a section of a plan is one, too.
+default where that is a number or a choice, or with ``{default}`` in its place. A command of ``sd2``
+is such a record, and takes options from others by inheriting from them, and may have other words
+for them; a section of a plan is one, too.
 """
 
 from __future__ import annotations
@@ -281,9 +282,12 @@ def _options(kind: type, section: str = "") -> Iterator[Option]:
         choices = get_args(plain) if get_origin(plain) is Literal else ()
         factory = ready[name].default_factory
         default = ready[name].default if factory is MISSING else factory()
-        called, words = _documented(owner)[name]
-        if _is_said(default, choices) and "(default" not in words:
-            words += f" (default: {default})" if choices else f" (default: {default:g})"
+        called, words = next(said[name] for said in map(_documented, kind.__mro__) if name in said)
+        if _is_said(default, choices):
+            text = str(default) if choices else f"{default:g}"
+            words = words.replace("{default}", text)
+            if not re.search(r"\(default|default\)", words):
+                words += f" (default: {text})"
         yield Option(
             name,
             type(choices[0]) if choices else get_origin(plain) or plain,

@@ -30,8 +30,6 @@ class JsonAndProgress(Json):
 
     Parameters
     ----------
-    json
-        print JSON, for other programs; an error as well
     progress_json
         print progress as JSON lines, for other programs (docs/formats.md)
     """

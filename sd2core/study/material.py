@@ -22,11 +22,11 @@ from sd2core.classify.data import (
 )
 from sd2core.datasets.clips import clips_of_dataset
 from sd2core.datasets.labelled import (
-    LabelledSource,
     clips_of_radar_file,
     labels_given,
     unfolded,
 )
+from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import radar_map
 from sd2core.denoise.resample_to_model import SAME_RATE

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import Field, FiniteFloat, model_validator
 
 from sd2core.batch.plan import Section, Share, Text
-from sd2core.classify.defaults import DELAY_S, DELAYS_S, WIDTH, WIDTHS
-from sd2core.datasets.labelled import LabelledSource
+from sd2core.classify.defaults import DELAY_S, DELAYS_S, WIDTH, WIDTHS, FeatureKind
+from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.denoise.card import Inputs
 from sd2core.files.paths import located_path
 from sd2core.files.texts import read_text
@@ -36,7 +36,7 @@ class Learner(Section):
     window_s: Annotated[FiniteFloat, Field(gt=0, le=60)] = 3.0
     """Time that ridge regression looks at."""
     # The others are not those of ridge regression.
-    features: Literal["peak", "columns"] = "columns"
+    features: FeatureKind = "columns"
     width: Annotated[int, Field(ge=WIDTHS.low, le=WIDTHS.high)] = WIDTH
     delay_s: Annotated[FiniteFloat, Field(ge=DELAYS_S.low, le=DELAYS_S.high)] = DELAY_S
     steps: Annotated[int, Field(ge=1)] | None = None

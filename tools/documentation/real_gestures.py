@@ -25,11 +25,13 @@ from sd2core.classify.spans import SpanOptions, predicted_spans
 from sd2core.classify.splitting import dealt
 from sd2core.classify.training import TrainOptions, train
 from sd2core.cli.classify.data import clips_of
-from sd2core.datasets.labelled import LabelledSource, unfolded
+from sd2core.datasets.labelled import unfolded
+from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.files.tables import markdown_table
 from sd2core.io.radar.kkt import RecordedMap, load_kkt
 from sd2core.labels.matching import match_spans
-from sd2core.labels.suggest import SuggestOptions, suggest_spans
+from sd2core.labels.suggest import suggest_spans
+from sd2core.options.suggesting import SuggestOptions
 from sd2core.study.plan import Learner
 from tools.documentation.measured import write_page
 from tools.documentation.places import BUILD, SHARED
@@ -43,7 +45,7 @@ IOUS = (0.3, 0.4, 0.5, 0.6, 0.7)
 """Options are chosen by the mean F1 over these: with few files F1 at one of them has steps."""
 AT = IOUS.index(0.5)
 GRID = [
-    SuggestOptions(high, low, 0.2, gap, margin, hold)
+    SuggestOptions(high_db=high, low_db=low, merge_gap_s=gap, margin_s=margin, hold_s=hold)
     for high, low, gap, margin, hold in product(
         (6.0, 7.0, 8.0, 9.0), (4.0, 5.0, 6.0), (0.1, 0.2), (0.1, 0.2, 0.3), (0.0, 0.1, 0.2, 0.3)
     )

@@ -102,7 +102,8 @@ class ClassSetup(RunSetup[DataSource]):
 
     def look_into(self, source: DataSource) -> DataSource:
         """Read the content of a source of data."""
-        from sd2core.datasets.labelled import LabelledSource, labelled_facts, unfolded
+        from sd2core.datasets.labelled import labelled_facts, unfolded
+        from sd2core.datasets.labelled_source import LabelledSource
 
         path, person = source.path, source.person
         try:

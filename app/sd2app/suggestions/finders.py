@@ -10,7 +10,8 @@ from PySide6.QtCore import SignalInstance
 
 from sd2app.session.maps import MapModel
 from sd2core.labels.spans import Span
-from sd2core.labels.suggest import SuggestOptions, motion_energy_db, suggest_spans
+from sd2core.labels.suggest import motion_energy_db, suggest_spans
+from sd2core.options.suggesting import SuggestOptions
 
 
 class Threshold(NamedTuple):

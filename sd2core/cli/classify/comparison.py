@@ -3,45 +3,59 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from sd2core.cli.classify.data import DATA_HELP, add_sources
-from sd2core.cli.classify.train import add_network
+from sd2core.cli.classify.data import DATA_HELP, Sources
+from sd2core.cli.classify.train import Network
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import positive_int, share
-from sd2core.cli.study import add_running, make_study
+from sd2core.cli.study import Running, make_study
+from sd2core.options.bounds import STEPS
+from sd2core.options.kinds import Count, Typed, joined, share
 
 if TYPE_CHECKING:
-    from sd2core.datasets.labelled import LabelledSource
     from sd2core.study.plan import Learner, StudyPlan
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table(Sources, Network, Running):
+    """Options of ``sd2 classify table``.
+
+    Parameters
+    ----------
+    out : FOLDER
+        the study to write
+    seeds : N
+        number of draws (default: 5; quick: 2)
+    shares : LIST
+        shares of the real data for the learning curve (default: 1%,2%,5%,10%,25%,50%,100%;
+        quick: 10%,100%)
+    quick
+        few trainings, for a first look
+    radar_only
+        add no synthetic maps: compare networks and amounts of radar data only
+    same_people
+        judge other movements of the people trained on, instead of other people
+    steps : N
+        batches per training
+    """
+
+    out: Path
+    seeds: Count | None = None
+    shares: Annotated[tuple[float, ...], Typed(_shares, joined)] | None = None
+    quick: bool = False
+    radar_only: bool = False
+    same_people: bool = False
+    steps: Annotated[int, STEPS] | None = None
 
 
 def add_table(kinds: argparse._SubParsersAction) -> None:
     """Add ``table``."""
-    parser = add_command(kinds, "table", handler=_table, description=DATA_HELP)
-    add_sources(parser)
-    parser.add_output("FOLDER", "the study to write", goes_on=True)
-    parser.add_value("--seeds", positive_int, "N", "number of draws (default: 5; quick: 2)")
-    text = "shares of the real data for the learning curve (default:"
-    text += " 1%%,2%%,5%%,10%%,25%%,50%%,100%%; quick: 10%%,100%%)"
-    parser.add_value("--shares", _shares, "LIST", text)
-    parser.add_flag("--quick", "few trainings, for a first look")
-    parser.add_flag(
-        "--radar-only", "add no synthetic maps: compare networks and amounts of radar data only"
-    )
-    parser.add_flag(
-        "--same-people", "judge other movements of the people trained on, instead of other people"
-    )
-    add_network(parser)
-    parser.add_value("--steps", positive_int, "N", "batches per training")
-    add_running(parser)
+    add_command(kinds, "table", options=Table, handler=_table, description=DATA_HELP)
 
 
-def _shares(text: str) -> tuple[float, ...]:
-    return tuple(sorted({share(part) for part in text.split(",")}))
-
-
-def _table(options: argparse.Namespace) -> None:
+def _table(options: Table) -> None:
     """Compare networks, and trainings with and without synthetic data.
 
     A study (`sd2 study`) in which everybody is judged once: by the chosen network, of the
@@ -66,7 +80,7 @@ def _table(options: argparse.Namespace) -> None:
     make_study(plan, options)
 
 
-def _plan(options: argparse.Namespace) -> StudyPlan:
+def _plan(options: Table) -> StudyPlan:
     from sd2core.denoise.files import MAP_MODEL
     from sd2core.study.plan import Denoiser, StudyPlan
 
@@ -74,7 +88,7 @@ def _plan(options: argparse.Namespace) -> StudyPlan:
     plan = StudyPlan(
         title=f"Gestures of {', '.join(one.path.stem for one in options.data)}",
         out=str(options.out.absolute()),
-        data=tuple(map(_source, options.data)),
+        data=tuple(str(one._replace(path=one.path.absolute())) for one in options.data),
         turns="once",
         seeds=options.seeds or (2 if quick else 5),
         shares=options.shares or ((0.1, 1.0) if quick else (0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0)),
@@ -86,12 +100,11 @@ def _plan(options: argparse.Namespace) -> StudyPlan:
     return _fitting(plan, options.same_people)
 
 
-def _source(one: LabelledSource) -> str:
-    path = one.path.absolute()
-    return f"{one.subject}={path}" if one.subject else str(path)
+def _shares(text: str) -> tuple[float, ...]:
+    return tuple(sorted({share(part) for part in text.split(",")}))
 
 
-def _learners(options: argparse.Namespace) -> tuple[Learner, ...]:
+def _learners(options: Table) -> tuple[Learner, ...]:
     """The chosen network, then those that it is compared with."""
     from sd2core.study.plan import Learner
 

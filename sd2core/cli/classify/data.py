@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from sd2core.cli.command_parser import Options
-from sd2core.cli.recording_maps import MAP_NAMES, MapName, maps_of, parsed_maps, usual_maps
+from sd2core.cli.recording_maps import MapName, maps_of, usual_maps
+from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.errors import Sd2Error
+from sd2core.options.kinds import Typed
+from sd2core.options.records import ARGUMENTS, OptionRecord
 
 if TYPE_CHECKING:
     from sd2core.classify.data import ClipSet
-    from sd2core.datasets.labelled import LabelledSource
     from sd2core.denoise.live import TrainedDenoiser
     from sd2core.maps import MapKind
     from sd2core.pairs.store import PairSet
@@ -32,25 +33,33 @@ _WITH_SUBJECTS = ("pairs", "dataset")
 _RADARS = ("simulated", "real")
 
 
-def source(text: str) -> LabelledSource:
-    """Parse ``PATH`` or ``PERSON=PATH``."""
-    from sd2core.datasets.labelled import LabelledSource
+@dataclass(frozen=True, kw_only=True)
+class Sources(OptionRecord):
+    """Labelled data.
 
-    return LabelledSource.parsed(text)
+    Parameters
+    ----------
+    data : DATA
+        labelled data, see above
+    denoiser : FILE|NAME
+        for denoised maps of pairs (default: the one that comes with SD² Studio)
+    """
+
+    data: Annotated[tuple[LabelledSource, ...], ARGUMENTS, Typed(LabelledSource.parsed)]
+    denoiser: str | None = None
 
 
-def add_data(parser: Options) -> None:
-    """Add the options for data and the choice of their maps."""
-    add_sources(parser)
-    text = f"some of {', '.join(MAP_NAMES)}, separated by commas (default: radar)"
-    parser.add_value("--maps", str, "LIST", text, "radar")
+@dataclass(frozen=True, kw_only=True)
+class SourcesAndMaps(Sources):
+    """Labelled data, and which of its maps.
 
+    Parameters
+    ----------
+    maps : LIST
+        some of synthetic, denoised, radar, separated by commas (default: radar)
+    """
 
-def add_sources(parser: Options) -> None:
-    """Add the options for data and the denoiser."""
-    parser.add_value("data", source, "DATA", "labelled data, see above", nargs="+")
-    text = "for denoised maps of pairs (default: the one that comes with SD² Studio)"
-    parser.add_value("--denoiser", str, "FILE|NAME", text)
+    maps: str = "radar"
 
 
 def clips_of(
@@ -97,11 +106,6 @@ def _denoiser_of(pairs: PairSet, kind: MapKind, given: str | None) -> TrainedDen
     if kind != "denoised":
         return None
     return load_model(given or default_name(limbs=pairs.has_limbs))
-
-
-def asked_maps(options: argparse.Namespace) -> tuple[MapName, ...]:
-    """Parse ``--maps``."""
-    return parsed_maps(options.maps)
 
 
 def split_of(

@@ -8,57 +8,85 @@ import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from sd2core.classify.defaults import DELAY_S, DELAYS_S, MODELS, WIDTH, WIDTHS
-from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of, split_of
-from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import given, positive_int, within
+from sd2core.classify.defaults import DELAY_S, DELAYS_S, WIDTH, WIDTHS, FeatureKind, Model
+from sd2core.cli.classify.data import DATA_HELP, SourcesAndMaps, clips_of, split_of
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import finite, print_event, print_facts, print_json
-from sd2core.options.bounds import LEARNING_RATE, STEPS
+from sd2core.cli.recording_maps import parsed_maps
+from sd2core.options.bounds import LEARNING_RATE, SEED, STEPS
+from sd2core.options.kinds import Count
+from sd2core.options.records import Group, OptionRecord, Place, given
+from sd2core.options.shared import JsonAndProgress, KeptOut, Overwrite
 from sd2core.processes import INTERRUPTED
 
 if TYPE_CHECKING:
     from sd2core.classify.training import TrainOptions, Watch
 
 
+@dataclass(frozen=True, kw_only=True)
+class Network(OptionRecord):
+    """What learns.
+
+    Parameters
+    ----------
+    model
+        two LSTM layers (the paper's), two S4 layers, or kernel ridge regression on windows of
+        twice the delay, which learns most of few recordings
+    features
+        input per frame: whole columns (the default), or the strongest bin (the paper's)
+    width : N
+        units or channels of a layer (default: {default}; the paper's: 16)
+    delay_s : S
+        classify a frame so much later, with the frames after it known (default: {default}; the
+        paper's: 0, at once)
+    """
+
+    GROUP = Group("network")
+
+    model: Model = "lstm"
+    features: FeatureKind = "columns"
+    width: Annotated[int, WIDTHS] = WIDTH
+    delay_s: Annotated[float, DELAYS_S] = DELAY_S
+
+
+@dataclass(frozen=True, kw_only=True)
+class Train(SourcesAndMaps, Overwrite, Network, KeptOut, JsonAndProgress):
+    """Options of ``sd2 classify train``.
+
+    Parameters
+    ----------
+    out : FILE.safetensors
+        the classifier to write
+    placements
+        range synthesis: train on all places of the sensor, or the first only
+    steps : N
+        number of training steps
+    patience : N
+        end after so many validations without improvement
+    learning_rate : RATE
+        peak learning rate
+    seed : N
+        seed of all random numbers
+    """
+
+    out: Annotated[Path, Place(endings=(".safetensors",))]
+    placements: Literal["all", "first"] = "all"
+    steps: Annotated[int, STEPS] | None = None
+    patience: Count | None = None
+    learning_rate: Annotated[float, LEARNING_RATE] | None = None
+    seed: Annotated[int, SEED] = 0
+
+
 def add_train(kinds: argparse._SubParsersAction) -> None:
     """Add ``train``."""
-    parser = add_command(kinds, "train", handler=_train, description=DATA_HELP)
-    add_data(parser)
-    parser.add_output("FILE.safetensors", "the classifier to write", ".safetensors")
-    add_network(parser)
-    parser.add_placements_used("range synthesis: train on", "all")
-    otherwise = "(default: as the data set says, or a sixth of all)"
-    parser.add_people_kept_out(
-        f"kept out for validation, separated by commas, or none {otherwise}",
-        f"kept out for a test, or none {otherwise}",
-    )
-    parser.add_value("--steps", within(STEPS), "N", "number of training steps")
-    parser.add_value(
-        "--patience", positive_int, "N", "end after so many validations without improvement"
-    )
-    parser.add_value("--learning-rate", within(LEARNING_RATE), "RATE", "peak learning rate")
-    parser.add_value("--seed", int, "N", "seed of all random numbers", 0)
-    parser.add_json_and_progress()
+    add_command(kinds, "train", options=Train, handler=_train, description=DATA_HELP)
 
 
-def add_network(parser: Options) -> None:
-    """Add model, features, width and delay."""
-    group = parser.add_argument_group("network")
-    text = "two LSTM layers (the paper's), two S4 layers, or kernel ridge regression on windows of"
-    text += " twice the delay, which learns most of few recordings"
-    group.add_choice("--model", MODELS, text, MODELS[0])
-    text = "input per frame: whole columns (the default), or the strongest bin (the paper's)"
-    group.add_choice("--features", ("columns", "peak"), text, "columns")
-    text = f"units or channels of a layer (default: {WIDTH}; the paper's: 16)"
-    group.add_value("--width", within(WIDTHS), "N", text, WIDTH)
-    text = "classify a frame so much later, with the frames after it known (default:"
-    text += f" {DELAY_S:g}; the paper's: 0, at once)"
-    group.add_value("--delay-s", within(DELAYS_S), "S", text, DELAY_S)
-
-
-def _train(options: argparse.Namespace) -> int:
+def _train(options: Train) -> int:
     """Train a classifier on labelled maps.
 
     Some people are kept out for validation, some for `sd2 classify eval`.
@@ -69,7 +97,7 @@ def _train(options: argparse.Namespace) -> int:
       sd2 classify train set.zarr --maps radar,denoised --out both.safetensors
       sd2 classify train anna=a.sd2 anna=b.sd2 ben=c.sd2 --model s4 --out own.safetensors
     """
-    maps = asked_maps(options)
+    maps = parsed_maps(options.maps)
     from sd2core.classify.defaults import pace_kind
     from sd2core.classify.files import save_classifier
     from sd2core.classify.splitting import split_clips
@@ -113,26 +141,21 @@ def _train(options: argparse.Namespace) -> int:
     return INTERRUPTED if made.interrupted else 0
 
 
-def _options(options: argparse.Namespace) -> TrainOptions:
+def _options(options: Train) -> TrainOptions:
     from sd2core.classify.training import TrainOptions
 
-    return TrainOptions(
-        options={"width": options.width},
-        **given(options, ("model", "features", "delay_s", "seed")),
-        **given(options, ("steps", "patience", "learning_rate")),
-    )
+    names = ("model", "features", "delay_s", "seed", "steps", "patience", "learning_rate")
+    return TrainOptions(options={"width": options.width}, **given(options, names))
 
 
-def _kept_out(
-    options: argparse.Namespace, part: Literal["validation", "test"]
-) -> Sequence[str] | None:
+def _kept_out(options: Train, part: Literal["validation", "test"]) -> Sequence[str] | None:
     """Return the people named, possibly none; otherwise those the data sets define."""
     named: tuple[str, ...] | None = getattr(options, f"{part}_subjects")
     return split_of(options.data, part) if named is None else named
 
 
 @contextmanager
-def _watching(options: argparse.Namespace, steps: int) -> Iterator[Watch]:
+def _watching(options: Train, steps: int) -> Iterator[Watch]:
     """Show a bar on standard error, or print a JSON line for every event."""
     from sd2core.cli.bars import bar as bar_of
 

@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from sd2core.cli.classify.data import DATA_HELP, add_data, asked_maps, clips_of
-from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.eval import add_judging, named_subjects
+from sd2core.cli.classify.data import DATA_HELP, SourcesAndMaps, clips_of
+from sd2core.cli.command_parser import add_command
+from sd2core.cli.eval import Judging, named_subjects
 from sd2core.cli.labels.reading import check_label_output, print_lost
 from sd2core.cli.labels.suggest import (
-    add_searched_map,
+    SearchedMap,
     map_and_clock,
     span_cells,
     spans_data,
     write_found,
 )
-from sd2core.cli.options import not_negative_float
 from sd2core.cli.output import counted, print_json, print_rows, progress_bar
-from sd2core.cli.recording_maps import MAP_NAMES
+from sd2core.cli.recording_maps import parsed_maps
 from sd2core.errors import Sd2Error
+from sd2core.options.kinds import NotNegative
+from sd2core.options.records import OptionRecord, Place
+from sd2core.options.shared import Json
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,20 +34,58 @@ if TYPE_CHECKING:
     from sd2core.classify.metrics import Score
 
 
-def _add_model(parser: Options) -> None:
-    text = "classifier from `sd2 classify train`"
-    parser.add_value("--model", Path, "FILE", text, required=True)
+@dataclass(frozen=True, kw_only=True)
+class TrainedModel(OptionRecord):
+    """The classifier that is used.
+
+    Parameters
+    ----------
+    model : FILE
+        classifier from `sd2 classify train`
+    """
+
+    model: Path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluate(SourcesAndMaps, TrainedModel, Judging):
+    """Options of ``sd2 classify eval``.
+
+    Parameters
+    ----------
+    subjects : LIST
+        people to evaluate on, separated by commas, or `all` (default: those the training kept
+        for the test)
+    figure : FILE
+        draw both matrices, as .png, .svg or .pdf
+    """
+
+
+@dataclass(frozen=True, kw_only=True)
+class Apply(SearchedMap, TrainedModel, Json):
+    """Options of ``sd2 classify apply``.
+
+    Parameters
+    ----------
+    probabilities : FILE.npz
+        write `probabilities` (frames, classes), `times_s` and `classes`
+    min_duration_s : S
+        shorter spans are left out
+    merge_gap_s : S
+        merge spans of a class with a shorter gap between them
+    """
+
+    probabilities: Annotated[Path | None, Place(endings=(".npz",))] = None
+    min_duration_s: NotNegative = 0.2
+    merge_gap_s: NotNegative = 0.1
 
 
 def add_eval(kinds: argparse._SubParsersAction) -> None:
     """Add ``eval``."""
-    parser = add_command(kinds, "eval", handler=_eval, description=DATA_HELP)
-    add_data(parser)
-    _add_model(parser)
-    add_judging(parser, "those the training kept for the test", "both matrices")
+    add_command(kinds, "eval", options=Evaluate, handler=_eval, description=DATA_HELP)
 
 
-def _eval(options: argparse.Namespace) -> None:
+def _eval(options: Evaluate) -> None:
     """Evaluate a classifier on people it was not trained on.
 
     Prints the confusion matrices of frames and of whole gestures, and the latency of a
@@ -59,7 +100,7 @@ def _eval(options: argparse.Namespace) -> None:
     from sd2core.files.figure_files import save_figure
 
     classifier = load_classifier(options.model)
-    maps = asked_maps(options)
+    maps = parsed_maps(options.maps)
     known = clips_of(options.data, maps, options.denoiser)
     clips = _judged(known, classifier.card, options)
     found = judge(classifier, clips, known)
@@ -90,7 +131,7 @@ def _eval(options: argparse.Namespace) -> None:
         save_figure(figure, options.figure)
 
 
-def _judged(known: ClipSet, card: ClassifierCard, options: argparse.Namespace) -> tuple[Clip, ...]:
+def _judged(known: ClipSet, card: ClassifierCard, options: Evaluate) -> tuple[Clip, ...]:
     kept = card.about.get("split", {}).get("test") or ()
     if options.subjects is not None:
         names = named_subjects(options.subjects, known.subjects)
@@ -128,18 +169,10 @@ def _say(found: Score, known: ClipSet, subjects: list[str], learnt: list[str]) -
 
 def add_apply(kinds: argparse._SubParsersAction) -> None:
     """Add ``apply``."""
-    parser = add_command(kinds, "apply", handler=_apply)
-    add_searched_map(parser, MAP_NAMES)
-    _add_model(parser)
-    text = "write `probabilities` (frames, classes), `times_s` and `classes`"
-    parser.add_file("--probabilities", "FILE.npz", text, ".npz")
-    parser.add_value("--min-duration-s", not_negative_float, "S", "shorter spans are left out", 0.2)
-    text = "merge spans of a class with a shorter gap between them"
-    parser.add_value("--merge-gap-s", not_negative_float, "S", text, 0.1)
-    parser.add_json()
+    add_command(kinds, "apply", options=Apply, handler=_apply)
 
 
-def _apply(options: argparse.Namespace) -> None:
+def _apply(options: Apply) -> None:
     """Find gestures in a recording or a map.
 
     Computes the probability of each class in every frame, and spans of the frames in

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.labels.agree import add_agree
 from sd2core.cli.labels.label_set import add_set
 from sd2core.cli.labels.reading import (
-    add_labels,
+    LabelFile,
     check_label_output,
     print_lost,
     read_named,
@@ -20,11 +21,48 @@ from sd2core.cli.labels.recording import add_cut, add_figure
 from sd2core.cli.labels.recover import add_recover
 from sd2core.cli.labels.suggest import add_suggest
 from sd2core.cli.output import counted, print_json, print_rows
+from sd2core.options.records import Place
+from sd2core.options.shared import Json, Overwrite
 
 if TYPE_CHECKING:
     from sd2core.labels.spans import Labels
     from sd2core.labels.statistics import LabelStatistics
     from sd2core.timebase import Timebase
+
+
+@dataclass(frozen=True, kw_only=True)
+class Show(LabelFile, Json):
+    """Options of ``sd2 labels show``."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Convert(LabelFile, Overwrite, Json):
+    """Options of ``sd2 labels convert``.
+
+    Parameters
+    ----------
+    out : FILE
+        the file to write
+    to : NAME
+        the format of --out, likewise
+    """
+
+    out: Path
+    to: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Statistics(LabelFile, Json):
+    """Options of ``sd2 labels statistics``.
+
+    Parameters
+    ----------
+    csv
+        print comma-separated values
+    """
+
+    csv: Annotated[bool, Place(one_of="form")] = False
+    json: Annotated[bool, Place(one_of="form")] = False
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -40,17 +78,9 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     """
     parser = add_command(commands, "labels", about=add_commands)
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    show = add_command(kinds, "show", handler=_show)
-    add_labels(show)
-    show.add_json()
-
-    convert = add_command(kinds, "convert", handler=_convert)
-    add_labels(convert)
-    convert.add_output("FILE", "the file to write")
-    convert.add_value("--to", str, "NAME", "the format of --out, likewise")
-    convert.add_json()
-
-    _add_statistics(kinds)
+    add_command(kinds, "show", options=Show, handler=_show)
+    add_command(kinds, "convert", options=Convert, handler=_convert)
+    add_command(kinds, "statistics", options=Statistics, handler=_statistics)
     add_set(kinds)
     add_suggest(kinds)
     add_figure(kinds)
@@ -59,7 +89,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     add_recover(kinds)
 
 
-def _show(options: argparse.Namespace) -> None:
+def _show(options: Show) -> None:
     """Print labels with their number and durations.
 
     FILE is a labels.json, a recording, the .h5 of a K60168A, or a file of ELAN, Praat,
@@ -95,7 +125,7 @@ def _show(options: argparse.Namespace) -> None:
     _print_statistics(labels, clock)
 
 
-def _convert(options: argparse.Namespace) -> None:
+def _convert(options: Convert) -> None:
     """Write labels as another program reads them.
 
     The suffix of --out says which program: .json for SD² Studio, .csv, .tsv, .eaf,
@@ -127,15 +157,7 @@ def _described(labels: Labels, clock: Timebase | None) -> dict[str, Any]:
     }
 
 
-def _add_statistics(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(kinds, "statistics", handler=_statistics)
-    add_labels(parser)
-    form = parser.add_mutually_exclusive_group()
-    form.add_flag("--csv", "print comma-separated values")
-    form.add_json()
-
-
-def _statistics(options: argparse.Namespace) -> None:
+def _statistics(options: Statistics) -> None:
     """Count the spans of every label and print their durations.
 
     Durations per label, and with frame times the share of the recording that its spans

@@ -3,34 +3,51 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.labels.reading import add_clock, clock_of, labels_at, needed, with_rate
+from sd2core.cli.labels.reading import FrameTimes, clock_of, labels_at, needed, with_rate
 from sd2core.cli.labels.suggest import spans_data
-from sd2core.cli.options import share
 from sd2core.cli.output import counted, picked, print_json, print_rows
+from sd2core.options.kinds import Share
+from sd2core.options.records import ARGUMENT
+from sd2core.options.shared import Json
 
 if TYPE_CHECKING:
     from sd2core.labels.agreement import Agreement, Answer, Kappa
 
 
+@dataclass(frozen=True, kw_only=True)
+class Agree(FrameTimes, Json):
+    """Options of ``sd2 labels agree``.
+
+    Parameters
+    ----------
+    a : A
+        labels of one person
+    b : B
+        labels of the other
+    min_iou : SHARE
+        intersection over union that a match must reach
+    track : NAME
+        compare this track only
+    """
+
+    a: Annotated[Path, ARGUMENT]
+    b: Annotated[Path, ARGUMENT]
+    min_iou: Share = 0.5
+    track: str | None = None
+
+
 def add_agree(kinds: argparse._SubParsersAction) -> None:
     """Add ``agree``."""
-    parser = add_command(kinds, "agree", handler=_agree)
-    parser.add_value("a", Path, "A", "labels of one person")
-    parser.add_value("b", Path, "B", "labels of the other")
-    parser.add_value(
-        "--min-iou", share, "SHARE", "intersection over union that a match must reach", 0.5
-    )
-    parser.add_value("--track", str, "NAME", "compare this track only")
-    add_clock(parser)
-    parser.add_json()
+    add_command(kinds, "agree", options=Agree, handler=_agree)
 
 
-def _agree(options: argparse.Namespace) -> None:
+def _agree(options: Agree) -> None:
     """Compare the labels of two people.
 
     Frame by frame by Cohen's kappa (1 is agreement, 0 is chance), span by span by

@@ -4,38 +4,57 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.labels.reading import (
-    add_labels,
+    LabelFile,
     check_label_output,
     print_lost,
     read_named,
     write,
 )
 from sd2core.cli.output import counted, print_json, print_rows
-from sd2core.errors import Sd2Error
+from sd2core.options.records import OptionError
+from sd2core.options.shared import Json, Overwrite
 
 if TYPE_CHECKING:
     from sd2core.labels.label_set import LabelSet
     from sd2core.labels.spans import Labels
 
-_USUAL = "usual"
+
+@dataclass(frozen=True, kw_only=True)
+class Set(LabelFile, Overwrite, Json):
+    """Options of ``sd2 labels set``.
+
+    Parameters
+    ----------
+    export : FILE.json
+        write the set by itself
+    use : FILE.json
+        another set; 'usual' is the program's own
+    out : FILE
+        where to write the labels with that other set
+    """
+
+    export: Path | None = None
+    use: str | None = None
+    out: Path | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.use is None) != (self.out is None):
+            raise OptionError("One of --use and --out is given", "both of them, or none")
 
 
 def add_set(kinds: argparse._SubParsersAction) -> None:
     """Add ``set``."""
-    parser = add_command(kinds, "set", handler=_set)
-    add_labels(parser)
-    parser.add_value("--export", Path, "FILE.json", "write the set by itself")
-    parser.add_value("--use", str, "FILE.json", f"another set; {_USUAL!r} is the program's own")
-    parser.add_output("FILE", "where to write the labels with that other set", required=False)
-    parser.add_json()
+    add_command(kinds, "set", options=Set, handler=_set)
 
 
-def _set(options: argparse.Namespace) -> None:
+def _set(options: Set) -> None:
     """Show, share or exchange a label set.
 
     Prints the labels with key, colour, class for the classifier and how many spans have
@@ -49,14 +68,12 @@ def _set(options: argparse.Namespace) -> None:
     from sd2core.labels import files
     from sd2core.labels.field_edits import set_label_set
 
-    if (options.use is None) != (options.out is None):
-        raise Sd2Error("One of --use and --out is given", "both of them, or none")
     there = {
         path: check_label_output(path) for path in (options.export, options.out) if path is not None
     }
     labels, clock = read_named(options)
     written, lost = [], []
-    if options.use is not None:
+    if options.use is not None and options.out is not None:
         labels = set_label_set(labels, _other(options.use)).labels
         lost = write(options.out, labels, clock, over=there[options.out])
         written.append(options.out)
@@ -77,7 +94,7 @@ def _other(name: str) -> LabelSet:
     from sd2core.labels.files import read_label_set
     from sd2core.labels.label_set import GESTURES
 
-    return GESTURES if name == _USUAL else read_label_set(Path(name))
+    return GESTURES if name == "usual" else read_label_set(Path(name))
 
 
 def _print(labels: Labels) -> None:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import argparse
 import math
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from sd2core.cli.command_parser import Options
-from sd2core.cli.options import positive_float
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
+from sd2core.options.kinds import Positive
+from sd2core.options.records import ARGUMENT, Group, OptionRecord, Place
 
 if TYPE_CHECKING:
     from sd2core.labels.spans import Labels
@@ -18,28 +18,52 @@ if TYPE_CHECKING:
     from sd2core.timebase import Timebase
 
 _MOST_FRAMES = 100_000_000
-_FORMATS = "sd2, csv, audacity, elan, textgrid, boris or mne"
 
 
-def add_clock(parser: Options) -> None:
-    """Add the options that give the times of frames."""
-    group = parser.add_argument_group("frame times", "one of these; a recording brings its own")
-    choice = group.add_mutually_exclusive_group()
-    choice.add_value("--recording", Path, "RECORDING", "those of a recording")
-    choice.add_value("--video", Path, "FILE", "those of a video")
-    choice.add_value("--mesh", Path, "FILE", "those of a mesh")
-    choice.add_value("--fps", positive_float, "FPS", "so many per second from 0 s on")
+@dataclass(frozen=True, kw_only=True)
+class FrameTimes(OptionRecord):
+    """Where the times of frames come from.
+
+    Parameters
+    ----------
+    recording : RECORDING
+        those of a recording
+    video : FILE
+        those of a video
+    mesh : FILE
+        those of a mesh
+    fps : FPS
+        so many per second from 0 s on
+    """
+
+    GROUP = Group("frame times", "one of these; a recording brings its own")
+
+    recording: Annotated[Path | None, Place(one_of="clock")] = None
+    video: Annotated[Path | None, Place(one_of="clock")] = None
+    mesh: Annotated[Path | None, Place(one_of="clock")] = None
+    fps: Annotated[Positive | None, Place(one_of="clock")] = None
 
 
-def add_labels(parser: Options) -> None:
-    """Add a file with labels, how to read it, and the times of frames; see :func:`read_named`."""
-    parser.add_value("file", Path, "FILE", "the file with labels")
-    parser.add_value("--format", str, "NAME", f"the format of FILE: {_FORMATS}")
-    parser.add_value("--observation", str, "NAME", "which one of a BORIS project with several")
-    add_clock(parser)
+@dataclass(frozen=True, kw_only=True)
+class LabelFile(FrameTimes):
+    """A file with labels, and how it is read; see :func:`read_named`.
+
+    Parameters
+    ----------
+    file : FILE
+        the file with labels
+    format : NAME
+        the format of FILE: sd2, csv, audacity, elan, textgrid, boris or mne
+    observation : NAME
+        which one of a BORIS project with several
+    """
+
+    file: Annotated[Path, ARGUMENT]
+    format: str | None = None
+    observation: str | None = None
 
 
-def read_named(options: argparse.Namespace) -> tuple[Labels, Timebase | None]:
+def read_named(options: LabelFile) -> tuple[Labels, Timebase | None]:
     """Read the labels that are named, and the frame times as far as they are known."""
     clock = clock_of(options, options.file)
     labels = labels_at(options.file, clock, options.format, options.observation)
@@ -68,7 +92,7 @@ def labels_at(
     return read_labels(path, timebase, observation=observation)
 
 
-def clock_of(options: argparse.Namespace, *sources: Path) -> Timebase | None:
+def clock_of(options: FrameTimes, *sources: Path) -> Timebase | None:
     """Return the frame times of the options, else those of the first source that has some.
 
     A source is a file with labels: a recording, a radar file, or a ``labels.json`` that
@@ -100,9 +124,7 @@ def clock_of(options: argparse.Namespace, *sources: Path) -> Timebase | None:
     return None
 
 
-def with_rate(
-    options: argparse.Namespace, timebase: Timebase | None, *labels: Labels
-) -> Timebase | None:
+def with_rate(options: FrameTimes, timebase: Timebase | None, *labels: Labels) -> Timebase | None:
     """Return the same frame times, or those of ``--fps`` for as long as the labels."""
     from sd2core.timebase import Timebase
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.labels.reading import labels_at, recording_clock
-from sd2core.cli.options import not_negative_float
 from sd2core.cli.output import counted, print_json, progress_bar
-from sd2core.cli.recording_maps import add_labelled_recording, chosen_maps, maps_of
+from sd2core.cli.recording_maps import MapName, maps_of, parsed_maps, usual_maps
 from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import SUFFIXES as FIGURES
+from sd2core.options.kinds import NotNegative
+from sd2core.options.records import ARGUMENT, OptionRecord, Place
+from sd2core.options.shared import Json, Overwrite
 
 if TYPE_CHECKING:
     from sd2core.cutouts.source import CutSource
@@ -23,16 +25,75 @@ if TYPE_CHECKING:
     from sd2core.timebase import Timebase
 
 
+_PARTS = "video,mesh,maps"
+
+
+@dataclass(frozen=True, kw_only=True)
+class LabelledRecording(OptionRecord):
+    """A recording, which of its maps, and labels in place of its own.
+
+    Parameters
+    ----------
+    recording : RECORDING
+        a recording (.sd2)
+    maps : LIST
+        some of synthetic, denoised, radar (default: those of its mesh and its radar)
+    labels : FILE
+        other labels than the recording's own
+    """
+
+    recording: Annotated[Path, ARGUMENT]
+    maps: str | None = None
+    labels: Path | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrawnLabels(LabelledRecording, Overwrite):
+    """Options of ``sd2 labels figure``.
+
+    Parameters
+    ----------
+    out : FILE
+        the figure to write (.png, .svg or .pdf)
+    from_s : S
+        start of the figure, in seconds
+    to_s : S
+        end of the figure, in seconds
+    """
+
+    out: Annotated[Path, Place(endings=FIGURES)]
+    from_s: NotNegative | None = None
+    to_s: NotNegative | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cut(LabelledRecording, Json):
+    """Options of ``sd2 labels cut``.
+
+    Parameters
+    ----------
+    out : FOLDER
+        where to write a folder for each span
+    label : LABEL
+        only spans with this label; may be given several times
+    parts : LIST
+        some of video,mesh,maps (default: all)
+    replace_others
+        replace folders that hold something else
+    """
+
+    out: Path
+    label: Annotated[tuple[str, ...], Place(many="again")] = ()
+    parts: str = _PARTS
+    replace_others: Annotated[bool, Place(("--overwrite", "--replace"))] = False
+
+
 def add_figure(kinds: argparse._SubParsersAction) -> None:
     """Add ``figure``."""
-    parser = add_command(kinds, "figure", handler=_figure)
-    add_labelled_recording(parser)
-    parser.add_output("FILE", "the figure to write (.png, .svg or .pdf)", *FIGURES)
-    parser.add_value("--from-s", not_negative_float, "S", "start of the figure, in seconds")
-    parser.add_value("--to-s", not_negative_float, "S", "end of the figure, in seconds")
+    add_command(kinds, "figure", options=DrawnLabels, handler=_figure)
 
 
-def _figure(options: argparse.Namespace) -> None:
+def _figure(options: DrawnLabels) -> None:
     """Draw the Doppler maps of a recording with its labels.
 
     Maps one above the other on one time axis, the labels below them with names and a
@@ -49,7 +110,7 @@ def _figure(options: argparse.Namespace) -> None:
     recording = open_recording(options.recording)
     clock = recording_clock(recording)
     labels = labels_at(options.labels or options.recording, clock)
-    names = chosen_maps(options, recording)
+    names = _maps(options, recording)
     rows = [
         MapRow(doppler, _title(name, doppler), _strongest(doppler))
         for name, doppler in maps_of(recording, names, axis=VelocityAxis()).items()
@@ -71,6 +132,11 @@ def _figure(options: argparse.Namespace) -> None:
     print(f"{options.out}: {', '.join(row.title.lower() for row in rows)}")
 
 
+def _maps(options: LabelledRecording, recording: Recording) -> tuple[MapName, ...]:
+    """Maps of ``--maps``, or the usual ones."""
+    return parsed_maps(options.maps) if options.maps else usual_maps(recording)
+
+
 def _title(name: str, doppler: DopplerMap) -> str:
     if name != "radar":
         return name.capitalize()
@@ -84,27 +150,14 @@ def _strongest(doppler: DopplerMap) -> float:
     return float(told.max(initial=0.0)) or 1.0
 
 
-_PARTS = "video,mesh,maps"
-
-
 def add_cut(kinds: argparse._SubParsersAction) -> None:
     """Add ``cut``."""
-    parser = add_command(kinds, "cut", handler=_cut)
-    add_labelled_recording(parser)
-    parser.add_output("FOLDER", "where to write a folder for each span", goes_on=True)
-    text = "only spans with this label; may be given several times"
-    parser.add_value("--label", str, "LABEL", text, action="append")
-    parser.add_value("--parts", str, "LIST", f"some of {_PARTS} (default: all)", _PARTS)
-    parser.add_argument(
-        "--overwrite", "--replace", dest="replace_others", action="store_true",
-        help="replace folders that hold something else",
-    )  # fmt: skip
-    parser.add_json()
+    add_command(kinds, "cut", options=Cut, handler=_cut)
 
 
-def _nothing_to_cut(path: Path, labels: Labels, wanted: Sequence[str] | None) -> Sd2Error:
+def _nothing_to_cut(path: Path, labels: Labels, wanted: tuple[str, ...]) -> Sd2Error:
     there = sorted({span.label for span in labels.spans if span.origin != "suggestion"})
-    if wanted is not None and there:
+    if wanted and there:
         return Sd2Error(
             f"{path} has no span of {' or '.join(wanted)}", f"one of {', '.join(there)}"
         )
@@ -118,7 +171,7 @@ def _nothing_to_cut(path: Path, labels: Labels, wanted: Sequence[str] | None) ->
     )
 
 
-def _cut(options: argparse.Namespace) -> None:
+def _cut(options: Cut) -> None:
     """Cut labelled spans out: video, mesh and maps of each.
 
     Makes a folder per span with video.mp4 (its very frames, encoded again), mesh.zarr,
@@ -140,7 +193,7 @@ def _cut(options: argparse.Namespace) -> None:
     spans = [
         span
         for span in labels.spans
-        if span.origin != "suggestion" and (wanted is None or span.label in wanted)
+        if span.origin != "suggestion" and (not wanted or span.label in wanted)
     ]
     if not spans:
         raise _nothing_to_cut(options.labels or options.recording, labels, wanted)
@@ -174,7 +227,7 @@ def _cut(options: argparse.Namespace) -> None:
     )
 
 
-def _source(options: argparse.Namespace, recording: Recording, clock: Timebase) -> CutSource:
+def _source(options: Cut, recording: Recording, clock: Timebase) -> CutSource:
     from sd2core.cutouts.source import PARTS, CutSource
     from sd2core.sensor import VelocityAxis
 
@@ -182,7 +235,7 @@ def _source(options: argparse.Namespace, recording: Recording, clock: Timebase) 
     if not {*parts} <= {*PARTS}:
         raise Sd2Error(f"The parts are {options.parts!r}", f"some of {_PARTS}")
     mesh = None
-    names = chosen_maps(options, recording)
+    names = _maps(options, recording)
     if recording.mesh is not None and ("mesh" in parts or "maps" in parts):
         with progress_bar("Reading the mesh") as progress:
             mesh = recording.load_mesh(progress)

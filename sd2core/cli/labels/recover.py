@@ -5,28 +5,56 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.labels.reading import check_label_output
 from sd2core.cli.output import counted, picked, print_json, print_rows
 from sd2core.errors import Sd2Error
+from sd2core.options.records import ARGUMENT, OptionError
+from sd2core.options.shared import Json, Overwrite
 
 if TYPE_CHECKING:
     from sd2core.labels.recovery import Offer
 
 
+@dataclass(frozen=True, kw_only=True)
+class Recover(Overwrite, Json):
+    """Options of ``sd2 labels recover``.
+
+    Parameters
+    ----------
+    recording : RECORDING
+        the labelled recording, or a video that was not saved as one yet
+    out : FILE.json
+        write the newest of RECORDING, for `convert`
+    """
+
+    recording: Annotated[Path | None, ARGUMENT] = None
+    out: Path | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.out is None:
+            return
+        if self.recording is None:
+            raise OptionError(
+                "--out was given without RECORDING", "a recording whose labels are written"
+            )
+        if self.out.suffix.lower() != ".json":
+            raise OptionError(
+                f"{self.out} is no .json", "a .json", "`sd2 labels convert` makes other files of it"
+            )
+
+
 def add_recover(kinds: argparse._SubParsersAction) -> None:
     """Add ``recover``."""
-    parser = add_command(kinds, "recover", handler=_recover)
-    text = "the labelled recording, or a video that was not saved as one yet"
-    parser.add_value("recording", Path, "RECORDING", text, nargs="?")
-    parser.add_output("FILE.json", "write the newest of RECORDING, for `convert`", required=False)
-    parser.add_json()
+    add_command(kinds, "recover", options=Recover, handler=_recover)
 
 
-def _recover(options: argparse.Namespace) -> None:
+def _recover(options: Recover) -> None:
     """List labels that were not saved when a window ended, or write them to a file.
 
     Opening the recording in the window offers them as well. Nothing is deleted here,
@@ -37,8 +65,6 @@ def _recover(options: argparse.Namespace) -> None:
     """
     from sd2core.labels.recovery import offers_in, recovery_folder
 
-    if options.out is not None and options.recording is None:
-        raise Sd2Error("--out was given without RECORDING", "a recording whose labels are written")
     found = offers_in(recovery_folder(), declined=True)
     offers = found.offers
     if options.recording is not None:
@@ -47,7 +73,7 @@ def _recover(options: argparse.Namespace) -> None:
     for note in found.notes:
         print(note, file=sys.stderr)
     if options.out is not None:
-        _write(options, offers)
+        _write(options.out, options, offers)
     elif options.json:
         print_json({"recoveries": [_data(offer) for offer in offers]})
     elif not offers:
@@ -56,7 +82,7 @@ def _recover(options: argparse.Namespace) -> None:
         _print(offers)
 
 
-def _write(options: argparse.Namespace, offers: tuple[Offer, ...]) -> None:
+def _write(out: Path, options: Recover, offers: tuple[Offer, ...]) -> None:
     from sd2core.labels.files import write_labels
 
     if not offers:
@@ -64,16 +90,12 @@ def _write(options: argparse.Namespace, offers: tuple[Offer, ...]) -> None:
             f"There is nothing to recover of {options.recording}",
             "one of those that `sd2 labels recover` lists",
         )
-    if options.out.suffix.lower() != ".json":
-        raise Sd2Error(
-            f"{options.out} is no .json", "a .json", "`sd2 labels convert` makes other files of it"
-        )
-    check_label_output(options.out)
-    write_labels(options.out, offers[0].labels, recording=offers[0].recording)
+    check_label_output(out)
+    write_labels(out, offers[0].labels, recording=offers[0].recording)
     if options.json:
-        print_json({"path": str(options.out)} | _data(offers[0]))
+        print_json({"path": str(out)} | _data(offers[0]))
     else:
-        print(f"Wrote {options.out} with {counted(len(offers[0].labels.spans), 'span')}")
+        print(f"Wrote {out} with {counted(len(offers[0].labels.spans), 'span')}")
 
 
 def _print(offers: tuple[Offer, ...]) -> None:

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from sd2core.cli.command_parser import Options, add_command
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.labels.reading import (
     check_label_output,
     print_lost,
     recording_clock,
     write,
 )
-from sd2core.cli.options import flag, given, not_negative_float
 from sd2core.cli.output import counted, picked, print_json, print_rows
 from sd2core.cli.recording_maps import MapName, maps_of
 from sd2core.errors import Sd2Error
+from sd2core.options.records import ARGUMENT
+from sd2core.options.shared import Json, Overwrite
+from sd2core.options.suggesting import SuggestOptions
 
 if TYPE_CHECKING:
     from sd2core.labels.spans import Span
@@ -26,37 +28,46 @@ if TYPE_CHECKING:
     from sd2core.sensor import VelocityAxis
     from sd2core.timebase import Timebase
 
-_HELP = {
-    "high_db": ("DB", "energy over the quiet level that the peak of a span reaches (default: 7)"),
-    "low_db": ("DB", "energy that a span never falls below (default: 5)"),
-    "min_duration_s": ("S", "least duration, without margins (default: 0.2)"),
-    "merge_gap_s": ("S", "quiet stretches up to this do not end a span (default: 0.1)"),
-    "margin_s": ("S", "added on both sides (default: 0.2)"),
-    "hold_s": ("S", "added to the margin at the end (default: 0.2)"),
-}
+
+@dataclass(frozen=True, kw_only=True)
+class SearchedMap(Overwrite):
+    """The map in which spans are looked for, and the file for them.
+
+    Parameters
+    ----------
+    map : MAP
+        a map, a recording, or the .h5 of a K60168A
+    of
+        which map of a recording (default: synthetic where there is a mesh)
+    out : FILE
+        the labels to write
+    """
+
+    map: Annotated[Path, ARGUMENT]
+    of: MapName | None = None
+    out: Path | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Suggest(SearchedMap, SuggestOptions, Json):
+    """Options of ``sd2 labels suggest``.
+
+    Parameters
+    ----------
+    label : LABEL
+        label of the spans (default: gesture)
+    """
+
+    of: Literal["synthetic", "radar"] | None = None
+    label: str = "gesture"
 
 
 def add_suggest(kinds: argparse._SubParsersAction) -> None:
     """Add ``suggest``."""
-    parser = add_command(kinds, "suggest", handler=_suggest)
-    add_searched_map(parser, ("synthetic", "radar"))
-    for name, (metavar, text) in _HELP.items():
-        parser.add_value(flag(name), not_negative_float, metavar, text)
-    text = "label of the spans (default: gesture)"
-    parser.add_value("--label", str, "LABEL", text, "gesture")
-    parser.add_json()
+    add_command(kinds, "suggest", options=Suggest, handler=_suggest)
 
 
-def add_searched_map(parser: Options, kinds: tuple[MapName, ...]) -> None:
-    """Add the map in which spans are looked for, and the file for them."""
-    parser.add_value("map", Path, "MAP", "a map, a recording, or the .h5 of a K60168A")
-    parser.add_choice(
-        "--of", kinds, "which map of a recording (default: synthetic where there is a mesh)"
-    )
-    parser.add_output("FILE", "the labels to write", required=False)
-
-
-def _suggest(options: argparse.Namespace) -> None:
+def _suggest(options: Suggest) -> None:
     """Find spans in which something moves.
 
     Measures the energy of every frame of a Doppler map over the map's own quiet level.
@@ -69,13 +80,12 @@ def _suggest(options: argparse.Namespace) -> None:
       sd2 labels suggest walk.sd2 --of radar --out suggested.eaf
       sd2 labels suggest swing.h5 --margin-s 0.1 --out suggested.csv
     """
-    from sd2core.labels.suggest import SuggestOptions, motion_energy_db, suggest_spans
+    from sd2core.labels.suggest import motion_energy_db, suggest_spans
 
     if options.out is not None:
         check_label_output(options.out)
-    chosen = SuggestOptions(**given(options, _HELP))
     doppler, clock = map_and_clock(options)
-    spans = suggest_spans(doppler, chosen, label=options.label)
+    spans = suggest_spans(doppler, options, label=options.label)
     energy_db = motion_energy_db(doppler)
     loudest_db = float(max((value for value in energy_db.tolist() if value == value), default=0.0))
     lost = write_found(options, spans, clock)
@@ -84,7 +94,7 @@ def _suggest(options: argparse.Namespace) -> None:
             {
                 "map_kind": doppler.kind,
                 "loudest_db": loudest_db,
-                "options": asdict(chosen),
+                "options": picked(options, *(one.name for one in fields(SuggestOptions))),
                 "spans": spans_data(spans, "confidence", "note"),
                 "path": None if options.out is None else str(options.out),
                 "not_kept": lost,
@@ -93,8 +103,8 @@ def _suggest(options: argparse.Namespace) -> None:
         return
     print(
         f"{counted(len(spans), 'span')} in which something moves, in the {doppler.kind} map:"
-        f" {chosen.high_db:g} dB or more over the quiet level somewhere,"
-        f" {chosen.low_db:g} dB throughout"
+        f" {options.high_db:g} dB or more over the quiet level somewhere,"
+        f" {options.low_db:g} dB throughout"
     )
     if spans:
         rows = [("id", "start s", "end s", "confidence", "why")]
@@ -107,7 +117,7 @@ def _suggest(options: argparse.Namespace) -> None:
     print_lost(lost)
 
 
-def write_found(options: argparse.Namespace, spans: tuple[Span, ...], clock: Timebase) -> list[str]:
+def write_found(options: SearchedMap, spans: tuple[Span, ...], clock: Timebase) -> list[str]:
     """Write spans to the file of ``--out``, where one is named; return what it cannot hold."""
     from sd2core.labels.spans import Labels, LabelTrack
     from sd2core.labels.suggest import TRACK
@@ -128,7 +138,7 @@ def span_cells(span: Span) -> tuple[str, str, str]:
 
 
 def map_and_clock(
-    options: argparse.Namespace, axis: VelocityAxis | None = None
+    options: SearchedMap, axis: VelocityAxis | None = None
 ) -> tuple[DopplerMap, Timebase]:
     """Read the map of ``options.map`` and ``options.of``, and the frame times of its labels.
 
@@ -139,7 +149,7 @@ def map_and_clock(
     from sd2core.maps import DopplerMap
     from sd2core.recording.recording import open_recording
 
-    path: Path = options.map
+    path = options.map
     kind = kind_of(path)
     if kind == "recording":
         recording = open_recording(path)

@@ -140,13 +140,15 @@ def test_recordings_have_persons_who_can_be_named(set_up, tmp_path, qtbot):
 
 def test_who_is_learnt_from_is_who_the_command_learns_from(set_up, tmp_path, qtbot):
     from sd2core.classify.splitting import split_clips
-    from sd2core.cli.classify.data import clips_of, source
+    from sd2core.cli.classify.data import clips_of
+    from sd2core.datasets.labelled_source import LabelledSource
 
     setup = (model := set_up.training()).setup
     for path in (set_up.data, write_pairs(tmp_path / "more.zarr", ("s3", "s4"))):
         setup.add(path)
     known(model, qtbot)
-    parts = split_clips(clips_of([source(one) for one in setup._sources], ("radar",))).to_json()
+    sources = [LabelledSource.parsed(one) for one in setup._sources]
+    parts = split_clips(clips_of(sources, ("radar",))).to_json()
     division = setup.division
     assert parts["training"] == list(division.training)
     assert parts["validation"] == list(division.validation)

@@ -12,7 +12,7 @@ from made_sources import AXIS, source
 
 from sd2core.cli.classify.data import clips_of, split_of
 from sd2core.datasets.clips import clips_of_dataset
-from sd2core.datasets.labelled import LabelledSource
+from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.writing import write_dataset

@@ -12,11 +12,11 @@ from made_sources import source
 from sd2core.cli.classify.data import clips_of
 from sd2core.datasets.labelled import (
     ONE_PERSON,
-    LabelledSource,
     labelled_facts,
     people_of,
     unfolded,
 )
+from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error

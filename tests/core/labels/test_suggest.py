@@ -22,11 +22,11 @@ from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.labels.suggest import (
     SURE_DB,
     TRACK,
-    SuggestOptions,
     motion_energy_db,
     suggest_spans,
 )
 from sd2core.maps import DopplerMap
+from sd2core.options.suggesting import SuggestOptions
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase

@@ -20,6 +20,7 @@ from sd2core.cli.command_parser import (
     record_of,
 )
 from sd2core.cli.running import attach_negative_values
+from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.errors import Sd2Error
 from sd2core.options.bounds import Bounds
 from sd2core.options.kinds import Count, Names, Share
@@ -46,6 +47,8 @@ TYPED: dict[str, st.SearchStrategy[Any]] = {
     "bin_list": st.lists(st.integers(0, 99)).map(tuple),
     "span_m": st.tuples(st.floats(0.0, 4.0), st.floats(4.5, 9.0)),
     "assignment": st.tuples(NAMES, st.integers() | st.booleans() | NAMES),
+    "parsed": st.builds(LabelledSource, PATHS, NAMES | st.just("")),
+    "_shares": st.sets(st.floats(0.001, 1.0), min_size=1).map(lambda them: tuple(sorted(them))),
 }
 """Values of what is typed in a way of its own, by the reader."""
 
