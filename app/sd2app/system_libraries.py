@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import sys
 from collections.abc import Iterable, Mapping
@@ -77,6 +76,8 @@ def how_to_install(packages: Iterable[str]) -> str:
 
 def loads(library: str) -> bool:
     """True if a shared library is found by its name."""
+    import ctypes  # not for commands that need no library
+
     try:
         ctypes.CDLL(library)
     except OSError:

@@ -11,7 +11,6 @@ from typing import Any
 from sd2core.files.tables import counted as counted
 from sd2core.files.tables import text_table
 from sd2core.progress import Progress
-from sd2core.runs.pace import Pace
 
 
 @contextmanager
@@ -44,6 +43,8 @@ def progress_events(every_s: float, *, time_left: bool = False, **content: Any) 
 
     With ``time_left`` they say how many seconds are left (``left_s``) by the pace so far.
     """
+    from sd2core.runs.pace import Pace  # loads statistics
+
     last_s, pace, pace_of = -1.0, Pace(), 0
 
     def report(done: int, total: int) -> None:
