@@ -15,13 +15,12 @@ from pydantic import (
     model_validator,
 )
 
-from sd2core.body.model import Resolution
 from sd2core.datasets.options import SpanOptions
 from sd2core.datasets.source import KINDS
 from sd2core.doppler.options import chosen_options
 from sd2core.errors import Sd2Error
 from sd2core.maps import MapKind
-from sd2core.options.bounds import FIELD_OF_VIEW_DEG, STATURE_M
+from sd2core.options.fitting import Fitting
 from sd2core.options.synthesis import Synthesis
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.placements.placements import Placements, placements_from_dict
@@ -37,8 +36,6 @@ STEPS: tuple[Step, ...] = get_args(Step)
 
 Text = Annotated[str, StringConstraints(pattern=r"\S")]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
-Stature = Annotated[FiniteFloat, Field(ge=STATURE_M.low, le=STATURE_M.high)]
-Angle = Annotated[FiniteFloat, Field(ge=FIELD_OF_VIEW_DEG.low, le=FIELD_OF_VIEW_DEG.high)]
 Share = Annotated[FiniteFloat, Field(gt=0, le=1)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
@@ -61,18 +58,6 @@ class Recordings(Section):
     subject_of: Mapping[Text, Text] = Field(default_factory=dict)
     """Pattern of a file's name, or of the end of its path, to a subject; the first that fits
     holds."""
-
-
-class Fit(Section):
-    """Section ``[fit]``: options of ``sd2 fit`` for videos without a mesh."""
-
-    resolution: Resolution = "medium"
-    stature_m: Stature | None = None  # of subjects not in stature_of
-    stature_of: Mapping[Text, Stature] = Field(default_factory=dict)  # subject to metres
-    focal_px: Positive | None = None
-    field_of_view_deg: Angle | None = None
-    max_gap_s: NotNegative | None = None  # longest gap that is bridged
-    models: Text | None = None  # folder of the landmark models
 
 
 class Denoise(Section):
@@ -129,7 +114,7 @@ class BatchPlan(Section):
     has none), ``kind = "positions"`` with ``positions_m``, or a spec of
     :func:`~sd2core.placements.placements.placements_from_dict` (``"grid"``, ``"cloud"``),
     around the body of each recording. With ``own = true`` the recording's own sensor besides."""
-    fit: Fit | None = None
+    fit: Fitting | None = None
     synthesise: Synthesis | None = None
     denoise: Denoise | None = None
     simulate: Simulate | None = None

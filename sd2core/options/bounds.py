@@ -62,6 +62,7 @@ class Bounds:
 ANY = Bounds()
 POSITIVE = Bounds(0.0, above=True)
 NOT_NEGATIVE = Bounds(0.0)
+NATURAL = Bounds(0, whole=True)
 COUNT = Bounds(0, whole=True, above=True)
 SHARE = Bounds(0.0, 1.0, above=True)
 
