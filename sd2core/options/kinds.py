@@ -8,7 +8,7 @@ from argparse import ArgumentTypeError
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from sd2core.options.bounds import COUNT, NATURAL, NOT_NEGATIVE, POSITIVE, SHARE, Bounds
 
@@ -147,6 +147,9 @@ def _numbers(text: str, *, single: bool = False) -> list[float]:
         raise ArgumentTypeError(f"{text!r} is not a number" + ("" if single else " list"))
     return values
 
+
+MapKind = Literal["synthetic", "simulated", "real", "denoised"]
+"""synthetic: counted from a mesh; simulated: a computed radar signal; real: a capture."""
 
 Text = Annotated[str, FILLED]
 Count = Annotated[int, COUNT]

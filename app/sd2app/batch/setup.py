@@ -122,7 +122,8 @@ class BatchSetupModel(RunSetup[Entry]):
 
     def plan(self) -> BatchPlan:
         """Plan in the form that the library takes; Sd2Error if something is missing."""
-        from sd2core.batch.plan import BatchPlan, Denoise, Export, Recordings
+        from sd2core.batch.plan import BatchPlan, Denoise, Recordings
+        from sd2core.options.exporting import Exporting
         from sd2core.options.fitting import Fitting
         from sd2core.options.synthesis import Synthesis
 
@@ -142,7 +143,7 @@ class BatchSetupModel(RunSetup[Entry]):
             fit=Fitting() if values["fit"] else None,
             synthesise=Synthesis(tolerance=tolerance, limbs=values["denoise"] and values["limbs"]),
             denoise=Denoise(model=values["model"]) if values["denoise"] else None,
-            export=Export(format=values["format"]) if values["export"] else None,
+            export=Exporting(format=values["format"]) if values["export"] else None,
         )
 
 
