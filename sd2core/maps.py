@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +17,13 @@ from sd2core.files.numpy_files import open_npz_file
 from sd2core.mesh.presence import Presence, checked, runs
 from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, QUANTITIES
 from sd2core.numerics.map_accuracy import MapAccuracy
+from sd2core.options.kinds import MapKind as MapKind
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from xarray import DataArray
-
-MapKind = Literal["synthetic", "simulated", "real", "denoised"]
-"""synthetic: counted from a mesh; simulated: a computed radar signal; real: a capture."""
 
 FORMAT_VERSION = 1
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache, lru_cache, partial
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.batch.folder import BatchFolder
+from sd2core.batch.inputs import open_mesh
 from sd2core.batch.keys import key_of
-from sd2core.batch.plan import Export
 from sd2core.batch.synthesis import LONGEST_FRAMES
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
@@ -22,56 +22,55 @@ from sd2core.files.limits import open_regular
 from sd2core.files.paths import remove
 from sd2core.files.texts import parse_json, read_json, whole_lines
 from sd2core.maps import DopplerMap, MapKind, joined
+from sd2core.options.exporting import Exporting
+from sd2core.options.records import changed
 from sd2core.progress import Progress
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
 if TYPE_CHECKING:
     from sd2core.datasets.source import LazySource, Source, SourceKey
+    from sd2core.imu.signals import InertialSignals
 
 Row = dict[str, Any]
 """A line of ``results.jsonl``: one stretch of one map."""
 
 _NOTE = "dataset.json"
 
+_NEW = ("imu", "label_rule", "min_share", "null_bins")
+"""Options that plans did not have at first: as by default, they leave keys as they were."""
 
-def dataset_path(folder: BatchFolder, export: Export) -> Path:
+
+def dataset_path(folder: BatchFolder, export: Exporting) -> Path:
     """Return the path of the data set."""
     return folder.path / f"dataset.{export.format}"
 
 
-def dataset_key(folder: BatchFolder, export: Export) -> str:
+def dataset_key(folder: BatchFolder, export: Exporting) -> str:
     """Return the hash of all that the data set depends on; ``results.jsonl`` must exist."""
-    content = {"results": file_digest(folder.results), "export": export.model_dump(mode="json")}
+    content = {"results": file_digest(folder.results), "export": _said(export)}
     return key_of("export", content)
 
 
-def is_exported(folder: BatchFolder, export: Export) -> bool:
+def is_exported(folder: BatchFolder, export: Exporting) -> bool:
     """Tell if the data set exists and was made of the current results."""
     if not dataset_path(folder, export).exists() or not folder.results.exists():
         return False
     return _noted(folder).get("key") == dataset_key(folder, export)
 
 
-def export_dataset(folder: BatchFolder, export: Export) -> None:
+def export_dataset(folder: BatchFolder, export: Exporting) -> None:
     """Write the data set with its card, or continue one that was begun.
 
     Sources that have been there stay. Where one of them has changed, or the settings have,
     the whole data set is written again.
     """
-    from sd2core.datasets.options import DatasetOptions
+    from sd2core.datasets.options import dataset_options
     from sd2core.datasets.writing import write_dataset
 
     out = dataset_path(folder, export)
     note = folder.path / _NOTE
-    options = DatasetOptions(
-        length=export.segment_frames,
-        overlap=export.overlap_frames,
-        validation=export.validation_subjects,
-        test=export.test_subjects,
-        spans=export.spans,
-        **export.model_dump(include={"kinds", "frame_rate_hz", "min_purity", "limbs", "title"}),
-    )
-    settings = key_of("export", {"settings": export.model_dump(mode="json")})
+    options = dataset_options(export, export.spans)
+    settings = key_of("export", {"settings": _said(export)})
     if _noted(folder).get("settings") != settings or _is_stale(out, folder, export):
         for path in (*folder.path.glob("dataset.*"),):
             remove(path)
@@ -87,6 +86,12 @@ def export_dataset(folder: BatchFolder, export: Export) -> None:
     atomic_write_text(note, json.dumps(content) + "\n")
 
 
+def _said(export: Exporting) -> dict[str, Any]:
+    """What a plan says of its data set; what is new in plans only where one says it."""
+    unsaid = {*_NEW} - {*changed(export)}
+    return {name: value for name, value in asdict(export).items() if name not in unsaid}
+
+
 def _noted(folder: BatchFolder) -> dict[str, Any]:
     """Content of the note about the data set; empty where there is none."""
     try:
@@ -96,7 +101,7 @@ def _noted(folder: BatchFolder) -> dict[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
-def _is_stale(out: Path, folder: BatchFolder, export: Export) -> bool:
+def _is_stale(out: Path, folder: BatchFolder, export: Exporting) -> bool:
     """Tell if the data set has a source that is no longer wanted or has changed."""
     from sd2core.datasets.reading import open_dataset
 
@@ -117,7 +122,7 @@ def _is_stale(out: Path, folder: BatchFolder, export: Export) -> bool:
 class _Counted:
     """Iterable of sources with a known length."""
 
-    def __init__(self, folder: BatchFolder, export: Export) -> None:
+    def __init__(self, folder: BatchFolder, export: Exporting) -> None:
         self._folder, self._export = folder, export
         self._count = sum(1 for _ in _sources(folder, export))
 
@@ -137,10 +142,10 @@ def rows_of(folder: BatchFolder) -> Iterator[list[Row]]:
             yield list(group)
 
 
-def _sources(folder: BatchFolder, export: Export) -> Iterator[LazySource]:
+def _sources(folder: BatchFolder, export: Exporting) -> Iterator[LazySource]:
     from sd2core.datasets.source import LazySource, SourceKey
 
-    opened = lru_cache(maxsize=1)(_opened)
+    opened, felt = lru_cache(maxsize=1)(_opened), lru_cache(maxsize=1)(_felt)
     for rows in rows_of(folder):
         parts = _parts(rows[-1]["stop"], export)
         for number, (start, stop) in enumerate(parts):
@@ -148,13 +153,14 @@ def _sources(folder: BatchFolder, export: Export) -> Iterator[LazySource]:
             if len(parts) > 1:
                 name = f"{name} part {number + 1} of {len(parts)}"
             key = SourceKey(rows[0]["subject"], name, rows[0]["placement"])
-            load = _loader(folder, rows, key, (start, stop), opened)
+            imu = partial(felt, rows[0]["source"], rows[0]["mesh"], export.imu)
+            load = _loader(folder, rows, key, (start, stop), opened, imu)
             told = json.dumps([rows, start, stop], sort_keys=True)
             fingerprint = hashlib.sha256(told.encode()).hexdigest()[:32]
             yield LazySource(key, load, partial(str, fingerprint))
 
 
-def _parts(frames: int, export: Export) -> list[tuple[int, int]]:
+def _parts(frames: int, export: Exporting) -> list[tuple[int, int]]:
     """Ranges of frames to cut, which give the segments that the recording gives as a whole."""
     step = export.segment_frames - export.overlap_frames
     length = max(LONGEST_FRAMES // step, 1) * step
@@ -168,6 +174,7 @@ def _loader(
     key: SourceKey,
     part: tuple[int, int],
     opened: Callable[[Path], Any],
+    imu: Callable[[], dict[str, InertialSignals]],
 ) -> Any:
     def load(_: Progress) -> Source:
         from sd2core.datasets.recording_sources import labels_and_classes
@@ -199,7 +206,8 @@ def _loader(
                 "recording": key.recording if recording is None else recording.title,
                 "simulated": recording is not None and recording.simulated,
             },
-            spans=labelled_spans(labels.spans, names),
+            {place: signals.between(*part) for place, signals in imu().items()},
+            labelled_spans(labels.spans, names),
         )
 
     return load
@@ -230,3 +238,18 @@ def _opened(path: Path) -> tuple[Any, Callable[[VelocityAxis], DopplerMap]]:
 
     recording: Any = open_recording(path) if is_recording(path) else None
     return recording, cache(partial(radar_map, recording))
+
+
+def _felt(source: str, mesh: str, places: tuple[str, ...]) -> dict[str, InertialSignals]:
+    """Inertial sensors at the frames of a mesh, the same from every placement."""
+    if not places:
+        return {}
+    from sd2core.imu.virtual import imu_at_frames
+    from sd2core.recording.recording import is_recording, open_recording
+
+    own = open_recording(Path(source)) if is_recording(Path(source)) else None
+    if own is not None and own.mesh is not None:
+        body = own.load_mesh()
+    else:
+        body = open_mesh(Path(mesh), None, {})
+    return {place: imu_at_frames(body, place) for place in places}

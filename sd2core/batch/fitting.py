@@ -10,32 +10,32 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from sd2core.batch.inputs import MeshInput, mesh_input_of
-from sd2core.batch.plan import Fit
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.texts import read_json
+from sd2core.options.fitting import FIT_CHOICES, Fitting
+from sd2core.options.records import given
 from sd2core.progress import silent
 
 _FACTS = TypeAdapter(MeshInput)
 
 
-def fit_choices(fit: Fit, subject: str, focal_px: float | None) -> dict[str, Any]:
+def fit_choices(fit: Fitting, subject: str, focal_px: float | None) -> dict[str, Any]:
     """Return the options for fitting one video, as JSON can hold them.
 
     The plan's focal length takes precedence over ``focal_px``, the recording's.
     """
-    told = fit.focal_px is not None or fit.field_of_view_deg is not None
-    choices = {
-        "resolution": fit.resolution,
-        "stature_m": fit.stature_of.get(subject, fit.stature_m),
-        "focal_px": fit.focal_px if told else focal_px,
-        "field_of_view_deg": fit.field_of_view_deg,
-        "max_gap_s": fit.max_gap_s,
-    }
-    return {name: value for name, value in choices.items() if value is not None}
+    choices = given(fit, FIT_CHOICES)
+    if fit.landmark_model == "heavy":  # of all batches of before it could be said
+        del choices["landmark_model"]
+    if focal_px is not None and not choices.keys() & {"focal_px", "field_of_view_deg"}:
+        choices["focal_px"] = focal_px
+    if subject in fit.stature_of:
+        choices["stature_m"] = fit.stature_of[subject]
+    return choices
 
 
-def fit_to_video(video: str, choices: dict[str, Any], models: str | None, out: str) -> None:
+def fit_to_video(video: str, choices: dict[str, Any], models: Path | None, out: str) -> None:
     """Fit a body, write the mesh, then a file with the facts that tasks need.
 
     A fit that was killed goes on where it was.
@@ -46,8 +46,7 @@ def fit_to_video(video: str, choices: dict[str, Any], models: str | None, out: s
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         quiet = FitReport(lambda _: silent, lambda *_: None, lambda *_: None)
-        folder = None if models is None else Path(models)
-        fit_video(Path(video), path, FitChoices(**choices), quiet, models=folder)
+        fit_video(Path(video), path, FitChoices(**choices), quiet, models=models)
     about = asdict(mesh_input_of(path, path.stem))
     atomic_write_text(facts_path(path), json.dumps(about) + "\n")
 

@@ -48,7 +48,7 @@ _CODE: dict[Step, tuple[str, ...]] = {
         "maps.py",
         "timebase.py",
     ),
-    "export": ("batch/exporting.py", "datasets", "labels", "pairs/segments.py", "maps.py"),
+    "export": ("batch/exporting.py", "datasets", "imu", "labels", "pairs/segments.py", "maps.py"),
 }
 """Modules that a step's results depend on, within sd2core."""
 

@@ -15,15 +15,12 @@ from pydantic import (
     model_validator,
 )
 
-from sd2core.body.model import Resolution
-from sd2core.datasets.options import SpanOptions
-from sd2core.datasets.source import KINDS
+from sd2core.datasets.options import dataset_options
 from sd2core.doppler.options import chosen_options
 from sd2core.errors import Sd2Error
-from sd2core.maps import MapKind
-from sd2core.options.bounds import FIELD_OF_VIEW_DEG, STATURE_M
+from sd2core.options.exporting import Exporting
+from sd2core.options.fitting import Fitting
 from sd2core.options.synthesis import Synthesis
-from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.placements.placements import Placements, placements_from_dict
 from sd2core.sensor import Vector, VirtualSensor
 
@@ -37,8 +34,6 @@ STEPS: tuple[Step, ...] = get_args(Step)
 
 Text = Annotated[str, StringConstraints(pattern=r"\S")]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
-Stature = Annotated[FiniteFloat, Field(ge=STATURE_M.low, le=STATURE_M.high)]
-Angle = Annotated[FiniteFloat, Field(ge=FIELD_OF_VIEW_DEG.low, le=FIELD_OF_VIEW_DEG.high)]
 Share = Annotated[FiniteFloat, Field(gt=0, le=1)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
@@ -63,18 +58,6 @@ class Recordings(Section):
     holds."""
 
 
-class Fit(Section):
-    """Section ``[fit]``: options of ``sd2 fit`` for videos without a mesh."""
-
-    resolution: Resolution = "medium"
-    stature_m: Stature | None = None  # of subjects not in stature_of
-    stature_of: Mapping[Text, Stature] = Field(default_factory=dict)  # subject to metres
-    focal_px: Positive | None = None
-    field_of_view_deg: Angle | None = None
-    max_gap_s: NotNegative | None = None  # longest gap that is bridged
-    models: Text | None = None  # folder of the landmark models
-
-
 class Denoise(Section):
     """Section ``[denoise]``: options of ``sd2 denoise``."""
 
@@ -89,34 +72,6 @@ class Simulate(Section):
     seed: Annotated[int, Field(ge=0)] = 0  # of phases and noise
 
 
-class Export(Section):
-    """Section ``[export]``: options of ``sd2 export``."""
-
-    format: Literal["zarr", "h5", "npz"] = "zarr"
-    kinds: Annotated[tuple[MapKind, ...], Field(min_length=1)] = KINDS
-    """Maps to take, where a recording has them; a radar's own with the recording's sensor."""
-    segment_frames: Annotated[int, Field(ge=2, le=10_000)] = LENGTH
-    overlap_frames: Annotated[int, Field(ge=0)] = OVERLAP
-    frame_rate_hz: Positive | None = None  # of all segments; otherwise that of the first source
-    min_purity: Annotated[FiniteFloat, Field(ge=0, le=1)] = 0.0
-    """Windows with less of their label than this share are left out."""
-    spans: SpanOptions | None = None
-    """One segment of each labelled span: ``margin_s``, ``shortest_s``, ``length``."""
-    validation_subjects: tuple[Text, ...] | None = None
-    """Chosen automatically if not given, like the test subjects."""
-    test_subjects: tuple[Text, ...] | None = None
-    limbs: bool = False  # also the limb maps, which [synthesise] limbs makes
-    title: str = ""
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Export:
-        if self.overlap_frames >= self.segment_frames:
-            raise ValueError("overlap_frames must be less than segment_frames")
-        if self.limbs and "synthetic" not in self.kinds:
-            raise ValueError("limbs goes with the kind synthetic")
-        return self
-
-
 class BatchPlan(Section):
     """Plan of a batch. A step whose section is absent is not done."""
 
@@ -129,18 +84,20 @@ class BatchPlan(Section):
     has none), ``kind = "positions"`` with ``positions_m``, or a spec of
     :func:`~sd2core.placements.placements.placements_from_dict` (``"grid"``, ``"cloud"``),
     around the body of each recording. With ``own = true`` the recording's own sensor besides."""
-    fit: Fit | None = None
+    fit: Fitting | None = None
     synthesise: Synthesis | None = None
     denoise: Denoise | None = None
     simulate: Simulate | None = None
-    export: Export | None = None
+    export: Exporting | None = None
 
-    @field_validator("synthesise")
+    @field_validator("synthesise", "export")
     @classmethod
-    def _made(cls, section: Synthesis | None) -> Synthesis | None:
+    def _made(cls, section: Any) -> Any:
         try:
-            if section is not None:
+            if isinstance(section, Synthesis):
                 chosen_options(section)
+            elif isinstance(section, Exporting):
+                dataset_options(section, section.spans)
         except Sd2Error as error:
             raise ValueError(str(error)) from None
         return section
@@ -163,6 +120,14 @@ class BatchPlan(Section):
         split = self.synthesise is not None and self.synthesise.limbs
         if self.export is not None and self.export.limbs and not split:
             raise ValueError("[export] limbs needs limbs = true in [synthesise] as well")
+        if self.synthesise is not None and self.export is not None:
+            made, wanted = chosen_options(self.synthesise), self.export.null_bins
+            allowed = range(made.axis.bins)
+            if wanted is not None and not {*made.null_bins} <= {*wanted} <= {*allowed}:
+                raise ValueError(
+                    f"[export] null_bins is {list(wanted)}; expected bins up to {allowed[-1]}, and"
+                    f" those among them that [synthesise] empties: {list(made.null_bins)}"
+                )
         return self
 
     @property

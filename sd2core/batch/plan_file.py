@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,8 @@ def plan_text(plan: BatchPlan, folder: Path) -> str:
     content = plan.model_dump(mode="json", exclude_defaults=True)
     content = {"format": plan.format, "version": plan.version, **content}
     content["placements"] = dict(plan.placements)
+    if plan.fit is not None and plan.fit.models is not None:
+        content["fit"]["models"] = plan.fit.models.as_posix()
     lines = ["# Plan of `sd2 batch`; docs/formats.md says what it may hold."]
     lines += toml_lines({k: v for k, v in content.items() if not isinstance(v, dict)}, folder)
     for section in ("recordings", "placements", *STEPS[1:]):
@@ -72,7 +75,7 @@ def _with_paths(plan: BatchPlan, changed: Any) -> BatchPlan:
     )
     updates: dict[str, Any] = {"out": changed(plan.out), "recordings": recordings}
     if plan.fit is not None and plan.fit.models is not None:
-        updates["fit"] = plan.fit.model_copy(update={"models": changed(plan.fit.models)})
+        updates["fit"] = replace(plan.fit, models=Path(changed(str(plan.fit.models))))
     if plan.denoise is not None and plan.denoise.model and _is_path(plan.denoise.model):
         updates["denoise"] = plan.denoise.model_copy(update={"model": changed(plan.denoise.model)})
     if plan.simulate is not None and plan.simulate.radar not in RADARS:

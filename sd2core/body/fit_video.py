@@ -19,10 +19,9 @@ from sd2core.body.camera import PinholeCamera, Source, camera_of, check_field_of
 from sd2core.body.fit import fit_motion
 from sd2core.body.fitted import FittedMotion
 from sd2core.body.landmark_files import save_track
-from sd2core.body.landmark_models import DEFAULT_MODEL, LandmarkModel, landmark_models
+from sd2core.body.landmark_models import DEFAULT_MODEL, landmark_models
 from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, SIGHTINGS, OnFrame, find_landmarks
 from sd2core.body.limbs import LIMB_LANDMARKS, LIMBS
-from sd2core.body.model import Resolution
 from sd2core.body.person_selection import Rectangle
 from sd2core.body.shape import DEFAULT_STATURE_M, check_stature
 from sd2core.body.solve import one_thread
@@ -34,6 +33,7 @@ from sd2core.files.resources import resource_path
 from sd2core.files.stores import open_group
 from sd2core.io.mesh import save_mesh
 from sd2core.io.video import VideoReader, open_video
+from sd2core.options.fitting import LandmarkModel, Resolution
 from sd2core.processes import return_free_memory
 from sd2core.progress import Progress
 from sd2core.version import __version__

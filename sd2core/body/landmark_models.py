@@ -20,17 +20,17 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Literal
+from typing import IO
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.files.paths import user_cache
+from sd2core.options.fitting import LandmarkModel
 from sd2core.progress import Progress, silent
 
 ENVIRONMENT = "SD2_MODELS"
 """Names the folder of the models, where they are not in the user's cache."""
 
-LandmarkModel = Literal["full", "heavy"]
 DEFAULT_MODEL: LandmarkModel = "heavy"
 
 DETECTOR = "pose_detection.tflite"

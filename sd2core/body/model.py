@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from sd2core.body.rotations import Floats
 from sd2core.files.resources import open_bundled_arrays, resource_path
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.options.fitting import Resolution as Resolution
 
 FORMAT = "sd2-body"
 VERSION = 2
@@ -22,8 +23,6 @@ INFLUENCES = 8
 """Bones per vertex, at most."""
 
 _SKELETON = ("bone_names", "bone_parents", "bone_heads", "bone_tails")
-
-Resolution = Literal["low", "medium", "high"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,19 +6,11 @@ import argparse
 import shlex
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import (
-    bin_list,
-    given,
-    name_list,
-    not_negative_float,
-    positive_float,
-    positive_int,
-    share,
-)
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import (
     counted,
     duration,
@@ -30,6 +22,11 @@ from sd2core.cli.output import (
     progress_bar,
     progress_events,
 )
+from sd2core.options.exporting import MAPS, PEOPLE, SEGMENTS, Exporting, SpanOptions
+from sd2core.options.kinds import Names, Share
+from sd2core.options.records import ARGUMENTS, OptionRecord, Place, given
+from sd2core.options.shared import Axis, JsonAndProgress, Texture
+from sd2core.options.synthesis import Counting, Synthesis
 
 if TYPE_CHECKING:
     from sd2core.datasets.forecast import Forecast
@@ -37,83 +34,96 @@ if TYPE_CHECKING:
     from sd2core.datasets.recording_sources import Making
     from sd2core.datasets.source import LazySource
     from sd2core.datasets.writing import Written
+    from sd2core.options.kinds import MapKind
 
-_KINDS = "synthetic,denoised,simulated,real"
 _LINE_EVERY_S = 0.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Spans(SpanOptions):
+    """What becomes a segment.
+
+    Parameters
+    ----------
+    segments
+        windows, wherever labels begin, or one segment per labelled span
+    """
+
+    GROUP = SEGMENTS
+
+    segments: Literal["windows", "spans"] = "windows"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _People(OptionRecord):
+    """Who is in the inputs.
+
+    Parameters
+    ----------
+    subjects : LIST
+        subject of each recording and map, separated by commas, in their order (default: each
+        recording shows another person)
+    labels : FILE
+        labels of a Doppler map; once for each map, in their order
+    """
+
+    GROUP = PEOPLE
+
+    subjects: Names | None = None
+    labels: Annotated[tuple[Path, ...], Place(many="again")] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Maps(Texture, Counting, Axis):
+    """How maps of recordings are made.
+
+    Parameters
+    ----------
+    placements : FILE|planned
+        sensors around the body besides the recording's own, as `sd2 placements` writes them, or
+        those that each recording plans
+    tolerance : SHARE
+        make synthetic maps as fast as possible within this error, e.g. 2% (default: exact)
+    simulate : NAME|CONFIG.json
+        simulate this radar (see sd2 simulate radar --help) at every place, which takes far longer
+        than everything else (default: only the maps in radar files)
+    model : FILE|NAME
+        the denoiser (default: that of each recording, or the bundled one)
+    """
+
+    GROUP = MAPS
+
+    placements: str | None = None
+    tolerance: Share | None = None
+    simulate: str | None = None
+    model: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Export(Exporting, _Spans, _People, _Maps, JsonAndProgress):
+    """Options of ``sd2 export``.
+
+    Parameters
+    ----------
+    inputs : INPUT
+        recordings, pairs, maps, folders
+    out : FILE
+        the data set to write (.zarr, .h5 or .npz)
+    dry_run
+        print counts, size and time, and write nothing
+    """
+
+    inputs: Annotated[tuple[Path, ...], ARGUMENTS]
+    out: Path
+    dry_run: bool = False
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``export``."""
-    parser = add_command(commands, "export", handler=_export)
-    parser.add_value("inputs", Path, "INPUT", "recordings, pairs, maps, folders", nargs="+")
-    parser.add_output("FILE", "the data set to write (.zarr, .h5 or .npz)", goes_on=True)
-    _add_content(parser)
-    _add_making(parser)
-    parser.add_flag("--dry-run", "print counts, size and time, and write nothing")
-    parser.add_json_and_progress()
+    add_command(commands, "export", options=Export, handler=_export)
 
 
-def _add_content(parser: Options) -> None:
-    group = parser.add_argument_group("segments")
-    group.add_value("--kinds", str, "LIST", f"some of {_KINDS} (default: all)", _KINDS)
-    group.add_limbs()
-    text = "also keep what inertial sensors there would feel at every frame, e.g."
-    text += " left-wrist,right-wrist; places as for `sd2 imu`"
-    group.add_value("--imu", name_list, "LIST", text, ())
-    group.add_value("--segment-frames", positive_int, "N", "length of a segment", 72)
-    group.add_value("--overlap-frames", int, "N", "frames that neighbours share", 10)
-    text = "frames per second; other sources are brought to it (default: the first one's)"
-    group.add_value("--rate", positive_float, "FPS", text)
-    text = "label of a segment: the gesture with most frames, if they are enough, or the label"
-    text += " with most frames, background included"
-    group.add_choice("--label-rule", ("foreground", "majority"), text, "foreground")
-    text = "least share of a segment for foreground (default: 20%%)"
-    group.add_value("--min-share", share, "SHARE", text, 0.2)
-    text = "leave out windows with less of their label than this share (default: none)"
-    group.add_value("--min-purity", share, "SHARE", text, 0.0)
-    text = "windows, wherever labels begin, or one segment per labelled span"
-    group.add_choice("--segments", ("windows", "spans"), text, "windows")
-    text = "of spans: time kept before and after each"
-    group.add_value("--margin-s", not_negative_float, "S", text, 0.0)
-    group.add_value(
-        "--shortest-s", not_negative_float, "S", "of spans: leave out shorter ones", 0.0
-    )
-    text = "of spans: fill up with empty frames, which the array mask tells apart, or stretch"
-    group.add_choice("--span-length", ("padded", "resampled"), text, "padded")
-    group.add_value("--title", str, "TEXT", "title of the card and the sheet", "")
-    people = parser.add_argument_group("people")
-    text = "subject of each recording and map, separated by commas, in their order (default:"
-    text += " each recording shows another person)"
-    people.add_value("--subjects", name_list, "LIST", text)
-    people.add_people_kept_out(
-        "kept out to validate with, separated by commas, or none (default: about a sixth of all,"
-        " chosen by their names, so that adding people does not move others)",
-        "kept out to test with, or none (default: likewise)",
-    )
-    text = "labels of a Doppler map; once for each map, in their order"
-    people.add_value("--labels", Path, "FILE", text, [], action="append")
-
-
-def _add_making(parser: Options) -> None:
-    group = parser.add_argument_group("maps")
-    text = "sensors around the body besides the recording's own, as `sd2 placements` writes"
-    text += " them, or those that each recording plans"
-    group.add_value("--placements", str, "FILE|planned", text)
-    text = "make synthetic maps as fast as possible within this error, e.g. 2%% (default: exact)"
-    group.add_value("--tolerance", share, "SHARE", text)
-    text = "simulate this radar (see sd2 simulate radar --help) at every place, which takes far"
-    text += " longer than everything else (default: only the maps in radar files)"
-    group.add_value("--simulate", str, "NAME|CONFIG.json", text)
-    text = "the denoiser (default: that of each recording, or the bundled one)"
-    group.add_value("--model", str, "FILE|NAME", text)
-    group.add_texture()
-    group.add_count()
-    group.add_axis()
-    text = "bins to set to zero in all kinds (default: those of the synthetic maps)"
-    group.add_value("--null-bins", bin_list, "LIST", text)
-
-
-def _export(options: argparse.Namespace) -> int:
+def _export(options: Export) -> int:
     """Write a data set to learn from: segments with labels, sensors and provenance.
 
     Cuts maps into segments, windows of 72 frames or one of each labelled span, and writes
@@ -133,7 +143,7 @@ def _export(options: argparse.Namespace) -> int:
 
     format_of(options.out)
     wanted = _dataset_options(options)
-    making = _making(options)
+    making = _making(options, wanted.kinds)
     sources = gather(options.inputs, making, subjects=options.subjects, label_files=options.labels)
     if options.dry_run:
         return _dry_run(options, sources, wanted, making)
@@ -162,48 +172,37 @@ def _export(options: argparse.Namespace) -> int:
     return 1 if written.failed else 0
 
 
-def _dataset_options(options: argparse.Namespace) -> DatasetOptions:
-    from sd2core.datasets.options import DatasetOptions, SpanOptions
+def _dataset_options(options: Export) -> DatasetOptions:
+    from sd2core.datasets.options import dataset_options
 
-    spans = SpanOptions(options.margin_s, options.shortest_s, options.span_length)
-    return DatasetOptions(
-        kinds=tuple(options.kinds.replace(" ", "").split(",")),
-        length=options.segment_frames,
-        overlap=options.overlap_frames,
-        frame_rate_hz=options.rate,
-        null_bins=options.null_bins,
-        validation=options.validation_subjects,
-        test=options.test_subjects,
-        spans=spans if options.segments == "spans" else None,
-        **picked(options, "label_rule", "min_share", "min_purity", "limbs", "imu", "title"),
-        provenance={"command": shlex.join(["sd2", *sys.argv[1:]])},
-    )
+    spans = SpanOptions(options.margin_s, options.shortest_s, options.length)
+    provenance = {"command": shlex.join(["sd2", *sys.argv[1:]])}
+    return dataset_options(options, spans if options.segments == "spans" else None, provenance)
 
 
-def _making(options: argparse.Namespace) -> Making:
+def _making(options: Export, kinds: tuple[MapKind, ...]) -> Making:
     from sd2core.datasets.recording_sources import Making
     from sd2core.datasets.simulating import Simulation
     from sd2core.doppler.options import chosen_options
     from sd2core.io.radar import named_radar
-    from sd2core.options.synthesis import Synthesis
     from sd2core.placements.placements import read_placements
 
+    placements: Any = options.placements
+    if placements not in (None, "planned"):
+        placements = read_placements(Path(placements))
     return Making(
-        kinds=_dataset_options(options).kinds,
+        kinds=kinds,
         synthesis=chosen_options(
             Synthesis(**given(options, ("bins", "v_max_mps", "null_bins", "count")))
         ),
-        tolerance=options.tolerance,
-        placements=options.placements
-        if options.placements in (None, "planned")
-        else read_placements(Path(options.placements)),
+        placements=placements,
         simulation=None if options.simulate is None else Simulation(named_radar(options.simulate)),
-        **picked(options, "model", "texture", "limbs", "imu"),
+        **picked(options, "tolerance", "model", "texture", "limbs", "imu"),
     )
 
 
 def _dry_run(
-    options: argparse.Namespace, sources: list[LazySource], wanted: DatasetOptions, making: Making
+    options: Export, sources: list[LazySource], wanted: DatasetOptions, making: Making
 ) -> int:
     from sd2core.datasets.forecast import Counting
     from sd2core.runs.pace import known_pace_s

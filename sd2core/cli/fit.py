@@ -6,11 +6,11 @@ import argparse
 import sys
 import time
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import not_negative_float, positive_float, within
 from sd2core.cli.output import (
     picked,
     print_event,
@@ -19,8 +19,10 @@ from sd2core.cli.output import (
     progress_bar,
     progress_events,
 )
-from sd2core.errors import Sd2Error
-from sd2core.options.bounds import FIELD_OF_VIEW_DEG, STATURE_M
+from sd2core.options.fitting import FIT_CHOICES, Fitting
+from sd2core.options.kinds import Natural, Typed, joined
+from sd2core.options.records import ARGUMENT, OptionError, Place, given
+from sd2core.options.shared import JsonAndProgress, Overwrite
 
 if TYPE_CHECKING:
     import numpy as np
@@ -45,40 +47,6 @@ _BARS = {
 }
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``fit``."""
-    parser = add_command(commands, "fit", handler=_fit)
-    parser.add_value("video", Path, "VIDEO", "any video that FFmpeg reads")
-    parser.add_output("FILE", "the mesh to write (.zarr or .npz)")
-    text = "a rectangle around the person, in pixels (default: who is seen best)"
-    parser.add_value("--person-box", _rectangle, "X,Y,W,H", text)
-    parser.add_value(
-        "--person-frame", _frame, "N", "the frame of that rectangle, counted from 0 (default: 0)"
-    )
-    parser.add_value(
-        "--stature-m", within(STATURE_M), "M", "how tall the person is, in metres (default: 1.72)"
-    )
-    text = "focal length in pixels (default: as the file says, or 56° across the longer side)"
-    parser.add_value("--focal-px", positive_float, "PX", text)
-    text = "instead of it, the angle across the longer side of the picture"
-    parser.add_value("--field-of-view", within(FIELD_OF_VIEW_DEG), "DEG", text)
-    text = "bridge gaps without the person up to this long; longer ones stay empty (default: 0.5)"
-    parser.add_value("--max-gap-s", not_negative_float, "S", text)
-    parser.add_choice(
-        "--resolution", ("low", "medium", "high"), "1,229, 5,000 or 13,348 vertices", "medium"
-    )
-    parser.add_choice(
-        "--landmark-model",
-        ("full", "heavy"),
-        "the network that finds the landmarks; full takes half the time and is a little less good",
-        "heavy",
-    )
-    parser.add_value("--models", Path, "FOLDER", "a folder with the landmark models")
-    parser.add_file("--landmarks", "FILE", "keep the landmarks as well (.npz)", ".npz")
-    parser.add_flag("--restart", "start from the beginning, not where a stopped run ended")
-    parser.add_json_and_progress()
-
-
 def _rectangle(text: str) -> tuple[float, float, float, float]:
     try:
         x, y, width, height = (float(part) for part in text.split(","))
@@ -91,13 +59,49 @@ def _rectangle(text: str) -> tuple[float, float, float, float]:
     return x, y, width, height
 
 
-def _frame(text: str) -> int:
-    if not text.isascii() or not text.isdigit():
-        raise argparse.ArgumentTypeError(f"{text!r} is not a frame number, counted from 0")
-    return int(text)
+@dataclass(frozen=True, kw_only=True)
+class Fit(Overwrite, Fitting, JsonAndProgress):
+    """Options of ``sd2 fit``.
+
+    Parameters
+    ----------
+    video : VIDEO
+        any video that FFmpeg reads
+    out : FILE
+        the mesh to write (.zarr or .npz)
+    person_box : X,Y,W,H
+        a rectangle around the person, in pixels (default: who is seen best)
+    person_frame : N
+        the frame of that rectangle, counted from 0 (default: 0)
+    landmarks : FILE
+        keep the landmarks as well (.npz)
+    restart
+        start from the beginning, not where a stopped run ended
+    """
+
+    video: Annotated[Path, ARGUMENT]
+    out: Path
+    person_box: Annotated[tuple[float, float, float, float] | None, Typed(_rectangle, joined)] = (
+        None
+    )
+    person_frame: Natural | None = None
+    landmarks: Annotated[Path | None, Place(endings=(".npz",))] = None
+    restart: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.person_frame is not None and self.person_box is None:
+            raise OptionError(
+                "--person-frame is given without --person-box", "the rectangle in that frame"
+            )
 
 
-def _fit(options: argparse.Namespace) -> None:
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``fit``."""
+    add_command(commands, "fit", options=Fit, handler=_fit)
+
+
+def _fit(options: Fit) -> None:
     """Make a moving mesh from a video of a person.
 
     Finds the person, 33 landmarks in every frame, and the body and motion that fit
@@ -112,10 +116,6 @@ def _fit(options: argparse.Namespace) -> None:
       sd2 fit two.mp4 --out left.zarr --person-box 40,60,180,400 --person-frame 12
       sd2 fit walk.mp4 --out walk.npz --field-of-view 68 --resolution low
     """
-    if options.person_frame is not None and options.person_box is None:
-        raise Sd2Error(
-            "--person-frame is given without --person-box", "the rectangle in that frame"
-        )
     from sd2core.body.fit_video import PARTIAL, check_fit_output, fit_video
     from sd2core.runs.pace import fit_kind, keep_pace
 
@@ -148,21 +148,15 @@ def _fit(options: argparse.Namespace) -> None:
         _print(options, made, seconds)
 
 
-def _choices(options: argparse.Namespace) -> FitChoices:
+def _choices(options: Fit) -> FitChoices:
     from sd2core.body.fit_video import FitChoices
-    from sd2core.body.landmarks import DEFAULT_MAX_GAP_S
     from sd2core.body.person_selection import Rectangle
 
     person = None
     if options.person_box is not None:
         x, y, width, height = options.person_box
         person = Rectangle(x, y, width, height, options.person_frame or 0)
-    return FitChoices(
-        person=person,
-        field_of_view_deg=options.field_of_view,
-        max_gap_s=DEFAULT_MAX_GAP_S if options.max_gap_s is None else options.max_gap_s,
-        **picked(options, "focal_px", "stature_m", "resolution", "landmark_model"),
-    )
+    return FitChoices(person=person, **given(options, FIT_CHOICES))
 
 
 def _bars(stack: ExitStack) -> FitReport:
@@ -182,7 +176,7 @@ def _bars(stack: ExitStack) -> FitReport:
     return FitReport(progress_of, started, lambda *_: None)
 
 
-def _lines(options: argparse.Namespace) -> FitReport:
+def _lines(options: Fit) -> FitReport:
     """Lines of JSON for another program."""
     from sd2core.body.fit_video import STAGES, FitReport
 
@@ -225,7 +219,7 @@ def _lines(options: argparse.Namespace) -> FitReport:
     return FitReport(progress_of, started, landmarks)
 
 
-def _summary(options: argparse.Namespace, made: FittedVideo, seconds: float) -> dict[str, Any]:
+def _summary(options: Fit, made: FittedVideo, seconds: float) -> dict[str, Any]:
     from sd2core.body.fit_video import provenance
 
     about = provenance(made, options.video, _choices(options))
@@ -236,7 +230,7 @@ def _summary(options: argparse.Namespace, made: FittedVideo, seconds: float) -> 
     }
 
 
-def _print(options: argparse.Namespace, made: FittedVideo, seconds: float) -> None:
+def _print(options: Fit, made: FittedVideo, seconds: float) -> None:
     about = _summary(options, made, seconds)
     camera, sources = about["camera"], {"user": "as given", "metadata": "as the file says"}
     frames, present, bridged = about["frames"], about["present"], about["bridged"]

@@ -16,10 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.datasets.options import DatasetOptions, SpanOptions
+from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import KINDS, LabelledSpan, Outline, Source
 from sd2core.denoise.resample_to_model import clips, interpolated, is_regular
 from sd2core.errors import Sd2Error
+from sd2core.options.exporting import SpanOptions
 from sd2core.pairs.segments import cut, segment_starts
 
 _BLOCK = 256

@@ -10,13 +10,13 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter
 
-from sd2core.datasets.options import LabelRule, SpanOptions
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import damage_in
 from sd2core.io.kinds import DATASET_FORMAT
 from sd2core.maps import MapKind
 from sd2core.mesh.vertex_parts import QUANTITIES
+from sd2core.options.exporting import LabelRule, SpanOptions
 from sd2core.sensor import VelocityAxis
 
 FORMAT = DATASET_FORMAT
@@ -112,7 +112,8 @@ class Header:
             names = (one.name for one in fields(cls) if one.name != "axis")
             # Before there were limb maps, headers did not have parts.
             content = {name: ({"parts": (), "joints": ()} | _ADDED | entry)[name] for name in names}
-            return _HEADER.validate_python({**content, "axis": axis})
+            spans = None if content["spans"] is None else SpanOptions(**content["spans"])
+            return _HEADER.validate_python({**content, "axis": axis, "spans": spans})
 
 
 _ADDED: dict[str, Any] = {"imu": (), "spans": None, "min_purity": 0.0}

@@ -4,51 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
-from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
 from sd2core.imu.mounting import checked_places
 from sd2core.imu.signals import LEAST_FRAMES
 from sd2core.maps import MapKind
 from sd2core.mesh.vertex_parts import JOINTS, PARTS
+from sd2core.options.exporting import KINDS, Exporting, LabelRule, SpanOptions
 from sd2core.pairs.segments import LENGTH, OVERLAP, segment_starts
 
-LabelRule = Literal["foreground", "majority"]
-"""Rule for a segment's label from those of its frames; see :class:`DatasetOptions`."""
-
-LABEL_RULES: tuple[LabelRule, ...] = get_args(LabelRule)
-MIN_SHARE = 0.2
-
-SpanLength = Literal["padded", "resampled"]
-SPAN_LENGTHS: tuple[SpanLength, ...] = get_args(SpanLength)
-
-
-@dataclass(frozen=True)
-class SpanOptions:
-    """How labelled spans become segments, one of each.
-
-    Parameters
-    ----------
-    margin_s : float
-        Time that is kept before and after each, as far as there are frames.
-    shortest_s : float
-        Spans that are shorter, as far as the person is seen, give no segment.
-    length : {"padded", "resampled"}
-        ``padded``: frames as they are, then empty ones that the array ``mask`` tells apart; a
-        longer span is refused. ``resampled``: each is stretched to the segment's frames.
-    """
-
-    margin_s: float = 0.0
-    shortest_s: float = 0.0
-    length: SpanLength = "padded"
-
-    def __post_init__(self) -> None:
-        for what, value in (("margin of", self.margin_s), ("shortest", self.shortest_s)):
-            if not 0 <= value < math.inf:
-                raise Sd2Error(f"The {what} spans is {value} s", "0 s or more")
-        if self.length not in SPAN_LENGTHS:
-            raise Sd2Error(f"Spans are {self.length!r}", f"one of {', '.join(SPAN_LENGTHS)}")
+_ALIKE = (
+    *("kinds", "frame_rate_hz", "null_bins", "label_rule", "min_share", "min_purity"),
+    *("limbs", "imu", "title"),
+)
+"""Options with the same name wherever they are given."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +70,7 @@ class DatasetOptions:
     frame_rate_hz: float | None = None
     null_bins: tuple[int, ...] | None = None
     label_rule: LabelRule = "foreground"
-    min_share: float = MIN_SHARE
+    min_share: float = 0.2
     min_purity: float = 0.0
     spans: SpanOptions | None = None
     validation: tuple[str, ...] | None = None
@@ -128,9 +98,9 @@ class DatasetOptions:
         segment_starts(0, self.length, self.overlap)  # refuses an overlap that cannot be
         if self.frame_rate_hz is not None and not 0 < self.frame_rate_hz < math.inf:
             raise Sd2Error(f"The frame rate is {self.frame_rate_hz}", "a positive number")
-        if self.label_rule not in LABEL_RULES:
+        if self.label_rule not in get_args(LabelRule):
             raise Sd2Error(
-                f"The label rule is {self.label_rule!r}", f"one of {', '.join(LABEL_RULES)}"
+                f"The label rule is {self.label_rule!r}", f"one of {', '.join(get_args(LabelRule))}"
             )
         for what, value in (("share of a label", self.min_share), ("purity", self.min_purity)):
             if not 0 <= value <= 1:
@@ -145,3 +115,18 @@ class DatasetOptions:
     def joints(self) -> tuple[str, ...]:
         """Joints whose kinematics are kept beside limb maps."""
         return JOINTS if self.limbs else ()
+
+
+def dataset_options(
+    told: Exporting, spans: SpanOptions | None, provenance: dict[str, Any] | None = None
+) -> DatasetOptions:
+    """Options of a data set as a plan or a command says them."""
+    return DatasetOptions(
+        length=told.segment_frames,
+        overlap=told.overlap_frames,
+        validation=told.validation_subjects,
+        test=told.test_subjects,
+        spans=spans,
+        provenance=provenance or {},
+        **{name: getattr(told, name) for name in _ALIKE},
+    )

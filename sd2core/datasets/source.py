@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,13 @@ from sd2core.errors import Sd2Error
 from sd2core.imu.signals import InertialSignals
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.mesh.presence import Presence
+from sd2core.options.exporting import KINDS as KINDS
 from sd2core.progress import Progress
 from sd2core.sensor import Vector, VirtualSensor, spherical_from_position
 from sd2core.timebase import Timebase
 
 BACKGROUND = "background"
 """Label of frames in which nothing is labelled; always label 0."""
-
-KINDS: tuple[MapKind, ...] = ("synthetic", "denoised", "simulated", "real")
-assert {*KINDS} == {*get_args(MapKind)}
 
 FROM_A_MESH: tuple[MapKind, ...] = ("synthetic", "denoised")
 """Kinds that say nothing where there is no person; the others are of a radar."""

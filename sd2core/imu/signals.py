@@ -11,7 +11,7 @@ differentiated in closed form; decision 65 compares that with differences.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -83,6 +83,16 @@ class InertialSignals:
                 row = int(np.argwhere(np.isinf(values))[0, 0])
                 raise Sd2Error(f"{name} is infinite at {times_s[row]:g} s", "finite values, or NaN")
             object.__setattr__(self, name, values)
+
+    def between(self, start: int, stop: int) -> InertialSignals:
+        """Samples from one index to another, the last excluded."""
+        part = slice(start, stop)
+        return replace(
+            self,
+            times_s=self.times_s[part],
+            acceleration_mps2=self.acceleration_mps2[part],
+            turn_rate_radps=self.turn_rate_radps[part],
+        )
 
     @property
     def rate_hz(self) -> float:

@@ -62,8 +62,10 @@ class Bounds:
 ANY = Bounds()
 POSITIVE = Bounds(0.0, above=True)
 NOT_NEGATIVE = Bounds(0.0)
+NATURAL = Bounds(0, whole=True)
 COUNT = Bounds(0, whole=True, above=True)
 SHARE = Bounds(0.0, 1.0, above=True)
+UP_TO_ONE = Bounds(0.0, 1.0)
 
 STATURE_M = Bounds(0.5, 2.6)
 """Standing height of a person, from a small child on."""

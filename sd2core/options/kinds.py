@@ -8,9 +8,9 @@ from argparse import ArgumentTypeError
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from sd2core.options.bounds import COUNT, NOT_NEGATIVE, POSITIVE, SHARE, Bounds
+from sd2core.options.bounds import COUNT, NATURAL, NOT_NEGATIVE, POSITIVE, SHARE, Bounds
 
 
 @dataclass(frozen=True)
@@ -19,6 +19,25 @@ class Typed:
 
     read: Callable[[str], Any]
     write: Callable[[Any], str] = str
+
+
+@dataclass(frozen=True)
+class Filled:
+    """Of a text or path in a plan: it is not blank."""
+
+    def __get_pydantic_core_schema__(self, kind: Any, handler: Any) -> Any:
+        """Check a field of a plan; pydantic asks for it."""
+        from pydantic_core import PydanticCustomError, core_schema
+
+        def check(value: Any) -> Any:
+            if not str(value).strip():
+                raise PydanticCustomError("blank", "a text that is not blank")
+            return value
+
+        return core_schema.no_info_before_validator_function(check, handler(kind))
+
+
+FILLED = Filled()
 
 
 def number_reader(bounds: Bounds) -> Callable[[str], Any]:
@@ -129,7 +148,12 @@ def _numbers(text: str, *, single: bool = False) -> list[float]:
     return values
 
 
+MapKind = Literal["synthetic", "simulated", "real", "denoised"]
+"""synthetic: counted from a mesh; simulated: a computed radar signal; real: a capture."""
+
+Text = Annotated[str, FILLED]
 Count = Annotated[int, COUNT]
+Natural = Annotated[int, NATURAL]
 Positive = Annotated[float, POSITIVE]
 NotNegative = Annotated[float, NOT_NEGATIVE]
 Share = Annotated[float, SHARE, Typed(share)]

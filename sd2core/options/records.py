@@ -98,8 +98,8 @@ class Group:
 class OptionRecord:
     """Base of records of options: their fields are checked when one is made."""
 
-    # A class may have a GROUP for the fields that it declares itself. Without a type these
-    # are no fields, nor what is taken for one.
+    # A class may have a GROUP for its fields, but for those that have one from a base. Without
+    # a type these are no fields, nor what is taken for one.
     __pydantic_config__ = {"extra": "forbid", "strict": True}  # noqa: RUF012
 
     def __post_init__(self) -> None:
@@ -270,7 +270,7 @@ def words_of(record: OptionRecord) -> list[str]:
 def _options(kind: type, section: str = "") -> Iterator[Option]:
     hints = get_type_hints(kind, include_extras=True)
     ready = {one.name: one for one in fields(kind)}
-    for name, owner in _declared(kind).items():
+    for name, (owner, group) in _declared(kind).items():
         plain, notes = _unwrapped(hints[name])
         if inner := _note(notes, Section):
             yield from _options(inner.kind, name)
@@ -298,7 +298,7 @@ def _options(kind: type, section: str = "") -> Iterator[Option]:
             _note(notes, Typed),
             choices,
             place,
-            vars(owner).get("GROUP"),
+            group,
             section,
         )
 
@@ -313,14 +313,14 @@ def _is_said(default: Any, choices: tuple[Any, ...]) -> bool:
     return number or (bool(choices) and default in choices)
 
 
-def _declared(kind: type) -> dict[str, type]:
-    """The fields, own ones first, and the class that says most about each."""
-    own = get_annotations(kind)
-    found = dict.fromkeys((one.name for one in fields(kind) if one.name in own), kind)
+def _declared(kind: type) -> dict[str, tuple[type, Group | None]]:
+    """The fields, own ones first, the class that says most about each, and the heading."""
+    own, group = get_annotations(kind), vars(kind).get("GROUP")
+    found = dict.fromkeys((one.name for one in fields(kind) if one.name in own), (kind, group))
     for base in kind.__bases__:
         if is_dataclass(base):
-            for name, owner in _declared(base).items():
-                found.setdefault(name, owner)
+            for name, (owner, nearer) in _declared(base).items():
+                found.setdefault(name, (owner, nearer or group))
     return found
 
 

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from sd2core.files.figure_files import SUFFIXES as FIGURES
+from sd2core.options.bounds import Bounds
 from sd2core.options.kinds import Count, ImageSize, Names, Positive, Vector
-from sd2core.options.records import ARGUMENT, Group, OptionRecord, Place
+from sd2core.options.records import ARGUMENT, Group, OptionError, OptionRecord, Place
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,6 +192,30 @@ class Method(OptionRecord):
     """
 
     method: Literal["histogram", "fmcw"] = "histogram"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SegmentFrames(OptionRecord):
+    """How recordings are cut into windows.
+
+    Parameters
+    ----------
+    segment_frames : N
+        length of a segment
+    overlap_frames : N
+        frames that neighbours share
+    """
+
+    segment_frames: Annotated[int, Bounds(2, 10_000, whole=True)] = 72
+    overlap_frames: Annotated[int, Bounds(0, 9_999, whole=True)] = 10
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.overlap_frames >= self.segment_frames:
+            raise OptionError(
+                f"overlap_frames is {self.overlap_frames}",
+                f"less than segment_frames, which is {self.segment_frames}",
+            )
 
 
 @dataclass(frozen=True, kw_only=True)

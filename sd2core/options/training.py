@@ -11,6 +11,7 @@ from sd2core.options import bounds
 from sd2core.options.bounds import Bounds
 from sd2core.options.kinds import Names
 from sd2core.options.records import NOT_TYPED, Group, OptionError, OptionRecord, Place
+from sd2core.options.shared import SegmentFrames
 
 if TYPE_CHECKING:
     from sd2core.runs.pace import Kind
@@ -20,7 +21,7 @@ MACHINE = Group("machine")
 
 
 @dataclass(frozen=True)
-class DataConfig(OptionRecord):
+class DataConfig(SegmentFrames):
     """Section ``[data]``: what is learnt from.
 
     Parameters
@@ -32,10 +33,6 @@ class DataConfig(OptionRecord):
         least one, from the end of the list), or none: then the last fifth of everybody's takes
     test_subjects : LIST
         kept out for `sd2 eval`, or none (default: as many)
-    segment_frames : N
-        length of a segment
-    overlap_frames : N
-        frames that neighbours share
     placements
         range synthesis: learn from all places of the sensor, or the first only
     segments
@@ -50,8 +47,6 @@ class DataConfig(OptionRecord):
     pairs: Annotated[tuple[Path, ...], NOT_TYPED]
     validation_subjects: Names | None = None
     test_subjects: Names | None = None
-    segment_frames: Annotated[int, Bounds(2, 10_000, whole=True)] = 72
-    overlap_frames: Annotated[int, Bounds(0, 9_999, whole=True)] = 10
     placements: Literal["all", "first"] = "all"
     segments: Literal["shifted", "fixed"] = "shifted"
     range_factor: Annotated[float, bounds.RANGE_FACTOR] = 1.0
@@ -60,11 +55,6 @@ class DataConfig(OptionRecord):
         super().__post_init__()
         if not self.pairs:
             raise OptionError("pairs is empty", "a list of at least one path")
-        if self.overlap_frames >= self.segment_frames:
-            raise OptionError(
-                f"overlap_frames is {self.overlap_frames}",
-                f"less than segment_frames, which is {self.segment_frames}",
-            )
 
 
 @dataclass(frozen=True)

@@ -122,7 +122,9 @@ class BatchSetupModel(RunSetup[Entry]):
 
     def plan(self) -> BatchPlan:
         """Plan in the form that the library takes; Sd2Error if something is missing."""
-        from sd2core.batch.plan import BatchPlan, Denoise, Export, Fit, Recordings
+        from sd2core.batch.plan import BatchPlan, Denoise, Recordings
+        from sd2core.options.exporting import Exporting
+        from sd2core.options.fitting import Fitting
         from sd2core.options.synthesis import Synthesis
 
         if self.problem:
@@ -138,10 +140,10 @@ class BatchSetupModel(RunSetup[Entry]):
                 subjects=values["subjects"],
             ),
             placements=where,
-            fit=Fit() if values["fit"] else None,
+            fit=Fitting() if values["fit"] else None,
             synthesise=Synthesis(tolerance=tolerance, limbs=values["denoise"] and values["limbs"]),
             denoise=Denoise(model=values["model"]) if values["denoise"] else None,
-            export=Export(format=values["format"]) if values["export"] else None,
+            export=Exporting(format=values["format"]) if values["export"] else None,
         )
 
 

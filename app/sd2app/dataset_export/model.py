@@ -298,8 +298,9 @@ class ExportModel(Runs[ExportRun]):
 
         def count(emit: Emit) -> _Counted:
             from sd2core.datasets.forecast import Counting
-            from sd2core.datasets.options import DatasetOptions, SpanOptions
+            from sd2core.datasets.options import DatasetOptions
             from sd2core.datasets.sources import gather
+            from sd2core.options.exporting import SpanOptions
 
             options = DatasetOptions(
                 kinds=choice.kinds,

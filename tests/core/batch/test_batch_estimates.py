@@ -86,7 +86,7 @@ def test_options_are_part_of_the_kind_and_names_are_not(tmp_path: Path) -> None:
     plan = plan_in(tmp_path)
     assert plan.synthesise is not None
     assert plan.export is not None
-    titled = plan.model_copy(update={"export": plan.export.model_copy(update={"title": "mine"})})
+    titled = plan.model_copy(update={"export": replace(plan.export, title="mine")})
     assert pace_kind(titled, "export") == pace_kind(plan, "export")
     loose = replace(plan.synthesise, tolerance=0.02)
     other = plan.model_copy(update={"synthesise": loose})

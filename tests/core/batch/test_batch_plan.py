@@ -8,10 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2core.batch.plan import BatchPlan, Denoise, Export, Fit, Recordings
+from sd2core.batch.fitting import fit_choices
+from sd2core.batch.plan import BatchPlan, Denoise, Recordings
 from sd2core.batch.plan_file import plan_from_text, plan_text, read_plan, write_plan
 from sd2core.doppler.options import PRESETS, chosen_options
 from sd2core.errors import Sd2Error
+from sd2core.options.exporting import Exporting
+from sd2core.options.fitting import Fitting
 from sd2core.options.synthesis import Synthesis
 from sd2core.options.toml_files import line_of
 from sd2core.sensor import VirtualSensor
@@ -43,7 +46,7 @@ plans = st.builds(
     placements=placements,
     fit=st.none()
     | st.builds(
-        Fit,
+        Fitting,
         resolution=st.sampled_from(["low", "high"]),
         stature_of=st.dictionaries(subjects, st.floats(1, 2), max_size=2),
     ),
@@ -55,7 +58,7 @@ plans = st.builds(
     ),
     denoise=st.none()
     | st.builds(Denoise, model=st.sampled_from([None, "denoiser", str(FOLDER / "m.safetensors")])),
-    export=st.none() | st.builds(Export, segment_frames=st.integers(20, 99)),
+    export=st.none() | st.builds(Exporting, segment_frames=st.integers(20, 99)),
 )
 
 
@@ -93,6 +96,11 @@ def test_paths_are_relative_to_the_plan_s_folder(tmp_path: Path) -> None:
         (LEAST + "[export]\nsegment_frames = 8\n", 5, ("overlap_frames",)),
         (LEAST + "[export]\nlimbs = true\n", None, ("[synthesise]", "limbs = true")),
         (LEAST + "[export]\nlimbs = true\nkinds = ['real']\n", 5, ("synthetic",)),
+        (LEAST + "[export]\nnull_bins = [20]\n", None, ("null_bins is [20]", "[14, 15, 16]")),
+        (LEAST + "[export]\nnull_bins = [14, 15, 16, 40]\n", None, ("null_bins", "up to 31")),
+        (LEAST + "[export]\nimu = ['left-ear']\n", 5, ("export", "left-ear")),
+        (LEAST + "[export]\nkinds = []\n", 5, ("export", "none")),
+        (LEAST + "[export]\nlabel_rule = 'most'\n", 6, ("export.label_rule", "majority")),
         (LEAST + "[placements]\nkind = 'ring'\n", 5, ("placements", "ring")),
         (LEAST + "[placements]\nkind = 'positions'\npositions_m = [[1, 2]]\n", 7, ("positions_m",)),
         (LEAST + "[placements]\nkind = 'grid'\nranges_m = []\n", 5, ("ranges",)),
@@ -172,3 +180,16 @@ def test_the_count_of_a_plan_arrives() -> None:
     assert chosen_options(Synthesis(preset="vid2doppler")).count == "plain"
     with pytest.raises(ValueError, match="vid2doppler"):
         Synthesis(preset="vid2doppler", count="expected")
+
+
+def test_a_plan_says_how_bodies_are_fitted() -> None:
+    told = Fitting(landmark_model="full", stature_m=1.8, stature_of={"anna": 1.6}, focal_px=900.0)
+    choices = {"landmark_model": "full", "resolution": "medium", "focal_px": 900.0}
+    assert fit_choices(told, "anna", 500.0) == choices | {"stature_m": 1.6}
+    assert fit_choices(told, "ben", 500.0) == choices | {"stature_m": 1.8}
+    # As before the network could be chosen, so that what was fitted stays.
+    usual = {"resolution": "medium"}
+    assert fit_choices(Fitting(), "ben", None) == usual
+    assert fit_choices(Fitting(), "ben", 500.0) == usual | {"focal_px": 500.0}
+    wide = Fitting(field_of_view_deg=60.0)
+    assert fit_choices(wide, "ben", 500.0) == usual | {"field_of_view_deg": 60.0}

@@ -27,7 +27,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.maps import DopplerMap
-from sd2core.recording.recording import Recording
+from sd2core.recording.recording import Recording, Span
 from sd2core.sensor import VirtualSensor
 
 PLAN = """
@@ -374,6 +374,44 @@ def test_limb_maps_are_exported_where_the_plan_says_so(run: Runs) -> None:
             # No model is named, so it is the one that takes them.
             denoised = DopplerMap.load(run.out / row["denoised"])
             assert denoised.meta["denoiser"]["name"] == LIMBS_MODEL
+
+
+@pytest.mark.slow
+def test_a_plan_exports_what_the_command_can(run: Runs, monkeypatch: pytest.MonkeyPatch) -> None:
+    from sd2core.batch import exporting
+    from sd2core.datasets.reading import open_dataset
+    from sd2core.imu.virtual import imu_at_frames
+
+    monkeypatch.setattr(exporting, "LONGEST_FRAMES", 20)  # so that it is cut in parts
+    (run.folder / "meshes").mkdir()
+    mesh = load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(30, 70)
+    save_mesh(mesh, run.folder / "mesh.npz")
+    spans = (Span(start_s=mesh.times_s[0], end_s=mesh.times_s[4], label="left"),)
+    place = run.folder / "meshes" / "anna.sd2"
+    anna = Recording.create(place, mesh=run.folder / "mesh.npz", spans=spans)
+    text = MAPS + "visibility = 'none'\n[export]\nsegment_frames = 10\noverlap_frames = 0\n"
+
+    def exported(more: str) -> tuple[list[str], Any, Any]:
+        end = run(text + more)
+        assert run.pool.submitted["export"] == 1
+        with open_dataset(Path(end.facts["dataset"])) as dataset:
+            names = [dataset.header.labels[one] for one in dataset["segment_label"][:]]
+            imu = dataset["imu"][:] if dataset.header.imu else None
+            return names, dataset["synthetic"][:], imu
+
+    names, maps, _ = exported("")
+    assert sorted(names) == ["background"] * 6 + ["left"] * 2
+    assert "left" not in exported("min_share = 0.5\n")[0]
+    assert "left" not in exported('label_rule = "majority"\n')[0]
+    emptied = exported("null_bins = [14, 15, 16, 20]\n")[1]
+    assert maps[..., 20].any()
+    assert not emptied[..., 20].any()
+    _, _, imu = exported('imu = ["left-wrist", "head"]\n')
+    for number, name in enumerate(("left-wrist", "head")):
+        expected = imu_at_frames(anna.load_mesh(), name).channels.reshape(4, 10, 6)
+        np.testing.assert_array_equal(imu[:, :, number], np.concatenate([expected, expected]))
+    with pytest.raises(Sd2Error, match="left-ear"):
+        run(text + 'imu = ["left-ear"]\n')
 
 
 def test_what_would_be_done_is_what_is_done(run: Runs) -> None:

@@ -170,7 +170,7 @@ def test_one_damaged_recording_is_reported_and_the_rest_is_written(
     ("arguments", "message"),
     [
         (("--kinds", "radar"), "some of synthetic, denoised, simulated, real"),
-        (("--overlap-frames", "72"), "an overlap of 0 to 71"),
+        (("--overlap-frames", "72"), "less than segment_frames, which is 72"),
         (("--subjects", "a,b"), "2 people are named for 3 recordings"),
         (("--test-subjects", "dora"), "'dora' is to be a test subject"),
         (("--test", "dora"), "'dora' is to be a test subject"),

@@ -150,7 +150,8 @@ def test_a_metavar_stands_for_one_kind_of_value() -> None:
 def test_a_unit_in_the_name_is_that_of_the_value() -> None:
     for name, argument in OPTIONS_WITH_VALUE:
         for ending, metavar in UNITS.items():
-            if argument.dest.endswith(ending) and not argument.dest.endswith("_per_s"):
+            flag = argument.option_strings[0].replace("-", "_")
+            if flag.endswith(ending) and not flag.endswith("_per_s"):
                 assert argument.metavar == metavar, name
 
 

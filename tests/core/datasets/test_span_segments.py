@@ -15,7 +15,7 @@ from made_sources import LABELS, source
 
 from sd2core.datasets.clips import clips_of_dataset
 from sd2core.datasets.cutting import count_segments, cut_source
-from sd2core.datasets.options import DatasetOptions, SpanOptions
+from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.source import LabelledSpan, Source
@@ -25,6 +25,7 @@ from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.labels.statistics import label_statistics
+from sd2core.options.exporting import SpanOptions
 from sd2core.recording.recording import open_recording
 
 NUMBERS = np.arange(3, dtype=np.int16)
