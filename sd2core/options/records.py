@@ -270,7 +270,7 @@ def words_of(record: OptionRecord) -> list[str]:
 def _options(kind: type, section: str = "") -> Iterator[Option]:
     hints = get_type_hints(kind, include_extras=True)
     ready = {one.name: one for one in fields(kind)}
-    for name, (owner, group) in _declared(kind).items():
+    for name, group in _declared(kind).items():
         plain, notes = _unwrapped(hints[name])
         if inner := _note(notes, Section):
             yield from _options(inner.kind, name)
@@ -313,14 +313,14 @@ def _is_said(default: Any, choices: tuple[Any, ...]) -> bool:
     return number or (bool(choices) and default in choices)
 
 
-def _declared(kind: type) -> dict[str, tuple[type, Group | None]]:
-    """The fields, own ones first, the class that says most about each, and the heading."""
+def _declared(kind: type) -> dict[str, Group | None]:
+    """The fields, own ones first, and the heading of each."""
     own, group = get_annotations(kind), vars(kind).get("GROUP")
-    found = dict.fromkeys((one.name for one in fields(kind) if one.name in own), (kind, group))
+    found = dict.fromkeys((one.name for one in fields(kind) if one.name in own), group)
     for base in kind.__bases__:
         if is_dataclass(base):
-            for name, (owner, nearer) in _declared(base).items():
-                found.setdefault(name, (owner, nearer or group))
+            for name, nearer in _declared(base).items():
+                found.setdefault(name, nearer or group)
     return found
 
 
