@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import re
 import types
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
 from inspect import cleandoc, get_annotations
@@ -153,13 +153,13 @@ class Option:
         """The values of an option that takes several, or its only one."""
         return tuple(value) if self.place.many else (value,)
 
-    def written(self, value: Any) -> list[str]:
+    def written(self, value: Any, *, always: bool = False) -> list[str]:
         """The words that say this value; of a value as it is by default there are none."""
         if not self.place.typed or value is None or value is False:
             return []
-        if value == self.default and not (self.place.argument or self.section):
+        if value == self.default and not (self.place.argument or self.section or always):
             return []
-        if value is True and self.kind is bool:
+        if (value is True and self.kind is bool) or value == self.place.bare:
             return [self.flags[0]]
         texts = [self.typed.write(one) if self.typed else str(one) for one in self.values(value)]
         if self.place.argument:
@@ -258,13 +258,17 @@ def _check_value(option: Option, value: Any) -> None:
         raise OptionError(f"{option.name} is {value!r}", words)
 
 
-def words_of(record: OptionRecord) -> list[str]:
-    """Arguments of ``sd2`` that say the same; what is as by default is left out."""
+def words_of(command: str, record: OptionRecord, named: Collection[str] = ()) -> list[str]:
+    """Words of ``sd2`` that say the same, command first.
+
+    What is as by default is left out, but for the ``named`` options.
+    """
     arguments: list[str] = []
     words: list[str] = []
     for option in options_of(type(record)):
-        (arguments if option.place.argument else words).extend(option.written(option.of(record)))
-    return [*arguments, *words]
+        found = option.written(option.of(record), always=option.name in named)
+        (arguments if option.place.argument else words).extend(found)
+    return [*command.split(), *arguments, *words]
 
 
 def _options(kind: type, section: str = "") -> Iterator[Option]:

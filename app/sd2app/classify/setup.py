@@ -14,8 +14,12 @@ from sd2app.background.run_setup import RunSetup
 from sd2app.settings import Settings, StoredChoices
 from sd2app.widgets.text import counted, duration_text
 from sd2core.classify.defaults import DELAY_S, DELAYS_S, MODELS, WIDTH, pace_kind
+from sd2core.cli.classify.comparison import Table
+from sd2core.cli.classify.train import Train
+from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import parse_json
+from sd2core.options.records import words_of
 from sd2core.runs.pace import known_pace_s
 
 if TYPE_CHECKING:
@@ -35,6 +39,7 @@ _DEFAULTS: dict[str, Any] = {
     "seed": 0,
 }
 """Defaults of ``sd2 classify train``."""
+_NETWORK = ("model", "features", "width", "delay_s")
 _DATA, _PEOPLE = "classify/train/data", "classify/train/people"
 _CHOICES = {"model": MODELS, "features": FEATURES}
 
@@ -103,7 +108,6 @@ class ClassSetup(RunSetup[DataSource]):
     def look_into(self, source: DataSource) -> DataSource:
         """Read the content of a source of data."""
         from sd2core.datasets.labelled import labelled_facts, unfolded
-        from sd2core.datasets.labelled_source import LabelledSource
 
         path, person = source.path, source.person
         try:
@@ -172,33 +176,30 @@ class ClassSetup(RunSetup[DataSource]):
         return known_pace_s(pace_kind(values["model"], values["features"], values["width"]))
 
     def train_arguments(self, out: Path) -> list[str]:
-        """Arguments of ``sd2 classify train`` for all that differs from the defaults."""
+        """Words of ``sd2 classify train`` for all that differs from the defaults."""
         values = self._values
-        # Network and steps are named even where they are the default: one looks for them.
-        words = ["classify", "train", *self._sources]
-        words += ["--model", values["model"], "--steps", f"{values['steps']}"]
-        words += self._others("features", "width", "delay_s", "maps", "seed")
-        return [*words, "--out", str(out)]
+        command = Train(
+            data=self._sources,
+            out=out,
+            maps=values["maps"],
+            seed=values["seed"],
+            **self._network,
+        )
+        # Named even where they are the default: one looks for them.
+        return words_of("classify train", command, ("model", "steps"))
 
-    def table_arguments(self) -> list[str]:
-        """Arguments of ``sd2 classify table`` for the data and the chosen network."""
-        values = self._values
-        words = ["classify", "table", *self._sources, "--steps", f"{values['steps']}"]
-        return [*words, *self._others("model", "features", "width", "delay_s")]
-
-    def _others(self, *names: str) -> list[str]:
-        """Options for all that differs from the defaults."""
-        others = self._values.others
-        return [
-            word
-            for name in names
-            if name in others
-            for word in (f"--{name.replace('_', '-')}", f"{others[name]}")
-        ]
+    def table(self, out: Path, **switches: Any) -> list[str]:
+        """Words of ``sd2 classify table`` for the data, the network and what is switched on."""
+        command = Table(data=self._sources, out=out, **self._network, **switches)
+        return words_of("classify table", command, ("steps",))
 
     @property
-    def _sources(self) -> list[str]:
-        return [f"{one.person}={one.path}" if one.person else str(one.path) for one in self.data]
+    def _network(self) -> dict[str, Any]:
+        return {name: self._values[name] for name in (*_NETWORK, "steps")}
+
+    @property
+    def _sources(self) -> tuple[LabelledSource, ...]:
+        return tuple(LabelledSource(one.path, one.person) for one in self.data)
 
 
 def _people(text: str) -> dict[str, str]:

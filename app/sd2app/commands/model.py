@@ -129,7 +129,7 @@ class CommandForms(Runs[AnyCommandRun]):
     @property
     def words(self) -> list[str]:
         """The command's words."""
-        return [*self.chosen.name.split(), *words_of(self.record)]
+        return words_of(self.chosen.name, self.record)
 
     @property
     def line(self) -> str:

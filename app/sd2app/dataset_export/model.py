@@ -16,10 +16,12 @@ from sd2app.dataset_export.run import Exported, ExportRun
 from sd2app.session.tasks import Job, TaskList
 from sd2app.settings import Settings
 from sd2app.widgets.text import about, counted
+from sd2core.cli.export import Export
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_data
 from sd2core.imu.mounting import PLACES
 from sd2core.maps import MapKind
+from sd2core.options.records import words_of
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.progress import Cancelled
 from sd2core.recording.recording import is_recording, open_recording
@@ -171,18 +173,22 @@ class ExportModel(Runs[ExportRun]):
 
     def start(self, out: Path) -> None:
         """Have the data set written, in a process of its own; goes on with one begun there."""
-        if not self.ready or self.choice.place is None:
+        choice, place = self.choice, self.choice.place
+        if not self.ready or place is None:
             return
-        choice = self.choice
-        words = [
-            "export", str(choice.place), "--out", str(out), "--kinds", ",".join(choice.kinds),
-            "--segment-frames", str(choice.length), "--overlap-frames", str(choice.overlap),
-            "--progress-json",
-        ]  # fmt: skip
-        words += ["--segments", "spans", "--margin-s", str(choice.margin_s)] if choice.spans else []
-        words += ["--placements", "planned"] if choice.planned else []
-        words += ["--imu", ",".join(choice.imu)] if choice.imu else []
-        words += ["--subjects", ",".join(choice.subjects)] if choice.subjects else []
+        command = Export(
+            inputs=(place,),
+            out=out,
+            kinds=choice.kinds,
+            segment_frames=choice.length,
+            overlap_frames=choice.overlap,
+            segments="spans" if choice.spans else "windows",
+            margin_s=choice.margin_s if choice.spans else 0.0,
+            placements="planned" if choice.planned else None,
+            imu=choice.imu,
+            subjects=choice.subjects or None,
+            progress_json=True,
+        )
         about = {
             "what": "export",
             "out": str(out),
@@ -191,7 +197,9 @@ class ExportModel(Runs[ExportRun]):
         path = free_folder(self._folder, "export", [out])
         try:
             # It may use all processors: it gives way to whatever else wants them.
-            process = CommandFolder(path).start(words, about, self._command, {})
+            process = CommandFolder(path).start(
+                words_of("export", command), about, self._command, {}
+            )
         except (Sd2Error, OSError) as error:
             CommandFolder(path).discard()
             self.failed.emit(str(error))

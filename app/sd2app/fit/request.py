@@ -8,10 +8,12 @@ from pathlib import Path
 
 from pydantic import TypeAdapter
 
+from sd2core.cli.fit import Fit
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import free_path, plain_path, remove
 from sd2core.files.texts import read_json
+from sd2core.options.records import words_of
 from sd2core.recording.recording import FILE_NAME, SUFFIX, open_recording
 
 REQUEST_NAME = "fit-request.json"
@@ -32,6 +34,11 @@ class Person:
     y: int
     width: int
     height: int
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """The rectangle: left, top, width, height."""
+        return self.x, self.y, self.width, self.height
 
 
 @dataclass(frozen=True)
@@ -62,17 +69,18 @@ class FitRequest:
 
     def arguments(self) -> list[str]:
         """The same as a command line."""
-        # A mesh of this name in the folder is of a fit before.
-        words = ["fit", str(self.video), "--out", str(self.mesh), "--overwrite", "--progress-json"]
-        if self.stature_m is not None:
-            words += ["--stature-m", f"{self.stature_m:.3f}"]
-        if self.focal_px is not None:
-            words += ["--focal-px", f"{self.focal_px:.2f}"]
-        if self.person is not None:
-            p = self.person
-            words += ["--person-box", f"{p.x},{p.y},{p.width},{p.height}"]
-            words += ["--person-frame", str(p.frame)]
-        return words
+        person = self.person
+        command = Fit(
+            video=self.video,
+            out=self.mesh,
+            overwrite=True,  # A mesh of this name in the folder is of a fit before.
+            stature_m=None if self.stature_m is None else round(self.stature_m, 3),
+            focal_px=None if self.focal_px is None else round(self.focal_px, 2),
+            person_box=None if person is None else person.box,
+            person_frame=None if person is None else person.frame,
+            progress_json=True,
+        )
+        return words_of("fit", command)
 
     def asks_the_same(self, other: FitRequest) -> bool:
         """True if the work of the other request can be continued for this one."""

@@ -10,6 +10,8 @@ from typing import Literal
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.settings import Settings, StoredChoices
+from sd2core.cli.listen import Listen
+from sd2core.options.records import words_of
 from sd2core.recording.recording import FILE_NAME, SUFFIX, folder_named
 
 Way = Literal["dca1000", "replay"]
@@ -28,12 +30,16 @@ class ListenRequest:
 
     def words(self) -> list[str]:
         """Words of the ``sd2`` command that does it."""
-        if self.replay is not None:
-            source = ["--replay", str(self.replay)]
-        else:
-            source = ["--dca1000", self.address] if self.address else ["--dca1000"]
-            source += ["--setup", str(self.setup)]
-        return ["listen", *source, "--out", str(self.folder), "--json", "--columns"]
+        replay = self.replay is not None
+        command = Listen(
+            dca1000=None if replay else self.address,
+            replay=self.replay,
+            setup=None if replay else self.setup,
+            out=self.folder,
+            json=True,
+            columns=True,
+        )
+        return words_of("listen", command)
 
 
 class ListenSetup(QObject):

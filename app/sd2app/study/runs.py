@@ -107,9 +107,7 @@ class StudyRuns(Runs[StudyRun]):
 
     def arguments(self, out: Path) -> list[str]:
         """Arguments of ``sd2 classify table`` for what is set up."""
-        words = self.data.table_arguments()
-        words += [f"--{name.replace('_', '-')}" for name in SWITCHES if self.is_on(name)]
-        return [*words, "--out", str(out)]
+        return self.data.table(out, **{name: self.is_on(name) for name in SWITCHES})
 
     def find(self) -> Sequence[KnownRun]:
         """Read the folder of studies."""

@@ -190,7 +190,7 @@ def train_arguments(config: TrainConfig, run: Path) -> list[str]:
         background=True,
         out=run,
     )
-    return ["train", *words_of(command)]
+    return words_of("train", command)
 
 
 def quoted(arguments: list[str]) -> str:

@@ -8,8 +8,10 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.run_monitor import CommandRun
+from sd2core.cli.pairs import Recordings
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import remove
+from sd2core.options.records import words_of
 from sd2core.recording.recording import is_recording, open_recording
 from sd2core.runs.command_folder import COMMAND, CommandFolder
 
@@ -56,8 +58,8 @@ class PairMaker(QObject):
         self._folder.mkdir(parents=True, exist_ok=True)
         out = _free(self._folder, place.stem)
         folder = CommandFolder(out.with_name(f".{out.stem}"))
-        words = ["pairs", "recordings", *map(str, recordings), "--out", str(out)]
-        words += ["--limbs"] * limbs
+        command = Recordings(recordings=tuple(recordings), out=out, limbs=limbs)
+        words = words_of("pairs recordings", command)
         try:
             process = folder.start(words, {"what": "pairs"}, self._command, {})
         except Sd2Error:

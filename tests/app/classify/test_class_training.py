@@ -15,11 +15,15 @@ from small_pairs import write_pairs
 from sd2app.classify.panel import recall_text
 from sd2app.classify.text import note, run_headline
 from sd2app.classify.training import ClassTraining
-from sd2app.command_line import main
+from sd2app.command_line import full_parser, main
 from sd2app.settings import Settings
 from sd2app.training.text import division_text
 from sd2app.widgets.run_text import time_text
 from sd2core.classify.defaults import WIDTH, pace_kind
+from sd2core.cli.classify.comparison import Table
+from sd2core.cli.classify.train import Train
+from sd2core.cli.command_parser import record_of
+from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.recording.recording import open_recording
@@ -57,6 +61,11 @@ def set_up(qtbot, tmp_path):
         one.close()
 
 
+def typed(words: list[str]) -> object:
+    """The command that words are understood as."""
+    return record_of(full_parser().parse_args(words))
+
+
 def test_what_is_set_up_is_the_command(set_up):
     model = set_up.training()
     assert model.why_not_train == "Add labelled data to learn from."
@@ -65,8 +74,9 @@ def test_what_is_set_up_is_the_command(set_up):
     assert source.text.startswith("pairs (simulated) · 3 people")
     out = Path("m.safetensors")
     data = str(set_up.data)
+    # Network and steps are named even where they are as by default.
     assert model.setup.train_arguments(out) == [
-        "classify", "train", data, "--model", "lstm", "--steps", "300", "--out", "m.safetensors",
+        "classify", "train", data, "--out", "m.safetensors", "--steps", "300", "--model", "lstm",
     ]  # fmt: skip
     model.setup.set_value("model", "s4")
     model.setup.set_value("features", "peak")
@@ -75,17 +85,14 @@ def test_what_is_set_up_is_the_command(set_up):
     model.setup.set_value("steps", 50)
     model.setup.set_value("seed", 7)
     model.setup.set_map("denoised", True)
-    words = model.setup.train_arguments(out)
-    assert words[3:] == [
-        "--model", "s4", "--steps", "50", "--features", "peak", "--width", "16",
-        "--delay-s", "0.25", "--maps", "radar,denoised", "--seed", "7", "--out", "m.safetensors",
-    ]  # fmt: skip
+    network = {"model": "s4", "features": "peak", "width": 16, "delay_s": 0.25, "steps": 50}
+    sources = (LabelledSource(set_up.data),)
+    chosen = Train(data=sources, out=out, maps="radar,denoised", seed=7, **network)
+    assert typed(model.setup.train_arguments(out)) == chosen
     assert model.command.startswith("sd2 classify train")
     # A study takes its seeds and maps itself.
-    assert model.setup.table_arguments() == [
-        "classify", "table", data, "--steps", "50", "--model", "s4", "--features", "peak",
-        "--width", "16", "--delay-s", "0.25",
-    ]  # fmt: skip
+    table = Table(data=sources, out=Path("t"), quick=True, **network)
+    assert typed(model.setup.table(Path("t"), quick=True, radar_only=False)) == table
     for name in ("radar", "denoised"):
         model.setup.set_map(name, False)
     assert model.why_not_train == "Choose maps to learn from."
@@ -97,7 +104,6 @@ def test_what_is_set_up_is_the_command(set_up):
 
 
 def test_the_command_is_one_that_the_program_has(set_up):
-    from sd2app.command_line import full_parser
     from sd2core.classify.training import TrainOptions
 
     model = set_up.training()
@@ -106,7 +112,7 @@ def test_the_command_is_one_that_the_program_has(set_up):
     set_up.ready(model)
     for words in (
         model.setup.train_arguments(Path("m.safetensors")),
-        [*model.setup.table_arguments(), "--out", "t"],
+        model.setup.table(Path("t")),
     ):
         full_parser().parse_args([*words, "--progress-json"])
 
@@ -141,14 +147,13 @@ def test_recordings_have_persons_who_can_be_named(set_up, tmp_path, qtbot):
 def test_who_is_learnt_from_is_who_the_command_learns_from(set_up, tmp_path, qtbot):
     from sd2core.classify.splitting import split_clips
     from sd2core.cli.classify.data import clips_of
-    from sd2core.datasets.labelled_source import LabelledSource
 
     setup = (model := set_up.training()).setup
     for path in (set_up.data, write_pairs(tmp_path / "more.zarr", ("s3", "s4"))):
         setup.add(path)
     known(model, qtbot)
-    sources = [LabelledSource.parsed(one) for one in setup._sources]
-    parts = split_clips(clips_of(sources, ("radar",))).to_json()
+    command = typed(setup.train_arguments(tmp_path / "m.safetensors"))
+    parts = split_clips(clips_of(command.data, ("radar",))).to_json()
     division = setup.division
     assert parts["training"] == list(division.training)
     assert parts["validation"] == list(division.validation)

@@ -149,7 +149,7 @@ def test_it_is_written_by_another_process(made, people, qtbot) -> None:
     assert said == [f"7 segments from 2 views are in {out}.", "Left out: b: it is damaged"]
     assert json.loads((people / "set.h5.asked").read_text()) == [
         "export", str(people), "--out", str(out), "--kinds", "synthetic", "--segment-frames", "30",
-        "--overlap-frames", "5", "--progress-json", "--subjects", "a,b",
+        "--overlap-frames", "5", "--subjects", "a,b", "--progress-json",
     ]  # fmt: skip
     model.choose(overlap=6)
     assert model.result is None

@@ -216,9 +216,9 @@ def test_a_request_as_a_command_line(tmp_path) -> None:
         Path("walk.mp4"), Path("w.sd2"), 1.7, 612.5, Person(frame=9, x=1, y=2, width=30, height=40)
     )
     assert request.arguments() == [
-        "fit", "walk.mp4", "--out", str(Path("w.sd2/mesh.zarr")), "--overwrite", "--progress-json",
-        "--stature-m", "1.700", "--focal-px", "612.50", "--person-box", "1,2,30,40",
-        "--person-frame", "9",
+        "fit", "walk.mp4", "--out", str(Path("w.sd2/mesh.zarr")), "--person-box", "1,2,30,40",
+        "--person-frame", "9", "--overwrite", "--stature-m", "1.7", "--focal-px", "612.5",
+        "--progress-json",
     ]  # fmt: skip
 
 

@@ -260,7 +260,7 @@ def test_a_set_up_says_what_is_missing_and_remembers(tmp_path, qtbot):
     setup.choose_folder(tmp_path / "walk")
     assert setup.request().words() == [
         "listen", "--dca1000", "192.168.33.30", "--setup", str(tmp_path / "profile.cfg"),
-        "--out", str(tmp_path / "walk.sd2"), "--json", "--columns",
+        "--out", str(tmp_path / "walk.sd2"), "--columns", "--json",
     ]  # fmt: skip
     setup.choose("way", "replay")
     assert "capture" in setup.problem

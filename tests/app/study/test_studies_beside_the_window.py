@@ -60,7 +60,7 @@ def test_what_is_set_up_is_a_command_of_the_program(studies):
     studies.ready()
     words = model.arguments(Path("t"))
     assert words == [
-        "classify", "table", str(studies.data), "--steps", "300", "--quick", "--out", "t",
+        "classify", "table", str(studies.data), "--out", "t", "--quick", "--steps", "300",
     ]  # fmt: skip
     for name in SWITCHES:
         model.turn(name, True)

@@ -111,7 +111,7 @@ def test_words_that_are_typed_give_the_record_again(command: str, data: st.DataO
     parser = CommandParser(prog=command)
     add_options(parser, RECORDS[command])
     parser.set_defaults(record=RECORDS[command])
-    typed = parser.parse_args(attach_negative_values(words_of(record)))
+    typed = parser.parse_args(attach_negative_values(words_of("", record)))
     assert record_of(typed) == record
 
 
@@ -174,7 +174,9 @@ def test_an_option_says_what_its_field_and_the_docstring_say() -> None:
 
 def test_words_leave_out_what_is_as_by_default() -> None:
     record = Example(files=(Path("a"), Path("b")), names=(), label=("x", "y"), count=3)
-    assert words_of(record) == ["a", "b", "--label", "x", "--label", "y", "--names", "none"]
+    options = ["--label", "x", "--label", "y", "--names", "none"]
+    assert words_of("do it", record) == ["do", "it", "a", "b", *options]
+    assert words_of("do it", record, ("count",))[-8:] == ["--count", "3", *options]
     assert changed(record) == ["files", "label", "names"]
 
 
