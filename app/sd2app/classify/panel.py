@@ -27,8 +27,7 @@ from sd2app.widgets.panel import FactRows, sentence, side_by_side
 from sd2app.widgets.run_panel import Button, RunPanel, RunView, RunWords
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
-from sd2core.classify.defaults import DELAYS_S, WIDTHS
-from sd2core.options.bounds import SEED, STEPS
+from sd2core.cli.classify.train import Train
 
 _DATA = "Data sets and labelled radar files (*.h5 *.hdf5 *.npz)"
 _MAP_TIPS = {
@@ -37,16 +36,11 @@ _MAP_TIPS = {
     "denoised": "The synthetic ones, as the bundled denoiser makes them a radar's",
 }
 _FIELDS = (
-    Field(
-        "delay_s", "Answers", DELAYS_S, 0.1,
-        "A frame is answered so much later, when what follows it has been seen; the paper's: 0,"
-        " at once",
-        decimals=2, suffix=" s late",
-    ),
-    Field("width", "Width", WIDTHS, 8, "Units of every layer; the paper's: 16"),
-    Field("steps", "Steps", STEPS, 50, "Batches that are learnt from"),
-    Field("seed", "Seed", SEED, 1, "Of weights, order and dropout"),
-)  # fmt: skip
+    Field(Train, "delay_s", "Answers", 0.1, decimals=2, suffix=" s late"),
+    Field(Train, "width", "Width", 8),
+    Field(Train, "steps", "Steps", 50),
+    Field(Train, "seed", "Seed", 1),
+)
 
 
 class ClassSetupView(TrainingForm):

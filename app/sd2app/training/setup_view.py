@@ -15,28 +15,18 @@ from sd2app.widgets.panel import ElidedLabel, Fold, outlined, sentence, title
 from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
-from sd2core.options import bounds
+from sd2core.options.training import DataConfig, TrainingConfig
 
 _FIELDS = (
-    Field("epochs", "Epochs", bounds.EPOCHS, 50, "Passes over all segments; the paper's is 500"),
-    Field("batch_size", "Batch", bounds.BATCH_SIZE, 16, "Segments per step; the paper's is 64"),
+    Field(TrainingConfig, "epochs", "Epochs", 50),
+    Field(TrainingConfig, "batch_size", "Batch", 16),
 )
 _MORE = (
-    Field(
-        "early_stopping_epochs", "Stop early after", bounds.PATIENCE_EPOCHS, 10,
-        "End when the validation has not become better for so many epochs", suffix=" epochs",
-    ),
-    Field(
-        "learning_rate", "Learning rate", bounds.LEARNING_RATE, 5e-4,
-        "At its highest; it warms up and falls", decimals=8,
-    ),
-    Field(
-        "range_factor", "Range factor", bounds.RANGE_FACTOR, 0.5,
-        "Learn as if the person were up to this many times nearer or farther; 1 is off",
-        decimals=1,
-    ),
-    Field("seed", "Seed", bounds.SEED, 1, "Of weights, order and dropout"),
-)  # fmt: skip
+    Field(TrainingConfig, "early_stopping_epochs", "Stop early after", 10, suffix=" epochs"),
+    Field(TrainingConfig, "learning_rate", "Learning rate", 5e-4, decimals=8),
+    Field(DataConfig, "range_factor", "Range factor", 0.5, decimals=1),
+    Field(TrainingConfig, "seed", "Seed", 1),
+)
 
 
 class TrainingSetupView(TrainingForm):

@@ -16,18 +16,29 @@ from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence, show_words, side_by_side, title
 from sd2app.widgets.text import about
 from sd2core.options.bounds import Bounds
+from sd2core.options.records import Option, OptionRecord, options_of
 
 
 class Field(NamedTuple):
-    """Setting that is a number."""
+    """Setting that is a number, an option of a record that says its bounds and what it is."""
 
+    record: type[OptionRecord]
     name: str
     text: str
-    bounds: Bounds
     step: float
-    tip: str
     decimals: int = 0
     suffix: str = ""
+
+    @property
+    def option(self) -> Option:
+        """The option."""
+        return next(one for one in options_of(self.record) if one.name == self.name)
+
+    @property
+    def tip(self) -> str:
+        """What it is, as a sentence."""
+        words = self.option.words
+        return f"{words[0].upper()}{words[1:]}"
 
 
 class TrainingForm(QWidget):
@@ -59,8 +70,9 @@ class TrainingForm(QWidget):
 
     def number(self, field: Field) -> NumberBox:
         """Make the box of a setting."""
+        bounds = field.option.bounds or Bounds()
         box = NumberBox(
-            field.bounds.low, field.bounds.high, field.suffix, field.tip,
+            bounds.low, bounds.high, field.suffix, field.tip,
             decimals=field.decimals, step=field.step,
         )  # fmt: skip
         box.setMinimumWidth(64)
