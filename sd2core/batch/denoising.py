@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.denoise.resample_to_model import input_of
+from sd2core.denoise.texture import content_of
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence
 
@@ -18,20 +19,28 @@ if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser
 
 
-def denoise(maps: Sequence[Path], model: str, digest: str, outs: Sequence[Path]) -> None:
+def denoise(
+    maps: Sequence[Path], model: str, digest: str, outs: Sequence[Path], texture: int | None = None
+) -> None:
     """Denoise a map, given in parts in order, and write one file per part, in order.
 
-    ``digest`` is the hash of the model's file.
+    ``digest`` is the hash of the model's file, ``texture`` the seed with which a map is drawn as a
+    radar would show it; that of several parts is known by the first of them.
     """
     trained = _model(model, digest)
     outs[0].parent.mkdir(parents=True, exist_ok=True)
     if len(maps) == 1:
-        trained.denoise(DopplerMap.load(maps[0])).save(outs[0])
+        denoised = trained.denoise(DopplerMap.load(maps[0]))
+        if texture is not None:
+            denoised = trained.card.needed_texture().on(denoised, texture)
+        denoised.save(outs[0])
     else:
-        _denoise_long(trained, maps, outs)
+        _denoise_long(trained, maps, outs, texture)
 
 
-def _denoise_long(trained: TrainedDenoiser, maps: Sequence[Path], outs: Sequence[Path]) -> None:
+def _denoise_long(
+    trained: TrainedDenoiser, maps: Sequence[Path], outs: Sequence[Path], texture: int | None
+) -> None:
     """Denoise one stretch after the other, keeping the model's state."""
     from sd2core.denoise.live import denoise_long
     from sd2core.denoise.resample_to_model import check_map, clips, is_regular
@@ -40,7 +49,7 @@ def _denoise_long(trained: TrainedDenoiser, maps: Sequence[Path], outs: Sequence
     check_map(files.part(0), trained.card)
     runs = clips(files.times_s, files.there, rate_hz)
     regular = all(is_regular(files.times_s[start:stop], rate_hz) for start, stop in runs)
-    writer = _Writer(trained, files, outs, resampled=not regular)
+    writer = _Writer(trained, files, outs, resampled=not regular, texture=texture)
     denoise_long(trained, runs, files.times_s, files.read, writer.take)
     writer.end()
 
@@ -86,10 +95,16 @@ class _Writer:
     """Writes denoised frames, which come in order, to one file per stretch."""
 
     def __init__(
-        self, trained: TrainedDenoiser, files: _Files, outs: Sequence[Path], resampled: bool
+        self,
+        trained: TrainedDenoiser,
+        files: _Files,
+        outs: Sequence[Path],
+        resampled: bool,
+        texture: int | None,
     ) -> None:
         self._trained, self._files, self._outs = trained, files, outs
-        self._resampled = resampled
+        self._resampled, self._texture = resampled, texture
+        self._content: int | None = None
         self._number = 0
         self._energies = self._empty()
 
@@ -111,6 +126,11 @@ class _Writer:
     def _next(self) -> None:
         part = self._files.part(self._number)
         denoised = self._trained.as_denoised(part, self._energies, self._resampled)
+        if self._texture is not None:
+            if self._content is None:
+                self._content = content_of(denoised)
+            law, first = self._trained.card.needed_texture(), int(self._files.edges[self._number])
+            denoised = law.on(denoised, self._texture, first, self._content)
         denoised.save(self._outs[self._number])
         self._number += 1
         if self._number < len(self._outs):

@@ -10,7 +10,6 @@ from pydantic import (
     ConfigDict,
     Field,
     FiniteFloat,
-    StringConstraints,
     field_validator,
     model_validator,
 )
@@ -20,6 +19,8 @@ from sd2core.doppler.options import chosen_options
 from sd2core.errors import Sd2Error
 from sd2core.options.exporting import Exporting
 from sd2core.options.fitting import Fitting
+from sd2core.options.kinds import Text
+from sd2core.options.shared import Denoising, Simulating
 from sd2core.options.synthesis import Synthesis
 from sd2core.placements.placements import Placements, placements_from_dict
 from sd2core.sensor import Vector, VirtualSensor
@@ -31,11 +32,6 @@ Step = Literal["inspect", "fit", "synthesise", "denoise", "simulate", "export"]
 """What is done, in this order; ``inspect`` is the look at what a recording holds."""
 
 STEPS: tuple[Step, ...] = get_args(Step)
-
-Text = Annotated[str, StringConstraints(pattern=r"\S")]
-Positive = Annotated[FiniteFloat, Field(gt=0)]
-Share = Annotated[FiniteFloat, Field(gt=0, le=1)]
-NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
 
 class Section(BaseModel):
@@ -58,20 +54,6 @@ class Recordings(Section):
     holds."""
 
 
-class Denoise(Section):
-    """Section ``[denoise]``: options of ``sd2 denoise``."""
-
-    # A file, or the name of an installed model; None: the bundled one for what is synthesised.
-    model: Text | None = None
-
-
-class Simulate(Section):
-    """Section ``[simulate]``: options of ``sd2 export --simulate``."""
-
-    radar: Text = "paper"  # a name, or the config.json of a capture
-    seed: Annotated[int, Field(ge=0)] = 0  # of phases and noise
-
-
 class BatchPlan(Section):
     """Plan of a batch. A step whose section is absent is not done."""
 
@@ -86,8 +68,8 @@ class BatchPlan(Section):
     around the body of each recording. With ``own = true`` the recording's own sensor besides."""
     fit: Fitting | None = None
     synthesise: Synthesis | None = None
-    denoise: Denoise | None = None
-    simulate: Simulate | None = None
+    denoise: Denoising | None = None
+    simulate: Simulating | None = None
     export: Exporting | None = None
 
     @field_validator("synthesise", "export")

@@ -77,10 +77,9 @@ def _with_paths(plan: BatchPlan, changed: Any) -> BatchPlan:
     if plan.fit is not None and plan.fit.models is not None:
         updates["fit"] = replace(plan.fit, models=Path(changed(str(plan.fit.models))))
     if plan.denoise is not None and plan.denoise.model and _is_path(plan.denoise.model):
-        updates["denoise"] = plan.denoise.model_copy(update={"model": changed(plan.denoise.model)})
+        updates["denoise"] = replace(plan.denoise, model=changed(plan.denoise.model))
     if plan.simulate is not None and plan.simulate.radar not in RADARS:
-        update = {"radar": changed(plan.simulate.radar)}
-        updates["simulate"] = plan.simulate.model_copy(update=update)
+        updates["simulate"] = replace(plan.simulate, radar=changed(plan.simulate.radar))
     return plan.model_copy(update=updates)
 
 

@@ -14,12 +14,13 @@ from sd2core.batch.fitting import fit_choices, fitted
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import Inspection, MeshInput, Origin, VideoInput, known_inspection
 from sd2core.batch.keys import key_of
-from sd2core.batch.plan import STEPS, BatchPlan, Simulate, Step
+from sd2core.batch.plan import STEPS, BatchPlan, Step
 from sd2core.batch.synthesis import Choosing, Stretch, stretches_of
 from sd2core.batch.tasks import Task
 from sd2core.doppler.options import chosen_options
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import file_digest
+from sd2core.options.shared import Simulating
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
@@ -260,12 +261,14 @@ class TaskGraph:
         return Task(step, key, origin, arguments, placement, frames, origin.name, str(out))
 
     def _denoising_task(self, synthesis: Sequence[Task]) -> Task:
-        model, digest = self.model
-        key = key_of("denoise", {"model": digest, "maps": [one.key for one in synthesis]})
+        assert self.plan.denoise is not None
+        (model, digest), texture = self.model, self.plan.denoise.texture
+        drawn = {} if texture is None else {"texture": texture}
+        key = key_of("denoise", {"model": digest, "maps": [one.key for one in synthesis], **drawn})
         ends = [".npz"] if len(synthesis) == 1 else [f"-{n}.npz" for n in range(len(synthesis))]
         outs = [self.folder.result("denoised", key, end) for end in ends]
         maps = [Path(one.out) for one in synthesis]
-        arguments = {"maps": maps, "model": model, "digest": digest, "outs": outs}
+        arguments = {"maps": maps, "model": model, "digest": digest, "outs": outs, **drawn}
         one, frames = synthesis[0], sum(each.frames for each in synthesis)
         return Task(
             "denoise", key, one.origin, arguments, one.placement, frames, one.group, str(outs[-1])
@@ -295,7 +298,7 @@ def _changing(origin: Origin) -> Sd2Error:
     )
 
 
-def simulation_of(section: Simulate) -> Simulation:
+def simulation_of(section: Simulating) -> Simulation:
     """Read the radar of a plan; errors come before the work begins."""
     from sd2core.datasets.simulating import Simulation
     from sd2core.io.radar import named_radar
@@ -310,5 +313,7 @@ def _model_of(plan: BatchPlan) -> tuple[str, str]:
     assert plan.denoise is not None
     limbs = plan.synthesise is not None and plan.synthesise.limbs
     path = find_model(plan.denoise.model or default_name(limbs=limbs))
-    describe_model(path)
+    card = describe_model(path)
+    if plan.denoise.texture is not None:
+        card.needed_texture()
     return str(path), file_digest(path)

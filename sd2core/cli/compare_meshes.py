@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import position
 from sd2core.cli.output import print_json, print_rows, progress_bar
-from sd2core.errors import Sd2Error
+from sd2core.files.figure_files import SUFFIXES as FIGURES
 from sd2core.files.paths import PICKLE_SUFFIXES
+from sd2core.options.kinds import Vector, Words
+from sd2core.options.records import ARGUMENTS, OptionError, Place
+from sd2core.options.shared import Json, MeshReading, Overwrite
 
 if TYPE_CHECKING:
     from sd2core.compare.meshes import Comparison
@@ -20,26 +23,67 @@ if TYPE_CHECKING:
 _OWN_NAMES = {"mesh.zarr", "mesh.npz"}
 
 
+@dataclass(frozen=True, kw_only=True)
+class CompareMeshes(MeshReading, Overwrite, Json):
+    """Options of ``sd2 compare-meshes``.
+
+    Parameters
+    ----------
+    meshes : MESH
+        two meshes or more, in one frame
+    names : LIST
+        what to call them, separated by commas
+    reference : NAME
+        name of the mesh that is right (default: the first)
+    sensor : X,Y,Z
+        where the radar is, in metres (default: at the camera)
+    align
+        measure joint distances where they are (default), or from the pelvis; velocities and maps
+        are never aligned
+    figure : FILE
+        draw maps and curves, as .png, .svg or .pdf
+    """
+
+    meshes: Annotated[tuple[Path, ...], ARGUMENTS]
+    names: Words | None = None
+    reference: str | None = None
+    sensor: Vector | None = None
+    align: Literal["none", "root"] = "none"
+    figure: Annotated[Path | None, Place(endings=FIGURES)] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        labels = self.labels
+        if len(labels) != len(self.meshes):
+            raise OptionError(f"{len(labels)} labels for {len(self.meshes)} meshes", "one for each")
+        if len(set(labels)) != len(labels) or not all(labels):
+            raise OptionError(
+                f"The labels are {', '.join(labels)}", "different ones", "Give other --names"
+            )
+        if self.reference is not None and self.reference not in labels:
+            raise OptionError(f"The reference is {self.reference!r}", f"one of {', '.join(labels)}")
+
+    @property
+    def labels(self) -> list[str]:
+        """What the meshes are called."""
+        if self.names is not None:
+            return list(self.names)
+        labels = [
+            path.parent.name if path.name in _OWN_NAMES and path.parent.name else path.stem
+            for path in self.meshes
+        ]
+        return [
+            label if labels.count(label) == 1 else str(path)
+            for label, path in zip(labels, self.meshes, strict=True)
+        ]
+
+
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``compare-meshes``."""
-    parser = add_command(commands, "compare-meshes", handler=_compare)
-    parser.add_value("meshes", Path, "MESH", "two meshes or more, in one frame", nargs="+")
-    parser.add_value("--names", str, "LIST", "what to call them, separated by commas")
-    parser.add_value(
-        "--reference", str, "NAME", "name of the mesh that is right (default: the first)"
-    )
-    parser.add_value(
-        "--sensor", position, "X,Y,Z", "where the radar is, in metres (default: at the camera)"
-    )
-    text = "measure joint distances where they are (default), or from the pelvis; velocities"
-    text += " and maps are never aligned"
-    parser.add_choice("--align", ("none", "root"), text, "none")
-    parser.add_figure_output("maps and curves")
-    parser.add_mesh_reading()
-    parser.add_json()
+    add_command(commands, "compare-meshes", options=CompareMeshes, handler=_compare)
 
 
-def _compare(options: argparse.Namespace) -> None:
+def _compare(options: CompareMeshes) -> None:
     """Compare meshes of one video: joints, velocities along the line of sight, Doppler maps.
 
     Every mesh is measured against the first (or --reference): mean distance of the
@@ -57,12 +101,8 @@ def _compare(options: argparse.Namespace) -> None:
     from sd2core.files.figure_files import save_figure
     from sd2core.sensor import VirtualSensor
 
-    labels = _labels(options)
-    reference = 0
-    if options.reference is not None:
-        if options.reference not in labels:
-            raise Sd2Error(f"The reference is {options.reference!r}", f"one of {', '.join(labels)}")
-        reference = labels.index(options.reference)
+    labels = options.labels
+    reference = 0 if options.reference is None else labels.index(options.reference)
     sensor = VirtualSensor() if options.sensor is None else VirtualSensor(options.sensor)
     meshes = [_load(path, options) for path in options.meshes]
     with progress_bar("Comparing") as progress:
@@ -111,26 +151,7 @@ def _print(comparison: Comparison) -> None:
         print(f"note: {note}")
 
 
-def _labels(options: argparse.Namespace) -> list[str]:
-    if options.names is not None:
-        labels = [name.strip() for name in options.names.split(",")]
-        if len(labels) != len(options.meshes):
-            raise Sd2Error(f"{len(labels)} labels for {len(options.meshes)} meshes", "one for each")
-    else:
-        labels = [
-            path.parent.name if path.name in _OWN_NAMES and path.parent.name else path.stem
-            for path in options.meshes
-        ]
-        labels = [
-            label if labels.count(label) == 1 else str(path)
-            for label, path in zip(labels, options.meshes, strict=True)
-        ]
-    if len(set(labels)) != len(labels) or not all(labels):
-        raise Sd2Error(f"The labels are {', '.join(labels)}", "different ones", "Give --labels")
-    return labels
-
-
-def _load(path: Path, options: argparse.Namespace) -> MeshSequence:
+def _load(path: Path, options: CompareMeshes) -> MeshSequence:
     """Read one mesh; what is said about reading holds for those that are not ours."""
     from sd2core.body.model import own_resolution
     from sd2core.cli.reading import mesh_reading

@@ -11,24 +11,20 @@ from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.records import ARGUMENT
-from sd2core.options.shared import Json, MapOutput, Texture
+from sd2core.options.shared import Denoising, Json, MapOutput
 
 
 @dataclass(frozen=True, kw_only=True)
-class Denoise(MapOutput, Texture, Json):
+class Denoise(MapOutput, Denoising, Json):
     """Options of ``sd2 denoise``.
 
     Parameters
     ----------
     map : MAP
         a map from `sd2 synth`
-    model : FILE|NAME
-        a model file from `sd2 train`, or the name of one that is installed (default: of those
-        that come with SD² Studio the one for limb maps, where there are such)
     """
 
     map: Annotated[Path, ARGUMENT]
-    model: str | None = None
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import given, positive_float, positive_int, share
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_json, progress_bar
-from sd2core.errors import Sd2Error
+from sd2core.files.figure_files import SUFFIXES as FIGURES
+from sd2core.options.kinds import Count, Share
+from sd2core.options.records import OptionError, Place, given
+from sd2core.options.shared import Json, MeshAndSensor, Overwrite
+from sd2core.options.synthesis import Counting, Weight, Wish
 
 if TYPE_CHECKING:
     from sd2core.accuracy import Choice, Measurement
@@ -20,23 +24,66 @@ if TYPE_CHECKING:
 _TOLERANCE = 0.02
 
 
+@dataclass(frozen=True, kw_only=True)
+class UsualWish(Wish):
+    """Error or time that is allowed, of what cannot do without.
+
+    Parameters
+    ----------
+    tolerance : SHARE
+        the error that is allowed, as 2% or 0.02: relative L1 of the smoothed map (default: 2%)
+    """
+
+    tolerance: Annotated[Share | None, Place(one_of="wish")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ladder(MeshAndSensor, UsualWish, Counting, Overwrite, Json):
+    """Options of ``sd2 ladder``.
+
+    Parameters
+    ----------
+    method
+        measure counting, or the FMCW signal
+    weight
+        what a vertex counts
+    quick
+        only say what the scene requires, without the table
+    repeats : N
+        how often every plan is timed (default: 5)
+    fresh
+        measure again what was measured before
+    figure : FILE
+        draw error against cost, as .png, .svg or .pdf
+    """
+
+    method: Literal["histogram", "fmcw"] = "histogram"
+    weight: Weight = "count"
+    quick: bool = False
+    repeats: Count | None = None
+    fresh: bool = False
+    figure: Annotated[Path | None, Place(endings=FIGURES)] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.figure is not None and self.quick:
+            raise OptionError(
+                "--figure is given with --quick", "one of the two: nothing is measured"
+            )
+        if self.method == "fmcw":
+            for flag, is_given in (("--quick", self.quick), ("--count", self.count is not None)):
+                if is_given:
+                    raise OptionError(
+                        f"{flag} is given with --method fmcw", "it with --method histogram only"
+                    )
+
+
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``ladder``."""
-    parser = add_command(commands, "ladder", handler=_ladder)
-    parser.add_mesh_and_sensor()
-    add_wish(parser, "2%%")
-    parser.add_method("measure counting, or the FMCW signal")
-    parser.add_choice("--weight", ("count", "area", "projected"), "what a vertex counts", "count")
-    parser.add_count()
-    parser.add_flag("--quick", "only say what the scene requires, without the table")
-    parser.add_value("--repeats", positive_int, "N", "how often every plan is timed (default: 5)")
-    parser.add_flag("--fresh", "measure again what was measured before")
-    parser.add_figure_output("error against cost")
-    parser.add_mesh_reading()
-    parser.add_json()
+    add_command(commands, "ladder", options=Ladder, handler=_ladder)
 
 
-def _ladder(options: Any) -> int:
+def _ladder(options: Ladder) -> int:
     """Measure what accuracy costs on a scene, and say what the scene requires.
 
     Tries every sensible way of computing the Doppler of a mesh on some of its frames:
@@ -56,12 +103,6 @@ def _ladder(options: Any) -> int:
     from sd2core.doppler import PRESETS
     from sd2core.files.figure_files import save_figure
 
-    if options.figure is not None and options.quick:
-        raise Sd2Error("--figure is given with --quick", "one of the two: nothing is measured")
-    if options.quick and options.method == "fmcw":
-        raise Sd2Error("--quick is given with --method fmcw", "it with --method histogram only")
-    if options.count is not None and options.method == "fmcw":
-        raise Sd2Error("--count is given with --method fmcw", "it with --method histogram only")
     mesh, sensor = mesh_and_sensor(options)
     chosen_by_user = given(options, ("weight", "count"))
     synthesis = check_options(mesh, replace(PRESETS["paper"], **chosen_by_user))
@@ -88,26 +129,15 @@ def _ladder(options: Any) -> int:
     return 0 if choice is None or choice.holds else 1
 
 
-def add_wish(parser: Options, default: str) -> None:
-    """Add ``--tolerance`` and ``--budget-ms``, of which one may be given."""
-    wanted = parser.add_mutually_exclusive_group()
-    text = "the error that is allowed, as 2%% or 0.02: relative L1 of the smoothed map"
-    text += f" (default: {default})"
-    wanted.add_value("--tolerance", share, "SHARE", text)
-    wanted.add_value(
-        "--budget-ms", positive_float, "MS", "instead, the milliseconds per frame that are allowed"
-    )
-
-
 def chosen(
     mesh: MeshSequence,
     sensor: VirtualSensor,
     synthesis: SynthesisOptions,
-    options: Any,
+    options: Wish,
     *,
     dragging: bool = True,
 ) -> Choice:
-    """Choose a plan as :func:`add_wish` asks for it, with progress bars; without a wish by 2 %."""
+    """Choose a plan as the options wish, with progress bars; without a wish by 2 %."""
     from sd2core.accuracy.choosing import choose
     from sd2core.numerics.compiled import warm_up
 
@@ -132,7 +162,7 @@ def _measured(
     mesh: MeshSequence,
     sensor: VirtualSensor,
     synthesis: SynthesisOptions,
-    options: Any,
+    options: Ladder,
 ) -> Measurement:
     from sd2core.accuracy.cache import cached_measurement, store_measurement
     from sd2core.accuracy.measuring import REPEATS, measure

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.ladder import add_wish
-from sd2core.cli.options import flag, given, positive_int
+from sd2core.cli.ladder import UsualWish
 from sd2core.cli.output import (
     counted,
     duration,
@@ -19,6 +19,9 @@ from sd2core.cli.output import (
     progress_bar,
 )
 from sd2core.errors import Sd2Error
+from sd2core.options.kinds import Count, Natural
+from sd2core.options.records import OptionError, Place, given_flags
+from sd2core.options.shared import Json, MeshInput, Overwrite
 
 if TYPE_CHECKING:
     from sd2core.accuracy import Choice
@@ -36,23 +39,55 @@ _LIMITS = (
 )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Placing(MeshInput, UsualWish, Overwrite, Json):
+    """Options of ``sd2 placements``.
+
+    Parameters
+    ----------
+    ranges : LIST
+        distances in metres; with --cloud from:to, as 1:4
+    azimuths : LIST
+        degrees; with --cloud from:to (default: 0)
+    elevations : LIST
+        degrees; with --cloud from:to (default: 0)
+    cloud : N
+        so many random places instead of a grid
+    seed : N
+        seed of the random places (default: 0)
+    placements : FILE
+        read the places from a file of --out
+    out : FILE.json
+        the plan to write
+    """
+
+    ranges: str | None = None
+    azimuths: str | None = None
+    elevations: str | None = None
+    cloud: Count | None = None
+    seed: Natural | None = None
+    placements: Path | None = None
+    out: Annotated[Path | None, Place(endings=(".json",))] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        typed = given_flags(self, ("ranges", "azimuths", "elevations", "cloud", "seed"))
+        if self.placements is not None and typed:
+            raise OptionError(f"--placements is given with {', '.join(typed)}", "one of the two")
+        if typed and self.ranges is None:
+            raise OptionError(
+                f"{', '.join(typed)} is given without --ranges", "distances from the body"
+            )
+        if self.seed is not None and self.cloud is None:
+            raise OptionError("--seed is given without --cloud", "it for random places only")
+
+
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``placements``."""
-    parser = add_command(commands, "placements", handler=_placements)
-    parser.add_value("mesh", Path, "MESH", "a mesh, or a recording")
-    parser.add_value("--ranges", str, "LIST", "distances in metres; with --cloud from:to, as 1:4")
-    parser.add_value("--azimuths", str, "LIST", "degrees; with --cloud from:to (default: 0)")
-    parser.add_value("--elevations", str, "LIST", "degrees; with --cloud from:to (default: 0)")
-    parser.add_value("--cloud", positive_int, "N", "so many random places instead of a grid")
-    parser.add_value("--seed", int, "N", "seed of the random places (default: 0)")
-    parser.add_value("--placements", Path, "FILE", "read the places from a file of --out")
-    parser.add_output("FILE.json", "the plan to write", ".json", required=False)
-    add_wish(parser, "2%%")
-    parser.add_mesh_reading()
-    parser.add_json()
+    add_command(commands, "placements", options=Placing, handler=_placements)
 
 
-def _placements(options: argparse.Namespace) -> int:
+def _placements(options: Placing) -> int:
     """Plan sensors around a body, and say what a map from each would cost.
 
     A grid of every range, azimuth and elevation that is given, or with --cloud as many
@@ -103,30 +138,22 @@ def _placements(options: argparse.Namespace) -> int:
     return 0
 
 
-def _spec(options: argparse.Namespace, recording: Recording | None) -> Placements:
+def _spec(options: Placing, recording: Recording | None) -> Placements:
     """Placements from the options, or those planned in the recording."""
     from sd2core.files.number_lists import parse_interval, parse_numbers
     from sd2core.placements.placements import PlacementCloud, PlacementGrid, read_placements
 
-    names = ("ranges", "azimuths", "elevations", "cloud", "seed")
-    typed = [flag(name) for name in given(options, names)]
     if options.placements is not None:
-        if typed:
-            raise Sd2Error(f"--placements is given with {', '.join(typed)}", "one of the two")
         return read_placements(options.placements)
-    if not typed:
+    if options.ranges is None:
         if recording is not None and recording.placements is not None:
             return recording.placements
         raise Sd2Error(
             f"{options.mesh} plans no placements",
             "--ranges with --azimuths and --elevations, --cloud, or --placements FILE",
         )
-    if options.ranges is None:
-        raise Sd2Error(f"{', '.join(typed)} is given without --ranges", "distances from the body")
     azimuths, elevations = options.azimuths or "0", options.elevations or "0"
     if options.cloud is None:
-        if options.seed is not None:
-            raise Sd2Error("--seed is given without --cloud", "it for random places only")
         return PlacementGrid(
             parse_numbers(options.ranges), parse_numbers(azimuths), parse_numbers(elevations)
         )
@@ -152,7 +179,7 @@ def _cost(
     mesh: MeshSequence,
     placements: Placements,
     sensors: tuple[VirtualSensor, ...],
-    options: argparse.Namespace,
+    options: Placing,
 ) -> tuple[Choice, PlacementCost]:
     """Plan and cost for the sensor at the median range."""
     from sd2core.accuracy.choosing import check_options

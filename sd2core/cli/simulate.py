@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import argparse
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from sd2core.cli.command_parser import Options, add_command
-from sd2core.cli.options import finite_float, position, positive_float, positive_int
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import picked, print_json, progress_bar
 from sd2core.errors import Sd2Error
+from sd2core.options.bounds import ANY, COUNT
+from sd2core.options.kinds import Count, Natural, Positive, Typed, joined, number_reader, vector
+from sd2core.options.records import OptionError, Place
+from sd2core.options.shared import Json, Limbs, MeshAndSensor, Overwrite, RadarChoice, Simulating
 
 if TYPE_CHECKING:
     from sd2core.fmcw import SignalOptions, WaveOptions
@@ -22,6 +25,174 @@ if TYPE_CHECKING:
     from sd2core.simulate.campaign.protocol import Protocol
 
 
+@dataclass(frozen=True)
+class Receivers:
+    """How many receivers there are, and where, relative to the transmitter, if that is said."""
+
+    count: int
+    offsets_m: tuple[tuple[float, float, float], ...] = ()
+
+    def __str__(self) -> str:
+        return ";".join(map(joined, self.offsets_m)) or str(self.count)
+
+
+def _receivers(text: str) -> Receivers:
+    """Read a number of receivers, or ``X,Y,Z;X,Y,Z``."""
+    if "," not in text:
+        return Receivers(number_reader(COUNT)(text))
+    offsets_m = tuple(vector(part) for part in text.split(";"))
+    return Receivers(len(offsets_m), offsets_m)
+
+
+def _plane_at(text: str) -> tuple[float, ...]:
+    """Read a place in metres with or without a reflection coefficient."""
+    values = tuple(number_reader(ANY)(part) for part in text.split(","))
+    if len(values) > 2:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a place, or a place and a coefficient")
+    return values
+
+
+def _sizes(text: str) -> tuple[float, float]:
+    try:
+        least, most = map(float, text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not LEAST,MOST, e.g. 0,1.5") from None
+    return least, most
+
+
+Plane = Annotated[tuple[float, ...], Typed(_plane_at, joined)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulateRadar(MeshAndSensor, Overwrite, Simulating, Json):
+    """Options of ``sd2 simulate radar``.
+
+    Parameters
+    ----------
+    out : FOLDER
+        the capture to write
+    method
+        sum by a non-uniform FFT, or triangle by triangle, some hundred times slower
+    blocks : N
+        parts of a frame that follow the range as it changes
+    motion
+        within a frame: constant velocity, or the mesh interpolated at every chirp, which takes as
+        many sums as there are chirps
+    incoherent
+        a rough surface: every triangle has a random phase (default: a smooth one)
+    visibility
+        which triangles echo: those that face the radar, or those that nothing hides
+    receivers : N
+        how many, half a wavelength apart; or their places relative to the transmitter, as
+        X,Y,Z;X,Y,Z in metres to the right, down and ahead (default: the radar's own number)
+    beam_width_deg : DEG
+        full width of the beam at half power, along where the sensor looks (default: all directions
+        alike)
+    ground : Y[,C]
+        a floor Y metres below the camera reflects; C is its amplitude coefficient (default:
+        concrete, -0.39)
+    wall : Z[,C]
+        a wall Z metres in front of the camera reflects, likewise
+    snr_db : DB
+        add thermal noise this many decibels below the moving mesh's echo (default: none)
+    link_budget
+        gain and noise of a 60 GHz radar on one chip, so that what is farther away is weaker
+        (default: a gain that suits the strongest echo)
+    """
+
+    out: Path
+    method: Literal["nufft", "direct"] = "nufft"
+    blocks: Count = 1
+    motion: Literal["constant", "interpolated"] = "constant"
+    incoherent: bool = False
+    visibility: Literal["facing", "exact"] = "exact"
+    receivers: Annotated[Receivers | None, Typed(_receivers)] = None
+    beam_width_deg: Positive | None = None
+    ground: Annotated[Plane | None, Place(one_of="plane")] = None
+    wall: Annotated[Plane | None, Place(one_of="plane")] = None
+    snr_db: Annotated[float | None, Place(one_of="noise")] = None
+    link_budget: Annotated[bool, Place(one_of="noise")] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulateCampaign(RadarChoice, Limbs, Json):
+    """Options of ``sd2 simulate campaign``.
+
+    Parameters
+    ----------
+    out : FILE.zarr
+        the pairs to write
+    people : N
+        number of people
+    minutes : MIN
+        minutes of all people together
+    protocol
+        what varies from take to take
+    order
+        of the paper's swipes: one kind in a take, or all four (default: to-and-fro)
+    movements
+        what people do: swipes, what real people were recorded doing, or both in turn
+    motions : FOLDER
+        recorded motions, as `python -m tools.motion_capture drive` makes them
+    motion_role
+        people of that folder: those to learn from, or those kept apart
+    radars
+        the same radar in all takes, or looks, surface, noise and threshold drawn for each
+    seed : N
+        seed of all random numbers
+    sensors : N
+        sensors that see each take: its own, beside the camera, and N - 1 at other ranges and angles
+    rate : FPS
+        frames per second of the radar, 10 to 120 (default: its own)
+    bins : N
+        velocity bins, 16 to 128 (default: 32)
+    take_seconds : S
+        length of a take, in seconds
+    workers : N
+        worker processes (default: one per core)
+    fit_errors : FILE.json
+        errors of fits to imitate (default: those measured of `sd2 fit`)
+    fit_error_sizes : LEAST,MOST
+        how many times as large as those errors are, drawn anew for every take; 0,0: meshes without
+        errors (default: 1,1)
+    """
+
+    out: Path
+    people: Count = 6
+    minutes: Positive = 90.0
+    protocol: Literal["paper", "varied"] = "varied"
+    order: Literal["to-and-fro", "random"] | None = None
+    movements: Literal["swipes", "captured", "both"] = "swipes"
+    motions: Path | None = None
+    motion_role: Literal["learn", "calibrate", "measure"] = "learn"
+    radars: Literal["one", "drawn"] = "one"
+    seed: Natural = 0
+    sensors: Count = 1
+    rate: Positive | None = None
+    bins: Count | None = None
+    take_seconds: Positive = 15.0
+    workers: Count | None = None
+    fit_errors: Path | None = None
+    fit_error_sizes: Annotated[tuple[float, float], Typed(_sizes, joined)] = (1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.protocol == "varied":
+            if self.order == "to-and-fro":
+                raise OptionError(
+                    "--order to-and-fro with the protocol varied, whose order is random",
+                    "another order or protocol",
+                    "Add --protocol paper",
+                )
+        elif self.movements != "swipes" or self.radars != "one" or self.radar != "paper":
+            raise OptionError(
+                f"--protocol paper with movements {self.movements}, radars {self.radars} and"
+                f" radar {self.radar}",
+                "swipes before one radar, the paper's",
+                "Leave the protocol out",
+            )
+
+
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Make radar samples of any mesh, or pairs of simulated people to train on.
 
@@ -30,63 +201,8 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     """
     parser = add_command(commands, "simulate", about=add_commands)
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    _add_radar(kinds)
-    _add_campaign(kinds)
-
-
-def _add_radar(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(kinds, "radar", handler=_radar)
-    parser.add_mesh_and_sensor()
-    parser.add_output("FOLDER", "the capture to write")
-    add_radar_choice(parser)
-    text = "sum by a non-uniform FFT, or triangle by triangle, some hundred times slower"
-    parser.add_choice("--method", ("nufft", "direct"), text, "nufft")
-    parser.add_value(
-        "--blocks", positive_int, "N", "parts of a frame that follow the range as it changes", 1
-    )
-    text = "within a frame: constant velocity, or the mesh interpolated at every chirp, which"
-    text += " takes as many sums as there are chirps"
-    parser.add_choice("--motion", ("constant", "interpolated"), text, "constant")
-    parser.add_flag(
-        "--incoherent", "a rough surface: every triangle has a random phase (default: a smooth one)"
-    )
-    text = "which triangles echo: those that face the radar, or those that nothing hides"
-    parser.add_choice("--visibility", ("facing", "exact"), text, "exact")
-    parser.add_value(
-        "--receivers",
-        receivers,
-        "N",
-        "how many, half a wavelength apart; or their places relative to the transmitter,"
-        " as X,Y,Z;X,Y,Z in metres to the right, down and ahead (default: the radar's own number)",
-    )
-    text = "full width of the beam at half power, along where the sensor looks (default: all"
-    text += " directions alike)"
-    parser.add_value("--beam-width-deg", positive_float, "DEG", text)
-    plane = parser.add_mutually_exclusive_group()
-    text = "a floor Y metres below the camera reflects; C is its amplitude coefficient"
-    text += " (default: concrete, -0.39)"
-    plane.add_value("--ground", plane_at, "Y[,C]", text)
-    plane.add_value(
-        "--wall", plane_at, "Z[,C]", "a wall Z metres in front of the camera reflects, likewise"
-    )
-    noise = parser.add_mutually_exclusive_group()
-    text = "add thermal noise this many decibels below the moving mesh's echo (default: none)"
-    noise.add_value("--snr-db", finite_float, "DB", text)
-    text = "gain and noise of a 60 GHz radar on one chip, so that what is farther away is weaker"
-    text += " (default: a gain that suits the strongest echo)"
-    noise.add_flag("--link-budget", text)
-    parser.add_value("--seed", int, "N", "seed of noise and random phases", 0)
-    parser.add_mesh_reading()
-    parser.add_json()
-
-
-def add_radar_choice(parser: Options) -> None:
-    """Add ``--radar``."""
-    from sd2core.radar_profiles import RADARS
-
-    text = f"a radar by its name ({', '.join(RADARS)}; docs/radar-files.md), or that of a"
-    text += " capture's config.json (default: paper)"
-    parser.add_value("--radar", str, "NAME|CONFIG.json", text, "paper")
+    add_command(kinds, "radar", options=SimulateRadar, handler=_radar)
+    add_command(kinds, "campaign", options=SimulateCampaign, handler=_campaign)
 
 
 def simulate_with_bar(
@@ -113,22 +229,7 @@ def simulate_with_bar(
         )
 
 
-def receivers(text: str) -> int | tuple[tuple[float, float, float], ...]:
-    """Parse a number of receivers, or ``X,Y,Z;X,Y,Z``."""
-    if "," not in text:
-        return positive_int(text)
-    return tuple(position(part) for part in text.split(";"))
-
-
-def plane_at(text: str) -> tuple[float, ...]:
-    """Parse a place in metres with or without a reflection coefficient."""
-    values = tuple(finite_float(part) for part in text.split(","))
-    if len(values) > 2:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a place, or a place and a coefficient")
-    return values
-
-
-def _radar(options: argparse.Namespace) -> None:
+def _radar(options: SimulateRadar) -> None:
     """Compute the raw samples that a radar would record of a moving mesh.
 
     Sums the echo of every triangle, with its phase, to the beat signal of an FMCW
@@ -151,9 +252,8 @@ def _radar(options: argparse.Namespace) -> None:
     config = named_radar(options.radar)
     offsets: tuple[tuple[float, float, float], ...] = ()
     if options.receivers is not None:
-        placed = not isinstance(options.receivers, int)
-        offsets = options.receivers if placed else ()
-        config = replace(config, receivers=len(offsets) if placed else options.receivers)
+        offsets = options.receivers.offsets_m
+        config = replace(config, receivers=options.receivers.count)
     mirror = None
     if options.ground is not None:
         mirror = Mirror.ground(*options.ground)
@@ -194,78 +294,16 @@ def _radar(options: argparse.Namespace) -> None:
     show(description, as_json=options.json)
 
 
-def _add_campaign(kinds: argparse._SubParsersAction) -> None:
-    parser = add_command(kinds, "campaign", handler=_campaign)
-    parser.add_output("FILE.zarr", "the pairs to write", goes_on=True)
-    parser.add_value("--people", positive_int, "N", "number of people", 6)
-    parser.add_value("--minutes", positive_float, "MIN", "minutes of all people together", 90.0)
-    parser.add_choice("--protocol", ("paper", "varied"), "what varies from take to take", "varied")
-    text = "of the paper's swipes: one kind in a take, or all four (default: to-and-fro)"
-    parser.add_choice("--order", ("to-and-fro", "random"), text)
-    text = "what people do: swipes, what real people were recorded doing, or both in turn"
-    parser.add_choice("--movements", ("swipes", "captured", "both"), text, "swipes")
-    text = "recorded motions, as `python -m tools.motion_capture drive` makes them"
-    parser.add_value("--motions", Path, "FOLDER", text)
-    text = "people of that folder: those to learn from, or those kept apart"
-    parser.add_choice("--motion-role", ("learn", "calibrate", "measure"), text, "learn")
-    add_radar_choice(parser)
-    text = "the same radar in all takes, or looks, surface, noise and threshold drawn for each"
-    parser.add_choice("--radars", ("one", "drawn"), text, "one")
-    parser.add_value("--seed", _seed, "N", "seed of all random numbers", 0)
-    text = "sensors that see each take: its own, beside the camera, and N - 1 at other ranges"
-    text += " and angles"
-    parser.add_value("--sensors", positive_int, "N", text, 1)
-    text = "frames per second of the radar, 10 to 120 (default: its own)"
-    parser.add_value("--rate", positive_float, "FPS", text)
-    parser.add_value("--bins", positive_int, "N", "velocity bins, 16 to 128 (default: 32)")
-    parser.add_value("--take-seconds", positive_float, "S", "length of a take, in seconds", 15.0)
-    parser.add_value("--workers", positive_int, "N", "worker processes (default: one per core)")
-    parser.add_limbs()
-    text = "errors of fits to imitate (default: those measured of `sd2 fit`)"
-    parser.add_value("--fit-errors", Path, "FILE.json", text)
-    text = "how many times as large as those errors are, drawn anew for every take; 0,0: meshes"
-    text += " without errors (default: 1,1)"
-    parser.add_value("--fit-error-sizes", _sizes, "LEAST,MOST", text, (1.0, 1.0))
-    parser.add_json()
-
-
-def _sizes(text: str) -> tuple[float, float]:
-    try:
-        least, most = map(float, text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not LEAST,MOST, e.g. 0,1.5") from None
-    return least, most
-
-
-def _seed(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 on")
-    return int(text)
-
-
-def _protocol(options: argparse.Namespace) -> Protocol:
+def _protocol(options: SimulateCampaign) -> Protocol:
     from sd2core.simulate.campaign.protocol import PAPER, VARIED
 
     if options.protocol == "paper":
-        if options.movements != "swipes" or options.radars != "one" or options.radar != "paper":
-            raise Sd2Error(
-                f"--protocol paper with movements {options.movements}, radars {options.radars} and"
-                f" radar {options.radar}",
-                "swipes before one radar, the paper's",
-                "Leave the protocol out",
-            )
         return replace(PAPER, order=options.order or PAPER.order)
-    if options.order == PAPER.order:
-        raise Sd2Error(
-            "--order to-and-fro with the protocol varied, whose order is random",
-            "another order or protocol",
-            "Add --protocol paper",
-        )
     drawn = options.radars == "drawn"
     return replace(VARIED, movements=options.movements, drawn_radars=drawn)
 
 
-def _campaign(options: argparse.Namespace) -> None:
+def _campaign(options: SimulateCampaign) -> None:
     """Make pairs of synthetic Doppler and simulated radar to train a denoiser on.
 
     People of random shape swipe to the right, left, down and up, or move as real people

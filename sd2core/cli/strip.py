@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import argparse
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import positive_float, positive_int
-from sd2core.cli.output import progress_bar
+from sd2core.cli.output import picked, progress_bar
 from sd2core.files.figure_files import SUFFIXES as FIGURES
+from sd2core.options.kinds import Count, Positive
+from sd2core.options.records import ARGUMENTS, Place
+from sd2core.options.shared import MeshReading, Overwrite, Sensor
 
 if TYPE_CHECKING:
     from sd2core.figures.strip_source import StripSource
@@ -19,34 +22,53 @@ if TYPE_CHECKING:
 _DEFAULT_COUNT = 8
 
 
+@dataclass(frozen=True, kw_only=True)
+class Strip(Sensor, MeshReading, Overwrite):
+    """Options of ``sd2 strip``.
+
+    Parameters
+    ----------
+    paths : PATH
+        a recording, or a video, a mesh, or both
+    out : FILE
+        the figure to write (.png, .svg or .pdf)
+    frames : LIST
+        frames such as 0,15,30, or ranges FROM:TO:STEP such as 0:90:15, TO not included
+    count : N
+        that many frames, spread evenly (default: 8)
+    rows : LIST
+        some of video, mesh and overlay (the mesh over the video), in this order (default:
+        video,mesh, as far as they are there)
+    dots
+        draw vertices instead of the surface
+    colour
+        what the colour of the mesh means
+    v_max_mps : MPS
+        velocity in m/s at which the colours end
+    whole
+        show the whole picture, not what is around the body
+    columns : N
+        pictures side by side; more go below
+    """
+
+    paths: Annotated[tuple[Path, ...], ARGUMENTS]
+    out: Annotated[Path, Place(endings=FIGURES)]
+    frames: Annotated[str | None, Place(one_of="frames")] = None
+    count: Annotated[Count | None, Place(one_of="frames")] = None
+    rows: str | None = None
+    dots: bool = False
+    colour: Literal["velocity", "plain"] = "velocity"
+    v_max_mps: Annotated[Positive, Place(("--v-max",))] = 2.0
+    whole: bool = False
+    columns: Count = 10
+
+
 def add_commands(commands: argparse._SubParsersAction) -> None:
     """Add ``strip``."""
-    parser = add_command(commands, "strip", handler=_strip)
-    parser.add_value("paths", Path, "PATH", "a recording, or a video, a mesh, or both", nargs="+")
-    parser.add_output("FILE", "the figure to write (.png, .svg or .pdf)", *FIGURES)
-    chosen = parser.add_mutually_exclusive_group()
-    text = "frames such as 0,15,30, or ranges FROM:TO:STEP such as 0:90:15, TO not included"
-    chosen.add_value("--frames", str, "LIST", text)
-    chosen.add_value(
-        "--count", positive_int, "N", f"that many frames, spread evenly (default: {_DEFAULT_COUNT})"
-    )
-    text = "some of video, mesh and overlay (the mesh over the video), in this order"
-    text += " (default: video,mesh, as far as they are there)"
-    parser.add_value("--rows", str, "LIST", text)
-    parser.add_flag("--dots", "draw vertices instead of the surface")
-    parser.add_choice(
-        "--colour", ("velocity", "plain"), "what the colour of the mesh means", "velocity"
-    )
-    parser.add_value(
-        "--v-max", positive_float, "MPS", "velocity in m/s at which the colours end", 2.0
-    )
-    parser.add_flag("--whole", "show the whole picture, not what is around the body")
-    parser.add_value("--columns", positive_int, "N", "pictures side by side; more go below", 10)
-    parser.add_sensor()
-    parser.add_mesh_reading()
+    add_command(commands, "strip", options=Strip, handler=_strip)
 
 
-def _strip(options: argparse.Namespace) -> None:
+def _strip(options: Strip) -> None:
     """Draw frames side by side: the video above its mesh.
 
     Every column is a moment, with its time and frame number. Colours of velocity are
@@ -66,10 +88,7 @@ def _strip(options: argparse.Namespace) -> None:
         how = StripOptions(
             rows=tuple(rows),
             as_dots=options.dots,
-            colour=options.colour,
-            v_max_mps=options.v_max,
-            whole=options.whole,
-            columns=options.columns,
+            **picked(options, "colour", "v_max_mps", "whole", "columns"),
         )
         total = len(source.clock)
         if options.frames:
@@ -87,7 +106,7 @@ def _rows(source: StripSource) -> list[str]:
     return [row for row, part in there.items() if part is not None]
 
 
-def _source(options: argparse.Namespace, stack: ExitStack) -> StripSource:
+def _source(options: Strip, stack: ExitStack) -> StripSource:
     from dataclasses import replace
 
     from sd2core.errors import Sd2Error
@@ -110,7 +129,7 @@ def _source(options: argparse.Namespace, stack: ExitStack) -> StripSource:
     return source
 
 
-def _recording(options: argparse.Namespace) -> Recording:
+def _recording(options: Strip) -> Recording:
     from sd2core.cli.reading import (
         mesh_reading,
         open_recording_from_options,

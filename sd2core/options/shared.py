@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from sd2core.files.figure_files import SUFFIXES as FIGURES
 from sd2core.options.bounds import Bounds
-from sd2core.options.kinds import Count, ImageSize, Names, Positive, Vector
+from sd2core.options.kinds import Count, ImageSize, Names, Natural, Positive, Text, Vector
 from sd2core.options.records import ARGUMENT, Group, OptionError, OptionRecord, Place
 
 
@@ -243,7 +243,21 @@ class Texture(OptionRecord):
         the mean (SEED of the random numbers: 0)
     """
 
-    texture: Annotated[int | None, Place(bare=0)] = None
+    texture: Annotated[Natural | None, Place(bare=0)] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Denoising(Texture):
+    """How maps are denoised: section ``[denoise]`` of a plan, and options of ``sd2 denoise``.
+
+    Parameters
+    ----------
+    model : FILE|NAME
+        a model file from `sd2 train`, or the name of one that is installed (default: of those
+        that come with SD² Studio the one for limb maps, where there are such)
+    """
+
+    model: Text | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -257,7 +271,20 @@ class RadarChoice(OptionRecord):
         (default: paper)
     """
 
-    radar: str = "paper"
+    radar: Text = "paper"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulating(RadarChoice):
+    """A radar and its noise: section ``[simulate]`` of a plan, and options of a command.
+
+    Parameters
+    ----------
+    seed : N
+        seed of noise and random phases
+    """
+
+    seed: Natural = 0
 
 
 @dataclass(frozen=True, kw_only=True)

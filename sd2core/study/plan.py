@@ -7,13 +7,14 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, FiniteFloat, model_validator
 
-from sd2core.batch.plan import Section, Share, Text
+from sd2core.batch.plan import Section
 from sd2core.classify.defaults import DELAY_S, DELAYS_S, WIDTH, WIDTHS, FeatureKind
 from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.denoise.card import Inputs
 from sd2core.files.paths import located_path
 from sd2core.files.texts import read_text
 from sd2core.files.toml import toml_lines
+from sd2core.options.kinds import Share, Text
 from sd2core.options.toml_files import parsed
 from sd2core.pairs.segments import OVERLAP
 

@@ -122,9 +122,10 @@ class BatchSetupModel(RunSetup[Entry]):
 
     def plan(self) -> BatchPlan:
         """Plan in the form that the library takes; Sd2Error if something is missing."""
-        from sd2core.batch.plan import BatchPlan, Denoise, Recordings
+        from sd2core.batch.plan import BatchPlan, Recordings
         from sd2core.options.exporting import Exporting
         from sd2core.options.fitting import Fitting
+        from sd2core.options.shared import Denoising
         from sd2core.options.synthesis import Synthesis
 
         if self.problem:
@@ -142,7 +143,7 @@ class BatchSetupModel(RunSetup[Entry]):
             placements=where,
             fit=Fitting() if values["fit"] else None,
             synthesise=Synthesis(tolerance=tolerance, limbs=values["denoise"] and values["limbs"]),
-            denoise=Denoise(model=values["model"]) if values["denoise"] else None,
+            denoise=Denoising(model=values["model"]) if values["denoise"] else None,
             export=Exporting(format=values["format"]) if values["export"] else None,
         )
 

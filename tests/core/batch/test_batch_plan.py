@@ -9,12 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.batch.fitting import fit_choices
-from sd2core.batch.plan import BatchPlan, Denoise, Recordings
+from sd2core.batch.plan import BatchPlan, Recordings
 from sd2core.batch.plan_file import plan_from_text, plan_text, read_plan, write_plan
 from sd2core.doppler.options import PRESETS, chosen_options
 from sd2core.errors import Sd2Error
 from sd2core.options.exporting import Exporting
 from sd2core.options.fitting import Fitting
+from sd2core.options.shared import Denoising
 from sd2core.options.synthesis import Synthesis
 from sd2core.options.toml_files import line_of
 from sd2core.sensor import VirtualSensor
@@ -57,7 +58,11 @@ plans = st.builds(
         null_bins=st.none() | st.just((1, 2)),
     ),
     denoise=st.none()
-    | st.builds(Denoise, model=st.sampled_from([None, "denoiser", str(FOLDER / "m.safetensors")])),
+    | st.builds(
+        Denoising,
+        model=st.sampled_from([None, "denoiser", str(FOLDER / "m.safetensors")]),
+        texture=st.none() | st.integers(0, 9),
+    ),
     export=st.none() | st.builds(Exporting, segment_frames=st.integers(20, 99)),
 )
 

@@ -134,6 +134,8 @@ def test_the_same_again_does_nothing(run: Runs) -> None:
 def test_an_option_redoes_what_depends_on_it(run: Runs) -> None:
     save_spheres(run.folder / "meshes", 1)
     run(BOTH)
+    run(BOTH + "texture = 1\n")
+    assert run.pool.submitted == {"denoise": 2}
     run(BOTH.replace("[denoise]\n", "time_sigma_s = 0.1\n[denoise]\n"))
     assert run.pool.submitted == {"synthesise": 2, "denoise": 2}
     # What a preset has already, said aloud, changes nothing.

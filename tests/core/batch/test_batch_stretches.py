@@ -15,7 +15,8 @@ from moving_spheres import swinging_sphere
 from sd2core.batch.denoising import denoise
 from sd2core.batch.inputs import mesh_input_of
 from sd2core.batch.synthesis import LONGEST_FRAMES, stretches_of, synthesise
-from sd2core.denoise.files import find_model, load_model
+from sd2core.denoise.files import describe_model, find_model, load_model
+from sd2core.denoise.texture import content_of
 from sd2core.doppler import Synthesizer
 from sd2core.doppler.options import chosen_options
 from sd2core.io.mesh import load_mesh, save_mesh
@@ -130,3 +131,26 @@ def test_denoised_stretches_are_those_of_the_whole_map(tmp_path: Path) -> None:
     assert {**found.meta, "input": None} == {**expected.meta, "input": None}
     scale = float(expected.values.max())
     np.testing.assert_allclose(found.values, expected.values, rtol=1e-4, atol=1e-6 * scale)
+
+
+def test_a_denoised_map_is_drawn_as_the_radar_shows_it_in_stretches_too(tmp_path: Path) -> None:
+    values = np.random.default_rng(2).random((32, 120)).astype(np.float32)
+    values[[14, 15, 16]] = 0
+    clock = Timebase(np.arange(120) / 30.0)
+    whole = DopplerMap(values, VelocityAxis(), clock, "synthetic", null_bins=(14, 15, 16))
+    path = find_model("denoiser")
+    law = describe_model(path).needed_texture()
+    for lengths in ([(0, 120)], [(0, 50), (50, 120)]):
+        files, plain, drawn = (
+            [tmp_path / f"{kind}{len(lengths)}-{start}.npz" for start, _ in lengths]
+            for kind in ("synthetic", "plain", "drawn")
+        )
+        for file, (start, stop) in zip(files, lengths, strict=True):
+            whole.between(start, stop).save(file)
+        denoise(files, str(path), "digest", plain)
+        denoise(files, str(path), "digest", drawn, texture=7)
+        content = content_of(DopplerMap.load(plain[0]))
+        expected = law.on(joined([DopplerMap.load(one) for one in plain]), 7, content=content)
+        found = joined([DopplerMap.load(one) for one in drawn])
+        np.testing.assert_allclose(found.values, expected.values, rtol=1e-6)
+        assert found.meta["texture"] == {"seed": 7}
