@@ -7,6 +7,15 @@ import sys
 from collections.abc import Callable, Sequence
 
 from sd2core.cli.running import run
+from sd2core.options.bounds import COUNT
+from sd2core.options.kinds import number_reader
+
+positive_int = number_reader(COUNT)
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Add ``--json``."""
+    parser.add_argument("--json", action="store_true", help="print JSON, for other programs")
 
 
 def run_tool(

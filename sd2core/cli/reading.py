@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from sd2core.cli.options import flag, given
 from sd2core.cli.output import picked, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import PICKLE_SUFFIXES
+from sd2core.options.records import given_flags
 
 if TYPE_CHECKING:
     from sd2core.mesh.sequence import MeshSequence
-    from sd2core.options.shared import MeshInput
-    from sd2core.recording.recording import MeshReading, Recording
+    from sd2core.options.shared import Axis, MeshAndSensor, MeshInput, MeshReading
+    from sd2core.recording.recording import MeshReading as StoredReading
+    from sd2core.recording.recording import Recording
     from sd2core.sensor import VelocityAxis, VirtualSensor
 
 
@@ -22,15 +23,15 @@ _OF_THE_MESH = ("faces", "fps", "scale", "person", "distance_m", "image_size", "
 _OF_BODY_MODELS = ("person", "image_size", "focal_px")
 
 
-def mesh_reading(options: Any) -> MeshReading:
+def mesh_reading(options: MeshReading) -> StoredReading:
     """Options for reading a mesh from the command line."""
-    from sd2core.recording.recording import MeshReading
+    from sd2core.recording.recording import MeshReading as StoredReading
 
     alike = picked(options, "scale", "person", "distance_m", "image_size", "focal_px")
-    return MeshReading(frames_per_s=options.fps, **alike)
+    return StoredReading(frames_per_s=options.fps, **alike)
 
 
-def load_mesh_from_options(path: Path, options: Any) -> MeshSequence:
+def load_mesh_from_options(path: Path, options: MeshReading) -> MeshSequence:
     """Load a mesh with the options on how to read it."""
     from sd2core.io.mesh import load_mesh
 
@@ -41,7 +42,7 @@ def load_mesh_from_options(path: Path, options: Any) -> MeshSequence:
         )
 
 
-def mesh_and_sensor(options: Any) -> tuple[MeshSequence, VirtualSensor]:
+def mesh_and_sensor(options: MeshAndSensor) -> tuple[MeshSequence, VirtualSensor]:
     """Mesh, and sensor of the recording or the camera, with ``--sensor`` in its place."""
     mesh, sensor = mesh_and_its_sensor(options)
     if options.sensor is not None:
@@ -65,7 +66,7 @@ def mesh_and_its_sensor(options: MeshInput) -> tuple[MeshSequence, VirtualSensor
     return mesh, sensor
 
 
-def open_recording_from_options(path: Path, options: Any) -> Recording:
+def open_recording_from_options(path: Path, options: MeshReading) -> Recording:
     """Open a recording; options on how to read its mesh replace the stored ones."""
     from sd2core.recording.recording import open_recording
 
@@ -82,21 +83,21 @@ def open_recording_from_options(path: Path, options: Any) -> Recording:
 
 
 def refuse_unused_mesh_options(
-    options: Any, path: Path, mesh: Path | None, *, but: tuple[str, ...] = ()
+    options: MeshReading, path: Path, mesh: Path | None, *, but: tuple[str, ...] = ()
 ) -> None:
     """Refuse options on how to read a mesh that would change nothing, except ``but``."""
     if mesh is None:
-        for name in map(flag, given(options, (n for n in _OF_THE_MESH if n not in but))):
+        for name in given_flags(options, (n for n in _OF_THE_MESH if n not in but)):
             raise Sd2Error(f"{name} is given, and {path} holds no mesh", f"{name} for a mesh only")
     elif mesh.suffix.lower() not in PICKLE_SUFFIXES:
-        for name in map(flag, given(options, (n for n in _OF_BODY_MODELS if n not in but))):
+        for name in given_flags(options, (n for n in _OF_BODY_MODELS if n not in but)):
             raise Sd2Error(
                 f"{name} is given, and {mesh} is not the output of a body model",
                 f"{name} for {', '.join(sorted(PICKLE_SUFFIXES))} files only",
             )
 
 
-def chosen_axis(options: Any, usual: VelocityAxis | None = None) -> VelocityAxis:
+def chosen_axis(options: Axis, usual: VelocityAxis | None = None) -> VelocityAxis:
     """Velocity axis of ``--bins`` and ``--v-max``; what is not given is as usual."""
     from sd2core.sensor import VelocityAxis
 

@@ -10,15 +10,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    add_json,
-    positive_int,
-)
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.cli.output_folders import check_output
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
-from tools.command_line import run_tool
+from tools.command_line import (
+    add_json,
+    positive_int,
+    run_tool,
+)
 from tools.fitting.clips import ALL_CLIPS, CLIPS, REAL_MOTION, TUNING, clip_named, make_fit_truth
 from tools.fitting.error_check import compare_errors
 from tools.fitting.error_measurement import measure_errors

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    positive_int,
-)
 from sd2core.cli.output import progress_bar
-from tools.command_line import run_tool
+from tools.command_line import (
+    positive_int,
+    run_tool,
+)
 from tools.motion_capture.bodies import drive_bodies, load_motions, minutes
 
 

@@ -13,15 +13,15 @@ from sd2core.body.landmark_models import DEFAULT_MODEL, LandmarkModel
 from sd2core.body.lifter import Lifter
 from sd2core.body.track import LANDMARKS
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.options import (
-    add_json,
-    positive_int,
-)
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.cli.output_folders import check_output
 from sd2core.errors import Sd2Error
 from sd2core.mocap.body_motion import Role
-from tools.command_line import run_tool
+from tools.command_line import (
+    add_json,
+    positive_int,
+    run_tool,
+)
 from tools.motion_capture.bodies import load_motions
 from tools.train_lifter.data import load_takes, make_lifter_data
 from tools.train_lifter.deeds import Manner

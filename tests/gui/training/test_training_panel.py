@@ -200,19 +200,20 @@ def test_what_is_set_up_is_what_is_started(made, qtbot, pairs) -> None:
     assert "Takes about 2 min" in texts(window)  # 500 × 0.25 s
     assert "20 segments, 500 steps of about 250 ms, as measured here before." in texts(window)
     type_number(qtbot, box(window, "Passes"), "3")
-    type_number(qtbot, box(window, "Segments per step"), "8")
+    type_number(qtbot, box(window, "Segments of a batch"), "8")
     model = next(c for c in window.panel.findChildren(Choice) if c.toolTip() == "Kind of model")
     model.setFocus()
     qtbot.keyClick(model, Qt.Key.Key_End)
     assert setup.value("model") == "s4-serial"
     qtbot.keyClick(model, Qt.Key.Key_Home)
     click(window, qtbot, "More settings")
-    type_number(qtbot, box(window, "End when"), "7")
+    type_number(qtbot, box(window, "End after"), "7")
     assert setup.config.training.early_stopping_epochs == 7
     click(window, qtbot, "Copy command")
     command = QApplication.clipboard().text()
-    assert command.startswith(f"sd2 train {pairs} --model s4 --background --batch-size 8")
-    assert "--epochs 3" in command
+    assert command.startswith(f"sd2 train {pairs} --out ")
+    for words in ("--model s4", "--background", "--batch-size 8", "--epochs 3"):
+        assert words in command
     assert "--early-stopping 7" in command
     click(window, qtbot, "Reset")
     assert (setup.value("epochs"), setup.value("batch_size")) == (500, 64)
