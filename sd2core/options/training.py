@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from sd2core.options import bounds
 from sd2core.options.bounds import Bounds
-from sd2core.options.kinds import Names
+from sd2core.options.kinds import Names, Typed
 from sd2core.options.records import NOT_TYPED, Group, OptionError, OptionRecord, Place
 from sd2core.options.shared import SegmentFrames
 
@@ -83,7 +83,7 @@ class ModelConfig(OptionRecord):
         default_factory=dict
     )
     inputs: Literal["map", "limbs", "kinematics"] = "map"
-    start: Annotated[Path | None, Place(("--from",))] = None
+    start: Annotated[Path | None, Typed(str), Place(("--from",))] = None  # or a name
     frozen: bool = False
 
 
