@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_json, print_rows, progress_bar
-from sd2core.files.figure_files import SUFFIXES as FIGURES
 from sd2core.files.paths import PICKLE_SUFFIXES
-from sd2core.options.kinds import Vector, Words
-from sd2core.options.records import ARGUMENTS, OptionError, Place
-from sd2core.options.shared import Json, MeshReading, Overwrite
+from sd2core.options.kinds import Words
+from sd2core.options.records import ARGUMENTS, OptionError
+from sd2core.options.shared import Figure, Json, MeshReading, Sensor
 
 if TYPE_CHECKING:
     from sd2core.compare.meshes import Comparison
@@ -24,7 +23,7 @@ _OWN_NAMES = {"mesh.zarr", "mesh.npz"}
 
 
 @dataclass(frozen=True, kw_only=True)
-class CompareMeshes(MeshReading, Overwrite, Json):
+class CompareMeshes(Sensor, MeshReading, Figure, Json):
     """Options of ``sd2 compare-meshes``.
 
     Parameters
@@ -47,9 +46,7 @@ class CompareMeshes(MeshReading, Overwrite, Json):
     meshes: Annotated[tuple[Path, ...], ARGUMENTS]
     names: Words | None = None
     reference: str | None = None
-    sensor: Vector | None = None
     align: Literal["none", "root"] = "none"
-    figure: Annotated[Path | None, Place(endings=FIGURES)] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

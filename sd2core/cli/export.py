@@ -23,10 +23,10 @@ from sd2core.cli.output import (
     progress_events,
 )
 from sd2core.options.exporting import MAPS, PEOPLE, SEGMENTS, Exporting, SpanOptions
-from sd2core.options.kinds import Names, Share
+from sd2core.options.kinds import Names
 from sd2core.options.records import ARGUMENTS, OptionRecord, Place, given
-from sd2core.options.shared import Axis, JsonAndProgress, Texture
-from sd2core.options.synthesis import Counting, Synthesis
+from sd2core.options.shared import Axis, Denoising, JsonAndProgress
+from sd2core.options.synthesis import Counting, Synthesis, Tolerance
 
 if TYPE_CHECKING:
     from sd2core.datasets.forecast import Forecast
@@ -74,7 +74,7 @@ class _People(OptionRecord):
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Maps(Texture, Counting, Axis):
+class _Maps(Denoising, Counting, Axis, Tolerance):
     """How maps of recordings are made.
 
     Parameters
@@ -94,9 +94,7 @@ class _Maps(Texture, Counting, Axis):
     GROUP = MAPS
 
     placements: str | None = None
-    tolerance: Share | None = None
     simulate: str | None = None
-    model: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_json, progress_bar
-from sd2core.files.figure_files import SUFFIXES as FIGURES
-from sd2core.options.kinds import Count, Share
-from sd2core.options.records import OptionError, Place, given
-from sd2core.options.shared import Json, MeshAndSensor, Overwrite
+from sd2core.options.kinds import Count
+from sd2core.options.records import OptionError, given
+from sd2core.options.shared import Figure, Json, MeshAndSensor, Method
 from sd2core.options.synthesis import Counting, Weight, Wish
 
 if TYPE_CHECKING:
@@ -34,11 +32,9 @@ class UsualWish(Wish):
         the error that is allowed, as 2% or 0.02: relative L1 of the smoothed map (default: 2%)
     """
 
-    tolerance: Annotated[Share | None, Place(one_of="wish")] = None
-
 
 @dataclass(frozen=True, kw_only=True)
-class Ladder(MeshAndSensor, UsualWish, Counting, Overwrite, Json):
+class Ladder(MeshAndSensor, UsualWish, Method, Counting, Figure, Json):
     """Options of ``sd2 ladder``.
 
     Parameters
@@ -57,12 +53,10 @@ class Ladder(MeshAndSensor, UsualWish, Counting, Overwrite, Json):
         draw error against cost, as .png, .svg or .pdf
     """
 
-    method: Literal["histogram", "fmcw"] = "histogram"
     weight: Weight = "count"
     quick: bool = False
     repeats: Count | None = None
     fresh: bool = False
-    figure: Annotated[Path | None, Place(endings=FIGURES)] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -12,9 +12,9 @@ from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import picked, print_json, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.bounds import ANY, COUNT
-from sd2core.options.kinds import Count, Natural, Positive, Typed, joined, number_reader, vector
+from sd2core.options.kinds import Count, Positive, Typed, joined, number_reader, vector
 from sd2core.options.records import OptionError, Place
-from sd2core.options.shared import Json, Limbs, MeshAndSensor, Overwrite, RadarChoice, Simulating
+from sd2core.options.shared import Json, Limbs, MeshAndSensor, Overwrite, Simulating
 
 if TYPE_CHECKING:
     from sd2core.fmcw import SignalOptions, WaveOptions
@@ -115,7 +115,7 @@ class SimulateRadar(MeshAndSensor, Overwrite, Simulating, Json):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SimulateCampaign(RadarChoice, Limbs, Json):
+class SimulateCampaign(Simulating, Limbs, Json):
     """Options of ``sd2 simulate campaign``.
 
     Parameters
@@ -166,7 +166,6 @@ class SimulateCampaign(RadarChoice, Limbs, Json):
     motions: Path | None = None
     motion_role: Literal["learn", "calibrate", "measure"] = "learn"
     radars: Literal["one", "drawn"] = "one"
-    seed: Natural = 0
     sensors: Count = 1
     rate: Positive | None = None
     bins: Count | None = None

@@ -18,7 +18,7 @@ from sd2core.options.kinds import (
     share,
 )
 from sd2core.options.records import NOT_TYPED, Group, OptionRecord, Place
-from sd2core.options.shared import Limbs, SegmentFrames
+from sd2core.options.shared import KeptOut, Limbs, SegmentFrames
 
 KINDS: tuple[MapKind, ...] = ("synthetic", "denoised", "simulated", "real")
 LabelRule = Literal["foreground", "majority"]
@@ -51,7 +51,7 @@ class SpanOptions(OptionRecord):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PeopleApart(OptionRecord):
+class PeopleApart(KeptOut):
     """People that are not learnt from.
 
     Parameters
@@ -64,9 +64,6 @@ class PeopleApart(OptionRecord):
     """
 
     GROUP = PEOPLE
-
-    validation_subjects: Names | None = None
-    test_subjects: Names | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

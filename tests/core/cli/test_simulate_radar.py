@@ -169,14 +169,15 @@ def test_the_samples_gestures_have_the_velocity_that_counting_gives(
         mesh = load_mesh(resource_path("swipes.sd2") / "mesh.zarr")
         cut = MeshSequence(mesh.read(first, last), mesh.faces, Timebase.regular(last - first, 30.0))
         save_mesh(cut, tmp_path / "cut.npz")
-        counted = tmp_path / "counted.npz"
+        counted = tmp_path / f"counted{first}.npz"
         same_law = ("--weight", "area", "--null-bins", "none", "--time-sigma-s", 0)
         # The Hann window's own width, 0.06 m/s.
         smooth = ("--velocity-sigma-bins", 0.5)
         assert sd2("synth", tmp_path / "cut.npz", "--out", counted, *same_law, *smooth).code == 0
         looks = []
         for seed in range(12):
-            radar, out = tmp_path / "radar", tmp_path / "map.npz"
+            radar = tmp_path / f"radar{first}-{seed}"
+            out = radar.with_suffix(".npz")
             made = sd2(
                 *("simulate", "radar", tmp_path / "cut.npz", "--out", radar),
                 *("--incoherent", "--seed", seed, "--visibility", "facing"),
