@@ -139,6 +139,11 @@ class Option:
         return self.kind if self.kind in (int, str, Path) else None
 
     @property
+    def sentence(self) -> str:
+        """The words, beginning with a capital."""
+        return f"{self.words[:1].upper()}{self.words[1:]}"
+
+    @property
     def dest(self) -> str:
         """Name that no option of another section of the command has."""
         return f"{self.section}.{self.name}" if self.section else self.name
@@ -183,6 +188,11 @@ def options_of(kind: type[OptionRecord]) -> tuple[Option, ...]:
     """Options of a record: its own, then those of its bases."""
     read_once: Any = _options_of  # of a class, which has a hash whatever its records have
     return read_once(kind)
+
+
+def option_named(kind: type[OptionRecord], name: str) -> Option:
+    """The option of a record with this name."""
+    return next(one for one in options_of(kind) if one.name == name)
 
 
 @cache

@@ -93,7 +93,7 @@ class CommandForm(QWidget):
 
     def _field(self, option: Option) -> QWidget:
         forms, name = self._forms, name_of(option)
-        tip = f"{option.words[0].upper()}{option.words[1:]}" if option.words else name
+        tip = option.sentence
         if option.kind is bool:
             box = CheckBox("", self, lambda on: forms.set_text(option, "yes" if on else ""), tip)
             box.setAccessibleName(name)

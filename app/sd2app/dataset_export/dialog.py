@@ -20,10 +20,11 @@ from sd2app.dataset_export.model import MAPS, ExportModel
 from sd2app.dataset_export.text import inertial_words, label_words, size_words, split_words
 from sd2app.manual.help import help_button
 from sd2app.widgets.dialogs import ask_folder, with_suffix
-from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
+from sd2app.widgets.inputs import CheckBox, Choice, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, rule, sentence, show_words, side_by_side
 from sd2app.widgets.text import counted
+from sd2core.cli.export import Export
 from sd2core.recording.recording import is_recording
 
 _FORMATS = {
@@ -86,11 +87,10 @@ class ExportDialog(QDialog):
             {False: "windows of", True: "each labelled span, filled up to"},
             lambda spans: model.choose(spans=spans),
         )
-        tip = "Time kept before and after each span"
-        self._margin = NumberBox(0.0, 10.0, " s around", tip, decimals=1, step=0.1)
+        self._margin = option_box(Export, "margin_s", " s around", decimals=1, step=0.1)
         self._margin.valueChanged.connect(lambda value: model.choose(margin_s=round(value, 3)))
-        self._length = self._frames("Frames of a segment", 2)
-        self._overlap = self._frames("Frames that neighbouring segments share", 0)
+        self._length = option_box(Export, "segment_frames", " frames")
+        self._overlap = option_box(Export, "overlap_frames", " frames")
         self._length.valueChanged.connect(lambda _: self._choose_frames())
         self._overlap.valueChanged.connect(lambda _: self._choose_frames())
         self._format = Choice(
@@ -132,9 +132,6 @@ class ExportDialog(QDialog):
         buttons = (self._stop, self._export, self._close)
         guide = help_button("Export data set", self)
         self._foot = row_of(guide, self._open, STRETCH, *buttons, spacing_px=8)
-
-    def _frames(self, tip: str, low: int) -> NumberBox:
-        return NumberBox(low, 10_000, " frames", tip, decimals=0, step=1.0)
 
     # --- following the model --------------------------------------------------------------
 

@@ -11,12 +11,12 @@ from sd2app.manual.help import with_help
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import accepting, ask_file, ask_new
-from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
+from sd2app.widgets.inputs import CheckBox, Choice, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.mesh_painting import paint_picture
 from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence, side_by_side
 from sd2app.widgets.time_axis import clock_text
-from sd2core.options.bounds import FIELD_OF_VIEW_DEG, STATURE_M
+from sd2core.cli.fit import Fit
 
 VIDEOS = "Video (*.mp4 *.mkv *.mov *.avi *.webm *.m4v *.mpg *.ts *.wmv);;All files (*)"
 _CAMERAS = {
@@ -174,9 +174,7 @@ class NewFromVideoDialog(QDialog):
         self._person.setWordWrap(True)
         tip = "Have the person chosen"
         self._clear = outlined("Clear", tip, lambda: setup.change(person=None), self, name=tip)
-        self._stature = NumberBox(
-            STATURE_M.low, STATURE_M.high, " m", "Height of the person", step=0.01
-        )
+        self._stature = option_box(Fit, "stature_m", " m", decimals=2, step=0.01)
         self._stature.setValue(DEFAULT_STATURE_M)
         self._stature.valueChanged.connect(lambda value_m: setup.change(stature_m=value_m))
         self._known = CheckBox(
@@ -191,14 +189,9 @@ class NewFromVideoDialog(QDialog):
             {way: text.format(angle=angle) for way, text in _CAMERAS.items()},
             lambda way: setup.change(camera=way),
         )
-        self._angle = NumberBox(
-            FIELD_OF_VIEW_DEG.low, FIELD_OF_VIEW_DEG.high, "°",
-            "Field of view across the longer side", decimals=1, step=1.0,
-        )  # fmt: skip
+        self._angle = option_box(Fit, "field_of_view_deg", "°", decimals=1)
         self._angle.valueChanged.connect(lambda value_deg: setup.change(angle_deg=value_deg))
-        self._focal = NumberBox(
-            1.0, 100_000.0, " px", "Focal length in pixels of the video", decimals=0, step=10.0
-        )
+        self._focal = option_box(Fit, "focal_px", " px", step=10.0)
         self._focal.valueChanged.connect(setup.set_focal)
         self._message = sentence("")
 

@@ -20,7 +20,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QAbstractButton, QApplication, QMainWindow, QWidget
 
-from sd2app.background.latest import LatestRunner
+from sd2app.background.latest import LatestRunner, delayed
 from sd2app.settings import Settings
 from sd2app.shell.drop import DropOverlay
 from sd2app.shell.loading import LoadingCover
@@ -69,7 +69,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self._settings = settings
         self._parts = parts or Parts()
-        self.ready = False  # true once the views stand and a recording can be shown
+        self.ready = self._behind = False  # true once the views stand and a recording can be shown
         self._tabbed: QWidget | None = None  # control that Tab has reached last
         self.setWindowTitle("SD² Studio")
         self.setAcceptDrops(True)
@@ -153,6 +153,7 @@ class MainWindow(QMainWindow):
         self._column.addWidget(transport)
         self._lines.addWidget(status)
         self._regions = (*notices, *bars, *self._panels.values(), transport, status)
+        self._soon = delayed(self._follow_actions, 0, self)
         self._connect()
         self._restyle()
         self._refresh()
@@ -217,11 +218,19 @@ class MainWindow(QMainWindow):
         self.maps.refresh()
         self._refresh()
 
+    def _follow_actions(self) -> None:
+        """Enable and check the actions as the models stand now."""
+        if self._behind:
+            self._behind = False
+            self._menus.refresh()
+            for feature in self.features:
+                feature.refresh_menus()
+
     def _refresh(self) -> None:
+        # An edit changes several models; a hundred actions follow them once, before they are used.
+        self._behind = True
+        self._soon.start()
         document = self.session.document
-        self._menus.refresh()
-        for feature in self.features:
-            feature.refresh_menus()
         mark = " *" if document.modified else ""
         kind = " (simulated)" if document.simulated else ""
         name = f"{document.title}{mark}{kind} – " if document.title else ""
@@ -243,6 +252,7 @@ class MainWindow(QMainWindow):
 
     def action(self, name: str) -> QAction:
         """Action by its id, of any feature."""
+        self._follow_actions()
         return self._menus[name]
 
     def note(self, text: str) -> None:
@@ -314,7 +324,9 @@ class MainWindow(QMainWindow):
             super().keyPressEvent(event)
 
     def event(self, event: QEvent) -> bool:
-        """Leave Space to a button that was reached with Tab."""
+        """Leave Space to a button that was reached with Tab; keys find the actions as they are."""
+        if event.type() == QEvent.Type.ShortcutOverride:
+            self._follow_actions()
         focus = self.focusWidget()
         if isinstance(focus, QAbstractButton) and focus is self._tabbed:
             return claims(event, (Qt.Key.Key_Space,)) or super().event(event)

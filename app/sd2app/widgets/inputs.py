@@ -19,6 +19,8 @@ from PySide6.QtWidgets import (
 
 from sd2core.errors import Sd2Error
 from sd2core.files.quantities import parse_quantity
+from sd2core.options.bounds import Bounds
+from sd2core.options.records import OptionRecord, option_named
 
 _ENDING_KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Return, Qt.Key.Key_Enter)
 _STEP_KEYS = (
@@ -35,6 +37,8 @@ _PLAIN = (
     Qt.KeyboardModifier.KeypadModifier,
 )
 _MANY_DECIMALS = 5
+_FAR = 1e5
+"""What is without end ends here in a box."""
 
 
 class NumberBox(QDoubleSpinBox):
@@ -167,6 +171,18 @@ class NumberBox(QDoubleSpinBox):
 
     def _end_typing(self) -> None:
         self._typing = False
+
+
+def option_box(
+    record: type[OptionRecord], name: str, suffix: str, *, decimals: int = 0, step: float = 1.0
+) -> NumberBox:
+    """Make the box of an option: its record says the bounds, and what the option is."""
+    option = option_named(record, name)
+    bounds = option.bounds or Bounds()
+    low, high = (min(max(end, -_FAR), _FAR) for end in (bounds.low, bounds.high))
+    # What must be above a number begins with the least that the box can show.
+    low += bounds.above * 10.0**-decimals
+    return NumberBox(low, high, suffix, option.sentence, decimals=decimals, step=step)
 
 
 class Choice(QComboBox):

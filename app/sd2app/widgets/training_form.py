@@ -11,12 +11,11 @@ from PySide6.QtWidgets import QApplication, QGridLayout, QLabel, QMenu, QSizePol
 
 from sd2app.background.run_setup import RunSetup
 from sd2app.feature import Shell
-from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.inputs import Choice, NumberBox, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, sentence, show_words, side_by_side, title
 from sd2app.widgets.text import about
-from sd2core.options.bounds import Bounds
-from sd2core.options.records import Option, OptionRecord, options_of
+from sd2core.options.records import OptionRecord, option_named
 
 
 class Field(NamedTuple):
@@ -28,17 +27,6 @@ class Field(NamedTuple):
     step: float
     decimals: int = 0
     suffix: str = ""
-
-    @property
-    def option(self) -> Option:
-        """The option."""
-        return next(one for one in options_of(self.record) if one.name == self.name)
-
-    @property
-    def tip(self) -> str:
-        """What it is, as a sentence."""
-        words = self.option.words
-        return f"{words[0].upper()}{words[1:]}"
 
 
 class TrainingForm(QWidget):
@@ -70,11 +58,9 @@ class TrainingForm(QWidget):
 
     def number(self, field: Field) -> NumberBox:
         """Make the box of a setting."""
-        bounds = field.option.bounds or Bounds()
-        box = NumberBox(
-            bounds.low, bounds.high, field.suffix, field.tip,
-            decimals=field.decimals, step=field.step,
-        )  # fmt: skip
+        box = option_box(
+            field.record, field.name, field.suffix, decimals=field.decimals, step=field.step
+        )
         box.setMinimumWidth(64)
         box.setGroupSeparatorShown(field.decimals == 0 and field.name != "seed")
         box.valueChanged.connect(partial(self._setup.set_value, field.name))
@@ -186,6 +172,6 @@ def step_text(seconds: float) -> str:
 def labelled(grid: QGridLayout, place: tuple[int, int], field: Field, box: NumberBox) -> None:
     """Put a box with its label into a grid, at a row and a column."""
     label = QLabel(field.text)
-    label.setToolTip(field.tip)
+    label.setToolTip(option_named(field.record, field.name).sentence)
     grid.addWidget(label, *place)
     grid.addWidget(box, place[0], place[1] + 1)

@@ -71,8 +71,8 @@ def test_counts_follow_and_the_data_set_is_written(
     # The recording has 60 frames: none of 72 on end.
     assert "No recording has 72 frames on end with a person." in words(dialog)
     assert not button(dialog, "Export…").isEnabled()
-    type_frames(dialog, "Frames of a segment", "20", qtbot)
-    type_frames(dialog, "Frames that neighbouring segments share", "0", qtbot)
+    type_frames(dialog, "Length of a segment (default: 72)", "20", qtbot)
+    type_frames(dialog, "Frames that neighbours share (default: 10)", "0", qtbot)
     check(dialog, "denoised", qtbot)
     assert (model.choice.length, model.choice.overlap) == (20, 0)
     assert model.choice.maps == {"synthetic", "radar"}
@@ -110,7 +110,7 @@ def test_it_goes_on_when_the_dialog_is_closed_and_can_be_stopped(
 ) -> None:
     model = models_of(window).export
     monkeypatch.setattr(model, "_command", (sys.executable, str(FAKE), "slow"))
-    type_frames(dialog, "Frames of a segment", "20", qtbot)
+    type_frames(dialog, "Length of a segment (default: 72)", "20", qtbot)
     qtbot.waitUntil(lambda: model.ready, timeout=20_000)
     out = tmp_path / "s.zarr"
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, **__: (str(out), ""))
@@ -135,10 +135,13 @@ def test_one_segment_of_each_labelled_span(window, dialog, qtbot) -> None:
     cut = next(one for one in dialog.findChildren(QComboBox) if "segment is" in one.toolTip())
     qtbot.keyClick(cut, Qt.Key.Key_Down)
     assert model.choice.spans
-    type_frames(dialog, "Time kept before and after each span", "0.1", qtbot)
+    type_frames(dialog, "Of spans: time kept before and after each (default: 0)", "0.1", qtbot)
     assert model.choice.margin_s == pytest.approx(0.1)
     shown = {one.toolTip() for one in dialog.findChildren(NumberBox) if one.isVisible()}
-    assert shown == {"Frames of a segment", "Time kept before and after each span"}
+    assert shown == {
+        "Length of a segment (default: 72)",
+        "Of spans: time kept before and after each (default: 0)",
+    }
     qtbot.waitUntil(lambda: not model.counting, timeout=20_000)
     assert model.forecast is not None
     assert model.forecast.of_label == {"there": 1, "back": 1}
