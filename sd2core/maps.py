@@ -508,9 +508,26 @@ def draw_cells(
     high: float,
     colours: Any = "viridis",
 ) -> Any:
-    """Draw levels (bins, frames) over seconds and m/s; grey where nothing is known.
+    """Draw levels over seconds and m/s; grey where nothing is known.
 
-    Returns what a colour bar is made for. ``present`` is False in frames without a person.
+    Parameters
+    ----------
+    axes : matplotlib Axes
+    level : float64 array, shape (bins, frames)
+        In any unit; NaN where nothing is known.
+    axis : VelocityAxis
+    timebase : Timebase
+        Of the frames.
+    present : bool array, shape (frames,), or None
+        False in frames without a person; None: there is one in all.
+    low, high : float
+        Levels of the first and the last colour.
+    colours : str or matplotlib Colormap
+
+    Returns
+    -------
+    matplotlib QuadMesh
+        What a colour bar is made for.
     """
     times_s = timebase.edges_s
     axes.set_facecolor(_NOTHING)

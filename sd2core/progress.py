@@ -17,7 +17,17 @@ _STEPS = 1000
 
 
 def part_of(progress: Progress, start: float, stop: float, of: int = 1) -> Progress:
-    """Progress of a part of the work, from ``start`` to ``stop`` of ``of``."""
+    """Progress of a part of the work.
+
+    Parameters
+    ----------
+    progress : Progress
+        Of the whole; called with thousandths of ``of``.
+    start, stop : float
+        Where the part begins and ends, from 0 to ``of``.
+    of : int
+        Size of the whole.
+    """
     return lambda done, total: progress(
         round(_STEPS * (start + (stop - start) * done / max(total, 1))), _STEPS * of
     )

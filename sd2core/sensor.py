@@ -138,6 +138,14 @@ def position_from_spherical(
 
     Azimuth 0, elevation 0 is on the target's camera side, straight along the
     optical axis; azimuth turns to the right in the image, elevation upwards.
+
+    Parameters
+    ----------
+    target_m : (float, float, float)
+        In the camera frame.
+    range_m : float
+        From target to sensor.
+    azimuth_deg, elevation_deg : float
     """
     towards = direction_from_angles(180.0 - azimuth_deg, elevation_deg)
     return (

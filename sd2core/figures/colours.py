@@ -56,7 +56,17 @@ DIVERGING = colour_table(_DIVERGING)
 
 
 def look_up(table: Rgb, values: NDArray[np.floating], low: float, high: float) -> Rgb:
-    """Colours of values between two limits, held at both ends; shape (..., 3)."""
+    """Colours of values between two limits, held at both ends; shape (..., 3).
+
+    Parameters
+    ----------
+    table : uint8 array, shape (256, 3)
+        As :func:`colour_table` makes it.
+    values : float array, shape (...)
+        NaN has the first colour.
+    low, high : float
+        Values of the first and the last colour; ``low < high``.
+    """
     share = (np.asarray(values, np.float32) - low) * (256.0 / (high - low))
     index = np.nan_to_num(np.clip(share, 0.0, 255.0), nan=0.0).astype(np.uint8)
     return table[index]

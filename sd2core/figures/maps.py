@@ -130,9 +130,27 @@ def draw_maps(
 ) -> Figure:
     """Draw maps on one time axis, from top to bottom, between two times.
 
-    ``difference`` names two rows: the level of the first minus that of the second is a last
-    row. Labels are drawn below the maps, and their edges on them, where any is in view. The
-    heading is the subject of the maps, with the word simulated where it is.
+    Parameters
+    ----------
+    rows : sequence of MapRow
+        At least one.
+    levels : Levels
+        Colour scale of all maps.
+    start_s, end_s : float
+        Ends of the time axis; ``start_s < end_s``.
+    difference : (int, int), optional
+        Two rows: the level of the first minus that of the second is a last row
+        (:func:`difference_of`).
+    labels : Labels, optional
+        Drawn below the maps, and their edges on them, where any is in view.
+    heading : str
+        Subject of the maps, with the word simulated where it is; empty for none.
+
+    Raises
+    ------
+    Sd2Error
+        Without a map, if the start is not before the end, or if the two maps of a difference have
+        different velocity axes.
     """
     from matplotlib.figure import Figure
 
@@ -172,7 +190,7 @@ def draw_maps(
         _draw_difference(figure, maps_axes[-1], first, second, levels)
     if labels is not None and lanes:
         in_per_s = 0.8 * _WIDTH_IN / (end_s - start_s)
-        draw_lanes(all_axes[-1], lanes, labels, start_s, end_s, in_per_s)
+        _draw_lanes(all_axes[-1], lanes, labels, start_s, end_s, in_per_s)
         add_key(figure, lanes, labels)
         for axes in maps_axes:
             draw_edges(axes, lanes, in_per_s)
@@ -189,7 +207,15 @@ def draw_maps(
 def save_maps(figure: Figure, path: Path, rows: Sequence[MapRow], about: dict[str, Any]) -> None:
     """Write a figure of :func:`draw_maps` as PNG, SVG or PDF by the name's ending.
 
-    ``about`` is further provenance, fit for JSON.
+    Parameters
+    ----------
+    figure : Figure
+    path : Path
+        Ends in ``.png``, ``.svg`` or ``.pdf``; errors are those of :func:`save_figure`.
+    rows : sequence of MapRow
+        Maps in the figure, for its provenance.
+    about : dict
+        Further provenance, fit for JSON.
     """
     provenance = about | {
         "maps": [
@@ -262,7 +288,7 @@ def lanes_of(labels: Labels, start_s: float, end_s: float) -> list[tuple[str, li
     return lanes
 
 
-def draw_lanes(
+def _draw_lanes(
     axes: Axes,
     lanes: Sequence[tuple[str, Sequence[Span]]],
     labels: Labels,

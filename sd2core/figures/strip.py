@@ -52,10 +52,21 @@ def plot_strip(
     options: StripOptions | None = None,
     progress: Progress = silent,
 ) -> Figure:
-    """Draw a strip of frames, which are numbers on :attr:`StripSource.clock`.
+    """Draw a strip of frames.
 
-    Progress is called once per frame. Raises Sd2Error if a row needs what is not there, or
-    a frame does not exist.
+    Parameters
+    ----------
+    source : StripSource
+    frames : sequence of int
+        Numbers on :attr:`StripSource.clock`, in the order in which they are drawn; 1 to 100.
+    options : StripOptions, optional
+    progress : Progress
+        Called once per frame.
+
+    Raises
+    ------
+    Sd2Error
+        If a row needs what is not there, or a frame does not exist.
     """
     from matplotlib.figure import Figure
 
@@ -94,6 +105,17 @@ def save_strip(
     """Write a strip as PNG, SVG or PDF by the name's ending, with its provenance.
 
     Text and axes of SVG and PDF are text and lines; pictures and meshes are pictures in them.
+
+    Parameters
+    ----------
+    figure : Figure
+        Of :func:`plot_strip`.
+    path : Path
+        Ends in ``.png``, ``.svg`` or ``.pdf``; errors are those of :func:`save_figure`.
+    source : StripSource
+    frames : sequence of int
+    options : StripOptions
+        What the figure was made of, for its provenance.
     """
     provenance = {
         "source": source.name,

@@ -66,7 +66,18 @@ class StripSource:
     def of(
         cls, recording: Recording, video: VideoReader | None, mesh: MeshSequence | None, name: str
     ) -> StripSource:
-        """Source from a recording, its parts opened by the caller."""
+        """Source from a recording, its parts opened by the caller.
+
+        Parameters
+        ----------
+        recording : Recording
+            Gives the focal length, the sensor, and whether it is simulated.
+        video : VideoReader or None
+            Without one the camera's picture has 640 × 480 pixels.
+        mesh : MeshSequence or None
+        name : str
+            Of the recording, for provenance and errors.
+        """
         width, height = (video.width, video.height) if video is not None else (640, 480)
         focal_px = recording.focal_px(width, height)
         camera = PinholeCamera.default(width, height)
@@ -127,6 +138,15 @@ def spread_frames(count: int, total: int) -> list[int]:
 
 
 def frames_around(frame: int, count: int, step: int, total: int) -> list[int]:
-    """``count`` frames, ``step`` apart, ``frame`` in their middle; none outside the clip."""
+    """``count`` frames, ``step`` apart, ``frame`` in their middle; none outside the clip.
+
+    Parameters
+    ----------
+    frame : int
+    count, step : int
+        1 or more; of an even count one frame more follows than precedes.
+    total : int
+        Frames of the clip.
+    """
     first = frame - step * ((count - 1) // 2)
     return [k for k in range(first, first + step * count, step) if 0 <= k < total]

@@ -84,8 +84,21 @@ def find_visible_triangles(
 ) -> VisibleTriangles:
     """Find the triangle of a mesh that each pixel of a picture, or of a part of it, shows.
 
-    Vertices (V, 3) are in metres in the camera's frame; triangles with an unknown corner
-    are left out. Faces (F, 3) are counter-clockwise seen from outside.
+    Parameters
+    ----------
+    vertices_m : float array, shape (V, 3)
+        In the camera's frame, metres; triangles with an unknown corner (NaN, or not ahead of the
+        camera) are left out.
+    faces : int32 array, shape (F, 3)
+        Counter-clockwise seen from outside; those that face away are not seen.
+    camera : PinholeCamera
+    frame : Frame, optional
+        Part of the picture; by default the whole at its own size.
+
+    Returns
+    -------
+    VisibleTriangles
+        Owners are numbers among the triangles that are not left out, which are its ``faces``.
     """
     frame = frame or Frame.whole(camera)
     pixels, depth = project_vertices(vertices_m, camera)
@@ -119,8 +132,20 @@ def shade_mesh(
 ) -> NDArray[np.float32]:
     """Shade a mesh by a lamp at the camera: 0 beside it, from a third (edge-on) to 1 (square on).
 
-    Vertices (V, 3) are in metres in the camera's frame; without faces they are drawn as
-    dots, of value 1. The whole picture (height, width) unless a part of it is given.
+    Parameters
+    ----------
+    vertices_m : float array, shape (V, 3)
+        In the camera's frame, metres.
+    faces : int32 array, shape (F, 3), or None
+        Counter-clockwise seen from outside. None: the vertices are drawn as dots of value 1
+        (:func:`draw_dots`).
+    camera : PinholeCamera
+    frame : Frame, optional
+        Part of the picture; by default the whole at its own size.
+
+    Returns
+    -------
+    float32 array, shape (height, width)
     """
     if faces is None:
         return draw_dots(vertices_m, camera, frame)

@@ -37,9 +37,21 @@ def save_figure(
 ) -> None:
     """Write a figure as PNG, SVG or PDF, by the name's ending.
 
-    Provenance, fit for JSON, goes into the file with the version of the program; words of SVG
-    and PDF are then text, and the same figure gives the same bytes. Raises Sd2Error for another
-    ending, or a folder that does not exist.
+    Parameters
+    ----------
+    figure : Figure
+    path : Path
+        In a folder that exists.
+    provenance : mapping, optional
+        Fit for JSON. It goes into the file with the version of the program; words of SVG and PDF
+        are then text, and the same figure gives the same bytes.
+    pixels_per_inch : float, optional
+        By default the figure's own.
+
+    Raises
+    ------
+    Sd2Error
+        For another ending, or a folder that does not exist.
     """
     from matplotlib import rc_context
 

@@ -48,8 +48,25 @@ class NpzArrays(Mapping[str, NDArray[Any]]):
 def open_npz_file(path: Path, what: str, expected: str, remedy: str = "") -> Iterator[NpzArrays]:
     """Open an ``.npz``, whose arrays are read where asked for.
 
-    Raises Sd2Error, that it cannot be read as ``what``, if it is damaged or declares more than its
-    size allows, also for what goes wrong while it is open, but with another file.
+    Parameters
+    ----------
+    path : Path
+    what : str
+        Name of the content in the message: "… cannot be read as ``what``".
+    expected : str
+        What was expected, for the message.
+    remedy : str
+        What to do, for the message.
+
+    Yields
+    ------
+    NpzArrays
+
+    Raises
+    ------
+    Sd2Error
+        If it is damaged or declares more than its size allows, also for what goes wrong while it is
+        open, except in another file.
     """
     try:
         with open_zip(path) as archive:

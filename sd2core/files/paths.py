@@ -104,7 +104,18 @@ def common_suffix_length(a: Path, b: Path) -> int:
 
 
 def free_path(folder: Path, name: str, prefix: str, *, reserved: str) -> Path:
-    """Free path for ``name`` in a folder, with a prefix and a number if it is taken."""
+    """Free path for ``name`` in a folder, with a prefix and a number if it is taken.
+
+    Parameters
+    ----------
+    folder : Path
+    name : str
+        Wanted name of a file or folder.
+    prefix : str
+        Put before the name where that is taken: ``prefix-name``, then ``prefix-2-name`` and so on.
+    reserved : str
+        Name that is never given.
+    """
     names = chain((name, f"{prefix}-{name}"), (f"{prefix}-{n}-{name}" for n in count(2)))
     return next(
         folder / free

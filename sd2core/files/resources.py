@@ -52,10 +52,30 @@ def open_bundled_arrays(
 ) -> Iterator[tuple[dict[str, Any], Mapping[str, NDArray[Any]]]]:
     """Open an ``.npz`` whose ``meta`` tells its format; arrays are read where asked for.
 
-    ``kind`` and ``version`` are the format that is wanted, from version ``oldest`` up to this one;
-    ``what`` it holds and the ``command`` that writes it are for the error. Raises Sd2Error if the
-    file is missing, damaged, of another version, or lacks an array that is asked for while it is
-    open.
+    Parameters
+    ----------
+    path : Path
+    kind : str
+        Name of the format that is wanted.
+    version : int
+        Latest version that is read.
+    what : str
+        What it holds, for the error.
+    command : str
+        Command that writes it, for the error.
+    oldest : int
+        Earliest version that is read.
+
+    Yields
+    ------
+    meta : dict
+    arrays : mapping of str to array
+
+    Raises
+    ------
+    Sd2Error
+        If the file is missing, damaged, of another format or version, or lacks an array that is
+        asked for while it is open.
     """
     from sd2core.files.numpy_files import open_npz_file
 

@@ -312,7 +312,19 @@ def array_names(path: Path) -> list[str]:
 def array_in(
     group: Any, path: Path, name: str, unit: str, *, sparse: bool | None = None
 ) -> StoredArray:
-    """Array of an open group, to be read; Sd2Error if its description is damaged."""
+    """Array of an open group, to be read.
+
+    Parameters
+    ----------
+    group : zarr.Group
+    path, name, unit, sparse
+        As for :class:`StoredArray`; the name is that within the group.
+
+    Raises
+    ------
+    Sd2Error
+        If the array is missing, or its description is damaged or not safe.
+    """
     try:
         return StoredArray(group[name], path, name, unit, sparse=sparse)
     except Sd2Error:

@@ -128,10 +128,23 @@ def read_json(path: Path, expected: str = EXPECTED_JSON, remedy: str = "") -> An
 
 
 def parse_json(text: str, place: str | Path, expected: str, remedy: str = "") -> Any:
-    """Parse JSON that stands at a place, such as a file.
+    """Parse JSON that stands at a place.
 
-    Raises Sd2Error where it is none, or holds what no reader copes with: lists or tables in each
-    other more than a hundred deep, a number of more than 300 digits, or half a character.
+    Parameters
+    ----------
+    text : str
+    place : str or Path
+        Where it stands, such as a file, for the error.
+    expected : str
+        What was expected, for the error.
+    remedy : str
+        What to do, for the error; by default to correct the file or copy it again.
+
+    Raises
+    ------
+    Sd2Error
+        Where it is none, or holds what no reader copes with: lists or tables in each other more
+        than a hundred deep, a number of more than 300 digits, or half a character.
     """
     return _parsed("JSON", text, place, expected, remedy)
 
@@ -142,7 +155,13 @@ def read_toml(path: Path, expected: str, remedy: str = "") -> dict[str, Any]:
 
 
 def parse_toml(text: str, place: str | Path, expected: str, remedy: str = "") -> dict[str, Any]:
-    """Parse TOML that stands at a place; raises Sd2Error as :func:`parse_json`."""
+    """Parse TOML that stands at a place; raises Sd2Error as :func:`parse_json`.
+
+    Parameters
+    ----------
+    text, place, expected, remedy
+        As for :func:`parse_json`.
+    """
     content: dict[str, Any] = _parsed("TOML", text, place, expected, remedy)
     return content
 
@@ -180,7 +199,23 @@ def damage_in(place: str | Path, expected: str = "") -> Iterator[None]:
 
 
 def check_version(content: Any, file: Path, form: str, newest: int) -> None:
-    """Refuse the content of a file of another format, or of a later version than the newest."""
+    """Refuse the content of a file of another format, or of a version that is not known.
+
+    Parameters
+    ----------
+    content : object
+        As parsed; anything but a dict has no format.
+    file : Path
+        For the error.
+    form : str
+        Wanted value of ``format``.
+    newest : int
+        Largest ``version`` that is read; the least is 1.
+
+    Raises
+    ------
+    Sd2Error
+    """
     found = content.get("format") if isinstance(content, dict) else None
     if found != form:
         raise Sd2Error(f"{file} has the format {found!r}", f"the format {form!r}")

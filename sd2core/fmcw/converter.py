@@ -43,12 +43,30 @@ def digitise(
 ) -> dict[str, float]:
     """Apply gain and thermal noise and round to converter counts around mid-scale.
 
-    ``samples``, of the shape of the signal, (frames, receivers, chirps, samples), gets the result:
-    counts, or relative to half the range where they are complex, with I and Q rounded each.
-    ``peak`` is the signal's largest magnitude, ``power`` the mean square of the moving scene's part
-    over the frames with a person. ``first`` is the number of the first of these frames in the
-    recording, which selects its noise. ``go_on`` is called once per frame and may raise to stop.
-    Returns improvement and noise of the converter, for provenance.
+    Parameters
+    ----------
+    signal : float32 or complex64 array, shape (frames, receivers, chirps, samples)
+        Real, or I and Q.
+    peak : float
+        The signal's largest magnitude.
+    power : float
+        Mean square of the moving scene's part over the frames with a person; 0 without any.
+    config : RadarConfig
+        The converter's bits, and the bandwidth of a link's noise.
+    options : SignalOptions
+        What sets gain and noise, and the noise's seed.
+    samples : array, shape of ``signal``
+        Written: counts, or relative to half the range where the signal is complex, with I and Q
+        rounded each.
+    go_on : callable
+        Called once per frame; may raise to stop.
+    first : int
+        Number of the first of these frames in the recording, which selects its noise.
+
+    Returns
+    -------
+    dict
+        For provenance: ``counts_per_unit``, ``noise_rms_counts`` and ``clipped_share``.
     """
     middle = 2 ** (config.adc_bits - 1)
     gain = options.peak_share * middle / peak if peak > 0 else 1.0
@@ -100,9 +118,23 @@ def simulated_capture(
 ) -> RadarCapture:
     """Capture of simulated samples, with the provenance of the simulation.
 
-    ``times_s`` are the middles of the frames on the scene's clock, ``levels`` what
-    :func:`digitise` returned, ``how`` further entries about the simulation, ``nobody``
-    half-open runs of frames in which nothing echoes because there is no person.
+    Parameters
+    ----------
+    samples : array, shape (frames, receivers, chirps, samples)
+        As :func:`digitise` wrote them.
+    config : RadarConfig
+    times_s : float64 array, shape (frames,)
+        Middles of the frames on the scene's clock; the capture's own begins at 0.
+    source : str
+        File of the scene; empty if there is none.
+    sensor : VirtualSensor
+    options : SignalOptions
+    levels : dict
+        What :func:`digitise` returned.
+    how : dict, optional
+        Further entries about the simulation.
+    nobody : sequence of (int, int)
+        Half-open runs of frames in which nothing echoes because there is no person.
     """
     return RadarCapture(
         samples=samples,

@@ -91,12 +91,24 @@ def facet_mean(
 ) -> Any:
     """Mean over a triangle of weight times exp(j phase), and its derivative.
 
-    ``a``, ``b``, ``c`` are phases at the corners in radians; weights are linear between the
-    corners; ``turn`` is the rate of change of the phase at a corner; ``bend`` is the deviation of
-    the phase from linearity: along an edge it sags by a quarter of this.
-
     The mean is exact to 1e-7 of the weight for a linear phase, and to first order in the bend about
     its mean; the derivative neglects the bend.
+
+    Parameters
+    ----------
+    a, b, c : float
+        Phases at the corners, in radians.
+    weight_a, weight_b, weight_c : float
+        Weights at the corners, linear between them.
+    turn_a, turn_b, turn_c : float
+        Rates of change of the phase at the corners; the derivative is by their variable.
+    bend_ab, bend_bc, bend_ca : float
+        Deviation of the phase from linearity, in radians: along an edge it sags by a quarter of
+        this.
+
+    Returns
+    -------
+    complex, complex
     """
     # Sorted, so that every division but those along the edges is by the whole span.
     if a > b:
@@ -153,7 +165,13 @@ def bent_facet_mean(
     bend_bc: float,
     bend_ca: float,
 ) -> Any:
-    """Compute :func:`facet_mean`; a strongly bent facet is cut in four, bent by a quarter each."""
+    """Compute :func:`facet_mean`; a strongly bent facet is cut in four, bent by a quarter each.
+
+    Parameters
+    ----------
+    a, b, c, weight_a, weight_b, weight_c, turn_a, turn_b, turn_c, bend_ab, bend_bc, bend_ca : float
+        As for :func:`facet_mean`.
+    """
     if max(bend_ab, bend_bc, bend_ca) < _CUT_ABOVE_RAD:
         return facet_mean(
             a, b, c, weight_a, weight_b, weight_c, turn_a, turn_b, turn_c,

@@ -229,11 +229,25 @@ def direct_sum(
     half_chirps: float,
     total: NDArray[np.complex128],
 ) -> None:
-    """Add scatterers [start, stop) to ``total`` (chirps, samples), every phase on its own.
+    """Add scatterers to ``total``, every phase on its own.
 
     Turns at chirp m and sample n, both counted from the frame's middle, are
-    start + m chirp + n sample + m n migration; the amplitude (terms, k) is a
-    polynomial in m over ``half_chirps``.
+    start + m chirp + n sample + m n migration.
+
+    Parameters
+    ----------
+    start_turns, chirp_turns, sample_turns, migration_turns : float64 array, shape (k,)
+        See :class:`~sd2core.fmcw.sums.Turns`.
+    amplitude : complex128 array, shape (terms, k)
+        Polynomial in m over ``half_chirps``, the constant first.
+    start, stop : int
+        Half-open range of the scatterers to add.
+    first_chirp, first_sample : float
+        The first m and the first n.
+    half_chirps : float
+        Half the chirps of the radar's frame.
+    total : complex128 array, shape (chirps, samples)
+        Added to.
     """
     terms = amplitude.shape[0]
     for k in range(start, stop):
@@ -265,10 +279,18 @@ def recurrent_sum(
     real_total: Floats,
     imaginary_total: Floats,
 ) -> None:
-    """Compute :func:`direct_sum` with one phasor per chirp, turned from sample to sample.
+    """Add all scatterers as :func:`direct_sum`, one phasor per chirp turned from sample to sample.
 
-    Totals are (samples, chirps) each; rounding grows with the number of samples, to some
-    1e-14 times it.
+    Rounding grows with the number of samples, to some 1e-14 times it.
+
+    Parameters
+    ----------
+    start_turns, chirp_turns, sample_turns, migration_turns, amplitude
+        As for :func:`direct_sum`.
+    first_chirp, first_sample, half_chirps : float
+        As for :func:`direct_sum`.
+    real_total, imaginary_total : float64 array, shape (samples, chirps)
+        Added to.
     """
     samples, chirps = real_total.shape
     terms = amplitude.shape[0]

@@ -50,9 +50,17 @@ def converged_frame(
     ``motion`` makes it, so that this is the limit of the same physics. A rough surface has
     one random phase per facet and is summed as it is.
 
-    ``time_s`` is the middle of the frame; ``tolerance`` the L1 between the last two marginals. It
-    stops after ``most_cuts`` halvings, converged or not. ``go_on`` is called every few ten
-    milliseconds and may raise to stop.
+    Parameters
+    ----------
+    scene : WaveScene
+    time_s : float
+        Middle of the frame.
+    tolerance : float
+        L1 between the last two marginals below which it has converged.
+    most_cuts : int
+        Halvings after which it stops, converged or not.
+    go_on : callable, optional
+        Called every few ten milliseconds; may raise to stop.
     """
     signal = _cut(scene, time_s, 0, go_on)
     pieces, changes = [1], list[float]()

@@ -78,8 +78,14 @@ def direct(
 ) -> NDArray[np.complex128]:
     """Sum every echo at every sample directly, (chirps, samples); the reference.
 
-    ``chirps`` is the number around the middle; None: the radar's own. ``go_on`` is called every few
-    ten milliseconds and may raise to stop.
+    Parameters
+    ----------
+    echoes : Echoes
+    config : RadarConfig
+    chirps : int, optional
+        Number around the frame's middle; by default the radar's own.
+    go_on : callable, optional
+        Called every few ten milliseconds; may raise to stop.
     """
     turns = turns_of(echoes, config)
     shape = (chirps or config.chirps_per_frame, config.samples_per_chirp)
@@ -128,9 +134,15 @@ def nufft(
 ) -> NDArray[np.complex128]:
     """Compute the same sum by type-1 non-uniform FFTs on one thread, (chirps, samples).
 
-    Each of the ``blocks``, no more than there are chirps, has beat frequencies of its own. One
-    block leaves 2 pi (2 / c) S r t_m t_n out of the phase at its ends. ``chirps`` is the number
-    around the middle; None: the radar's own.
+    Parameters
+    ----------
+    echoes : Echoes
+    config : RadarConfig
+    blocks : int
+        Each, no more than there are chirps, has beat frequencies of its own. One block leaves
+        2 pi (2 / c) S r t_m t_n out of the phase at its ends.
+    chirps : int, optional
+        Number around the frame's middle; by default the radar's own.
     """
     turns = turns_of(echoes, config)
     chirps = chirps or config.chirps_per_frame

@@ -103,8 +103,16 @@ class WaveScene:
     ) -> Echoes:
         """Echoes of every facet on every path to one receiver.
 
-        Other ``faces`` than the mesh's own belong to other vertices, and are for a
-        smooth surface: the phases of a rough one belong to its facets.
+        Parameters
+        ----------
+        position_m, velocity_mps : float64 array, shape (V, 3)
+            Of the vertices, in the middle of the frame, or at a chirp.
+        visible : bool array, shape (F,), or None
+            Facets that nothing hides; None: all. Of these, those that face both antennas echo.
+        receiver : int
+        faces : int32 array, shape (F, 3), optional
+            Others than the mesh's own belong to other vertices, and are for a smooth surface: the
+            phases of a rough one belong to its facets.
         """
         assert faces is None or self._random is None
         faces = self.faces if faces is None else faces

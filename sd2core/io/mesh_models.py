@@ -32,8 +32,18 @@ def read_model_output(
 ) -> RawMesh:
     """Read vertices from a pickle or joblib file without executing anything in it.
 
-    Options as for :func:`sd2core.io.mesh.load_mesh`. Raises Sd2Error if the file holds no vertices,
-    or something that is not plain data.
+    Parameters
+    ----------
+    path : Path
+    person, image_size, focal_px, distance_m
+        As for :func:`sd2core.io.mesh.load_mesh`, which moves the mesh by the distance: where it is
+        given, the mesh is not placed here.
+
+    Raises
+    ------
+    Sd2Error
+        If the file holds no vertices, something that is not plain data, no such person, or a camera
+        that does not fit its frames.
     """
     content = read_pickle(path)
     content = _plain_keys(content) if isinstance(content, dict) else {"verts": content}
@@ -77,8 +87,16 @@ def weak_perspective_shift(
     = 2·f/(s·h); equal position gives T_x = t_x + (c_x - W/2)·2/(s·h). The same holds for y
     with the image's height.
 
-    ``camera`` (T, 3) is s, t_x, t_y; ``boxes`` (T, 4) are c_x, c_y, width, height in pixels
-    (VIBE's are square); the image's size is width, height in pixels.
+    Parameters
+    ----------
+    camera : float64 array, shape (T, 3)
+        s, t_x, t_y.
+    boxes : float64 array, shape (T, 4)
+        c_x, c_y, width and height in pixels; VIBE's are square.
+    image_size : (int, int)
+        Width and height in pixels.
+    focal_px : float
+        f.
     """
     metres_per_pixel = 2.0 / (camera[:, 0] * boxes[:, 2])
     width, height = image_size

@@ -25,12 +25,28 @@ def write_video(
     crf: int = 21,
     preset: str = "slow",
 ) -> None:
-    """Encode sRGB pictures (height, width, 3) as H.264 in MP4.
+    """Encode sRGB pictures as H.264 in MP4.
 
-    Width and height are even. Frame k is shown at ``k / frames_per_s``, or at its time in
-    ``times_s``, the first of which is 0. ``crf`` and ``preset`` are those of x264: a lower
-    constant rate factor is better (18 is hard to tell from the source), a slower preset
-    makes a smaller file. Raises Sd2Error if this build of PyAV has no H.264 encoder.
+    Parameters
+    ----------
+    path : Path
+    frames : iterable of uint8 arrays, shape (height, width, 3)
+        Taken one by one.
+    frames_per_s : int
+        Frame k is shown at ``k / frames_per_s``; half of this many are between key frames.
+    size : (int, int)
+        Width and height in pixels, both even.
+    times_s : float64 array, shape (frames,), optional
+        Times of the frames instead, the first of which is 0.
+    crf : int
+        Constant rate factor of x264: lower is better; 18 is hard to tell from the source.
+    preset : str
+        Of x264: a slower one makes a smaller file.
+
+    Raises
+    ------
+    Sd2Error
+        If this build of PyAV has no H.264 encoder.
     """
     import av
 

@@ -62,7 +62,24 @@ def create(
     end_s: float,
     label: str,
 ) -> Edit:
-    """Create a span between two times, in either order, clipped to the free time of the track."""
+    """Create a span between two times, clipped to the free time of the track.
+
+    Parameters
+    ----------
+    labels : Labels
+    timebase : Timebase
+        Of the recording.
+    track : str
+        Name of one of the tracks.
+    start_s, end_s : float
+        In either order; the edges go to the nearest frame edges.
+    label : str
+
+    Raises
+    ------
+    Sd2Error
+        When no frame between them is free.
+    """
     frames = Frames.of(timebase)
     part = clip_to_free(labels, track, frames.stretch(start_s, end_s), frames)
     made = Span(labels.next_id, track, *part, label)
@@ -70,7 +87,23 @@ def create(
 
 
 def duplicate(labels: Labels, timebase: Timebase, ids: Collection[int], start_s: float) -> Edit:
-    """Copy spans so that the first copy begins at a time; each is clipped to free time."""
+    """Copy spans so that the first copy begins at a time; each is clipped to free time.
+
+    Parameters
+    ----------
+    labels : Labels
+    timebase : Timebase
+        Of the recording.
+    ids : collection of int
+        Spans to copy.
+    start_s : float
+        Start of the copy of the first of them; the others keep their distances from it.
+
+    Raises
+    ------
+    Sd2Error
+        When there is no free frame for a copy.
+    """
     frames, chosen = Frames.of(timebase), _chosen(labels, ids)
     after = labels
     made: list[int] = []
@@ -93,7 +126,18 @@ def delete(labels: Labels, ids: Iterable[int]) -> Edit:
 
 
 def resize(labels: Labels, timebase: Timebase, span_id: int, side: Side, time_s: float) -> Edit:
-    """Move one edge of a span to the frame edge nearest to a time, as far as it can go."""
+    """Move one edge of a span to the frame edge nearest to a time, as far as it can go.
+
+    Parameters
+    ----------
+    labels : Labels
+    timebase : Timebase
+        Of the recording.
+    span_id : int
+    side : {"start", "end"}
+        Edge that is moved.
+    time_s : float
+    """
     frames = Frames.of(timebase)
     span = labels.span(span_id)
     ((low_s, high_s),) = limits_of(labels, [span], frames)
@@ -114,6 +158,18 @@ def move(
     """Move spans so that one of them, the dragged one, begins at a time.
 
     One alone keeps its duration; several keep their order and their contacts.
+
+    Parameters
+    ----------
+    labels : Labels
+    timebase : Timebase
+        Of the recording.
+    ids : collection of int
+        Spans to move; the lead may be among them.
+    lead_id : int
+        Span that is dragged.
+    start_s : float
+        Its wanted start; frame edges and neighbours decide how near it comes.
     """
     frames = Frames.of(timebase)
     chosen = _chosen(labels, {*ids, lead_id})
@@ -133,6 +189,15 @@ def nudge(labels: Labels, timebase: Timebase, ids: Collection[int], count: int) 
 
     Where frames are not evenly spaced their durations change, and a step back restores them. A
     span alone that is between frames goes to them with the first step.
+
+    Parameters
+    ----------
+    labels : Labels
+    timebase : Timebase
+        Of the recording.
+    ids : collection of int
+    count : int
+        Frames; negative to earlier ones.
     """
     frames = Frames.of(timebase)
     chosen = _chosen(labels, ids)
@@ -154,7 +219,22 @@ def nudge(labels: Labels, timebase: Timebase, ids: Collection[int], count: int) 
 
 
 def split(labels: Labels, timebase: Timebase, span_id: int, time_s: float) -> Edit:
-    """Split a span at the frame nearest to a time; the first part keeps the id."""
+    """Split a span at the frame nearest to a time; the first part keeps the id.
+
+    Parameters
+    ----------
+    labels : Labels
+    timebase : Timebase
+        Of the recording.
+    span_id : int
+    time_s : float
+        Within the span.
+
+    Raises
+    ------
+    Sd2Error
+        When the time is not within the span, or that holds a single frame.
+    """
     frames = Frames.of(timebase)
     span = labels.span(span_id)
     if not span.start_s <= time_s <= span.end_s:
@@ -195,7 +275,23 @@ def merge(labels: Labels, ids: Sequence[int]) -> Edit:
 
 
 def join_at(labels: Labels, timebase: Timebase, one_id: int, other_id: int, time_s: float) -> Edit:
-    """Make two neighbours on a track meet at the frame nearest to a time: no gap, no overlap."""
+    """Make two neighbours on a track meet at the frame nearest to a time: no gap, no overlap.
+
+    Parameters
+    ----------
+    labels : Labels
+    timebase : Timebase
+        Of the recording.
+    one_id, other_id : int
+        In either order.
+    time_s : float
+        Each keeps a frame at least, however far away this is.
+
+    Raises
+    ------
+    Sd2Error
+        When they are no neighbours on one track, or have one frame between them.
+    """
     frames = Frames.of(timebase)
     left, right = sorted(
         (labels.span(one_id), labels.span(other_id)), key=lambda one: (one.start_s, one.end_s)
@@ -219,6 +315,16 @@ def fill_gaps(labels: Labels, timebase: Timebase, track: str, label: str) -> Edi
     """Create a span in every gap of a track that holds a frame, e.g. of background.
 
     Gaps before the first and after the last span count.
+
+    Parameters
+    ----------
+    labels : Labels
+    timebase : Timebase
+        Of the recording.
+    track : str
+        Name of one of the tracks.
+    label : str
+        Of the new spans.
     """
     frames = Frames.of(timebase)
     labels.track(track)
@@ -239,6 +345,17 @@ def overwrite(
     """Create a span between two times, cutting away other spans of the track there.
 
     A span around it is split; parts without a single frame are deleted.
+
+    Parameters
+    ----------
+    labels : Labels
+    timebase : Timebase
+        Of the recording.
+    track : str
+        Name of one of the tracks.
+    start_s, end_s : float
+        In either order; the edges go to the nearest frame edges.
+    label : str
     """
     frames = Frames.of(timebase)
     labels.track(track)

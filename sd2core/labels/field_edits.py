@@ -25,8 +25,19 @@ SpanField = Literal["label", "note", "author", "confidence", "track"]
 def set_field(labels: Labels, ids: Iterable[int], field: SpanField, value: Any) -> Edit:
     """Set one field of spans, at the times they have.
 
-    An empty note removes it; a confidence is 0 to 1, or None for unknown. Raises Sd2Error when
-    spans would overlap on an exclusive track; the message names both.
+    Parameters
+    ----------
+    labels : Labels
+    ids : iterable of int
+    field : {"label", "note", "author", "confidence", "track"}
+    value : str, float or None
+        An empty note removes it; a confidence is 0 to 1, or None for unknown.
+
+    Raises
+    ------
+    Sd2Error
+        When the value is none for that field, or spans would overlap on an exclusive track; the
+        message names both.
     """
     if field == "track":
         labels.track(value)
@@ -52,8 +63,16 @@ def offer(
 ) -> Edit:
     """Put suggestions on a track of their own, in place of earlier ones.
 
-    The edges of the ``found`` are put on frames of the recording. Spans that were rejected
-    (``declined``) or are labelled already are not suggested again.
+    Parameters
+    ----------
+    labels : Labels
+    timebase : Timebase
+        Of the recording.
+    found : sequence of Span
+        Suggestions, whose edges are put on frames. Those that overlap a labelled or a rejected span
+        by :data:`SAME_IOU` are left out.
+    declined : sequence of Span
+        Suggestions that were rejected.
     """
     kept = [one for one in labels.spans if one.origin != "suggestion" or one.track != TRACK]
     known = [*declined, *(one for one in kept if one.origin != "suggestion")]
@@ -82,10 +101,24 @@ def take(
 ) -> Edit:
     """Accept suggestions as spans of the user, on a track and with a label.
 
-    A track that is not there is added. On another track than their own they are clipped like new
-    spans to the longest free part, in the order given; those for which there is none stay
-    suggestions. ``keep_known`` keeps the label of suggestions that name a gesture or a label of the
-    set. Raises Sd2Error when one is no suggestion, or none has free time.
+    Parameters
+    ----------
+    labels : Labels
+    timebase : Timebase
+        Of the recording.
+    ids : iterable of int
+        Suggestions. On another track than their own they are clipped like new spans to the longest
+        free part, in this order; those for which there is none stay suggestions.
+    track : str
+        Added where it is not there.
+    label : str
+    keep_known : bool
+        Keeps the label of suggestions that name a gesture or a label of the set.
+
+    Raises
+    ------
+    Sd2Error
+        When none can be accepted: no id is a suggestion that has free time.
     """
     frames = Frames.of(timebase)
     after, done, refusal = labels, [], None

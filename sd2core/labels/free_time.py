@@ -121,7 +121,22 @@ def limits_of(labels: Labels, moved: Sequence[Span], frames: Frames) -> list[Str
 
 
 def steps_free(frames: Frames, span: Span, room: Stretch, count: int) -> int:
-    """Limit a move by ``count`` frames to those that a span can make inside its limits."""
+    """Limit a move by ``count`` frames to those that a span can make inside its limits.
+
+    Parameters
+    ----------
+    frames : Frames
+    span : Span
+    room : (float, float)
+        Limits of the span, as :func:`limits_of` finds them.
+    count : int
+        Frames; negative to earlier ones.
+
+    Returns
+    -------
+    int
+        From 0 to ``count``.
+    """
     low_s, high_s = room
     if count < 0:
         wall = int(frames.edges_s.searchsorted(low_s))
@@ -151,7 +166,19 @@ def free_parts(labels: Labels, track: str, wanted: Stretch) -> list[Stretch]:
 def clip_to_free(labels: Labels, track: str, wanted: Stretch, frames: Frames) -> Stretch:
     """Return the longest free part of a stretch; all of it where spans may overlap.
 
-    Raises Sd2Error when no frame of it is free.
+    Parameters
+    ----------
+    labels : Labels
+    track : str
+        Name of one of the tracks.
+    wanted : (float, float)
+        Start and end in seconds.
+    frames : Frames
+
+    Raises
+    ------
+    Sd2Error
+        When no frame of it is free.
     """
     if labels.track(track).overlap == "free":
         return wanted
@@ -178,8 +205,16 @@ def snap(
     Frames are always near: were they to compete with spans, spans would hardly ever win. Of edges
     equally near, a span's goes before a suggestion's, then the earlier one.
 
-    A span attracts from ``within_s``, some pixels of the time axis; 0: only exact hits. Spans to
-    ``ignore``, such as those being dragged, do not attract.
+    Parameters
+    ----------
+    labels : Labels
+    timebase : Timebase
+        Of the recording.
+    time_s : float
+    within_s : float
+        Distance from which a span attracts, some pixels of the time axis; 0: only exact hits.
+    ignore : collection of int
+        Spans that do not attract, such as those being dragged.
     """
     nearest_s = Frames.of(timebase).nearest(time_s)
     best: tuple[float, bool, float] | None = None
@@ -205,7 +240,18 @@ def seen_at(
 
     A key is pressed after the event was seen. The time is that of the frame on screen
     ``reaction_s`` earlier; not before the recording, nor, on an exclusive track, before the end of
-    the span before, and never later than ``now_s``, the frame on screen.
+    the span before, and never later than ``now_s``.
+
+    Parameters
+    ----------
+    labels : Labels
+    timebase : Timebase
+        Of the recording.
+    track : str
+        Name of the track on which the event is marked.
+    now_s : float
+        Time of the frame on screen.
+    reaction_s : float
     """
     frame = timebase.frame_at(now_s - reaction_s)
     if labels.track(track).overlap == "exclusive":

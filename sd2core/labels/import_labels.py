@@ -58,10 +58,23 @@ class Incoming:
 def take_in(labels: Labels, incoming: Incoming, way: Way, source: str) -> Edit:
     """Import the labels of a file into a recording.
 
-    Replacing takes the tracks, spans and numbers of the file, and its label set where it brings one
-    of its own. Adding leaves all that is there: the file's tracks come below it, those whose names
-    are taken with the name of the file (``source``), and what the file says of labels that the set
-    does not have is added to the set. Raises Sd2Error when there is nothing to take.
+    Parameters
+    ----------
+    labels : Labels
+        Of the recording.
+    incoming : Incoming
+        Of the file.
+    way : {"replace", "add"}
+        Replacing takes the tracks, spans and numbers of the file, and its label set where it brings
+        one of its own. Adding leaves all that is there: the file's tracks come below it, and what
+        the file says of labels that the set does not have is added to the set.
+    source : str
+        Name of the file, which tracks get whose names are taken.
+
+    Raises
+    ------
+    Sd2Error
+        When a file without spans is to be added.
     """
     brought = incoming.labels
     if not brought.spans and not incoming.outside and way == "add":

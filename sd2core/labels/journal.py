@@ -137,7 +137,15 @@ def head(kept: Kept) -> dict[str, Any]:
 
 
 def change(name: str, time_unix_s: float, before: Labels, after: Labels) -> dict[str, Any]:
-    """Return the content of the record of an edit."""
+    """Return the content of the record of an edit: what of the labels has changed.
+
+    Parameters
+    ----------
+    name : str
+        Of the edit.
+    time_unix_s : float
+    before, after : Labels
+    """
     content: dict[str, Any] = {"name": name, "time_unix_s": time_unix_s}
     if before.spans is not after.spans:
         # Spans that an edit did not touch are the very same; those that equal others do no harm.

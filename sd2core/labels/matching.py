@@ -66,8 +66,20 @@ def match_spans(
     """Match spans one to one.
 
     Of all ways to match, one with the most matches is taken; of these, one with the most pairs of
-    the same label; of these, one with the largest sum of IoU. Raises Sd2Error when `min_iou` is not
-    above 0 and up to 1.
+    the same label; of these, one with the largest sum of IoU.
+
+    Parameters
+    ----------
+    a, b : sequence of Span
+    timebase : Timebase
+        Of the recording, for differences in frames.
+    min_iou : float
+        Least IoU of a match, above 0 and up to 1.
+
+    Raises
+    ------
+    Sd2Error
+        When ``min_iou`` is not.
     """
     if not 0.0 < min_iou <= 1.0:
         raise Sd2Error(f"The least IoU of a match is {min_iou:g}", "above 0 and up to 1")

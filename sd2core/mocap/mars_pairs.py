@@ -110,7 +110,17 @@ def body_doppler(
     place: RadarPlace = AT_THE_CAMERA,
     progress: Progress = silent,
 ) -> DopplerMap:
-    """Synthetic Doppler of a driven body from the radar's place, on the radar's frames."""
+    """Synthetic Doppler of a driven body from the radar's place, on the radar's frames.
+
+    Parameters
+    ----------
+    driven : DrivenClip
+    choices : MarsChoices
+        Synthesis, resolution, poses per frame, and whether the map is also split by limbs.
+    place : RadarPlace
+        Position and clock's offset of the radar.
+    progress : Progress
+    """
     frames = len(driven.clip.times_s)
     times_s = np.arange((frames - 1) * choices.moments + 1) / (FRAMES_PER_S * choices.moments)
     mesh = driven.mesh(times_s + place.offset_s, choices.resolution)
@@ -133,11 +143,22 @@ def make_mars_pairs(
 ) -> MadePairs:
     """Write the pairs of some folders, each with one person's parts; resume a stopped run.
 
-    The subject of a take is the person; every stretch is a take. ``out`` is the store;
-    progress counts frames.
+    The subject of a take is the person; every stretch is a take.
 
-    Raises Sd2Error if a folder cannot be used, two hold the same, or the store holds other
-    pairs.
+    Parameters
+    ----------
+    folders : sequence of Path
+        As :func:`~sd2core.io.radar.mars.mars_parts` reads them.
+    out : Path
+        Store of the pairs.
+    choices : MarsChoices, optional
+    progress : Progress
+        Counts frames.
+
+    Raises
+    ------
+    Sd2Error
+        If a folder cannot be used, two hold the same, or the store holds other pairs.
     """
     choices = choices or MarsChoices()
     parts = [read_mars(folder, name) for folder in folders for name in mars_parts(folder)]

@@ -55,13 +55,26 @@ def make_recording_pairs(
     """Put recordings into a store of pairs; resume a store that was begun.
 
     Every recording is seen by its own sensor. The radar's frame that is nearest to a frame
-    of the mesh, by the recording's offset, is its target. Axis and nulled bins are those of
-    the synthesis, in input and target alike. ``subjects`` are the people in the recordings;
-    by default a different one in each, named like it. With ``limbs`` the input is also split by
-    the parts of the body.
+    of the mesh, by the recording's offset, is its target.
 
-    Raises Sd2Error if a recording lacks mesh or radar, two are called alike, or frame rates
-    or kinds of radar differ.
+    Parameters
+    ----------
+    recordings : sequence of Path
+    out : Path
+        Store of the pairs.
+    synthesis : SynthesisOptions
+        Of the input; axis and nulled bins are the target's, too. By default the paper's.
+    subjects : sequence of str, optional
+        People in the recordings; by default a different one in each, named like it.
+    limbs : bool
+        The input is also split by the parts of the body.
+    progress : Progress
+
+    Raises
+    ------
+    Sd2Error
+        If a recording lacks mesh or radar, two are called alike, there is not one person for each,
+        or frame rates or kinds of radar differ.
     """
     named = named_recordings(recordings, subjects)
     opened = [recording for recording, _ in named]

@@ -95,11 +95,21 @@ def run_jobs(
 ) -> float:
     """Run all jobs, wait until they are done, and return their processor time in seconds.
 
-    ``progress`` is called in the calling thread, at least every 30 ms. When it raises, or a
-    job does, the others stop at their next report before the exception goes on. ``total``
-    is the amount of work in all jobs. By default there is a thread per core; 1 runs them
-    one after the other in the calling thread. The time is that of all threads together,
-    which other programs on this machine do not change.
+    The time is that of all threads together, which other programs on this machine do not
+    change. When ``progress`` raises, or a job does, the others stop at their next report
+    before the exception goes on.
+
+    Parameters
+    ----------
+    jobs : sequence of callables
+        Each is called with the :class:`Ticket` by which it reports.
+    total : int
+        Amount of work in all jobs.
+    progress : Progress
+        Called in the calling thread, at least every 30 ms.
+    threads : int, optional
+        Jobs at a time, by default one per core; 1 runs them one after the other in the calling
+        thread, with progress at every report.
     """
     progress(0, total)
     if threads == 1:

@@ -53,11 +53,20 @@ def single_is_enough(
 ) -> bool:
     """True if positions may be kept, and vertices counted, in single precision.
 
-    ``extent_m`` is the largest coordinate, counted from the origin that positions are kept
-    around; ``size_m`` the largest extent of the body itself, at one moment (0 for a point
-    without a shape); ``duration_s`` the shortest time between two positions that a velocity
-    is measured over. The weight's relative error is ``range_exponent`` times the range's;
-    below ``nearest_range_m`` a range counts as this in the range law.
+    Parameters
+    ----------
+    extent_m : float
+        Largest coordinate, counted from the origin that positions are kept around.
+    size_m : float
+        Largest extent of the body itself, at one moment; 0 for a point without a shape.
+    duration_s : float
+        Shortest time between two positions that a velocity is measured over.
+    bin_width_mps : float
+        Of the Doppler axis.
+    range_exponent : float
+        Of the range law: the weight's relative error is this many times the range's.
+    nearest_range_m : float
+        Shorter ranges count as this in the range law.
     """
     range_error_m = velocity_error_mps(extent_m, 1.0)
     return (

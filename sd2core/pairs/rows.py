@@ -16,7 +16,18 @@ from sd2core.pairs.summary import INDEX_NAME, REMAKE, TakeEntry
 
 
 def check_array(array: StoredArray, frames: int, row: tuple[int, ...], kind: str) -> None:
-    """Raise Sd2Error for an array that is not of this type, or has too few frames."""
+    """Raise Sd2Error for an array that is not of this type, or has too few frames.
+
+    Parameters
+    ----------
+    array : StoredArray
+    frames : int
+        Least number of rows.
+    row : tuple of int
+        Shape of a row.
+    kind : str
+        Wanted dtype, such as ``"float32"``.
+    """
     if array.shape[:1] < (frames,):
         raise Sd2Error(
             f"{array.path}: the array {array.name} is missing or shorter than {INDEX_NAME} says",

@@ -102,7 +102,19 @@ class PairFacts(BaseModel):
     def segments(
         self, subjects: Iterable[str], length: int, overlap: int, *, first_only: bool = False
     ) -> int:
-        """Count the windows of the takes of these subjects."""
+        """Count the windows of the takes of these subjects.
+
+        Parameters
+        ----------
+        subjects : iterable of str
+        length : int
+            Frames of a window.
+        overlap : int
+            Frames that neighbours share, 0 to ``length - 1``; see
+            :func:`~sd2core.pairs.segments.segment_starts`.
+        first_only : bool
+            Only takes as the first placement of the sensor sees them.
+        """
         wanted = set(subjects)
         return sum(
             len(segment_starts(take.stop - take.start, length, overlap))

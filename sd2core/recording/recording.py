@@ -201,11 +201,20 @@ class Recording:
     ) -> Recording:
         """Make ``folder`` a recording with the same content, and return it.
 
-        ``.sd2`` is appended to a name without it. Files are referred to where
-        they are; ``copy=True`` copies those outside the folder into it. A
-        folder that exists is taken when it is no recording yet, so that files
-        may be put into it first. Without a title it is called as its folder.
-        ``timebase`` is that of :meth:`save`.
+        Without a title it is called as its folder.
+
+        Parameters
+        ----------
+        folder : Path
+            ``.sd2`` is appended to a name without it. One that exists is taken when it is no
+            recording yet, so that files may be put into it first.
+        copy : bool
+            Copies the files outside the folder into it; otherwise files are referred to where they
+            are.
+        timebase : Timebase, optional
+            As for :meth:`save`.
+        progress : Progress
+            Counts the files that are copied.
 
         Raises
         ------

@@ -129,9 +129,24 @@ class CommandFolder(RunFolder):
     ) -> ProcessId:
         """Start an ``sd2`` command with these arguments, or start it again in the same folder.
 
-        ``about`` is kept with it and must fit into JSON. ``environment`` is added to that of
-        this process; by default the command uses one processor, so that the window stays quick.
-        Raises Sd2Error if it cannot be started, OSError if the folder cannot be made.
+        Parameters
+        ----------
+        arguments : sequence of str
+            Those after ``sd2``.
+        about : mapping
+            Kept with it; must fit into JSON.
+        command : sequence of str
+            Program that is started, to which this folder and the arguments are added.
+        environment : mapping of str to str
+            Added to that of this process; by default matrices are multiplied on one thread, so that
+            the window stays quick.
+
+        Raises
+        ------
+        Sd2Error
+            If it cannot be started.
+        OSError
+            If the folder cannot be made.
         """
         self.path.mkdir(parents=True, exist_ok=True)
         for path in (self.description, self.output, self._launched, *self._of_yesterday):

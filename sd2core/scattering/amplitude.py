@@ -39,15 +39,25 @@ def vertex_areas(positions: NDArray[Any], faces: NDArray[np.int32]) -> NDArray[n
 
 @compiled
 def vertex_areas_kernel(
-    positions: NDArray[np.float32],  # (n, 3, V)
+    positions: NDArray[np.float32],
     faces: NDArray[np.int32],
     first: int,
     last: int,
-    areas: NDArray[np.float32],  # (n, V), written
+    areas: NDArray[np.float32],
 ) -> None:
     """Compiled form of :func:`vertex_areas` for frames ``first`` to ``last``.
 
     In double precision: the area of a sliver is the small difference of large products.
+
+    Parameters
+    ----------
+    positions : float array, shape (n, 3, V)
+        Metres.
+    faces : int32 array, shape (F, 3)
+    first, last : int
+        Half-open range of frames.
+    areas : float32 array, shape (n, V)
+        Written.
     """
     for t in range(first, last):
         x, y, z = positions[t, 0], positions[t, 1], positions[t, 2]
@@ -94,13 +104,25 @@ def vertex_area_vectors(positions: NDArray[Any], faces: NDArray[np.int32]) -> ND
 
 @compiled
 def vertex_area_vectors_kernel(
-    positions: NDArray[np.float32],  # (n, 3, V)
+    positions: NDArray[np.float32],
     faces: NDArray[np.int32],
     first: int,
     last: int,
-    vectors: NDArray[np.float32],  # (n, 3, V), written
+    vectors: NDArray[np.float32],
 ) -> None:
-    """Compiled form of :func:`vertex_area_vectors` for frames ``first`` to ``last``."""
+    """Compiled form of :func:`vertex_area_vectors` for frames ``first`` to ``last``.
+
+    Parameters
+    ----------
+    positions : float array, shape (n, 3, V)
+        Metres.
+    faces : int32 array, shape (F, 3)
+        Counter-clockwise seen from outside.
+    first, last : int
+        Half-open range of frames.
+    vectors : float32 array, shape (n, 3, V)
+        Written.
+    """
     vertices = positions.shape[2]
     total = np.empty((vertices, 3), np.float64)
     for t in range(first, last):

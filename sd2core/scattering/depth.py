@@ -213,17 +213,37 @@ def _beside_doubt(drawn, bounds, triangles, upto) -> int:  # type: ignore[no-unt
 
 @compiled
 def depth_visibility_kernel(
-    positions: NDArray[np.float32],  # (n, 3, V)
-    faces: NDArray[np.int32],  # (F, 3)
-    closed: bool,  # they enclose a body, as :func:`.visibility.encloses` says
-    sensor: NDArray[np.float64],  # (3,), in the frame of positions
+    positions: NDArray[np.float32],
+    faces: NDArray[np.int32],
+    closed: bool,
+    sensor: NDArray[np.float64],
     resolution: int,
-    needed: NDArray[np.uint8],  # (n, V): which vertices to test
+    needed: NDArray[np.uint8],
     first: int,
     last: int,
-    visible: NDArray[np.uint8],  # (n, V), written where needed
+    visible: NDArray[np.uint8],
 ) -> None:
-    """Set ``visible`` of the needed vertices in frames ``first`` to ``last``."""
+    """Set ``visible`` of the needed vertices in frames ``first`` to ``last``.
+
+    Parameters
+    ----------
+    positions : float array, shape (n, 3, V)
+        Metres.
+    faces : int32 array, shape (F, 3)
+        Counter-clockwise seen from outside.
+    closed : bool
+        They enclose a body, as :func:`.visibility.encloses` says.
+    sensor : float64 array, shape (3,)
+        In the frame of the positions.
+    resolution : int
+        Pixels along each side of the depth buffer.
+    needed : uint8 array, shape (n, V)
+        Which vertices to test.
+    first, last : int
+        Half-open range of frames.
+    visible : uint8 array, shape (n, V)
+        Written where needed.
+    """
     vertices = positions.shape[2]
     picture = np.empty((4, vertices), np.float64)
     depths = np.empty((resolution, resolution), np.float64)

@@ -35,8 +35,19 @@ def depth_visibility(
 ) -> NDArray[np.bool_]:
     """Mark the needed vertices of one frame that are visible by the depth buffer, shape (V,).
 
-    Points are of shape (3, V), faces (F, 3). ``closed`` faces enclose a body, so that
-    back-facing ones hide nothing more. ``resolution`` is in pixels along each side.
+    Parameters
+    ----------
+    points : float array, shape (3, V)
+        Metres.
+    faces : int32 array, shape (F, 3)
+        Counter-clockwise seen from outside.
+    closed : bool
+        They enclose a body, so that back-facing ones hide nothing more.
+    sensor : float64 array, shape (3,)
+        In the frame of the points.
+    resolution : int
+        Pixels along each side of the depth buffer.
+    needed : bool array, shape (V,)
     """
     place = np.asarray(points, np.float64)
     centre = 0.5 * (place.min(axis=1) + place.max(axis=1))

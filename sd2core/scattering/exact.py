@@ -50,10 +50,19 @@ LANES = 8
 def hides(  # type: ignore[no-untyped-def]
     x, y, z, i: int, j: int, k: int, v: int, gx: float, gy: float, gz: float, contact: float
 ) -> bool:
-    """True if triangle (i, j, k) crosses the open segment from vertex v along g.
+    """True if triangle (i, j, k) crosses the open segment from vertex v to the sensor.
 
-    ``g`` is the vector from the vertex to the sensor. Möller and Trumbore's test
-    in double precision, with everything relative to the vertex.
+    Möller and Trumbore's test in double precision, with everything relative to the vertex.
+
+    Parameters
+    ----------
+    x, y, z : float array, shape (V,)
+        Places of the vertices.
+    i, j, k, v : int
+    gx, gy, gz : float
+        Vector from the vertex to the sensor.
+    contact : float
+        Length that is left out at both ends of the segment.
     """
     length = np.sqrt(gx * gx + gy * gy + gz * gz)
     if length <= 2 * contact:
@@ -171,10 +180,31 @@ def search_view(  # type: ignore[no-untyped-def]
 ) -> None:  # fmt: skip
     """Set ``visible`` to 0 for the owned vertices that a triangle hides in one view.
 
-    ``g`` (3, V) float64 is sensor − vertex, ``axes`` (3, 3) the view's right, up
-    and forward; ``image`` (2, V) and ``depth`` (V,) float32 hold each vertex's
-    image coordinates and depth. In a view that looks in one direction only,
-    ``near`` cuts off triangles behind it.
+    Parameters
+    ----------
+    x, y, z : float array, shape (V,)
+        Places of the vertices.
+    faces : int32 array, shape (F, 3)
+        Triangles that may hide something.
+    g : float64 array, shape (3, V)
+        Sensor − vertex.
+    axes : float64 array, shape (3, 3)
+        The view's right, up and forward.
+    near : float32
+        In a view that looks in one direction only, cuts off triangles behind it.
+    contact : float
+        As for :func:`hides`.
+    owned : uint8 array, shape (V,)
+        Vertices that this view decides.
+    owned_count : int
+        Number of these.
+    image : float32 array, shape (2, V)
+        Image coordinates of each vertex.
+    depth : float32 array, shape (V,)
+        Depth of each vertex.
+    scratch : tuple of arrays
+        Of :func:`search_scratch`.
+    visible : uint8 array, shape (V,)
     """
     # Sorted arrays have room for some lanes more.
     cell, start, order, sorted_image, sorted_depth, hidden = scratch
@@ -290,15 +320,31 @@ def search_view(  # type: ignore[no-untyped-def]
 
 @compiled
 def exact_visibility_kernel(
-    positions: NDArray[np.float32],  # (n, 3, V)
-    faces: NDArray[np.int32],  # (F, 3)
-    sensor: NDArray[np.float64],  # (3,), in the frame of positions
-    needed: NDArray[np.uint8],  # (n, V): which vertices to test
+    positions: NDArray[np.float32],
+    faces: NDArray[np.int32],
+    sensor: NDArray[np.float64],
+    needed: NDArray[np.uint8],
     first: int,
     last: int,
-    visible: NDArray[np.uint8],  # (n, V), written where needed
+    visible: NDArray[np.uint8],
 ) -> None:
-    """Set ``visible`` of the needed vertices in frames ``first`` to ``last``."""
+    """Set ``visible`` of the needed vertices in frames ``first`` to ``last``.
+
+    Parameters
+    ----------
+    positions : float array, shape (n, 3, V)
+        Metres.
+    faces : int32 array, shape (F, 3)
+        Oriented in any way.
+    sensor : float64 array, shape (3,)
+        In the frame of the positions.
+    needed : uint8 array, shape (n, V)
+        Which vertices to test.
+    first, last : int
+        Half-open range of frames.
+    visible : uint8 array, shape (n, V)
+        Written where needed.
+    """
     vertices = positions.shape[2]
     g = np.empty((3, vertices), np.float64)
     image = np.empty((2, vertices), np.float32)
@@ -381,7 +427,15 @@ def exact_visibility_kernel(
 
 @compiled
 def axes_along(fx: float, fy: float, fz: float, axes: NDArray[np.float64]) -> None:
-    """Right, up and forward of a view along the unit vector f."""
+    """Right, up and forward of a view.
+
+    Parameters
+    ----------
+    fx, fy, fz : float
+        Unit vector along which it looks.
+    axes : float64 array, shape (3, 3)
+        Written.
+    """
     if abs(fz) < 0.9:
         rx, ry, rz = fy, -fx, 0.0
     else:

@@ -25,7 +25,18 @@ def exact_visibility(
     sensor: NDArray[np.float64],
     needed: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Mark the needed vertices (V,) of one frame that no face (F, 3) hides; points are (3, V)."""
+    """Mark the needed vertices of one frame that no face hides, shape (V,).
+
+    Parameters
+    ----------
+    points : float array, shape (3, V)
+        Metres.
+    faces : int32 array, shape (F, 3)
+        Oriented in any way.
+    sensor : float64 array, shape (3,)
+        In the frame of the points.
+    needed : bool array, shape (V,)
+    """
     seen = needed.copy()
     place = np.asarray(points, np.float64).T  # (V, 3)
     size = float(np.linalg.norm(np.ptp(place, axis=0)))
@@ -139,8 +150,21 @@ def crosses(
 ) -> NDArray[np.bool_]:
     """Tell for each triangle if it crosses the open segment from its vertex to the sensor.
 
-    Places are of shape (V, 3), corners (n, 3), vertices (n,); ``contact`` metres are left
-    out at both ends of the segment.
+    Parameters
+    ----------
+    place : float64 array, shape (V, 3)
+        Of the vertices, metres.
+    corners : int32 array, shape (n, 3)
+        Of the triangles.
+    vertex : int array, shape (n,)
+        The vertex of each triangle's segment.
+    sensor : float64 array, shape (3,)
+    contact : float
+        Metres that are left out at both ends of the segment.
+
+    Returns
+    -------
+    bool array, shape (n,)
     """
     start = place[vertex]
     ray = sensor - start

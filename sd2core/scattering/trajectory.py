@@ -75,9 +75,18 @@ class Trajectory:
     ) -> NDArray[Any]:
         """Positions (knots, V, 3) at knots ``first_knot`` to ``last_knot`` (exclusive).
 
-        ``vertices`` holds the frames that :meth:`frames_needed` names, from ``first_frame``
-        on. It is returned itself where nothing is to be done; otherwise the result is
-        float64.
+        Parameters
+        ----------
+        vertices : float array, shape (frames, V, 3)
+            The frames that :meth:`frames_needed` names.
+        first_frame : int
+            Number of the first of them.
+        first_knot, last_knot : int
+
+        Returns
+        -------
+        float array, shape (knots, V, 3)
+            Part of ``vertices`` itself where nothing is to be done; otherwise float64.
         """
         if self.oversampling == 1 and self.smoothing_s == 0:
             return vertices[first_knot - first_frame : last_knot - first_frame]

@@ -76,10 +76,21 @@ def moments(
     next to frames without a person); an even number lie midway between two knots, which
     they are measured between.
 
-    ``centres`` (n,) are the knots of the frames, ``oversampling`` the knots per frame;
-    presence is that of the frames. The stencil has the shape (n, oversampling). Where a
-    moment lies outside the clip, or outside the frame's stretch, both knots are its end,
-    with a duration of 0.
+    Parameters
+    ----------
+    times_s : float64 array, shape (knots,)
+    centres : int64 array, shape (n,)
+        Knots of the frames.
+    oversampling : int
+        Knots per frame, and moments of each.
+    presence : Presence, optional
+        Of all frames; by default there is a person in every one.
+
+    Returns
+    -------
+    Stencil
+        Shape (n, oversampling). Where a moment lies outside the clip, or outside the frame's
+        stretch, both knots are its end, with a duration of 0.
     """
     half, odd = oversampling // 2, oversampling % 2
     begin = np.zeros((len(centres), 1), np.int64)

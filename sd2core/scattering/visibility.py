@@ -68,7 +68,16 @@ def encloses(faces: NDArray[np.int32]) -> bool:
 
 @compiled
 def add_cross_product(x, y, z, face, total):  # type: ignore[no-untyped-def]
-    """Add the edge cross product of a triangle to the totals (V, 3) of its vertices."""
+    """Add the edge cross product of a triangle to the totals of its vertices.
+
+    Parameters
+    ----------
+    x, y, z : float array, shape (V,)
+        Places of the vertices.
+    face : int32 array, shape (3,)
+    total : float64 array, shape (V, 3)
+        Added to.
+    """
     i, j, k = face[0], face[1], face[2]
     px, py, pz = np.float64(x[i]), np.float64(y[i]), np.float64(z[i])
     ax, ay, az = x[j] - px, y[j] - py, z[j] - pz
@@ -82,7 +91,18 @@ def add_cross_product(x, y, z, face, total):  # type: ignore[no-untyped-def]
 
 @compiled
 def set_normal(total, v, normal, at):  # type: ignore[no-untyped-def]
-    """Write the normal of vertex ``v`` into the column ``at`` of (3, ...)."""
+    """Write the normal of a vertex, :data:`NORMAL_SCALE` long.
+
+    Parameters
+    ----------
+    total : float64 array, shape (V, 3)
+        Sums of :func:`add_cross_product`; a sum of 0 gives a normal of 0.
+    v : int
+        Vertex, a row of ``total``.
+    normal : int8 array, shape (3, ...)
+        Written in column ``at``.
+    at : int
+    """
     length = np.sqrt(total[v, 0] ** 2 + total[v, 1] ** 2 + total[v, 2] ** 2)
     factor = NORMAL_SCALE / length if length > 0 else 0.0
     for axis in range(3):
@@ -104,13 +124,24 @@ def sum_cross_products(
 
 @compiled
 def vertex_normals_kernel(
-    positions: NDArray[np.float32],  # (n, 3, V)
+    positions: NDArray[np.float32],
     faces: NDArray[np.int32],
     first: int,
     last: int,
-    normals: NDArray[np.int8],  # (n, 3, V), written
+    normals: NDArray[np.int8],
 ) -> None:
-    """Compiled form of :func:`vertex_normals` for frames ``first`` to ``last``."""
+    """Compiled form of :func:`vertex_normals` for frames ``first`` to ``last``.
+
+    Parameters
+    ----------
+    positions : float array, shape (n, 3, V)
+    faces : int32 array, shape (F, 3)
+        Counter-clockwise seen from outside.
+    first, last : int
+        Half-open range of frames.
+    normals : int8 array, shape (n, 3, V)
+        Written.
+    """
     vertices = positions.shape[2]
     total = np.empty((vertices, 3), np.float64)
     for t in range(first, last):
@@ -146,7 +177,19 @@ def facing_mask(
 def facing_kernel(  # type: ignore[no-untyped-def]
     x, y, z, nx, ny, nz, sx: np.float32, sy: np.float32, sz: np.float32, visible
 ) -> None:
-    """Compiled form of :func:`facing_mask` for a run of vertices of one frame."""
+    """Compiled form of :func:`facing_mask` for a run of vertices of one frame.
+
+    Parameters
+    ----------
+    x, y, z : float array, shape (n,)
+        Places of the vertices.
+    nx, ny, nz : int8 array, shape (n,)
+        Their normals.
+    sx, sy, sz : float32
+        Place of the sensor.
+    visible : uint8 array, shape (n,)
+        Written.
+    """
     for v in range(visible.shape[0]):
         cosine = (
             (sx - x[v]) * np.float32(nx[v])

@@ -85,8 +85,21 @@ def plan_steps(path: Path, duration_s: float, half_base_m: float) -> list[Step]:
 def gait(skeleton: Skeleton, times_s: Floats, path: Path, arm_scale: float = 1.0) -> Motion:
     """Motion of the whole body along a path.
 
-    The translation moves the body from the origin; its floor is at y = 0. ``arm_scale`` is as for
-    :func:`sd2core.simulate.limbs.reach`.
+    The translation moves the body from the origin; its floor is at y = 0.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    times_s : float64 array, shape (T,)
+        Multiples of 1 / :data:`GRID_HZ`, from 0 on.
+    path : Path
+    arm_scale : float
+        As the scale of :func:`sd2core.simulate.limbs.reach`.
+
+    Raises
+    ------
+    ValueError
+        For other times.
     """
     duration_s = float(times_s[-1]) + 1.0
     fine = np.arange(0.0, duration_s, 1.0 / GRID_HZ)

@@ -54,7 +54,18 @@ def minimum_jerk(phase: ArrayLike) -> Floats:
 
 
 def turn_torso(skeleton: Skeleton, rotations: Floats, times: Floats, across_deg: Floats) -> None:
-    """Sway, breathing and what the torso does for the arm; the head stays on the camera."""
+    """Sway, breathing and what the torso does for the arm; the head stays on the camera.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    rotations : float64 array, shape (T, B, 3, 3)
+        Those of spine, collar bones, neck and head are written.
+    times : float64 array, shape (T,)
+        Seconds.
+    across_deg : float64 array, shape (T,)
+        Turn of the upper body; positive: its right side comes forward.
+    """
     index = skeleton.index
     # Degrees and Hz: quiet breaths, 16 a minute, and a slow sway of no common period.
     breath = np.sin(2.0 * np.pi * 0.27 * times)
@@ -88,9 +99,16 @@ def reach(
 ) -> None:
     """Bring one wrist to its place: shoulder, elbow and wrist rotations in closed form.
 
-    ``rotations``, (T, B, 3, 3), are those of the whole body, which faces the camera; those of the
-    arm are replaced. ``arm``, (T, 9), has the fields of :class:`ArmPose`; ``scale`` is the length
-    of this arm to that for which the poses were written.
+    Parameters
+    ----------
+    skeleton : Skeleton
+    rotations : float64 array, shape (T, B, 3, 3)
+        Of the whole body, which faces the camera; those of the arm are replaced.
+    side : {"L", "R"}
+    arm : float64 array, shape (T, 9)
+        The fields of :class:`ArmPose`.
+    scale : float
+        Length of this arm to that for which the poses were written.
     """
     index, heads = skeleton.index, skeleton.heads_m
     upper, lower = index[f"upperarm01.{side}"], index[f"lowerarm01.{side}"]
@@ -129,9 +147,18 @@ def bend(
 ) -> tuple[Floats, Floats]:
     """Turn the two bones of a limb so that it reaches from one place to another.
 
-    ``start`` and ``end`` are (T, 3); ``upper_rest`` and ``lower_rest``, (3,), are the two bones at
-    rest, which is not straight; ``pole`` is as for :func:`elbow_position`. Returns whole rotations
-    of the two bones from rest, (T, 3, 3).
+    Parameters
+    ----------
+    start, end : float64 array, shape (T, 3)
+    upper_rest, lower_rest : float64 array, shape (3,)
+        The two bones at rest, which is not straight.
+    pole : float64 array, shape (T, 3)
+        As for :func:`elbow_position`.
+
+    Returns
+    -------
+    upper_turn, lower_turn : float64 array, shape (T, 3, 3)
+        Whole rotations of the two bones from rest.
     """
     elbow = elbow_position(
         start, end, float(np.linalg.norm(upper_rest)), float(np.linalg.norm(lower_rest)), pole
@@ -150,8 +177,14 @@ def elbow_position(
 ) -> Floats:
     """Elbow of an arm with two bones of known lengths, bent towards a pole, (T, 3).
 
-    Shoulder and wrist are further apart than ``|upper_m - lower_m|`` and nearer than their sum; the
-    pole, (T, 3), is not along the line between them.
+    Parameters
+    ----------
+    shoulder, wrist : float64 array, shape (T, 3)
+        Further apart than ``|upper_m - lower_m|`` and nearer than their sum.
+    upper_m, lower_m : float
+        Lengths of upper arm and forearm.
+    pole : float64 array, shape (T, 3)
+        Direction in which the elbow bends; not along the line between shoulder and wrist.
     """
     line = wrist - shoulder
     distance = np.linalg.norm(line, axis=1, keepdims=True)
@@ -179,11 +212,26 @@ def place_limb(
 ) -> Floats:
     """Bring the end of a limb of two bones to a place.
 
-    ``bones`` are thigh, shank, foot; or upper arm, forearm, wrist. The first two are written in
-    ``rotations``, (T, B, 3, 3). ``root``, (T, 3, 4), is the transform of the parent of the limb;
-    ``target_m``, (T, 3), is brought nearer where it is out of reach, which is ``stretch`` of the
-    limb's length; ``pole``, (T, 3), is where the joint bends to. Returns the turn of the second
-    bone against rest, (T, 3, 3), in the axes of ``target_m``.
+    Parameters
+    ----------
+    skeleton : Skeleton
+    rotations : float64 array, shape (T, B, 3, 3)
+        Those of the first two bones are written.
+    bones : (str, str, str)
+        Thigh, shank, foot; or upper arm, forearm, wrist.
+    root : float64 array, shape (T, 3, 4)
+        Transform of the parent of the limb.
+    target_m : float64 array, shape (T, 3)
+        Brought nearer where it is out of reach.
+    pole : float64 array, shape (T, 3)
+        Direction in which the joint bends.
+    stretch : float
+        Reach as a share of the limb's length.
+
+    Returns
+    -------
+    float64 array, shape (T, 3, 3)
+        Turn of the second bone against rest, in the axes of ``target_m``.
     """
     first, second, end = (skeleton.index[bone] for bone in bones)
     heads = skeleton.heads_m
@@ -206,8 +254,16 @@ def turn_hand(
 ) -> None:
     """Turn, bend and close one hand.
 
-    The rotations of forearm, wrist and fingers are written. ``angles_deg``, (T, 3): pronation,
-    flexion, deviation. ``curl``, (T, 2): of fingers and thumb, 0 open to 1 closed.
+    Parameters
+    ----------
+    skeleton : Skeleton
+    rotations : float64 array, shape (T, B, 3, 3)
+        Those of forearm, wrist and fingers are written.
+    side : {"L", "R"}
+    angles_deg : float64 array, shape (T, 3)
+        Pronation, flexion, deviation.
+    curl : float64 array, shape (T, 2)
+        Of fingers and thumb, 0 open to 1 closed.
     """
     index, heads = skeleton.index, skeleton.heads_m
     across = 1.0 if side == "R" else -1.0

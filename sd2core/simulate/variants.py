@@ -81,10 +81,24 @@ def vary_recordings(
 ) -> PairSet:
     """Write simulated pairs of the movements of recordings that have a mesh, and return all.
 
-    Movements are cut and called as in pairs of recordings. What ``out`` holds is not made again.
+    Movements are cut and called as in pairs of recordings.
 
-    Raises Sd2Error if a recording has no mesh, two are called alike, frame rates differ, or
-    (shapes) a mesh has another surface than the bundled body.
+    Parameters
+    ----------
+    recordings : sequence of Path
+    out : Path
+        Store of the pairs; what it holds is not made again.
+    options : VariantOptions
+    subjects : sequence of str, optional
+        People in the recordings; by default a different one in each, named like it.
+    progress : Progress
+        Counts recordings.
+
+    Raises
+    ------
+    Sd2Error
+        If a recording has no mesh, two are called alike, there is not one person for each, frame
+        rates differ, or (shapes) a mesh has another surface than the bundled body.
     """
     named = named_recordings(recordings, subjects)
     check_there([recording for recording, _ in named], ("mesh",))
@@ -117,10 +131,20 @@ def _of_recording(recording: Recording, subject: str, mesh: MeshSequence) -> Ite
 def vary_mars(
     folders: Sequence[Path], out: Path, options: VariantOptions, progress: Progress = silent
 ) -> PairSet:
-    """Write simulated pairs of MARS' movements, each folder with one person's parts.
+    """Write simulated pairs of MARS' movements, and return all.
 
     Bodies, places of the radar and names of takes are those of
     :func:`sd2core.mocap.mars_pairs.make_mars_pairs`; there are no labels.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Each with one person's parts.
+    out : Path
+        Store of the pairs; what it holds is not made again.
+    options : VariantOptions
+    progress : Progress
+        Counts people.
     """
     parts = [read_mars(folder, name) for folder in folders for name in mars_parts(folder)]
     names = (BACKGROUND,)

@@ -26,7 +26,25 @@ from sd2core.study.plan import Denoiser
 def learn_denoiser(
     place: Path, chosen: Denoiser, pairs: PairSet, takes: Sequence[Take], seed: int
 ) -> None:
-    """Have a denoiser learnt in a folder, if it is not there; a reason is kept if it fails."""
+    """Have a denoiser learnt in a folder, if it is not there; a reason is kept if it fails.
+
+    Parameters
+    ----------
+    place : Path
+        Folder, made anew if a denoiser failed in it or was stopped; a reason is in its file
+        ``done``.
+    chosen : Denoiser
+    pairs : PairSet
+        Axis, frame rate and the like of the takes.
+    takes : sequence of Take
+        What is learnt from; those shorter than a segment are left out.
+    seed : int
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If the training was interrupted.
+    """
     if (place / "done").exists() and (place / "run" / "best.safetensors").exists():
         return
     if place.exists():  # It failed, or was stopped.
@@ -77,7 +95,25 @@ def added_map(
 ) -> NDArray[np.float32]:
     """Return the map of a take that is added, of a condition that is not the radar's.
 
-    Raises Sd2Error with the ``reason`` where it needs a denoiser and there is none.
+    Parameters
+    ----------
+    condition : {"synthetic", "synthetic+texture", "denoised", "denoised+texture"}
+    take : Take
+    model : TrainedDenoiser or None
+        Needed by all but the first.
+    reason : str
+        Why there is no denoiser, for the error.
+    seed : (int, int)
+        Of the texture.
+
+    Returns
+    -------
+    float32 array, shape (frames, bins)
+
+    Raises
+    ------
+    Sd2Error
+        Where it needs a denoiser and there is none.
     """
     if condition == "synthetic":
         return take.synthetic

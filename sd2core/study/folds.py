@@ -62,7 +62,23 @@ def folds_of(
 def groups_of(
     known: ClipSet, movements: Sequence[Movement], parts: int | None, seed: int
 ) -> Mapping[tuple[str, str], Group]:
-    """Return the group of every movement: its person, or one of so many parts."""
+    """Return the group of every movement: its person, or one of so many parts.
+
+    Parameters
+    ----------
+    known : ClipSet
+        The classes, of which every part gets its share.
+    movements : sequence of Movement
+    parts : int or None
+        Number of parts; None: people are the groups.
+    seed : int
+        By which movements are dealt.
+
+    Returns
+    -------
+    mapping of (str, str) to str
+        By the key of a movement's clip.
+    """
     clips = [one.clip for one in movements]
     if parts is None:
         return {clip.key: clip.subject for clip in clips}
@@ -76,6 +92,14 @@ def share_of(
 
     Of movements beside background whole ones are drawn. Without background there are runs of one
     class, in random order; of these the last is cut short.
+
+    Parameters
+    ----------
+    known : ClipSet
+    movements : sequence of Movement
+    share : float
+        Of the frames of each class, or of its movements beside background; above 0, up to 1.
+    seed : int
     """
     if BACKGROUND in known.classes:
         return _whole(known, movements, share, seed)

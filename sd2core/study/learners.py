@@ -38,7 +38,18 @@ def learnt(
 ) -> Callable[[Clip], Scores]:
     """Learn from real and added clips, and return what scores another one.
 
-    All added frames together weigh ``added_weight`` times as much as all real ones.
+    Parameters
+    ----------
+    learner : Learner
+    known : ClipSet
+        Classes, axis and frame rate of the clips.
+    real, added : sequence of Clip
+    added_weight : float
+        All added frames together weigh this many times as much as all real ones.
+    seed : int
+        Of a network's training; ridge regression has none.
+    describe : callable
+        Of :func:`describing`; only ridge regression is shown it.
     """
     clips = [*real, *added]
     counts = [int(frame_counts(part, len(known.classes)).sum()) for part in (real, added)]

@@ -172,7 +172,18 @@ def _best(results: Results) -> str:
 def page(
     results: Results, findings: Sequence[Finding], said: str, totals: dict[str, list[Score]]
 ) -> str:
-    """Return the page in Markdown."""
+    """Return the page in Markdown.
+
+    Parameters
+    ----------
+    results : Results
+    findings : sequence of Finding
+        Of :func:`findings_of`.
+    said : str
+        Of :func:`conclusion`.
+    totals : dict of str to list of Score
+        Of :func:`totals_of`.
+    """
     plan = results.plan
     people = ", ".join(
         f"{one} ({counted(count, 'movement')})" for one, count in results.takes.items()

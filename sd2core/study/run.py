@@ -63,10 +63,26 @@ def run_study(
     scheduler: str | None = None,
     progress: Progress = silent,
 ) -> Results:
-    """Make the missing runs of a study, whose paths are absolute, and read the others.
+    """Make the missing runs of a study, and read the others.
 
     A study that was stopped goes on; after a change of data or settings what depends on them is
-    made anew. Progress counts denoisers and runs. Raises Sd2Error if the study cannot be.
+    made anew.
+
+    Parameters
+    ----------
+    plan : StudyPlan
+        Whose paths are absolute.
+    processes : int
+        Runs, and denoisers that learn, at a time.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers do the runs; by default processes of this machine.
+    progress : Progress
+        Counts denoisers and runs.
+
+    Raises
+    ------
+    Sd2Error
+        If the study cannot be.
     """
     folder = StudyFolder(Path(plan.out))
     make_folder(folder.path / "runs")

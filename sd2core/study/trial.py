@@ -83,7 +83,19 @@ class Run:
 
 def drawn(plan: StudyPlan, material: Material, real: Sequence[str], share: float, seed: int
           ) -> list[Movement]:  # fmt: skip
-    """Return the real movements that are learnt from."""
+    """Return the real movements that are learnt from.
+
+    Parameters
+    ----------
+    plan : StudyPlan
+    material : Material
+    real : sequence of str
+        Groups whose radar is looked at.
+    share : float
+        As for :func:`~sd2core.study.folds.share_of`.
+    seed : int
+        Of the parts and of the share.
+    """
     group = grouped(plan, material, seed)
     own = [one for one in material.real if group[one.clip.key] in real]
     return share_of(material.known, own, share, seed)

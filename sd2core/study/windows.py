@@ -31,11 +31,23 @@ Features = NDArray[np.float64]
 def window_features(
     energies: NDArray[np.float32], axis: VelocityAxis, frame_rate_hz: float, window_s: float
 ) -> Features:
-    """Describe the window around every frame of one take, (frames, bins) → (frames, numbers).
+    """Describe the window around every frame of one take.
 
     Of the mean velocity, the spread, the speed and the peak: mean and deviation; of the mean
     velocity also quantiles, spectrum and autocorrelation; of the share of each bin: root of the
     mean, and deviation. All are free of the map's gain.
+
+    Parameters
+    ----------
+    energies : float32 array, shape (frames, bins)
+    axis : VelocityAxis
+    frame_rate_hz : float
+    window_s : float
+        Length of the window, which is cut at both ends of the take.
+
+    Returns
+    -------
+    float64 array, shape (frames, numbers)
     """
     rate = axis.v_max_mps
     mean = np.nan_to_num(mean_velocity_mps(energies, axis)) / rate
@@ -104,7 +116,24 @@ class Ridge:
         classes: int,
         describe: Callable[[Clip], Features],
     ) -> Ridge:
-        """Fit to clips, whose frames weigh so much; every class counts the same where it occurs."""
+        """Fit to clips; every class counts the same where it occurs.
+
+        Parameters
+        ----------
+        clips : sequence of Clip
+            Frames without a class are left out.
+        weights : sequence of float
+            Of every frame of each clip.
+        classes : int
+            Number of classes.
+        describe : callable
+            Features of a clip, (frames, numbers).
+
+        Raises
+        ------
+        Sd2Error
+            Without a labelled frame.
+        """
         known = [clip.label != UNKNOWN for clip in clips]
         if not any(one.any() for one in known):
             raise Sd2Error("There is no labelled frame to learn from", "one at least")

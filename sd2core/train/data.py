@@ -276,7 +276,23 @@ def segments_of(
     null_bins: Sequence[int] = (),
     parts: Sequence[str] = (),
 ) -> Segments:
-    """All segments of some takes, in their order. Raises Sd2Error without any."""
+    """All segments of some takes, in their order.
+
+    Parameters
+    ----------
+    takes : sequence of Take
+    length, overlap : int
+        Frames, as for :func:`~sd2core.pairs.segments.segment_starts`.
+    null_bins : sequence of int
+        Bins that do not tell whether something moves.
+    parts : sequence of str
+        The input is the limb maps of these parts of the body; by default the map.
+
+    Raises
+    ------
+    Sd2Error
+        Without any.
+    """
     inputs, targets, moving = [], [], []
     for take in takes:
         starts = segment_starts(len(take.times_s), length, overlap)

@@ -66,7 +66,17 @@ class Group:
     def values(
         self, part: str, number: str, label: str | None = None, subject: str | None = None
     ) -> NDArray[np.float64]:
-        """One number of every model, e.g. ``values("peak", "mae_mps")``."""
+        """One number of every model, e.g. ``values("peak", "mae_mps")``, shape (models,).
+
+        Parameters
+        ----------
+        part : {"peak", "peak_all", "mean", "map"}
+            Field of :class:`Score`.
+        number : str
+            Field of that.
+        label, subject : str, optional
+            Frames of one label, or of one subject; by default all. With both, those of the label.
+        """
         scores = [_score_of(report, label, subject) for report in self.reports]
         return np.array([getattr(getattr(score, part), number) for score in scores], np.float64)
 
@@ -149,11 +159,23 @@ def evaluate(
     """Measure models, and for comparison filters that need no training.
 
     The filters are fitted on the subjects that the first model learnt from, as far as they
-    are there; else on all that are not judged. By default the test subjects of the first
-    model are judged, or all, with ``first_only`` on what every take's own sensor saw.
-    Progress counts takes.
+    are there; else on all that are not judged.
 
-    Raises Sd2Error if a model does not fit the pairs, or a subject has no take.
+    Parameters
+    ----------
+    models : sequence of TrainedDenoiser
+    pairs : PairSet
+    subjects : iterable of str, optional
+        To be judged; by default the test subjects of the first model, or all.
+    first_only : bool
+        On what every take's own sensor saw.
+    progress : Progress
+        Counts takes, once for every model and filter.
+
+    Raises
+    ------
+    Sd2Error
+        If a model does not fit the pairs, a subject has no take, or no take is left.
     """
     for model in models:
         check_fits(model.card, pairs, "Judge it by pairs like those that it learnt from")

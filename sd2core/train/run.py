@@ -57,9 +57,27 @@ def carry_out(
 ) -> tuple[Outcome, Position]:
     """Train a model in a folder that is made, and locked by this process.
 
-    ``resume`` goes on from the last checkpoint; ``command`` goes onto the model's card. Where
-    several processes compute, the first starts the others, which get their ``rank`` and the file
-    at which all meet. Raises Sd2Error for what the user can mend.
+    Where several processes compute, the first starts the others.
+
+    Parameters
+    ----------
+    folder : TrainingFolder
+    config : TrainConfig
+    writer : ProgressWriter
+    control : Control
+    resume : bool
+        Goes on from the last checkpoint.
+    command : str
+        Goes onto the model's card.
+    rank : int
+        Number of the process, 0 for the first.
+    meeting : Path, optional
+        File at which all processes meet; the first makes it.
+
+    Raises
+    ------
+    Sd2Error
+        For what the user can mend.
     """
     lower_priority(config.machine.nice)
     ranks = Ranks(rank, config.machine.devices)

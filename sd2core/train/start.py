@@ -50,9 +50,19 @@ def begin(
 ) -> Ending:
     """Train a model in a new or empty folder, or where a run failed before it learnt anything.
 
-    ``command`` is kept with the model; ``watch`` is called with every event of the
-    progress. Raises Sd2Error for what the user can mend; the run's folder then says it,
-    too, if it was made.
+    Parameters
+    ----------
+    config : TrainConfig
+    out : Path
+    command : str
+        Kept with the model.
+    watch : callable, optional
+        Called with every event of the progress.
+
+    Raises
+    ------
+    Sd2Error
+        For what the user can mend; the run's folder then says it, too, if it was made.
     """
     config = with_start(config)
     check(config)

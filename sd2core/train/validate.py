@@ -51,7 +51,17 @@ class Exam:
     def of(
         cls, segments: Segments, scaling: Scaling, axis: VelocityAxis, null_bins: tuple[int, ...]
     ) -> Exam:
-        """Build it from segments of energies."""
+        """Build it from segments of energies.
+
+        Parameters
+        ----------
+        segments : Segments
+        scaling : Scaling
+            Compresses inputs and targets.
+        axis : VelocityAxis
+        null_bins : tuple of int
+            Not counted, in error or peak.
+        """
         energies = segments.targets.reshape(-1, axis.bins).copy()
         energies[:, list(null_bins)] = 0.0
         return cls(

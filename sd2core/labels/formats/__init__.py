@@ -180,7 +180,17 @@ def would_lose(
 ) -> list[Loss]:
     """Return what a file of a format would not hold, without leaving a file.
 
-    Raises Sd2Error when the format cannot hold the times.
+    Parameters
+    ----------
+    labels, timebase, media
+        As for :func:`write_labels`.
+    format : str
+        Name of one of :data:`FORMATS`.
+
+    Raises
+    ------
+    Sd2Error
+        When the format cannot hold the times.
     """
     with tempfile.TemporaryDirectory(prefix="sd2-") as folder:
         path = Path(folder) / f"labels{_named(format).suffixes[0]}"

@@ -30,7 +30,20 @@ _EXPECTED = "an Audacity label file: start, end and text in each line, separated
 
 
 def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
-    """Write all tracks as one label track."""
+    """Write all tracks as one label track.
+
+    Parameters
+    ----------
+    path : Path
+    labels : Labels
+    timebase, media
+        Not used: the format has neither frames nor a video.
+
+    Returns
+    -------
+    list of Loss
+        Empty: what is lost depends on the format alone.
+    """
     lines = [
         f"{positional(span.start_s, min_digits=6)}\t{positional(span.end_s, min_digits=6)}"
         f"\t{span.label}\n"

@@ -49,7 +49,14 @@ _NO_SUBJECT = "No focal subject"
 def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
     """Write a project with one observation, called like the file; what it cannot hold is returned.
 
-    Without ``media``, the video, it is a live observation.
+    Parameters
+    ----------
+    path : Path
+    labels : Labels
+    timebase : Timebase
+        Of the video: frames of the events, and its length.
+    media : Path, optional
+        The video, linked relative to the file; without it, it is a live observation.
     """
     now = datetime.now().isoformat(timespec="seconds")
     lanes = lanes_of(labels, edges_s)

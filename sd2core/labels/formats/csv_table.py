@@ -77,7 +77,17 @@ _EXPECTED = "a table with a heading that names label, start_s and end_s"
 
 
 def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
-    """Write a table; what it cannot hold is returned."""
+    """Write a table; what it cannot hold is returned.
+
+    Parameters
+    ----------
+    path : Path
+    labels : Labels
+    timebase : Timebase
+        Of the recording: for the columns of frames.
+    media : Path, optional
+        Not used.
+    """
     held, replaced = hold_texts(labels, _BANNED, FORMAT.title)
     text = io.StringIO(newline="")
     # Texts in quotes keep the spaces around them, whoever reads them.

@@ -41,7 +41,15 @@ _EXTRAS = ("track", "overlap", "id", "note", "author", "confidence", "origin")
 
 
 def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
-    """Write annotations with extra columns; what they cannot hold is returned."""
+    """Write annotations with extra columns; what they cannot hold is returned.
+
+    Parameters
+    ----------
+    path : Path
+    labels : Labels
+    timebase, media
+        Not used: the format has neither frames nor a video.
+    """
     overlap = {track.name: track.overlap for track in labels.tracks}
     texts: dict[str, Callable[[Span], str]] = {
         "track": lambda span: span.track,

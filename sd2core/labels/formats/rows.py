@@ -65,7 +65,20 @@ class TableRows:
         confidence: float | None,
         cells: Mapping[str, str],
     ) -> None:
-        """Add a line of the table, with what has been read of it; the rest is in ``cells``."""
+        """Add a line of the table, with what has been read of it.
+
+        Parameters
+        ----------
+        line : int
+            Number of the line in the file, for messages.
+        edges_s : (float, float)
+            Start and end.
+        label : str
+        confidence : float or None
+        cells : mapping of str to str
+            Texts of the other columns: ``track``, ``overlap``, ``note``, ``author``, ``origin`` and
+            ``id``, as far as there are any.
+        """
         track = cells.get("track") or DEFAULT_TRACK
         stated = next((one for one in OVERLAPS if one == cells.get("overlap")), None)
         self.tracks[clean_name(track)] = stated
@@ -93,13 +106,25 @@ def assemble(
 ) -> Labels:
     """Make labels of rows.
 
-    A row without extent becomes the frame that is shown at that instant, for which the timebase is
-    needed. Ids are kept where they are positive and differ; the other spans are numbered after
-    them, in the order of time.
+    Ids are kept where they are positive and differ; the other spans are numbered after them, in
+    the order of time.
 
-    ``tracks`` are given in their order, also those without spans; further ones of the rows follow.
-    Where the overlap is None it is ``"free"`` when spans do overlap, otherwise ``"exclusive"``.
-    Raises Sd2Error naming the file (``path``) and the place, when a row is not a span.
+    Parameters
+    ----------
+    path : Path
+        The file, for messages.
+    rows : sequence of Row
+    tracks : iterable of (str, Overlap or None)
+        In their order, also those without spans; further ones of the rows follow. A track is
+        ``"free"`` where spans do overlap, else as it says; where it says None, ``"exclusive"``.
+    label_set : LabelSet
+    timebase : Timebase, optional
+        Needed for a row without extent, which becomes the frame that is shown at that instant.
+
+    Raises
+    ------
+    Sd2Error
+        Naming the file and the place, when a row is not a span.
     """
     ids = _ids(rows)
     spans = tuple(_span(path, row, number, timebase) for row, number in zip(rows, ids, strict=True))

@@ -39,7 +39,22 @@ _TOKEN = re.compile(
 
 
 def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
-    """Write a TextGrid from the first to the last instant of video and spans."""
+    """Write a TextGrid from the first to the last instant of video and spans.
+
+    Parameters
+    ----------
+    path : Path
+    labels : Labels
+    timebase : Timebase
+        Of the video: for its first and last instant.
+    media : Path, optional
+        Not used.
+
+    Returns
+    -------
+    list of Loss
+        Empty: what is lost depends on the format alone.
+    """
     start_s = min([timebase.start_s, *(span.start_s for span in labels.spans)])
     end_s = max([timebase.end_s, *(span.end_s for span in labels.spans)])
     lanes = lanes_of(labels, edges_s)

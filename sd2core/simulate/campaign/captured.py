@@ -70,8 +70,23 @@ class CapturedMotions:
     ) -> Performance:
         """A part of a recording on one subject's body, about the floor's origin.
 
-        ``number`` is the subject's. It is at most as long as the recording: the times are then
-        those from the first on. Half of the motions are reversed in time.
+        Half of the motions are reversed in time.
+
+        Parameters
+        ----------
+        rng : Generator
+        subject : Subject
+        number : int
+            Of the subject: it chooses the recorded person.
+        skeleton : Skeleton
+            The subject's.
+        times_s : float64 array, shape (T,)
+            Evenly spaced from 0 on.
+
+        Returns
+        -------
+        Performance
+            At most as long as the recording: the times are then those from the first on.
         """
         motion = _drawn(rng, self._people[number % len(self._people)])
         pace = float(np.exp(rng.uniform(-_PACE, _PACE)))

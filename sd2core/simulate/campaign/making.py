@@ -55,11 +55,26 @@ def make_campaign(
     stopped has equally much of every subject; started again it goes on, as if it
     had not been stopped. A longer one begins with a shorter one's takes.
 
-    ``out`` is the folder of the pairs; ``minutes`` is the length of all subjects together, where
-    placements count once, as in the number of takes. With one process the takes are made in this
-    one. ``errors`` replaces the bundled errors of fits. ``progress`` counts takes.
+    Parameters
+    ----------
+    out : Path
+        Folder of the pairs.
+    campaign : Campaign
+    subjects : int
+        1 or more.
+    minutes : float
+        Length of all subjects together, where placements count once, as in the number of takes.
+    processes : int
+        With one the takes are made in this process.
+    errors : Path, optional
+        Errors of fits, in place of the bundled ones.
+    progress : Progress
+        Counts takes.
 
-    Raises Sd2Error when the folder holds something else, or a campaign of other settings.
+    Raises
+    ------
+    Sd2Error
+        When the folder holds something else, or a campaign of other settings.
     """
     if subjects < 1:
         raise Sd2Error(f"{subjects} subjects", "at least one")

@@ -114,9 +114,21 @@ def perform(
 ) -> Performance:
     """Motion of one person in one take, on the floor's origin, facing -z.
 
-    ``skeleton`` is the person's, ``base`` that of the bundled body. The times are multiples of
-    1/240 s. The kind, where it is not given, is drawn, or without other movements follows from the
-    take's ``number``, as does the one kind of swipe of a take to and fro.
+    Parameters
+    ----------
+    rng : Generator
+    subject : Subject
+    skeleton : Skeleton
+        The subject's.
+    base : Skeleton
+        Of the bundled body, for which poses of arms were written.
+    times_s : float64 array, shape (T,)
+        Multiples of 1/240 s.
+    kind : Kind, optional
+        By default drawn, or without other movements it follows from the take's number.
+    protocol : Protocol
+    number : int
+        Of the take; the one kind of swipe of a take to and fro follows from it as well.
     """
     drawn: Kind = rng.choice(list(KINDS), p=list(KINDS.values()))
     kind = kind or (drawn if protocol.others else _IN_TURN[number % len(_IN_TURN)])
@@ -144,7 +156,23 @@ def plan_arms(
     protocol: Protocol = VARIED,
     number: int = 0,
 ) -> dict[str, list[Move]]:
-    """Moves of both arms until there is no time for another; one arm moves at a time."""
+    """Moves of both arms until there is no time for another; one arm moves at a time.
+
+    Parameters
+    ----------
+    rng : Generator
+    subject : Subject
+    duration_s : float
+        Of the take.
+    protocol : Protocol
+    number : int
+        Of the take; the one kind of swipe of a take to and fro follows from it.
+
+    Returns
+    -------
+    dict
+        Moves of ``"L"`` and of ``"R"``, in order of time.
+    """
     to_and_fro = protocol.order == "to-and-fro"
     swipe = _SWIPE if protocol.others else 1.0
     alternating = itertools.cycle(_TO_AND_FRO[number % len(_IN_TURN) % len(_TO_AND_FRO)])

@@ -110,10 +110,16 @@ def change_posture(
 ) -> Floats:
     """Transforms of a body in another posture, (T, B, 3, 4).
 
-    The skeleton is that of the result and may be of another shape than the one that the posture was
-    read from; ``transforms`` are those of the body in the true posture. ``change`` holds, (T, n),
-    metres along the axes of the line of sight for the place, rotation vectors in them for the
-    trunk, differences of directions for limbs; ``place`` and ``trunk`` have the side "".
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Of the result; it may be of another shape than the one that the posture was read from.
+    transforms : float64 array, shape (T, B, 3, 4)
+        Of the body in the true posture.
+    true : Posture
+    change : mapping of (group, side) to float64 array, shape (T, n)
+        Metres along the axes of the line of sight for the place, rotation vectors in them for the
+        trunk, differences of directions for limbs; ``place`` and ``trunk`` have the side "".
     """
     frames = len(transforms)
     back = transposed(true.axes)  # from the axes of the line of sight to the camera's

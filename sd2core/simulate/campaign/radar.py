@@ -101,9 +101,22 @@ def radar_target(
 ) -> NDArray[np.float32]:
     """Doppler map of a moving mesh by a radar: power, (T, bins), see :data:`REFERENCE_RANGE_M`.
 
-    The mesh has faces, and the radar's frames are at its times. ``null_bins`` are emptied, as in
-    the synthetic map; ``reflectors`` are static clutter; the seed is that of phases and noise.
-    ``on_frame`` is called before every frame and may raise to stop.
+    Parameters
+    ----------
+    mesh : MeshSequence
+        With faces; the radar's frames are at its times.
+    config : RadarConfig
+    sensor : VirtualSensor
+    axis : VelocityAxis
+    null_bins : sequence of int
+        Emptied, as in the synthetic map.
+    reflectors : tuple of Reflector
+        Static clutter.
+    seed : sequence of int
+        Of phases and noise.
+    options : TargetOptions, optional
+    on_frame : callable
+        Called before every frame; may raise to stop.
     """
     options = options or TargetOptions()
     rng = np.random.default_rng(seed)

@@ -110,7 +110,20 @@ def random_setting(
     config: RadarConfig,
     protocol: Protocol = VARIED,
 ) -> Setting:
-    """A setting; the first sensor does not depend on how many there are."""
+    """A setting; the first sensor does not depend on how many there are.
+
+    Parameters
+    ----------
+    rng : Generator
+    stature_m : float
+        Of the person: sensors are aimed at the chest.
+    placements : int
+        Number of sensors.
+    config : RadarConfig
+        By its wavelength reflectors have their areas.
+    protocol : Protocol
+        Whether place and heading vary.
+    """
     distance_m = float(rng.uniform(RANGES_M[0] + _BESIDE_M, RANGES_M[1]))
     camera_m = float(rng.uniform(*_CAMERA_M))
     across_m = float(rng.uniform(-0.1, 0.1)) * distance_m

@@ -146,8 +146,15 @@ class TakeMaker:
     ) -> list[Take]:
         """One take as every placement sees it.
 
-        ``on_frame`` is called before every radar frame and may raise to stop. Other values of
-        ``look`` have the same motion, and a radar with other noise and another rough surface.
+        Parameters
+        ----------
+        subject_number, number : int
+            Of the subject and of the take, from 0 on.
+        on_frame : callable
+            Called before every radar frame; may raise to stop.
+        look : int
+            Other values have the same motion, and a radar with other noise and another rough
+            surface.
         """
         campaign = self._campaign
         rngs = [

@@ -38,6 +38,15 @@ def random_motion(
 
     Drawn again where it would be too fast for anybody: near a straight arm the side
     to which the elbow bends may jump.
+
+    Parameters
+    ----------
+    rng : Generator
+    skeleton : Skeleton
+    stature_m : float
+        Of the person with this skeleton.
+    times_s : float64 array, shape (T,)
+    deed : Deed
     """
     while True:
         motion = _drawn(rng, skeleton, stature_m, times_s, deed)

@@ -39,6 +39,14 @@ def wander(rng: np.random.Generator, times_s: Floats, cutoff_hz: float, count: i
 
     A sum of sines whose frequencies spread evenly below ``cutoff_hz``, the slow
     ones larger.
+
+    Parameters
+    ----------
+    rng : Generator
+    times_s : float64 array, shape (T,)
+    cutoff_hz : float
+    count : int
+        Number of independent signals.
     """
     frequency = cutoff_hz * rng.uniform(0.05, 1.0, (_WAVES, count))
     phase = rng.uniform(0.0, 2.0 * np.pi, (_WAVES, count))
@@ -49,7 +57,15 @@ def wander(rng: np.random.Generator, times_s: Floats, cutoff_hz: float, count: i
 
 
 def envelope(times_s: Floats, start_s: float, end_s: float, ramp_s: float) -> Floats:
-    """1 from ``start_s`` to ``end_s``, 0 outside, with smooth ramps inside, (T,)."""
+    """1 from ``start_s`` to ``end_s``, 0 outside, with smooth ramps inside, (T,).
+
+    Parameters
+    ----------
+    times_s : float64 array, shape (T,)
+    start_s, end_s : float
+    ramp_s : float
+        Length of each ramp.
+    """
     one = np.ones(())
     rise = smooth_share((times_s - start_s) / ramp_s, one)
     fall = smooth_share((end_s - times_s) / ramp_s, one)

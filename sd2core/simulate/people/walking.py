@@ -32,7 +32,16 @@ class Footwork:
 def footwork(
     rng: np.random.Generator, times_s: Floats, mode: Mode, *, still: bool = False
 ) -> Footwork:
-    """Random footwork; ``still`` leaves a breath of sway only."""
+    """Random footwork.
+
+    Parameters
+    ----------
+    rng : Generator
+    times_s : float64 array, shape (T,)
+    mode : {"stand", "shift", "walk", "turn", "sit"}
+    still : bool
+        Leaves a breath of sway only.
+    """
     count = len(times_s)
     place = np.zeros((count, 2))
     heading = np.zeros(count)
