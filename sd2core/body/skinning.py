@@ -45,14 +45,14 @@ def pose_vertices(body: Body, transforms: Floats) -> NDArray[np.float32]:
 
 @compiled
 def pose_kernel(
-    rest: NDArray[np.float64],  # (V, 3)
-    bones: NDArray[np.int32],  # (V, 8)
-    weights: NDArray[np.float64],  # (V, 8), strongest first
-    influences: NDArray[np.int32],  # (V,) how many of them are not zero
-    transforms: NDArray[np.float64],  # (T, B, 3, 4)
+    rest: NDArray[np.float64],
+    bones: NDArray[np.int32],
+    weights: NDArray[np.float64],
+    influences: NDArray[np.int32],
+    transforms: NDArray[np.float64],
     first: int,
     last: int,
-    vertices: NDArray[np.float32],  # (T, V, 3), written
+    vertices: NDArray[np.float32],
 ) -> None:
     """Compiled form of :func:`pose_vertices` for frames ``first`` to ``last``.
 
