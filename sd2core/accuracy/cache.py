@@ -42,7 +42,24 @@ def clip_fingerprint(mesh: MeshSequence) -> str:
 def scene_fingerprint(
     mesh: MeshSequence, sensor: VirtualSensor, options: SynthesisOptions, family: Family
 ) -> str:
-    """Fingerprint of everything that errors depend on."""
+    """Fingerprint of everything that errors depend on.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+        With its uncertainty, where the options count the expected map.
+    sensor : VirtualSensor
+        Where it stands and looks.
+    options : SynthesisOptions
+        For what a plan does not choose.
+    family : {"histogram", "fmcw"}
+        Family of the plans measured.
+
+    Returns
+    -------
+    str
+        16 hexadecimal digits.
+    """
     what: dict[str, Any] = {
         "clip": clip_fingerprint(mesh),
         "sensor": asdict(sensor),
@@ -73,6 +90,15 @@ def cached_measurement(
 
     It is ``stale`` if it was of another sensor place or other options, or on another
     machine or version.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+        Clip measured: measurements are found by :func:`clip_fingerprint` and family.
+    sensor, options : VirtualSensor, SynthesisOptions
+        Those in use now.
+    family : {"histogram", "fmcw"}
+        Family of the plans measured.
     """
     try:
         measurement = _from_json(read_text(_place(mesh, family), "a measurement"))

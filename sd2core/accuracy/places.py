@@ -76,9 +76,26 @@ def choose_for_places(
     is chosen there. Where choosing is estimated to take longer than it saves, maps are made
     as the options say, if that holds, or with the most accurate plan, which does.
 
-    ``places`` are a few, see :func:`spread`; ``frames`` are those of all maps that are to
-    be made, together. Tolerance and errors are those of
-    :func:`~sd2core.accuracy.choosing.choose`; progress may raise Cancelled.
+    Parameters
+    ----------
+    mesh : MeshSequence
+        Whole mesh, not decimated.
+    places : sequence of VirtualSensor
+        A few of all, see :func:`spread`.
+    frames : int
+        Frames of all maps that are to be made, together.
+    tolerance : float
+        As for :func:`~sd2core.accuracy.choosing.choose`: relative L1 after smoothing, above 0 and
+        up to 1.
+    options : SynthesisOptions
+        For what a plan does not choose; taken as a plan, they are tried too.
+    progress : Progress
+        May raise Cancelled.
+
+    Raises
+    ------
+    Sd2Error
+        For a tolerance out of bounds, or options that take Vid2Doppler's velocities.
     """
     check_wish(tolerance)
     options = check_options(mesh, options)

@@ -187,9 +187,16 @@ def counting_plans(
 ) -> Iterator[AccuracyPlan]:
     """Plans of every combination of the counting settings, without reused masks.
 
-    ``surface`` is False for a point cloud, which has no visibility and cannot be decimated;
-    ``range_law`` if there is none to apply by vertex or by frame. ``vertices_kept`` are the
-    shares that the surface can be decimated to, and 1: a few faces cannot be.
+    Parameters
+    ----------
+    weight : {"count", "area", "projected"}
+        Of all plans: a choice of quantity.
+    surface : bool
+        False for a point cloud, which has no visibility and cannot be decimated.
+    range_law : bool
+        False if there is none to apply by vertex or by frame.
+    vertices_kept : sequence of float
+        Shares that the surface can be decimated to, and 1: a few faces cannot be.
     """
     laws: tuple[RangeLaw, ...] = ("vertex", "frame") if range_law else ("vertex",)
     for sight, kept, factor, law in product(

@@ -21,9 +21,19 @@ def reasons_for(
 ) -> tuple[Reason, ...]:
     """Explain the settings of a chosen plan.
 
-    ``tried`` are the errors of the plan and of others that were tried; the tolerance is None where
-    a budget decided. Where a setting alone would be within the tolerance and is not lowered, or the
-    reverse, the sentence says what decided.
+    Where a setting alone would be within the tolerance and is not lowered, or the reverse, the
+    sentence says what decided.
+
+    Parameters
+    ----------
+    survey : Survey
+        Of the scene that the plan was chosen for.
+    plan : AccuracyPlan
+        The chosen one.
+    tried : mapping of AccuracyPlan to Errors
+        Errors of the plan and of others that were tried.
+    tolerance : float or None
+        Relative L1 after smoothing; None where a budget decided.
     """
     base, facts, change = survey.base, survey.facts, survey.change
     found: list[Reason] = []

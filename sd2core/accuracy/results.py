@@ -191,10 +191,19 @@ def compute_errors(
     reference_smooth: NDArray[np.float64],
     axis: VelocityAxis,
 ) -> Errors:
-    """Compare a map (bins, n) with its reference, before and after smoothing; none is negative.
+    """Compare a map with its reference, before and after smoothing.
 
     A frame that is empty in the map but not in the reference has peak and mean velocity 0,
     and all its energy in wrong bins.
+
+    Parameters
+    ----------
+    raw, reference_raw : ndarray, (bins, n)
+        Map and reference before smoothing; no value is negative.
+    smooth, reference_smooth : ndarray, (bins, n)
+        The same frames after smoothing.
+    axis : VelocityAxis
+        Of both.
     """
     energy = reference_smooth.sum(axis=0)
     moving = (energy > 0) & (energy >= _MOVING * energy.mean())

@@ -111,9 +111,17 @@ def survey_scene(
 ) -> Survey:
     """Measure error and cost of each setting alone.
 
-    ``options`` are for what a plan does not choose. ``trial`` is one of the same scene, if there
-    is one already; that of another place, with :meth:`Trial.at` this one, saves sampling and
-    decimating again. Progress counts the tries and may raise Cancelled.
+    Parameters
+    ----------
+    mesh, sensor : MeshSequence, VirtualSensor
+        The scene.
+    options : SynthesisOptions
+        For what a plan does not choose.
+    progress : Progress
+        Counts the tries; may raise Cancelled.
+    trial : Trial, optional
+        One of the same scene, if there is one already; that of another place, with
+        :meth:`Trial.at` this one, saves sampling and decimating again.
     """
     surface = mesh.faces is not None
     if trial is None:

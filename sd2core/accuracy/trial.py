@@ -35,10 +35,22 @@ def synthesizer_for(
 ) -> Synthesizer:
     """Create the synthesizer of a counting plan for a full mesh.
 
-    ``options`` are for what a plan does not choose: axis, nulled bins, range law,
-    smoothing. ``like`` is the synthesizer of a plan that keeps as many vertices; its
-    decimated mesh, and its prepared frames where possible, are shared. Raises Sd2Error for
-    an FMCW plan, or a plan that this mesh cannot have.
+    Parameters
+    ----------
+    plan : AccuracyPlan
+        Of the histogram family.
+    mesh : MeshSequence
+        Full mesh, which is decimated as the plan says.
+    options : SynthesisOptions
+        For what a plan does not choose: axis, nulled bins, range law, smoothing.
+    like : Synthesizer, optional
+        That of a plan that keeps as many vertices; its decimated mesh, and its prepared frames
+        where possible, are shared.
+
+    Raises
+    ------
+    Sd2Error
+        For an FMCW plan, or a plan that this mesh cannot have.
     """
     if plan.family != "histogram":
         raise Sd2Error(f"The plan is {plan}", "a plan that counts vertices")
@@ -172,9 +184,19 @@ class Trial:
         runs: Sequence[Run] | None = None,
         progress: Progress = silent,
     ) -> float:
-        """Time of a plan per frame, after the sensor has moved: of some runs, or all that is read.
+        """Milliseconds that a plan takes per frame, after the sensor has moved.
 
-        With one thread the processor time of that thread, otherwise wall-clock time.
+        Parameters
+        ----------
+        plan : AccuracyPlan
+            To be timed, without preparing frames.
+        threads : int, optional
+            With 1 the processor time of that thread, otherwise wall-clock time; by default one
+            per core.
+        runs : sequence of Run, optional
+            Frames that are timed; all that is read by default.
+        progress : Progress
+            May raise Cancelled.
         """
         synthesizer = self.synthesizer(plan, threads, runs=runs, progress=progress)
         spans = [(0, synthesizer.mesh.frame_count)] if runs is None else _spans(runs)
@@ -212,7 +234,19 @@ class Trial:
         runs: Sequence[Run] | None = None,
         progress: Progress = silent,
     ) -> Synthesizer:
-        """Synthesizer of a plan for the sampled frames, prepared for some runs or for all."""
+        """Synthesizer of a plan, without smoothing, with frames prepared.
+
+        Parameters
+        ----------
+        plan : AccuracyPlan
+            Of the histogram family.
+        threads : int, optional
+            Of the synthesizer; by default one per core.
+        runs : sequence of Run, optional
+            Sampled frames that are prepared; all of them by default.
+        progress : Progress
+            Of the preparation; may raise Cancelled.
+        """
         # As small blocks take their own time, all frames are in those of any synthesizer.
         block_frames = None if runs is None else _BLOCK_FRAMES
         key = plan.vertices_kept, plan.frame_rate_factor, block_frames

@@ -24,8 +24,19 @@ def denoise(
 ) -> None:
     """Denoise a map, given in parts in order, and write one file per part, in order.
 
-    ``digest`` is the hash of the model's file, ``texture`` the seed with which a map is drawn as a
-    radar would show it; that of several parts is known by the first of them.
+    Parameters
+    ----------
+    maps : sequence of Path
+        Files of the parts.
+    model : str
+        File of the denoiser.
+    digest : str
+        Hash of that file's content: a worker loads the model again when it is another.
+    outs : sequence of Path
+        Files to write, as many as ``maps``.
+    texture : int, optional
+        Seed with which a map is drawn as a radar would show it; that of several parts is known by
+        the first of them. None leaves the texture out; Sd2Error if the model knows none.
     """
     trained = _model(model, digest)
     outs[0].parent.mkdir(parents=True, exist_ok=True)

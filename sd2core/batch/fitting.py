@@ -38,7 +38,18 @@ def fit_choices(fit: Fitting, subject: str, focal_px: float | None) -> dict[str,
 def fit_to_video(video: str, choices: dict[str, Any], models: Path | None, out: str) -> None:
     """Fit a body, write the mesh, then a file with the facts that tasks need.
 
-    A fit that was killed goes on where it was.
+    A fit that was killed goes on where it was; a mesh that is there is not made again.
+
+    Parameters
+    ----------
+    video : str
+        Path of the video.
+    choices : dict
+        Fields of :class:`~sd2core.body.fit_video.FitChoices`, from :func:`fit_choices`.
+    models : Path or None
+        Folder of the landmark models, see :func:`~sd2core.body.landmark_models.landmark_models`.
+    out : str
+        Path of the mesh; the facts are at :func:`facts_path`.
     """
     from sd2core.body.fit_video import FitChoices, FitReport, fit_video
 

@@ -282,7 +282,19 @@ def _bytes_in_memory(path: Path) -> int:
 def mesh_input_of(
     path: Path, identity: str, faces: str | None = None, reading: Mapping[str, Any] | None = None
 ) -> MeshInput:
-    """Open a mesh and return the facts that tasks need."""
+    """Open a mesh and return the facts that tasks need.
+
+    Parameters
+    ----------
+    path : Path
+        The mesh; Sd2Error if it can neither be streamed nor is small enough for memory.
+    identity : str
+        Hash of its content and of how it is read, or "" if that is not asked for.
+    faces : str, optional
+        File with the triangles, in place of those of the mesh.
+    reading : mapping, optional
+        Further arguments for :func:`~sd2core.io.mesh.load_mesh`.
+    """
     from sd2core.placements.body_extent import BodyExtent
 
     mesh = open_mesh(path, faces, reading or {})

@@ -58,13 +58,27 @@ def run_batch(
     watch: Watch | None = None,
     pool: AbstractContextManager[Pool] | None = None,
 ) -> BatchEnd:
-    """Make all results of a plan, whose paths are absolute, that do not exist yet.
+    """Make all results of a plan that do not exist yet.
 
-    ``source`` is the file of the plan; ``scheduler`` the address of a dask-scheduler,
-    without which ``processes`` are started here; ``watch`` is called with every line of the
-    progress. A ``pool`` runs the tasks in place of scheduler and processes.
+    Parameters
+    ----------
+    plan : BatchPlan
+        Its paths are absolute.
+    source : Path, optional
+        File of the plan, for the progress.
+    scheduler : str, optional
+        Address of a dask-scheduler that runs the tasks.
+    processes : int
+        Number of processes to start here without a scheduler.
+    watch : callable, optional
+        Called with every line of the progress.
+    pool : context manager of Pool, optional
+        Runs the tasks in place of scheduler and processes.
 
-    Raises Sd2Error if the batch cannot begin, or cannot go on at all.
+    Raises
+    ------
+    Sd2Error
+        If the batch cannot begin, or cannot go on at all.
     """
     folder = BatchFolder(Path(plan.out))
     origins = find_origins(plan.recordings, folder.path)

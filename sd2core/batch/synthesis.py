@@ -75,7 +75,22 @@ def synthesise(
     """Make the map of some frames and write it.
 
     It equals these columns of the map of the whole clip: smoothing and the reuse of masks
-    look beyond the stretch. ``choosing`` is for a section with a tolerance.
+    look beyond the stretch.
+
+    Parameters
+    ----------
+    mesh : MeshInput
+        Kept open for further tasks of the same mesh.
+    sensor : VirtualSensor
+        Sd2Error if it stands in the body.
+    section : Synthesis
+        Section ``[synthesise]`` of the plan.
+    stretch : tuple of 2 int
+        Half-open range of frames.
+    choosing : Choosing or None
+        For a section with a tolerance: maps that share an accuracy plan.
+    out : Path
+        Map to write (.npz).
     """
     from sd2core.body.parts import synthetic_map
 
@@ -100,6 +115,21 @@ def simulate(
     """Make the map that a radar would show of some frames and write it.
 
     It equals these columns of the map of the whole clip.
+
+    Parameters
+    ----------
+    mesh : MeshInput
+        With faces; kept open for further tasks of the same mesh.
+    sensor : VirtualSensor
+        Sd2Error if it stands in the body.
+    simulation : Simulation
+        Radar and seed.
+    axis : VelocityAxis
+        Of the map.
+    stretch : tuple of 2 int
+        Half-open range of frames.
+    out : Path
+        Map to write (.npz).
     """
     from sd2core.datasets.simulating import simulated_map
 

@@ -67,7 +67,19 @@ def _per_frame() -> list[str]:
 def evidence_of(
     track: LandmarkTrack, lifted: LiftedTrack, camera: PinholeCamera, stature_m: float
 ) -> Evidence:
-    """Landmarks and depths of the same frames in metres and seconds, scaled by the stature."""
+    """Landmarks and depths of the same frames in metres and seconds, scaled by the stature.
+
+    Parameters
+    ----------
+    track : LandmarkTrack
+        Landmarks in the picture, T frames.
+    lifted : LiftedTrack
+        The same frames in statures, from the lifter (docs/decisions/0018).
+    camera : PinholeCamera
+        That of the track's picture.
+    stature_m : float
+        Stature of the person.
+    """
     moving_mps = _STEPPING_MPS * np.sqrt(1.0 - lifted.standing)
     return Evidence(
         times_s=np.array(track.timebase.times_s),

@@ -109,7 +109,21 @@ def search_store(
     silhouettes: int | None,
     landmark_model: str,
 ) -> ArrayStore:
-    """Store of a search; files of another one (by any of these) are ignored."""
+    """Store of a search; files of another one (by any of these) are ignored.
+
+    Parameters
+    ----------
+    folder : Path or None
+        Made where it is missing; None keeps the arrays in memory.
+    video : VideoReader
+        Known by path, size, time of change, number of frames and size of the picture.
+    person : Rectangle or None
+        Rectangle around the person, or None for the most prominent one.
+    silhouettes : int or None
+        Number of frames whose mask is kept; None for all.
+    landmark_model : str
+        Name of the landmark model.
+    """
     if folder is None:
         return ArrayStore(None)
     about = os.stat(video.path)
@@ -132,7 +146,23 @@ def repaired_track(
     unclear: NDArray[np.bool_] | None = None,
     notes: tuple[str, ...] = (),
 ) -> TrackInParts:
-    """Repair what was found, into a store; see :func:`repair_landmarks`."""
+    """Repair what was found, into a store; see :func:`repair_landmarks`.
+
+    Parameters
+    ----------
+    store : ArrayStore
+        Repaired parts are written to it, and read from it by the track.
+    video : VideoReader
+        Searched for ``refined``.
+    refined : RefinedStretches
+        All stretches of the video.
+    max_gap_s : float
+        Longest gap without the person that is bridged.
+    unclear : bool ndarray, (T,), optional
+        Frames in which whoever is there may be another person.
+    notes : tuple of str
+        Sentences that the track has beside those about the repair.
+    """
     present, bridged = np.zeros((2, len(video)), bool)
     written = 0
 

@@ -119,10 +119,21 @@ def landmark_models(
 ) -> LandmarkModels:
     """Find the models, and fetch them into the user's cache where they are missing.
 
-    A given folder is the only place to look; by default that is the folder named by
-    ``SD2_MODELS``, or the user's cache. Progress counts bytes while they are fetched and
-    may raise ``Cancelled``. Raises Sd2Error if they are missing, not the known ones, or
-    cannot be fetched.
+    Parameters
+    ----------
+    folder : Path, optional
+        The only place to look; by default that named by ``SD2_MODELS``, else the user's cache.
+    progress : Progress
+        Counts bytes while they are fetched; may raise ``Cancelled``.
+    download : bool
+        False refuses to fetch what is missing.
+    model : {"full", "heavy"}
+        Landmark model of the second pass.
+
+    Raises
+    ------
+    Sd2Error
+        If they are missing, not the known ones, or cannot be fetched.
     """
     named = folder or (Path(os.environ[ENVIRONMENT]) if os.environ.get(ENVIRONMENT) else None)
     if named is not None:

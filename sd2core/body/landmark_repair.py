@@ -191,10 +191,20 @@ def repair_landmarks(
 ) -> tuple[str, ...]:
     """Repair a whole clip part by part; return sentences about it.
 
-    ``seen`` (T,) marks the frames in which the person was found, ``unclear`` (T,) those in which
-    whoever is there may be another person. Gaps up to ``max_gap_s``,
-    from the last frame before to the first after, are bridged. ``write`` is called with the
-    repaired parts, in order.
+    Parameters
+    ----------
+    read : callable
+        ``read(start, stop)`` gives what was found in these frames.
+    times_s : float64 ndarray, (T,)
+        Times of all frames.
+    seen : bool ndarray, (T,)
+        Frames in which the person was found.
+    max_gap_s : float
+        Longest gap that is bridged, from the last frame before to the first after.
+    write : callable
+        Called with the repaired parts, in order.
+    unclear : bool ndarray, (T,), optional
+        Frames in which whoever is there may be another person; None: in none.
     """
     swapped = find_side_swaps(read, len(seen))
     tally = _Tally(swapped)

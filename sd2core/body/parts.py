@@ -105,7 +105,18 @@ def synthetic_map(
 ) -> DopplerMap:
     """Doppler map of a mesh that states its accuracy, as far as the mesh says that of the body.
 
-    With ``limbs`` also its split, as :func:`known_parts` finds them.
+    Parameters
+    ----------
+    maker : Synthesizer
+        Of that mesh.
+    sensor : VirtualSensor
+        Where it stands and looks.
+    limbs : bool
+        True for its split as well, by the parts that :func:`known_parts` finds (or refuses).
+    frames : tuple of 2 int, optional
+        Half-open range; all frames by default.
+    progress : Progress
+        Counts frames; may raise Cancelled.
     """
     from sd2core.doppler.body_error import body_error
 

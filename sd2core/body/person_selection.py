@@ -48,8 +48,19 @@ def find_prominent_person(
 ) -> Start:
     """Find the most prominent person: large, near the middle, surely a person.
 
-    ``progress`` is called now and then and may raise ``Cancelled``. Raises Sd2Error if no person
-    is found in the whole video.
+    Parameters
+    ----------
+    video : VideoReader
+        Searched in a few frames first, then in more and in parts of the picture.
+    detector, landmarker : PoseDetector, PoseLandmarker
+        What says where people are, and how surely there is one.
+    progress : Progress
+        Called now and then, without a share of the work; may raise ``Cancelled``.
+
+    Raises
+    ------
+    Sd2Error
+        If no person is found in the whole video.
     """
     best_score = 0.0
     looked: set[int] = set()
@@ -119,8 +130,20 @@ def find_person_in(
 ) -> Start:
     """Find the person in a rectangle of one frame.
 
-    Raises Sd2Error if there is no such frame, the rectangle is outside the picture, or there is
-    no person in it.
+    Parameters
+    ----------
+    rectangle : Rectangle
+        Around the person, in pixels of the upright picture.
+    video : VideoReader
+        Only the rectangle's frame is read.
+    detector, landmarker : PoseDetector, PoseLandmarker
+        What says where people are, and how surely there is one.
+
+    Raises
+    ------
+    Sd2Error
+        If there is no such frame, the rectangle is outside the picture, or there is no person in
+        it.
     """
     if not 0 <= rectangle.frame < len(video):
         raise Sd2Error(

@@ -60,6 +60,18 @@ def pixels_per_metre(found: RawTrack) -> Floats:
 
 
 def place_m(found: RawTrack, rows: NDArray[np.intp], scale: Floats, landmark: int) -> Floats:
-    """One landmark in the picture and in the model's own coordinates, in metres, (N, 5)."""
+    """One landmark in the picture and in the model's own coordinates, in metres, (N, 5).
+
+    Parameters
+    ----------
+    found : RawTrack
+        Landmarks, not repaired.
+    rows : int ndarray, (N,)
+        Frames of it.
+    scale : float64 ndarray, (N, 1)
+        Pixels per metre in these frames, see :func:`pixels_per_metre`.
+    landmark : int
+        Number of the landmark, 0 to 32.
+    """
     picture = found.image_px[rows, landmark] / scale
     return np.concatenate([picture, found.world_m[rows, landmark]], axis=1, dtype=np.float64)

@@ -75,11 +75,21 @@ class Refiner:
         kept: frozenset[int],
         seen: Callable[[int, Pose | None], None],
     ) -> Stretch:
-        """Landmarks of the frames from ``start`` on, one for each of ``rois`` (None: no person).
+        """Landmarks of successive frames.
 
-        The silhouettes of the frames in ``kept`` are kept. ``seen`` is called with each frame, in
-        order, and what was seen in it, None where it is not looked at now; it may raise
-        ``Cancelled``.
+        Parameters
+        ----------
+        video : VideoReader
+            Read forwards.
+        start : int
+            First frame.
+        rois : sequence of Roi or None
+            Square around the person in each frame from ``start`` on; None: no person.
+        kept : frozenset of int
+            Frames of the whole video whose silhouettes are kept.
+        seen : callable
+            Called with each frame, in order, and what was seen in it, None where it is not looked
+            at now; may raise ``Cancelled``.
         """
         frames = len(rois)
         times_s = video.timebase.times_s[start : start + frames]
@@ -195,9 +205,20 @@ def fast_looks(
     visibility: Singles,
     sizes_px: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Looks (K,) at which a landmark that is seen moves fast, of places (K, 33, 2).
+    """Looks (K,) at which a landmark that is seen moves fast.
 
     So are those at both ends, and next to a frame without the person.
+
+    Parameters
+    ----------
+    times_s : float64 ndarray, (K,)
+        Times of the frames looked at.
+    image_px : float32 ndarray, (K, 33, 2)
+        Landmarks in the picture; NaN without the person.
+    visibility : float32 ndarray, (K, 33)
+        Below 0.5 a landmark does not count.
+    sizes_px : float64 ndarray, (K,)
+        Sides of the squares around the person.
     """
     fast = np.ones(len(times_s), bool)
     if len(times_s) > 2:

@@ -44,9 +44,20 @@ NEAREST_M = 0.05
 def shape_of_lengths(
     space: ShapeSpace, keypoints: KeypointSpace, seen_m: Floats, trust: Floats, stature_m: float
 ) -> tuple[BodyShape, Floats]:
-    """Likeliest shape for distances between landmarks (T, 33, 3), and its covariance (K, K).
+    """Likeliest shape for distances between landmarks, and its covariance (K, K).
 
-    Landmarks whose trust (T, 33), from 0 to 1, is below a half are left out.
+    Parameters
+    ----------
+    space : ShapeSpace
+        K directions of shape, with their spread over bodies.
+    keypoints : KeypointSpace
+        Landmarks on bodies of that space.
+    seen_m : float64 ndarray, (T, 33, 3)
+        Places of the landmarks, in one frame for each moment.
+    trust : float64 ndarray, (T, 33)
+        From 0 to 1; landmarks below a half are left out.
+    stature_m : float
+        Stature of the person, which is kept.
     """
     rows, lengths, sds = [], [], []
     for first, second, sd_m in _SEGMENTS:
@@ -88,10 +99,20 @@ def shape_of_outlines(
     camera: PinholeCamera,
     outlines: Sequence[NDArray[np.bool_]],
 ) -> BodyShape:
-    """Shape whose outlines overlap best with those seen (h, w), near one that fits the bones.
+    """Shape whose outlines overlap best with those seen, near one that fits the bones.
 
-    ``start`` and ``spread`` are those of :func:`shape_of_lengths`; ``transforms_of`` gives the
-    poses (n, B, 3, 4) of the frames with outlines for a shape.
+    Parameters
+    ----------
+    space : ShapeSpace
+        K directions of shape.
+    start, spread : BodyShape, float64 ndarray (K, K)
+        Shape that fits the bones and its covariance, of :func:`shape_of_lengths`.
+    transforms_of : callable
+        Gives the poses (n, B, 3, 4) of the frames with outlines for a shape.
+    camera : PinholeCamera
+        Of the whole picture.
+    outlines : sequence of n bool ndarray, (h, w)
+        Masks of the person, which show the whole picture at any size.
     """
     from scipy.optimize import minimize
 
@@ -131,8 +152,16 @@ def silhouette(
 ) -> NDArray[np.bool_]:
     """Mask (height, width) of the pixels that a mesh in the camera frame covers.
 
-    ``size`` (width, height) is that of the mask, which shows the whole picture; by default the
-    picture's own.
+    Parameters
+    ----------
+    vertices_m : ndarray, (V, 3)
+        Triangles with a vertex less than 5 cm in front of the camera are left out.
+    faces : int32 ndarray, (F, 3)
+        Its triangles.
+    camera : PinholeCamera
+        Of the whole picture.
+    size : tuple of 2 int, optional
+        Width and height of the mask, which shows the whole picture; by default the picture's own.
     """
     width, height = size or (camera.width, camera.height)
     vertices = np.asarray(vertices_m, np.float64)

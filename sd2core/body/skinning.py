@@ -45,16 +45,34 @@ def pose_vertices(body: Body, transforms: Floats) -> NDArray[np.float32]:
 
 @compiled
 def pose_kernel(
-    rest: NDArray[np.float64],  # (V, 3)
-    bones: NDArray[np.int32],  # (V, 8)
-    weights: NDArray[np.float64],  # (V, 8), strongest first
-    influences: NDArray[np.int32],  # (V,) how many of them are not zero
-    transforms: NDArray[np.float64],  # (T, B, 3, 4)
+    rest: NDArray[np.float64],
+    bones: NDArray[np.int32],
+    weights: NDArray[np.float64],
+    influences: NDArray[np.int32],
+    transforms: NDArray[np.float64],
     first: int,
     last: int,
-    vertices: NDArray[np.float32],  # (T, V, 3), written
+    vertices: NDArray[np.float32],
 ) -> None:
-    """Compiled form of :func:`pose_vertices` for frames ``first`` to ``last``."""
+    """Compiled form of :func:`pose_vertices` for frames ``first`` to ``last``.
+
+    Parameters
+    ----------
+    rest : float64 ndarray, (V, 3)
+        Vertices at rest, in metres.
+    bones : int32 ndarray, (V, 8)
+        Bones that move each vertex.
+    weights : float64 ndarray, (V, 8)
+        Their weights, strongest first.
+    influences : int32 ndarray, (V,)
+        How many of them are not zero.
+    transforms : float64 ndarray, (T, B, 3, 4)
+        Of the bones in all frames.
+    first, last : int
+        Half-open range of frames.
+    vertices : float32 ndarray, (T, V, 3)
+        Written, in these frames.
+    """
     for t in range(first, last):
         at = transforms[t]
         for v in range(rest.shape[0]):

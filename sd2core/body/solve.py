@@ -389,8 +389,18 @@ def solve(
     """Pose through time that agrees best with the evidence of consecutive frames.
 
     The smoothness follows the motion: after each round, every degree of freedom may accelerate as
-    much as it was found to do around each moment. ``tick`` is called often with the number of
-    rounds done, of :data:`ROUNDS`; it may raise.
+    much as it was found to do around each moment (docs/decisions/0022).
+
+    Parameters
+    ----------
+    rig : Rig
+        Joints of the body, and the landmarks that follow them.
+    evidence : Evidence
+        T consecutive frames.
+    start : Pose
+        Of the same frames, to begin with.
+    tick : callable
+        Called often with the number of rounds done, of :data:`ROUNDS`; may raise.
     """
     frames = len(evidence.times_s)
     sd = np.full((max(frames - 2, 0), rig.freedoms), _FIRST_ROTATION_RADPS2)

@@ -19,7 +19,20 @@ def confusion_figure(
     titles: Sequence[str],
     heading: str,
 ) -> Figure:
-    """Draw row-normalised confusion matrices in a row or two, bound to no window."""
+    """Draw row-normalised confusion matrices in a row or two, bound to no window.
+
+    Parameters
+    ----------
+    matrices : sequence of float64 ndarray, (classes, classes)
+        True classes by found ones, see :func:`~sd2core.classify.metrics.shares`; NaN is drawn as a
+        dash.
+    classes : sequence of str
+        Names of rows and columns.
+    titles : sequence of str
+        One for each matrix.
+    heading : str
+        Title of the figure.
+    """
     from matplotlib.figure import Figure
 
     columns = min(len(matrices), 3)

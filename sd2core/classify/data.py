@@ -130,8 +130,21 @@ def clips_of_pairs(
 ) -> ClipSet:
     """Return the clips of one kind of maps in a store of pairs.
 
-    The radar's are simulated or real, as the pairs say; denoised ones need the denoiser.
-    ``names`` gives the class of every label; by default :func:`gesture_classes`.
+    Parameters
+    ----------
+    pairs : PairSet
+        Its radar is simulated or real.
+    kind : {"synthetic", "denoised", "simulated", "real"}
+        Of the radar's maps that which the pairs say.
+    denoiser : TrainedDenoiser, optional
+        Needed for denoised maps, of the axis, null bins and frame rate of the pairs.
+    names : sequence of str, optional
+        Class of every label of the pairs; by default :func:`gesture_classes`.
+
+    Raises
+    ------
+    Sd2Error
+        If the radar is of another kind, or the denoiser is missing or does not fit.
     """
     if kind in ("simulated", "real") and kind != pairs.kind:
         raise Sd2Error(f"The pairs hold a {pairs.kind} radar", f"a {kind} one")
@@ -309,7 +322,19 @@ def with_noise_floor(clip: Clip, null_bins: Sequence[int], rng: np.random.Genera
 def some_noisy(
     clips: Sequence[Clip], null_bins: Sequence[int], share: float, seed: int
 ) -> list[Clip]:
-    """Add a noise floor to each clip with this probability."""
+    """Add a noise floor to some clips, see :func:`with_noise_floor`.
+
+    Parameters
+    ----------
+    clips : sequence of Clip
+        The others are returned as they are, in the same order.
+    null_bins : sequence of int
+        Bins that stay empty.
+    share : float
+        Probability for each clip, 0 to 1.
+    seed : int
+        The same one gives the same clips and noise.
+    """
     rng = np.random.default_rng(seed)
     return [
         with_noise_floor(clip, null_bins, rng) if rng.random() < share else clip for clip in clips

@@ -70,9 +70,20 @@ class KernelClassifier(Classifier):
         of_clips: Sequence[float],
         seed: int,
     ) -> None:
-        """Fit to clips: features (frames, size), labels (frames,), below 0 where unknown.
+        """Fit to clips.
 
-        ``weights`` are those of the classes, ``of_clips`` those of a frame of each clip.
+        Parameters
+        ----------
+        features : sequence of Tensor, (frames, size)
+            One for each clip.
+        labels : sequence of Tensor, (frames,)
+            Integer classes; below 0 where unknown.
+        weights : Tensor, (classes,)
+            Weights of the classes.
+        of_clips : sequence of float
+            Weight of a frame of each clip.
+        seed : int
+            For the draw of reference windows, where there are more frames than references.
         """
         described = [
             self._of_clip(one)[label >= 0] for one, label in zip(features, labels, strict=True)

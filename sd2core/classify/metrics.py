@@ -119,8 +119,18 @@ def score(
 ) -> Score:
     """Compare classes frame by frame and gesture by gesture.
 
-    ``truths`` and ``answers`` hold one integer array (frames,) per clip; ``background`` is
-    the class that is no gesture, ``delay_s`` the time from a frame to its answer.
+    Parameters
+    ----------
+    truths, answers : sequence of integer ndarray, (frames,)
+        True and found classes, one array per clip; where a truth is ``UNKNOWN`` it does not count.
+    classes : tuple of str
+        Names of the classes.
+    frame_rate_hz : float
+        Frames per second of all clips.
+    background : int or None
+        Class that is no gesture; None if there is none.
+    delay_s : float
+        Time from a frame to its answer, which is added to latencies.
     """
     number = len(classes)
     frames = np.zeros((number, number), np.int64)

@@ -47,9 +47,21 @@ def split_clips(
 ) -> Parts:
     """Split by subject, or with one subject by movement.
 
-    ``validation`` and ``test`` are subjects, see :func:`sd2core.train.data.split_subjects`.
-    With ``first_only`` the training part, too, holds only what each movement's own sensor
-    saw, or the first one where it was not its own; validation and test always do.
+    Parameters
+    ----------
+    known : ClipSet
+        What is split.
+    validation, test : sequence of str, optional
+        Subjects of these parts; by default see :func:`sd2core.train.data.split_subjects`.
+    first_only : bool
+        True if the training part, too, holds only what each movement's own sensor saw, or the
+        first one where it was not its own; validation and test always do.
+
+    Raises
+    ------
+    Sd2Error
+        If a subject is unknown or named twice, nobody is left to learn from, or of one subject no
+        class has two movements.
     """
     split = split_subjects(known.subjects, validation, test)
     parts = {name: known.of(getattr(split, name)) for name in ("training", "validation", "test")}
@@ -63,7 +75,21 @@ def split_clips(
 
 
 def dealt(known: ClipSet, clips: Sequence[Clip], parts: int, seed: int) -> dict[Movement, int]:
-    """Deal the movements of every class into parts; return the part of each, 0 and up."""
+    """Deal the movements of every class into parts; return the part of each, 0 and up.
+
+    A movement counts as one of the rarest class that it holds.
+
+    Parameters
+    ----------
+    known : ClipSet
+        Whose classes they are.
+    clips : sequence of Clip
+        Whose movements are dealt.
+    parts : int
+        Number of parts.
+    seed : int
+        Of the order in which the movements of a class are dealt.
+    """
     by_class: dict[int, list[Movement]] = {}
     for key, number in rarest(known, clips).items():
         by_class.setdefault(number, []).append(key)

@@ -122,8 +122,27 @@ def train(
     The loss is the cross entropy, every class weighted by the inverse of its number of
     frames, so that all of them count the same. The clips are shuffled again when all have
     been seen. The best on validation is the one with the highest mean recall of frames;
-    without validation the last one is taken. ``weights`` say how much a frame of each training
-    clip counts, by default all the same. ``about`` goes onto the card.
+    without validation the last one is taken.
+
+    Parameters
+    ----------
+    training, validation : sequence of Clip
+        Clips to learn from, and to choose the best by; the latter may be none.
+    known : ClipSet
+        Axis, null bins, frame rate and classes of both.
+    chosen : TrainOptions, optional
+        The defaults by default.
+    weights : sequence of float, optional
+        How much a frame of each training clip counts; by default all the same.
+    about : mapping, optional
+        Goes onto the card; fits into JSON.
+    watch : callable
+        Called with every event; may raise ``KeyboardInterrupt`` to stop with the best so far.
+
+    Raises
+    ------
+    Sd2Error
+        If no training clip has a labelled frame.
     """
     chosen = chosen or TrainOptions()
     own_weights = np.ones(len(training)) if weights is None else np.asarray(weights, np.float64)

@@ -153,9 +153,26 @@ def add_command(
 ) -> CommandParser:
     """Add a subcommand with its help, and the options of a record, which the handler gets.
 
-    Without a summary the docstring of the handler, or of what is given in its place (``about``),
-    is the help: a summary, a description, and examples from the first line on that begins with
-    ``sd2``.
+    Parameters
+    ----------
+    commands : argparse._SubParsersAction
+        Where it is added.
+    name : str
+        As it is typed.
+    summary : str
+        First line of the help, small at the beginning and without a full stop. Without it the
+        docstring of the handler, or of ``about``, is the help: a summary, a description, and
+        examples from the first line on that begins with ``sd2``.
+    options : type of OptionRecord, optional
+        Fields become options.
+    handler : callable, optional
+        Called with the record, or what was typed without one; returns the exit code, None for 0.
+    about : callable, optional
+        Its docstring is the help in place of the handler's.
+    description : str
+        Text below the summary; that of a docstring follows it.
+    examples : str
+        Lines at the end; a docstring has its own.
     """
     if not summary:
         text, *lines = re.split(r"\n+ *(?=sd2 )", inspect.getdoc(about or handler) or f"{name}.")

@@ -131,7 +131,19 @@ def chosen(
     *,
     dragging: bool = True,
 ) -> Choice:
-    """Choose a plan as the options wish, with progress bars; without a wish by 2 %."""
+    """Choose a plan as the options wish, with progress bars.
+
+    Parameters
+    ----------
+    mesh, sensor : MeshSequence, VirtualSensor
+        The scene.
+    synthesis : SynthesisOptions
+        For what a plan does not choose.
+    options : Wish
+        Tolerance or budget; without either the tolerance is 2 %.
+    dragging : bool
+        True if a budget also considers plans that keep a mask while the sensor moves.
+    """
     from sd2core.accuracy.choosing import choose
     from sd2core.numerics.compiled import warm_up
 

@@ -85,7 +85,19 @@ def open_recording_from_options(path: Path, options: MeshReading) -> Recording:
 def refuse_unused_mesh_options(
     options: MeshReading, path: Path, mesh: Path | None, *, but: tuple[str, ...] = ()
 ) -> None:
-    """Refuse options on how to read a mesh that would change nothing, except ``but``."""
+    """Refuse options on how to read a mesh that would change nothing.
+
+    Parameters
+    ----------
+    options : MeshReading
+        As they were typed.
+    path : Path
+        What was named, for the message.
+    mesh : Path or None
+        Mesh that is read; None if there is none.
+    but : tuple of str
+        Fields that are used for something else, too, and not refused.
+    """
     if mesh is None:
         for name in given_flags(options, (n for n in _OF_THE_MESH if n not in but)):
             raise Sd2Error(f"{name} is given, and {path} holds no mesh", f"{name} for a mesh only")

@@ -40,8 +40,16 @@ def maps_of(
 ) -> dict[MapName, DopplerMap]:
     """Maps on the recording's clock, from top to bottom.
 
-    ``mesh`` is its mesh, where that has been read already; ``axis`` that of the radar's map, by
-    default its own. Raises Sd2Error if the recording lacks the source of a map.
+    Parameters
+    ----------
+    recording : Recording
+        Sd2Error if it lacks the source of a map.
+    names : tuple of {"synthetic", "denoised", "radar"}
+        Maps that are made.
+    mesh : MeshSequence, optional
+        Its mesh, where that has been read already.
+    axis : VelocityAxis, optional
+        Of the radar's map; by default its own.
     """
     made: dict[MapName, DopplerMap] = {}
     if {"synthetic", "denoised"} & {*names}:

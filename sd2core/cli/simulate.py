@@ -213,7 +213,21 @@ def simulate_with_bar(
     wave: WaveOptions | None = None,
     options: SignalOptions | None = None,
 ) -> RadarCapture:
-    """Raw samples of a mesh, with a bar; without noise unless the options say otherwise."""
+    """Raw samples of a mesh, with a bar.
+
+    Parameters
+    ----------
+    mesh, sensor : MeshSequence, VirtualSensor
+        The scene.
+    config : RadarConfig
+        Radar that is simulated.
+    visibility : {"facing", "exact"}
+        Triangles that echo.
+    wave : WaveOptions, optional
+        Sum of echoes, surface, motion, antennas and mirror; by default its defaults.
+    options : SignalOptions, optional
+        Static surroundings, gain and noise; by default none, no noise.
+    """
     from sd2core.fmcw import SignalOptions, simulate_radar
 
     with progress_bar("Simulating") as progress:

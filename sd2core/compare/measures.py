@@ -42,8 +42,19 @@ def line_of_sight_velocity(
 ) -> Floats:
     """Velocity (T, N) towards a sensor in m/s, positive when approaching.
 
-    ``positions_m`` is of shape (T, N, 3), with T of 2 at least. The velocity is 0 where
-    nothing can be measured; nothing is measured from one stretch with a person to another.
+    The velocity is 0 where nothing can be measured.
+
+    Parameters
+    ----------
+    positions_m : ndarray, (T, N, 3)
+        Paths of N points; T is 2 at least.
+    times_s : float64 ndarray, (T,)
+        Times of the frames.
+    sensor_m : array-like, (3,)
+        Place of the sensor; by default the camera.
+    presence : Presence, optional
+        Nothing is measured from one stretch with a person to another; by default all frames are
+        one.
     """
     stencil = moments(times_s, np.arange(len(times_s)), 1, presence)
     paths = np.ascontiguousarray(np.swapaxes(positions_m, 1, 2), dtype=np.float64)  # (T, 3, N)
@@ -151,10 +162,21 @@ def synthesize_alike(
     progress: Progress = silent,
     count: HowCounted = "plain",
 ) -> tuple[DopplerMap, ...]:
-    """HowCounted maps of all meshes by the paper's preset, plainly unless asked otherwise.
+    """Doppler maps of all meshes by the paper's preset.
 
     Hidden vertices are left out where every mesh has faces; otherwise all vertices of
     all meshes count, so that none is compared with another kind of map.
+
+    Parameters
+    ----------
+    meshes : sequence of MeshSequence
+        A map is made of each, in order.
+    sensor : VirtualSensor
+        Of all maps.
+    progress : Progress
+        Counts the frames of all meshes; may raise Cancelled.
+    count : {"plain", "expected"}
+        Whether a vertex counts in one bin, or is spread as badly as its velocity is known.
     """
     options = replace(PRESETS["paper"], count=count)
     if any(mesh.faces is None for mesh in meshes):

@@ -79,9 +79,25 @@ def cut_out(
     """Write the folders that do not exist yet, and an index of all; return the written folders.
 
     A folder has its name only once it is complete. Folders with the same content are kept, so a
-    stopped export continues where it was. Folders of the same name that hold something else stay
-    unless ``replace_others``. ``progress`` counts frames and may raise ``Cancelled``. Raises
-    Sd2Error when another process is writing there.
+    stopped export continues where it was.
+
+    Parameters
+    ----------
+    source : CutSource
+        What spans are cut from.
+    cuts : sequence of Cut
+        Plan of :func:`plan_cuts` for this source and folder.
+    folder : Path
+        Holds the folders and the index; made where it is missing.
+    replace_others : bool
+        True to replace folders of the same name that hold something else; otherwise they stay.
+    progress : Progress
+        Counts frames; may raise ``Cancelled``.
+
+    Raises
+    ------
+    Sd2Error
+        When another process is writing there.
     """
     folder.mkdir(parents=True, exist_ok=True)
     lock = FileLock(folder / _LOCK)

@@ -51,7 +51,16 @@ def clips_of(
 ) -> list[Clip]:
     """Find the clips of a source and the first frames of their segments.
 
-    ``present`` marks frames with a person; None: all. ``frame_rate_hz`` is that of the segments.
+    Parameters
+    ----------
+    times_s : float64 ndarray, (T,)
+        Times of the source's frames.
+    present : bool ndarray, (T,), or None
+        Frames with a person; None: all.
+    frame_rate_hz : float
+        Frames per second of the segments.
+    length, overlap : int
+        Frames of a segment, and those that it shares with the next one.
     """
     there = np.ones(len(times_s), bool) if present is None else present
     found = []
@@ -66,7 +75,7 @@ def clips_of(
     return found
 
 
-def clips_of_spans(
+def _clips_of_spans(
     outline: Outline, frame_rate_hz: float, length: int, options: SpanOptions
 ) -> tuple[list[Clip], Counter[str]]:
     """Find the clip of one segment that each labelled span is, and why others are none.
@@ -115,8 +124,20 @@ def clips_of_spans(
 def count_spans(
     outline: Outline, frame_rate_hz: float, length: int, options: SpanOptions
 ) -> dict[str, int]:
-    """Count the spans that are segments (``segments``), and the others by their reasons."""
-    found, left_out = clips_of_spans(outline, frame_rate_hz, length, options)
+    """Count the spans that are segments (``segments``), and the others by their reasons.
+
+    Parameters
+    ----------
+    outline : Outline
+        Of the source with the spans.
+    frame_rate_hz : float
+        Frames per second of the segments.
+    length : int
+        Frames of a segment; Sd2Error for a longer span that is not resampled.
+    options : SpanOptions
+        Margins, shortest span, and whether spans are padded or resampled.
+    """
+    found, left_out = _clips_of_spans(outline, frame_rate_hz, length, options)
     return {"segments": len(found), **left_out}
 
 
@@ -124,7 +145,7 @@ def count_segments(outline: Outline, frame_rate_hz: float, options: DatasetOptio
     """Count the segments of a source by their labels."""
     counts: Counter[str] = Counter()
     if options.spans is not None:
-        found, _ = clips_of_spans(outline, frame_rate_hz, options.length, options.spans)
+        found, _ = _clips_of_spans(outline, frame_rate_hz, options.length, options.spans)
         return Counter(outline.labels[clip.span.label] for clip in found if clip.span)
     for clip in clips_of(
         outline.times_s, outline.present, frame_rate_hz, options.length, options.overlap
@@ -146,11 +167,23 @@ def cut_source(
 ) -> Iterator[Arrays]:
     """Yield the rows of a data set in blocks of bounded size.
 
-    ``null_bins`` are set to zero. ``label_numbers`` holds the data set's number of each label of
-    the source. A block has, per segment (first axis), the kinds that the source has, ``limbs``
+    A block has, per segment (first axis), the kinds that the source has, ``limbs``
     and ``kinematics`` if they are wanted and its synthetic map has them, ``imu`` if it is wanted,
     and ``available``, ``label``, ``segment_label``, ``purity``, ``start_s``, ``start_frame``,
     ``resampled``; of spans also ``mask`` and ``end_s``.
+
+    Parameters
+    ----------
+    source : Source
+        Maps and labels of one recording as one sensor sees it.
+    frame_rate_hz : float
+        Frames per second of the segments.
+    null_bins : sequence of int
+        Bins that are set to zero.
+    label_numbers : int16 ndarray, (labels of the source,)
+        The data set's number of each of them.
+    options : DatasetOptions
+        What is wanted; frame rate and null bins, which it may leave open, are given apart.
     """
     known = source.known
     kinds = [kind for kind in options.kinds if kind in source.maps]
@@ -158,7 +191,7 @@ def cut_source(
     if options.spans is None:
         found = clips_of(source.times_s, source.present, frame_rate_hz, length, options.overlap)
     else:
-        found, _ = clips_of_spans(source.outline(), frame_rate_hz, length, options.spans)
+        found, _ = _clips_of_spans(source.outline(), frame_rate_hz, length, options.spans)
     for clip in found:
         label = _filled(label_numbers[_label(source.times_s, source.label, clip)], length)
         there = {kind: _known(source.times_s, known[kind], clip) for kind in kinds}

@@ -57,7 +57,20 @@ def write_packed(
 ) -> None:
     """Write a data set as one file, in one step.
 
-    The arrays, of Zarr or h5py, are read in parts. ``progress`` counts segments.
+    Parameters
+    ----------
+    out : Path
+        File to write.
+    form : {"hdf5", "npz"}
+        HDF5 is written in parts, an NPZ from memory.
+    header : Header
+        Description, which says what arrays there are.
+    arrays : dict
+        Arrays of Zarr or h5py by name, (segments, …).
+    sources : iterable of dict
+        Lines of the sources.
+    progress : Progress
+        Counts rows of all arrays of an HDF5; may raise Cancelled.
     """
     if form == "npz":
         _write_npz(out, header, arrays, sources)

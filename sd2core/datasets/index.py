@@ -61,7 +61,19 @@ def header_of(source: Source, options: DatasetOptions) -> Header:
 def empty_header(
     options: DatasetOptions, axis: VelocityAxis, timebase: Timebase, nulled: tuple[int, ...] = ()
 ) -> Header:
-    """Return the header of a data set without segments; what the options leave open is given."""
+    """Return the header of a data set without segments; what the options leave open is given.
+
+    Parameters
+    ----------
+    options : DatasetOptions
+        Take precedence where they name null bins or a frame rate.
+    axis : VelocityAxis
+        Of all maps.
+    timebase : Timebase
+        Its frame rate, to three decimals, is that of the segments.
+    nulled : tuple of int
+        Bins that are empty in the maps.
+    """
     return Header(
         length=options.length,
         overlap=options.overlap,

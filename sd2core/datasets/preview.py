@@ -88,7 +88,19 @@ def examples_of(dataset: Dataset, each: int = EXAMPLES) -> list[Example]:
 
 
 def draw_preview(title: str, header: Header, examples: list[Example], segments: int) -> Figure:
-    """Draw the sheet: a column per segment, a row per kind."""
+    """Draw the sheet: a column per segment, a row per kind.
+
+    Parameters
+    ----------
+    title : str
+        Heading of the sheet.
+    header : Header
+        Labels, kinds, axis and frame rate.
+    examples : list of Example
+        Segments to draw; those of one label come together.
+    segments : int
+        Number of all segments, for the caption.
+    """
     from matplotlib.figure import Figure
 
     kinds = [kind for kind in KINDS if any(kind in one.levels for one in examples)]

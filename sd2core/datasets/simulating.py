@@ -70,8 +70,20 @@ def simulated_map(
     ``sd2 simulate radar --link-budget --incoherent`` makes with this sensor and seed. The raw
     samples are of some hundred frames at a time and not kept.
 
-    The mesh has faces. ``frames``, the last excluded, limits the result to columns of the whole
-    map.
+    Parameters
+    ----------
+    mesh : MeshSequence
+        With faces.
+    sensor : VirtualSensor
+        Place and direction of the radar.
+    simulation : Simulation
+        Radar, and the seed of phases and noise, see :func:`seed_of`.
+    axis : VelocityAxis
+        Of the map.
+    frames : tuple of 2 int, optional
+        Half-open range that limits the result to columns of the whole map.
+    progress : Progress
+        May raise Cancelled.
     """
     start_s = mesh.timebase.start_s
     # As a capture says it, whose clock begins with its first frame.

@@ -95,7 +95,19 @@ class SegmentStore:
     def unpack(
         cls, path: Path, header: Header, arrays: Any, sources: Iterable[dict[str, Any]]
     ) -> SegmentStore:
-        """Rebuild the store that a file was packed from."""
+        """Rebuild the store that a file was packed from.
+
+        Parameters
+        ----------
+        path : Path
+            Folder of the store; an earlier store there is deleted.
+        header : Header
+            Description in the file.
+        arrays : mapping
+            Arrays by name, (segments, …), read in parts.
+        sources : iterable of dict
+            Lines of the sources in the file.
+        """
         with _new_group(path, header) as group:
             for name, (kind, row) in row_shapes(header).items():
                 rows = arrays[name].shape[0]

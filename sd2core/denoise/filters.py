@@ -150,9 +150,17 @@ def fit_wiener(
     frames: int = 9,
     width: int = 5,
 ) -> WienerDenoiser:
-    """Fit a Wiener filter of ``frames`` by ``width`` cells in closed form.
+    """Fit a Wiener filter in closed form.
 
-    Inputs and targets are compressed, (frames, bins), one per take. ``null_bins`` do not count.
+    Parameters
+    ----------
+    inputs, targets : sequence of float32 ndarray, (frames, bins)
+        Compressed maps, one of each per take.
+    null_bins : sequence of int
+        Bins that do not count.
+    frames, width : int
+        Cells that the filter spans: the last frames, and bins around the own one. The width is
+        odd.
     """
     bins = inputs[0].shape[1]
     counted = _counted(bins, null_bins)
@@ -190,9 +198,17 @@ def fit_ridge(
 ) -> RidgeDenoiser:
     """Fit a ridge regression (A. E. Hoerl and R. W. Kennard, 1970) in closed form.
 
-    Inputs and targets are compressed, (frames, bins), one per take. ``null_bins`` do not count.
     The ridge is the one of :data:`_RIDGES` that does best on every fifth take, fitted to the
     others; of fewer than five takes it is the largest.
+
+    Parameters
+    ----------
+    inputs, targets : sequence of float32 ndarray, (frames, bins)
+        Compressed maps, one of each per take.
+    null_bins : sequence of int
+        Bins that do not count; their answer is 0.
+    frames : int
+        Last frames that an answer is made of.
     """
     bins = inputs[0].shape[1]
     ridge = RidgeDenoiser(bins, frames=frames)

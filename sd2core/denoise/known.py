@@ -90,9 +90,20 @@ class KnownMovements:
         axis: VelocityAxis,
         floor: float = 0.0,
     ) -> NDArray[np.float32]:
-        """Answers (…, bins) of a network with what they were made of (…, bins), as trust says.
+        """Answers of a network with what they were made of, as trust says, (…, bins).
 
-        What is strange is the synthetic map's alone; of the rest, cells below ``floor`` are empty.
+        What is strange is the synthetic map's alone.
+
+        Parameters
+        ----------
+        answer : float32 ndarray, (…, bins)
+            Energies that the network answers, in the unit of the radar's maps.
+        energies : float32 ndarray, (…, bins)
+            Those of the synthetic map.
+        axis : VelocityAxis
+            Of both.
+        floor : float
+            Energy below which cells are empty, in frames that the network has a share in.
         """
         share = (self.trust * (1.0 - self.strangeness(energies, axis)))[..., None]
         amplitude = share * np.sqrt(answer)
@@ -111,9 +122,17 @@ class KnownMovements:
     ) -> KnownMovements:
         """The same, with the trust that does best on maps that the network did not learn from.
 
-        Answers, energies of the synthetic map and the radar's are (segments, frames, bins),
-        ``moving`` (segments, frames). Peak, mean and cells (L1) count alike; what a segment is made
-        worse by than the synthetic map counts twice.
+        Peak, mean and cells (L1) count alike; what a segment is made worse by than the synthetic
+        map counts twice (docs/decisions/0074).
+
+        Parameters
+        ----------
+        answers, energies, radar : float32 ndarray, (segments, frames, bins)
+            Energies that the network answers, those of the synthetic map, and the radar's.
+        moving : bool ndarray, (segments, frames)
+            Frames whose velocities count; without any the trust stays.
+        axis : VelocityAxis
+            Of all of them.
         """
         if not moving.any():
             return self

@@ -333,9 +333,19 @@ def denoise_long(
     A causal model continues from its last state; another one gets the windows that it would get
     in the whole map. So results are equal to the rounding of single precision.
 
-    ``runs`` are half-open ranges of frames that are clips of their own, from
-    :func:`~sd2core.denoise.resample_to_model.clips`; ``times_s`` are the times of all frames, and
-    ``write`` is called for the frames of all runs, in their order.
+    Parameters
+    ----------
+    trained : TrainedDenoiser
+        Its device does the work.
+    runs : list of tuple of 2 int
+        Half-open ranges of frames that are clips of their own, from
+        :func:`~sd2core.denoise.resample_to_model.clips`.
+    times_s : float64 ndarray, (T,)
+        Times of all frames.
+    read : callable
+        ``read(start, stop)`` returns the energies of frames, (n, features).
+    write : callable
+        ``write(first, energies)`` takes denoised ones, (n, bins), of all runs in their order.
     """
     rate_hz = trained.card.frame_rate_hz
     for start, stop in runs:

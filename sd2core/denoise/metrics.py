@@ -101,7 +101,17 @@ def peak_error(
     axis: VelocityAxis,
     frames: NDArray[np.bool_] | None = None,
 ) -> VelocityError:
-    """Error of the peak velocity (the paper's Table 1), of energies (frames, bins)."""
+    """Error of the peak velocity (the paper's Table 1).
+
+    Parameters
+    ----------
+    estimate, target : ndarray, (frames, bins)
+        Energies.
+    axis : VelocityAxis
+        Of both.
+    frames : bool ndarray, (frames,), optional
+        Limits it to some frames; by default all count.
+    """
     return velocity_error(
         peak_velocity_mps(estimate, axis), peak_velocity_mps(target, axis), frames
     )
@@ -113,7 +123,17 @@ def mean_velocity_error(
     axis: VelocityAxis,
     frames: NDArray[np.bool_] | None = None,
 ) -> VelocityError:
-    """Error of the energy-weighted mean velocity, of energies (frames, bins)."""
+    """Error of the energy-weighted mean velocity.
+
+    Parameters
+    ----------
+    estimate, target : ndarray, (frames, bins)
+        Energies.
+    axis : VelocityAxis
+        Of both.
+    frames : bool ndarray, (frames,), optional
+        Limits it to some frames; by default all count.
+    """
     return velocity_error(
         mean_velocity_mps(estimate, axis), mean_velocity_mps(target, axis), frames
     )
@@ -125,9 +145,16 @@ def map_error(
     compression: Compression,
     null_bins: tuple[int, ...] = (),
 ) -> MapError:
-    """Error of all cells of two maps of energies, (frames, bins), in the unit of the target.
+    """Error of all cells of two maps.
 
-    ``compression`` is that of the model's targets; ``null_bins`` are ignored.
+    Parameters
+    ----------
+    estimate, target : ndarray, (frames, bins)
+        Energies, in the unit of the target; Sd2Error for different shapes.
+    compression : Compression
+        That of the model's targets.
+    null_bins : tuple of int
+        Bins that are ignored.
     """
     if estimate.shape != target.shape:
         raise Sd2Error(f"The maps are of shape {estimate.shape} and {target.shape}", "the same")

@@ -111,10 +111,24 @@ def summary(name: str) -> str:
 def build(name: str, bins: int = 32, parts: int = 1, more: int = 0, **given: Any) -> Denoiser:
     """Create a model of :data:`MODELS` or :data:`FILTERS` with fresh weights.
 
-    ``parts`` is the number of maps in the input, ``more`` that of kinematics after the one map;
-    filters take one map. Options that are not given come from :func:`options`. Raises Sd2Error
-    when there is no such model or option, or an option is not of its kind, or for more bins than
-    a map has.
+    Parameters
+    ----------
+    name : str
+        Name of the model.
+    bins : int
+        Velocity bins of a map.
+    parts : int
+        Number of maps in the input; filters take one.
+    more : int
+        Numbers of kinematics per frame after the one map.
+    **given
+        Options in place of those of :func:`options`.
+
+    Raises
+    ------
+    Sd2Error
+        When there is no such model or option, or an option is not of its kind, or for more bins
+        than a map has.
     """
     entry = _entry(name)
     if not 1 <= bins <= _MOST_BINS:
@@ -153,7 +167,14 @@ def fit_filter(
 ) -> tuple[Denoiser, dict[str, Any]]:
     """Fit one of :data:`FILTERS`; returns it and its options.
 
-    Inputs and targets are compressed, (frames, bins), one per take. ``null_bins`` do not count.
+    Parameters
+    ----------
+    name : {"none", "median", "wiener", "ridge"}
+        Sd2Error for another name.
+    inputs, targets : sequence of float32 ndarray, (frames, bins)
+        Compressed maps, one of each per take.
+    null_bins : sequence of int
+        Bins that do not count.
     """
     from sd2core.denoise import filters
 
@@ -177,7 +198,19 @@ def _entry(name: str) -> _Entry:
 def check_option(what: str, option: str, value: Any, known: Mapping[str, Any], most: int) -> None:
     """Raise Sd2Error for an option of a network that is unknown or not of its default's kind.
 
-    ``what`` names the network in messages; whole numbers are 1 to ``most``.
+    Parameters
+    ----------
+    what : str
+        Names the network in messages.
+    option : str
+        Name of the option.
+    value : object
+        Value that was given for it.
+    known : mapping
+        Defaults of all options. Steps (``dt_min``, ``dt_max``) are 1e-6 to 10, other numbers that
+        are not whole shares from 0 to below 1.
+    most : int
+        Largest whole number; the smallest is 1.
     """
     if option not in known:
         raise Sd2Error(

@@ -161,11 +161,27 @@ def apply_to_stretches(
     result: Stretch,
     progress: Progress,
 ) -> bool:
-    """Apply ``work`` to every stretch of a map, at the model's rate, and write it into ``result``.
+    """Apply ``work`` to every stretch of a map, at the model's rate.
 
-    ``energies`` are the map's, in the form that ``work`` takes. The rows of the result are the
-    map's frames; those between stretches stay as they are. Progress counts frames. True if
-    frames were interpolated to the model's rate and back.
+    Parameters
+    ----------
+    work : callable
+        Takes energies without a gap, and a progress, and returns as many frames.
+    doppler : DopplerMap
+        Gives times, and frames with a person.
+    energies : float32 ndarray, (frames, features)
+        Those of the map, in the form that ``work`` takes.
+    frame_rate_hz : float
+        Rate of the model.
+    result : float32 ndarray, (frames, bins)
+        Written; rows between stretches stay as they are.
+    progress : Progress
+        Counts frames; may raise Cancelled.
+
+    Returns
+    -------
+    bool
+        True if frames were interpolated to the model's rate and back.
     """
     total, resampled = len(energies), False
     for start, stop in stretches(doppler, frame_rate_hz):
@@ -189,7 +205,19 @@ def at_rate(
     times_s: NDArray[np.float64],
     frame_rate_hz: float,
 ) -> Stretch:
-    """Apply ``work`` to (frames, bins) at an even frame rate, with linear interpolation."""
+    """Apply ``work`` at an even frame rate, with linear interpolation there and back.
+
+    Parameters
+    ----------
+    work : callable
+        Takes float32 (frames at that rate, features) and returns as many frames.
+    values : float32 ndarray, (frames, features)
+        Energies without a gap.
+    times_s : float64 ndarray, (frames,)
+        Their times, which the result has, too.
+    frame_rate_hz : float
+        Rate at which ``work`` is done.
+    """
     even_s = even_times(times_s, frame_rate_hz)
     return interpolated(work(interpolated(values, times_s, even_s)), even_s, times_s)
 

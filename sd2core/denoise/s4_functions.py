@@ -430,8 +430,14 @@ def mix_gated(
     Residual + a · sigmoid(b), where (a, b) = weight · gelu(signal) + bias. One step of autograd
     instead of six, and no copy made only to be differentiated.
 
-    Signal and residual are (H, …) and contiguous, the weight (2H, H), the bias (2H,). ``share``,
-    broadcast to the signal, multiplies what the activation lets through (dropout).
+    Parameters
+    ----------
+    signal, residual : (H, …)
+        Contiguous; of one shape, which the result has.
+    weight, bias : (2H, H) and (2H,)
+        Rows of a, then those of b.
+    share : optional
+        Broadcast to the signal; multiplies what the activation lets through (dropout).
     """
     mixed: Tensor = _MixGated.apply(signal, residual, weight, bias, share)
     return mixed

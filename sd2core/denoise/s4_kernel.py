@@ -216,8 +216,18 @@ def diagonal_kernel(A: Tensor, B: Tensor, C: Tensor, dt: Tensor | float, length:
     Ā = exp(Δ A), B̄ = (exp(Δ A) − 1) / A · B (Gu et al. 2022, S4D: zero-order hold), whose
     limit Δ B is taken at A → 0.
 
-    A, B and C, (H, N/2) or (N/2,), hold one of each conjugate pair, hence the 2 Re; Re A ≤ 0. The
-    result is (H, length) or (length,), float32 or float64 by the type of C.
+    Parameters
+    ----------
+    A, B, C : (H, N/2) or (N/2,) complex64 or complex128
+        One of each conjugate pair, hence the 2 Re; Re A ≤ 0.
+    dt : (H,) or () float
+        Δ, above 0.
+    length : int
+        Frames of the kernel, at least 1.
+
+    Returns
+    -------
+    (H, length) or (length,), float32 or float64 by the type of C.
     """
     check_length(length)
     precision = C.real.dtype

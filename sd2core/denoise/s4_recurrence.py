@@ -77,7 +77,19 @@ class Block(NamedTuple):
 
 
 def nplr_recurrence(matrix: StateMatrix, C: Tensor, dt: Tensor, skip: Tensor) -> Recurrence:
-    """Bilinear recurrence of an NPLR matrix; `skip` (H,) is D, other shapes as `nplr_kernel`."""
+    """Bilinear recurrence of an NPLR matrix, see :func:`~sd2core.denoise.s4_kernel.nplr_kernel`.
+
+    Parameters
+    ----------
+    matrix : StateMatrix
+        Learned, or HiPPO-LegS; (H, N/2), or (N/2,) for all channels.
+    C : (H, N/2) complex64 or complex128
+        In the basis of ``matrix``.
+    dt : (H,) float
+        Δ.
+    skip : (H,) float
+        D.
+    """
     dt = dt.double()[..., None]
     half = 0.5 * dt
     inverse = 1.0 / (1.0 - half * matrix.poles)
@@ -90,7 +102,17 @@ def nplr_recurrence(matrix: StateMatrix, C: Tensor, dt: Tensor, skip: Tensor) ->
 
 
 def diagonal_recurrence(A: Tensor, B: Tensor, C: Tensor, dt: Tensor, skip: Tensor) -> Recurrence:
-    """Zero-order-hold recurrence of a diagonal matrix; shapes as `diagonal_kernel`."""
+    """Zero-order-hold recurrence of a diagonal matrix.
+
+    Parameters
+    ----------
+    A, B, C : (H, N/2) complex64 or complex128
+        As for :func:`~sd2core.denoise.s4_kernel.diagonal_kernel`.
+    dt : (H,) float
+        Δ.
+    skip : (H,) float
+        D.
+    """
     dt = dt.double()[..., None]
     grown, held = held_exponential(dt * A.to(torch.complex128))
     inputs = B * (dt * held)

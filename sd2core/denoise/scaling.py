@@ -111,9 +111,26 @@ class Scaling:
         input_exponent: float = EXPONENT,
         target_exponent: float = EXPONENT,
     ) -> Scaling:
-        """Fit both on training data: inputs (frames, features) and targets (frames, bins).
+        """Fit both on training data, so that what comes out has a root mean square of 1.
 
-        The first ``parts`` · bins features are maps; what follows is not compressed.
+        Parameters
+        ----------
+        inputs : iterable of float32 ndarray, (frames, features)
+            Synthetic maps; the first ``parts`` · bins features are energies, what follows is not
+            compressed.
+        targets : iterable of float32 ndarray, (frames, bins)
+            The radar's maps.
+        null_bins : sequence of int
+            Bins that are always zero, which are ignored.
+        parts : int
+            Number of maps in an input.
+        input_exponent, target_exponent : float
+            Above 0, up to 1; 1/2 turns power into amplitude.
+
+        Raises
+        ------
+        Sd2Error
+            When there is no energy at all in the one or the other.
         """
         inputs, targets = list(inputs), list(targets)
         bins = targets[0].shape[1] if targets else 0

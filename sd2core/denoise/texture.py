@@ -97,8 +97,17 @@ class Texture:
     ) -> DopplerMap:
         """A denoised map as the radar would show it; other maps get other fluctuations.
 
-        A stretch of a map, from frame ``first`` on, gets those of the map with the same ``content``
-        (:func:`content_of`).
+        Parameters
+        ----------
+        doppler : DopplerMap
+            The map, or a stretch of it.
+        seed : int
+            The same one draws the same map again.
+        first : int
+            Number of the stretch's first frame in the map.
+        content : int, optional
+            :func:`content_of` the map that a stretch is of, so that it gets its fluctuations; by
+            default that of ``doppler``.
         """
         content = content_of(doppler) if content is None else content
         note = f"drawn as the radar would show it (seed {seed}): it scatters about the mean"

@@ -117,8 +117,23 @@ def read_network(
 ) -> Network:
     """Build a network as a file describes it, and load its weights into it.
 
-    ``name`` is the model's in the file; ``shapes`` come from :func:`read_header`. Raises Sd2Error
-    if the network cannot be built, is not that of the weights, or they are not finite.
+    Parameters
+    ----------
+    path : Path
+        The model file.
+    build : callable
+        Makes the network; called twice, at first on torch's device without memory (``meta``).
+    name : str
+        Name of the model in the file, for messages.
+    shapes : mapping
+        From :func:`read_header`.
+    expected : str
+        Names the kind of file in messages.
+
+    Raises
+    ------
+    Sd2Error
+        If the network cannot be built, is not that of the weights, or they are not finite.
     """
     import torch
     from safetensors import SafetensorError

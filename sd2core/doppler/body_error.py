@@ -32,6 +32,17 @@ def body_error(
     absolute deviations are added up and divided by the sum of the expected map. Of more than 64
     frames eight stretches of eight are looked at, which tells it to a tenth. None if the mesh does
     not say how badly its velocities are known, or says that they are exact.
+
+    Parameters
+    ----------
+    maker : Synthesizer
+        Of the mesh and the options that the map is made with.
+    sensor : VirtualSensor
+        Of the map.
+    frames : tuple of 2 int, optional
+        Half-open range; all frames by default.
+    progress : Progress
+        Counts the stretches; may raise Cancelled.
     """
     if maker.mesh.uncertainty is None:
         return None

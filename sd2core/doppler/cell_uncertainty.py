@@ -51,7 +51,23 @@ def cell_uncertainty(
     progress: Progress,
     threads: int | None,
 ) -> CellUncertainty:
-    """Uncertainty of frames ``start`` to ``stop``, see :meth:`Synthesizer.uncertainty`."""
+    """Uncertainty of some frames, see :meth:`Synthesizer.uncertainty`.
+
+    Parameters
+    ----------
+    counts : FrameCounts
+        Of the mesh; Sd2Error if it does not say how well its velocities are known.
+    sensor : VirtualSensor
+        Of the map.
+    start, stop : int
+        Half-open range of frames.
+    visibility : {"none", "facing", "depth", "exact", "frozen"}
+        That of the map.
+    progress : Progress
+        Counts frames; may raise Cancelled.
+    threads : int or None
+        Number of worker threads; None: one per core.
+    """
     mesh, axis = counts.mesh, counts.options.axis
     if mesh.uncertainty is None:
         raise Sd2Error(

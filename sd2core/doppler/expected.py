@@ -48,8 +48,20 @@ def sigma_bins(
 ) -> NDArray[np.float64]:
     """Deviation of each limb's velocity towards a sensor in bins, (n, limbs).
 
-    The limbs' places (n, limbs, 3) are those of the frames from ``start`` on. A velocity that may
-    be anywhere on the axis is as good as one that may be even farther.
+    A velocity that may be anywhere on the axis is as good as one that may be even farther.
+
+    Parameters
+    ----------
+    known : VelocityUncertainty
+        As the mesh states it.
+    sensor_m : tuple of 3 float
+        Place of the sensor in the camera frame.
+    limbs_m : float64 ndarray, (n, limbs, 3)
+        Places of the limbs in the camera frame.
+    start : int
+        First of these frames in the clip.
+    axis : VelocityAxis
+        Of the map.
     """
     sigma_mps = known.towards(sensor_m, limbs_m, start)
     return np.minimum(sigma_mps / axis.bin_width_mps, axis.bins)
@@ -66,7 +78,22 @@ def count_expected(
 ) -> None:
     """Count some frames as :func:`sd2core.doppler.histogram.count` does, each vertex spread.
 
-    ``sigma_bins`` (n, limbs) are the deviations of the limbs that ``vertex_limb`` (V,) names.
+    Parameters
+    ----------
+    frames : Frames
+        The n frames with all vertices.
+    sensor : float64 ndarray, (3,)
+        In the frame of the positions.
+    counting : Counting
+        Velocity axis and range law.
+    scatterers : Scatterers
+        Of these frames.
+    sigma_bins : float64 ndarray, (n, limbs)
+        Deviations of the limbs in bins; of 0 a vertex counts in one bin.
+    vertex_limb : uint8 ndarray, (V,)
+        Limb of every vertex.
+    into : Counts
+        Written; zero at first.
     """
     parts = scatterers.parts
     number = vertex_limb.astype(np.intp)
@@ -126,9 +153,18 @@ def spread_over_bins(
     sigma: NDArray[np.float64],
     counting: Counting,
 ) -> NDArray[np.float64]:
-    """Shares (bins,) of what lies at some places of the axis and is spread, all in bins.
+    """Shares (bins,) of what lies at some places of the axis and is spread.
 
-    All three are of shape (N,); the axis runs from 0 to ``bins``. What is known counts in one bin.
+    Parameters
+    ----------
+    place : float64 ndarray, (N,)
+        Places in bins; the axis runs from 0 to ``bins``.
+    weight : float64 ndarray, (N,)
+        What lies there.
+    sigma : float64 ndarray, (N,)
+        Standard deviations in bins; what has 0 counts in one bin.
+    counting : Counting
+        Axis, and what happens beyond it.
     """
     known, bins, turns = sigma == 0, counting.bins, 0
     number, _ = place_in_bins(place[known], counting)

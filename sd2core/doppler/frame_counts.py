@@ -47,8 +47,24 @@ class FrameCounts:
     ) -> Quality:
         """Count some of a block's frames; returns the visibility that was used.
 
-        Vertices of different ``parts`` (V,) are counted apart. Without ``shares`` the number of
-        visible vertices may be left out.
+        Parameters
+        ----------
+        block : Block
+            Of the prepared mesh.
+        rows : slice
+            Its n frames that are counted; start and stop are given.
+        position_m : tuple of 3 float
+            Place of the sensor in the camera frame.
+        visibility : {"none", "facing", "depth", "exact", "frozen"}
+            What is wished for.
+        into : Counts
+            Of n frames; written, zero at first.
+        totals : float64 ndarray, (n,)
+            Written: what the counts are shares of.
+        parts : uint8 ndarray, (V,), optional
+            Part of the body of every vertex, to count them apart; by default all together.
+        shares : bool
+            False if the number of visible vertices may be left out.
         """
         prepared, place = self.prepared, self.prepared.sensor(position_m)
         totals[:] = self.totals(block, rows)
@@ -148,7 +164,20 @@ class FrameCounts:
     ) -> tuple[Scatterers, Quality]:
         """Scatterers of some of a block's frames, and the visibility that was used.
 
-        With ``moving``, normals and areas are those of what moves in all of the block's frames.
+        Parameters
+        ----------
+        block : Block
+            Of the prepared mesh.
+        rows : slice
+            Its n frames.
+        position_m : tuple of 3 float
+            Place of the sensor in the camera frame.
+        visibility : {"none", "facing", "depth", "exact", "frozen"}
+            What is wished for.
+        parts : uint8 ndarray, (V,), or None
+            Part of the body of every vertex; None: all together.
+        moving : MovingVertices, optional
+            With it normals and areas are those of what moves in all of the block's frames.
         """
         mask, quality = self.masks.for_rows(block, rows, position_m, visibility)
         facing = mask is None and quality == "facing"

@@ -94,7 +94,19 @@ class Scatterers:
     def weights(
         self, row: int, points: NDArray[Any], sensor: NDArray[np.float64], counting: Counting
     ) -> NDArray[np.float64]:
-        """Weight of each vertex of a frame, float64 (V,); parameters as for :meth:`seen`."""
+        """Weight of each vertex of a frame, float64 (V,).
+
+        Parameters
+        ----------
+        row : int
+            Number of the frame.
+        points : ndarray, (3, V)
+            Its vertices.
+        sensor : float64 ndarray, (3,)
+            In the frame of the vertices.
+        counting : Counting
+            Gives the range law.
+        """
         if self.area_vectors is not None:
             weight = projected_areas(points, self.area_vectors[row], sensor)
         elif self.areas is not None:
@@ -263,14 +275,38 @@ def relative_range(positions: NDArray[Any], sensor: NDArray[np.float64]) -> NDAr
 def bins_plain(
     frames: Frames, t: int, sample: int, sensor: NDArray[np.float64], counting: Counting
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Bin of every vertex (``bins`` where dropped), and a mask of those beyond the axis."""
+    """Bin of every vertex (``bins`` where dropped), and a mask of those beyond the axis.
+
+    Parameters
+    ----------
+    frames : Frames
+        With all vertices.
+    t, sample : int
+        Frame and velocity sample, which has something to measure.
+    sensor : float64 ndarray, (3,)
+        In the frame of the positions.
+    counting : Counting
+        Axis, and what happens beyond it.
+    """
     return place_in_bins(places_plain(frames, t, sample, sensor, counting), counting)
 
 
 def places_plain(
     frames: Frames, t: int, sample: int, sensor: NDArray[np.float64], counting: Counting
 ) -> NDArray[Any]:
-    """Position of every vertex (V,) on the velocity axis, which runs from 0 to ``bins``."""
+    """Position of every vertex (V,) on the velocity axis, in the precision of the frames.
+
+    Parameters
+    ----------
+    frames : Frames
+        With all vertices.
+    t, sample : int
+        Frame and velocity sample, which has something to measure.
+    sensor : float64 ndarray, (3,)
+        In the frame of the positions.
+    counting : Counting
+        Its axis runs from 0 to ``bins``.
+    """
     closer = relative_range(frames.positions[frames.before[t, sample]], sensor) - relative_range(
         frames.positions[frames.after[t, sample]], sensor
     )
@@ -307,7 +343,20 @@ def count_plain(
 ) -> None:
     """Count some frames as :func:`count` does, in NumPy.
 
-    ``bins_of`` a frame and a sample replaces what :func:`bins_plain` finds.
+    Parameters
+    ----------
+    frames : Frames
+        The n frames with all vertices.
+    sensor : float64 ndarray, (3,)
+        In the frame of the positions.
+    counting : Counting
+        Velocity axis and range law.
+    scatterers : Scatterers
+        Of these frames.
+    into : Counts
+        Written; zero at first.
+    bins_of : callable, optional
+        ``bins_of(t, sample)`` replaces what :func:`bins_plain` finds.
     """
     if bins_of is None:
 
@@ -377,8 +426,14 @@ def mark_needed(
 ) -> NDArray[np.uint8]:
     """Mark the vertices (n, V) whose visibility can change the histogram, compiled.
 
-    ``live`` (bins + 1,) is 1 for bins that are kept; its last entry is for velocities
-    beyond the axis. The other parameters are those of :func:`count`.
+    Parameters
+    ----------
+    paths, start, duration_s, sensor
+        As for :func:`count`.
+    counting : Counting
+        Axis, and what happens beyond it.
+    live : uint8 ndarray, (bins + 1,)
+        1 for bins that are kept; the last entry is for velocities beyond the axis.
     """
     needed = np.zeros((len(duration_s), paths.vertices), np.uint8)
     precision = paths.places.dtype
@@ -397,7 +452,15 @@ def mark_needed(
 def mark_needed_plain(
     frames: Frames, sensor: NDArray[np.float64], counting: Counting, live: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
-    """Mark vertices of all frames as :func:`mark_needed` does, in NumPy."""
+    """Mark vertices of all frames as :func:`mark_needed` does, in NumPy.
+
+    Parameters
+    ----------
+    frames : Frames
+        The n frames with all vertices.
+    sensor, counting, live
+        As for :func:`mark_needed`.
+    """
     needed = np.zeros((len(frames.centre), frames.positions.shape[2]), np.uint8)
     for t in range(len(frames.centre)):
         for sample in range(frames.before.shape[1]):

@@ -34,7 +34,7 @@ DROP, WRAP, CLIP = 0, 1, 2
 
 
 @compiled
-def relative_ranges(x, y, z, sx, sy, sz, distance, ranges):  # type: ignore[no-untyped-def]
+def _relative_ranges(x, y, z, sx, sy, sz, distance, ranges):  # type: ignore[no-untyped-def]
     """Compiled form of :func:`sd2core.doppler.histogram.relative_range` for one knot."""
     two = np.float32(2)
     for v in range(ranges.shape[0]):
@@ -56,15 +56,24 @@ def distance_of(sensor):  # type: ignore[no-untyped-def]
 
 @compiled
 def ranges_at(here, knot, sensor, distance, ranges, held):  # type: ignore[no-untyped-def]
-    """Ranges of a group's vertices at one of its knots, computed when they are first asked for.
+    """Ranges (n,) of a group's vertices at one of its knots, computed when first asked for.
 
-    ``ranges`` keeps those of the newest knots, whose numbers are ``held``.
+    Parameters
+    ----------
+    here : (3 knots, n)
+        Coordinates of the vertices, from :func:`group_of`.
+    knot : int
+        Number of the knot in the group.
+    sensor, distance
+        Place (3,), and its :func:`distance_of`, by which ranges are less.
+    ranges, held : (k, most) and int (k,)
+        Keep those of the newest knots, and their numbers (-1: none); written.
     """
     row = knot % ranges.shape[0]
     # Cut like this the compiler knows that they lie side by side.
     found = ranges[row][: here.shape[1]]
     if held[row] != knot:
-        relative_ranges(
+        _relative_ranges(
             here[3 * knot], here[3 * knot + 1], here[3 * knot + 2],
             sensor[0], sensor[1], sensor[2], distance, found,
         )  # fmt: skip
@@ -74,7 +83,15 @@ def ranges_at(here, knot, sensor, distance, ranges, held):  # type: ignore[no-un
 
 @compiled
 def group_of(vertex, first, places, group):  # type: ignore[no-untyped-def]
-    """Vertices (n,) of a group and their coordinates at its knots (3 knots, n)."""
+    """Vertices (n,) of a group and their coordinates at its knots (3 knots, n).
+
+    Parameters
+    ----------
+    vertex, first, places
+        Those of :class:`~sd2core.doppler.histogram.Paths`.
+    group : int
+        Number of the group.
+    """
     knots = places.shape[0] // (3 * max(vertex.shape[0], 1))
     begin, end = first[group], first[group + 1]
     here = places[3 * knots * begin : 3 * knots * end].reshape((3 * knots, end - begin))
@@ -102,13 +119,25 @@ def run_end(numbers, p):  # type: ignore[no-untyped-def]
 
 @compiled
 def axis_positions(before, after, scale, offset, f):  # type: ignore[no-untyped-def]
-    """Position on the velocity axis, in bins."""
+    """Position on the velocity axis, in bins.
+
+    Parameters
+    ----------
+    before, after : (n,)
+        Ranges in metres at the two knots.
+    scale : float
+        Bins per metre of range change.
+    offset : float
+        Position of zero velocity, half the number of bins.
+    f : (n,)
+        Written.
+    """
     for v in range(f.shape[0]):
         f[v] = offset + scale * (before[v] - after[v])
 
 
 @compiled
-def slots_of(f, seen, bins, beyond, slot):  # type: ignore[no-untyped-def]
+def _slots_of(f, seen, bins, beyond, slot):  # type: ignore[no-untyped-def]
     """Set the slot of each vertex: its bin, ``bins`` beyond the axis, ``bins + 1`` if hidden.
 
     Returns the number of visible vertices beyond the axis.
@@ -148,7 +177,7 @@ def slots_of(f, seen, bins, beyond, slot):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def squared_ratios(ranges, distance, reference, weight):  # type: ignore[no-untyped-def]
+def _squared_ratios(ranges, distance, reference, weight):  # type: ignore[no-untyped-def]
     """Squared ratios (R_ref / R)² of a run of vertices."""
     for v in range(weight.shape[0]):
         ratio = reference / max(ranges[v] + distance, _NEAREST)
@@ -184,7 +213,7 @@ def raise_to(weight, exponent, spare):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def projected(x, y, z, ax, ay, az, sx, sy, sz, weight):  # type: ignore[no-untyped-def]
+def _projected(x, y, z, ax, ay, az, sx, sy, sz, weight):  # type: ignore[no-untyped-def]
     """Compiled form of :func:`sd2core.scattering.amplitude.projected_areas`."""
     for v in range(weight.shape[0]):
         qx, qy, qz = sx - x[v], sy - y[v], sz - z[v]
@@ -193,7 +222,7 @@ def projected(x, y, z, ax, ay, az, sx, sy, sz, weight):  # type: ignore[no-untyp
 
 
 @compiled
-def heads_beyond(f, seen, heads, bins):  # type: ignore[no-untyped-def]
+def _heads_beyond(f, seen, heads, bins):  # type: ignore[no-untyped-def]
     """Number of vertices that the visible ones beyond the axis stand for."""
     end, total = np.float32(bins), np.int32(0)
     for v in range(f.shape[0]):
@@ -216,13 +245,38 @@ def weigh_run(  # type: ignore[no-untyped-def]
     p, q, own, middle, away, numbers, heads, normals, marks, areas, vectors, which, weighting,
     sensor, distance, exponent, reference, seen, weight, spare,
 ):  # fmt: skip
-    """Return the visibility of vertices ``p`` to ``q`` of a frame and set their weights.
+    """Return the visibility of a run of vertices of a frame and set their weights.
 
-    Weights of 1 are left.
-
-    ``middle`` (3, n) and ``away`` (n,) are the frame's places and ranges, ``marks`` its row of the
-    mask, ``own`` is the place of its values among those of all frames. ``heads`` (n,) is the
-    number of vertices that each stands for. The last three are of length q - p.
+    Parameters
+    ----------
+    p, q : int
+        First vertex of the run and the one after its last, of the n in the frame.
+    own : int
+        Place of the frame's values among those of all frames, in values of one column.
+    middle : (3, n)
+        Places of the vertices in the frame.
+    away : (n,)
+        Their ranges, less ``distance``.
+    numbers : int32 (n,)
+        Their numbers among all V.
+    heads : float32 (n,)
+        Number of vertices that each stands for.
+    normals, areas, vectors : flat
+        Of all frames; see :class:`~sd2core.doppler.histogram.Scatterers`.
+    marks : uint8 (V,)
+        The frame's row of the mask.
+    which, weighting : int
+        Which vertices count, and what.
+    sensor, distance
+        Place (3,), and its :func:`distance_of`.
+    exponent, reference : float
+        Those of the range law; an exponent of 0 turns it off.
+    seen : uint8 (q - p,)
+        Ones where all count; otherwise work space, which may be what is returned.
+    weight : float32 (q - p,)
+        Ones at first, which stay where each vertex counts 1 and there is no range law; written.
+    spare : float32 (q - p,)
+        Work space.
     """
     count = numbers.shape[0]
     x, y, z = middle[0][p:q], middle[1][p:q], middle[2][p:q]
@@ -237,7 +291,7 @@ def weigh_run(  # type: ignore[no-untyped-def]
         for i in range(q - p):
             seen[i] = marks[np.uint32(numbers[p + i])]
     if exponent != 0:
-        squared_ratios(away[p:q], distance, reference, weight)
+        _squared_ratios(away[p:q], distance, reference, weight)
         raise_to(weight, exponent, spare)
     if weighting == ONE:
         return seen
@@ -246,7 +300,7 @@ def weigh_run(  # type: ignore[no-untyped-def]
     elif weighting == PROJECTED:
         vector = vectors[3 * own : 3 * (own + count)].reshape((3, count))
         ax, ay, az = vector[0][p:q], vector[1][p:q], vector[2][p:q]
-        projected(x, y, z, ax, ay, az, sx, sy, sz, spare)
+        _projected(x, y, z, ax, ay, az, sx, sy, sz, spare)
     else:
         spare[:] = heads[p:q]
     if exponent != 0:
@@ -295,12 +349,25 @@ def _total(sums, total):  # type: ignore[no-untyped-def]
 def count_kernel(  # type: ignore[no-untyped-def]
     paths, start, scale, scatterers, sensor, law, histogram, visible, outside
 ):
-    """Compiled form of :func:`sd2core.doppler.histogram.count`; the last three are written.
+    """Compiled form of :func:`sd2core.doppler.histogram.count`.
 
-    ``scale`` (n, samples), the mask and what is written are of the frames from ``start`` on. The
-    histogram is of shape (n, parts, bins). Vertices go to several tables in turn, so that equal
-    slots do not wait for one another: by their numbers, so that all vertices and those that move
-    are added up in the same order.
+    Vertices go to several tables in turn, so that equal slots do not wait for one another: by
+    their numbers, so that all vertices and those that move are added up in the same order.
+
+    Parameters
+    ----------
+    paths, scatterers, law : tuple
+        See the head of this module. The mask is of the n frames alone.
+    start : int
+        First of the n frames in the paths.
+    scale : (n, samples)
+        Bins per metre of range change; 0 where there is nothing to measure.
+    sensor : (3,)
+        In the frame and the precision of the positions.
+    histogram : float64 (n, parts, bins)
+        Written.
+    visible, outside : float64 (n,)
+        Written: number of visible vertices, and of those of them beyond the axis.
     """
     vertex, first, places, centre, before, after, group_frames, vertices = paths
     normals, mask, areas, vectors, every, part, which, weighting = scatterers
@@ -370,10 +437,10 @@ def count_kernel(  # type: ignore[no-untyped-def]
                 b = ranges_at(here, after[frame, sample], sensor, distance, ranges, held)
                 axis_positions(a[p:q], b[p:q], scale[t, sample], offset, f[:n])
                 if grouped:
-                    outside_count += heads_beyond(f[:n], sight, heads[p:q], bins)
-                    slots_of(f[:n], sight, bins, beyond, slot[:n])
+                    outside_count += _heads_beyond(f[:n], sight, heads[p:q], bins)
+                    _slots_of(f[:n], sight, bins, beyond, slot[:n])
                 else:
-                    outside_count += slots_of(f[:n], sight, bins, beyond, slot[:n])
+                    outside_count += _slots_of(f[:n], sight, bins, beyond, slot[:n])
                 if count == vertices and not split:
                     _add_in_turn(slot[:n], weight[:n], tables)
                 else:
@@ -391,7 +458,17 @@ def count_kernel(  # type: ignore[no-untyped-def]
 def needed_kernel(  # type: ignore[no-untyped-def]
     paths, start, scale, sensor, law, live, needed
 ) -> None:
-    """Compiled :func:`sd2core.doppler.histogram.mark_needed`; ``needed`` starts as zeros."""
+    """Compiled :func:`sd2core.doppler.histogram.mark_needed`.
+
+    Parameters
+    ----------
+    paths, start, scale, sensor, law
+        As for :func:`count_kernel`.
+    live : uint8 (bins + 1,)
+        1 for bins that are kept; the last entry is for velocities beyond the axis.
+    needed : uint8 (n, V)
+        Written; zero at first.
+    """
     vertex, first, places, _, before, after, group_frames, _ = paths
     bins, beyond, _, _ = law
     samples, most = scale.shape[1], most_in_a_group(first)
@@ -413,7 +490,7 @@ def needed_kernel(  # type: ignore[no-untyped-def]
             a = ranges_at(here, before[frame, sample], sensor, distance, ranges, held)
             b = ranges_at(here, after[frame, sample], sensor, distance, ranges, held)
             axis_positions(a, b, scale[t, sample], offset, f[:n])
-            slots_of(f[:n], seen[:n], bins, beyond, slot[:n])
+            _slots_of(f[:n], seen[:n], bins, beyond, slot[:n])
             for i in range(n):
                 needed[t, numbers[i]] |= live[slot[i]]
 

@@ -44,14 +44,28 @@ def fine_kernel(  # type: ignore[no-untyped-def]
     paths, scale, scatterers, sensor, law, limb, room, sigma, part, fine, histogram, visible,
     outside,
 ) -> None:  # fmt: skip
-    """Count every limb on a fine axis, (n, limbs, parts, 2), or spread its vertices at once.
+    """Count every limb on a fine axis, or spread its vertices at once.
 
-    The paths are those of all vertices. ``limb`` (V,) is the limb of each, which takes the place
-    of the scatterers' part, and ``room`` the number of bins beyond each end of the axis.
-    A part holds the sum of its weights, and that of weights times the place within the part. The
-    last four are written, and zero at first. ``sigma`` (n, limbs) is that of each limb in bins: of
-    those below ``SPREAD_AT_ONCE`` the vertices go to ``histogram`` (n, body parts, bins), spread;
-    ``part`` (limbs,) is a limb's part of the body.
+    Parameters
+    ----------
+    paths, scale, scatterers, sensor, law
+        As for :func:`~sd2core.doppler.kernels.count_kernel`; the paths are those of all vertices.
+    limb : intp (V,)
+        Limb of each vertex, which takes the place of the scatterers' part.
+    room : int
+        Bins beyond each end of the axis.
+    sigma : float64 (n, limbs)
+        Deviation of each limb in bins: of those below ``SPREAD_AT_ONCE`` the vertices go to
+        ``histogram``, spread, all others to ``fine``.
+    part : intp (limbs,)
+        Part of the body of each limb.
+    fine : float64 (n, limbs, parts, 2)
+        Sum of the weights in a part, and that of weights times the place within the part. This
+        and what follows is written, and zero at first.
+    histogram : float64 (n, body parts, bins)
+        Of what is spread at once.
+    visible, outside : float64 (n,)
+        Number of visible vertices, and of those of them beyond the axis.
     """
     vertex, first, places, centre, before, after, _, _ = paths
     normals, mask, areas, vectors, heads, _, which, weighting = scatterers
@@ -132,9 +146,18 @@ def _tally(  # type: ignore[no-untyped-def]
 
 @compiled
 def spread_kernel(fine, sigma, part, bins, room, beyond, histogram):  # type: ignore[no-untyped-def]
-    """Add the fine histograms of :func:`fine_kernel` to coarse ones (n, body parts, bins), spread.
+    """Add the fine histograms of :func:`fine_kernel` to coarse ones, spread.
 
     Each part is spread from the mean place of what lies in it.
+
+    Parameters
+    ----------
+    fine, sigma, part, room
+        As for :func:`fine_kernel`.
+    bins, beyond : int
+        Those of the axis.
+    histogram : float64 (n, body parts, bins)
+        Added to.
     """
     for t in range(fine.shape[0]):
         for limb in range(fine.shape[1]):

@@ -68,10 +68,25 @@ class VisibilityMasks:
     def for_rows(
         self, block: Block, rows: slice, position_m: Position, visibility: Visibility
     ) -> tuple[NDArray[np.uint8] | None, Quality]:
-        """Mask (n, V) for counting some of a block's frames, and the visibility that was used.
+        """Mask for counting some of a block's frames, and the visibility that was used.
 
-        The mask is None for ``none`` and ``facing``, which counting tests by itself.
-        Visibility is ``facing`` for ``frozen`` if no mask is kept.
+        Parameters
+        ----------
+        block : Block
+            Of the prepared mesh.
+        rows : slice
+            Its n frames.
+        position_m : tuple of 3 float
+            Place of the sensor in the camera frame.
+        visibility : {"none", "facing", "depth", "exact", "frozen"}
+            What is wished for; ``frozen`` becomes ``facing`` if no mask is kept.
+
+        Returns
+        -------
+        mask : uint8 ndarray, (n, V), or None
+            None for ``none`` and ``facing``, which counting tests by itself.
+        quality : str
+            Visibility that was used.
         """
         if visibility == "exact" or visibility == "depth":
             return self._compute(block, rows, position_m, visibility), visibility
@@ -87,6 +102,17 @@ class VisibilityMasks:
 
         Depth and exact also where they cannot change the map. With a stride, that of
         the frame whose visibility serves this one.
+
+        Parameters
+        ----------
+        block : Block
+            Of the prepared mesh.
+        local : int
+            Number of the frame in the block.
+        position_m : tuple of 3 float
+            Place of the sensor in the camera frame.
+        visibility : {"none", "facing", "depth", "exact", "frozen"}
+            What is wished for; ``frozen`` becomes ``facing`` if no mask is kept.
         """
         rows = slice(local, local + 1)
         place = self._prepared.sensor(position_m)
@@ -109,7 +135,19 @@ class VisibilityMasks:
     def kept(
         self, index: int, rows: slice, position_m: Position, occlusion: Occlusion
     ) -> NDArray[np.uint8] | None:
-        """Mask of a block's frames from this place, uint8 (n, V), if all are in memory."""
+        """Mask of a block's frames from this place, uint8 (n, V), if all are in memory.
+
+        Parameters
+        ----------
+        index : int
+            Number of the block.
+        rows : slice
+            Its n frames.
+        position_m : tuple of 3 float
+            Place of the sensor in the camera frame; no other one will do.
+        occlusion : {"depth", "exact"}
+            Kind of mask.
+        """
         if self._stride == 1:
             mask: _BlockMask | None = self._prepared.budget.get(
                 self._key(occlusion, index, position_m)

@@ -93,10 +93,20 @@ class MovingVertices(Paths):
 def find_moving(
     frames: Frames, reach_m: float, counting: Counting, still: float
 ) -> MovingVertices | None:
-    """Vertices that can enter a bin ``still`` bins or more from zero; None where most of them can.
+    """Vertices that can enter a bin that is kept; None where most of them can.
 
-    ``reach_m`` is the largest coordinate of the frames. The bound holds for what the kernels
-    compute, roundings included, from any place.
+    The bound holds for what the kernels compute, roundings included, from any place.
+
+    Parameters
+    ----------
+    frames : Frames
+        Of a block, with all vertices.
+    reach_m : float
+        Largest coordinate of the frames.
+    counting : Counting
+        Velocity axis.
+    still : float
+        Bins from zero velocity to the nearest bin that is kept, see :func:`still_bins`.
     """
     precision = frames.positions.dtype
     scale = counting.scale(frames.duration_s, precision).astype(np.float64)  # bins per metre
@@ -145,7 +155,18 @@ def visible_counts(
 ) -> NDArray[np.float64]:
     """Number of all visible vertices in each frame, (n,): marked, facing the sensor, or all.
 
-    ``points`` (n, 3, V) are their positions.
+    Parameters
+    ----------
+    points : ndarray, (n, 3, V)
+        Positions of all vertices.
+    sensor : float64 ndarray, (3,)
+        In the frame of the positions.
+    mask : uint8 ndarray, (n, V), or None
+        Where it is given, only marked vertices are visible.
+    normals : int8 ndarray, (n, 3, V), or None
+        Without a mask only vertices whose normal faces the sensor are visible; None: all are.
+    heads : float32 ndarray, (V,), or None
+        Number of vertices that each stands for; None: itself only.
     """
     vertices = points.shape[2]
     stands_for = np.ones(vertices) if heads is None else heads.astype(np.float64)

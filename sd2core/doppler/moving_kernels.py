@@ -15,7 +15,19 @@ more vertices are kept that do not move in all of them."""
 
 @compiled
 def moving_kernel(positions, before, after, limit_m, marks):  # type: ignore[no-untyped-def]
-    """Mark the vertices (groups, V) that move ``limit_m`` (n, samples) or more in any sample."""
+    """Mark the vertices that move so far or farther in any sample.
+
+    Parameters
+    ----------
+    positions : (knots, 3, V)
+        Of all vertices.
+    before, after : int64 (n, samples)
+        Knots between which each sample is measured.
+    limit_m : float64 (n, samples)
+        Distance from which on a vertex moves.
+    marks : bool (groups, V)
+        Written; false at first.
+    """
     for t in range(before.shape[0]):
         group = marks[t // GROUP]
         for sample in range(before.shape[1]):
@@ -30,7 +42,19 @@ def moving_kernel(positions, before, after, limit_m, marks):  # type: ignore[no-
 
 @compiled
 def gather_kernel(values, rows, vertex, first, found):  # type: ignore[no-untyped-def]
-    """Write the values (N, columns, V) of the vertices that move, at the rows of every group."""
+    """Write the values of the vertices that move, at the rows of every group.
+
+    Parameters
+    ----------
+    values : (N, columns, V)
+        Of all vertices.
+    rows : int64 (groups, rows)
+        Which of the N are wanted of a group.
+    vertex, first
+        Those of :class:`~sd2core.doppler.histogram.Paths`.
+    found : flat
+        Written: group after group, row after row, (columns, n).
+    """
     at = 0
     for group in range(rows.shape[0]):
         for row in rows[group]:
@@ -46,6 +70,17 @@ def moving_normals_kernel(points, faces, vertex, first, normals):  # type: ignor
 
     They are those of :func:`sd2core.scattering.visibility.vertex_normals_kernel`, of which only
     the triangles at these vertices are looked at.
+
+    Parameters
+    ----------
+    points : float32 (frames, 3, V)
+        All vertices.
+    faces : int32 (F, 3)
+        All triangles.
+    vertex, first
+        Those of :class:`~sd2core.doppler.histogram.Paths`.
+    normals : int8, flat
+        Written; of a last group with fewer frames what is missing is left.
     """
     total = np.empty((points.shape[2], 3), np.float64)
     moves = np.zeros(points.shape[2], np.bool_)
@@ -77,7 +112,19 @@ def moving_normals_kernel(points, faces, vertex, first, normals):  # type: ignor
 
 @compiled
 def facing_counts_kernel(points, normals, heads, sensor, visible):  # type: ignore[no-untyped-def]
-    """Number of vertices that face the sensor in each frame, or of those that they stand for."""
+    """Number of vertices that face the sensor in each frame, or of those that they stand for.
+
+    Parameters
+    ----------
+    points, normals : (n, 3, V) and int8 (n, 3, V)
+        All vertices.
+    heads : float32 (V,)
+        Number of vertices that each stands for; empty: itself only.
+    sensor : (3,)
+        In the frame and the precision of the points.
+    visible : float64 (n,)
+        Written.
+    """
     seen = np.empty(points.shape[2], np.uint8)
     for t in range(points.shape[0]):
         x, y, z = points[t, 0], points[t, 1], points[t, 2]

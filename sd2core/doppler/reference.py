@@ -37,9 +37,17 @@ def reference_stretch(
     the first frame, over the time between the two knots that it is measured between.
     Weights differ by 1e-6 of themselves.
 
-    Visibility is always exact: that of the options, its resolution and stride are not used,
-    nor is the smoothing. Without faces all vertices count. Frames are half-open; nulled
-    bins are emptied.
+    Parameters
+    ----------
+    mesh : MeshSequence
+        Without faces all vertices count.
+    sensor : VirtualSensor
+        Where the radar is.
+    options : SynthesisOptions
+        Visibility is always exact: theirs, its resolution and stride are not used, nor is the
+        smoothing. Nulled bins are emptied.
+    start, stop : int
+        Half-open range of frames.
     """
     place = np.asarray(sensor.position_m, np.float64)
     first = mesh.frame(0).astype(np.float64)
@@ -103,7 +111,19 @@ def _sigma_bins(
 def at_frames(
     mesh: MeshSequence, place: NDArray[np.float64], options: SynthesisOptions, start: int, stop: int
 ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Yield velocities (moments, V) and positions (3, V), frame by frame."""
+    """Yield velocities (moments, V) in m/s and positions (3, V), frame by frame.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+        Read around the frames as far as the velocities need it.
+    place : float64 ndarray, (3,)
+        Place of the sensor in the camera frame.
+    options : SynthesisOptions
+        Oversampling, smoothing of paths, and the rule of velocities.
+    start, stop : int
+        Half-open range of frames.
+    """
     every = options.oversampling
     trajectory = Trajectory(mesh.times_s, every, options.trajectory_smoothing_s, mesh.presence)
     centre = np.arange(start, stop) * every

@@ -28,12 +28,22 @@ def smooth(
     options: SynthesisOptions,
     presence: Presence | None = None,
 ) -> NDArray[np.float64]:
-    """Smooth frames ``start`` to ``stop`` of a map along velocity and time.
+    """Smooth frames of a map along velocity and time, (..., bins, stop - start).
 
-    ``raw`` (..., bins, n) holds the frames that :func:`frames_within_reach` names, from frame
-    ``first`` on, with nulled bins emptied. Times and presence are of all frames; nothing is
-    smoothed across frames without a person. The options name the widths, and the bins that
-    are emptied again afterwards.
+    Parameters
+    ----------
+    raw : float64 ndarray, (..., bins, n)
+        Frames that :func:`frames_within_reach` names, with nulled bins emptied.
+    times_s : float64 ndarray, (T,)
+        Times of all frames.
+    first : int
+        First frame of ``raw``.
+    start, stop : int
+        Half-open range of frames that are smoothed.
+    options : SynthesisOptions
+        Widths, and the bins that are emptied again afterwards.
+    presence : Presence, optional
+        Of all frames; nothing is smoothed across frames without a person.
     """
     values = velocity_kernel(options.axis.bins, options.velocity_sigma_bins) @ raw
     values = smooth_time(values, times_s, first, start, stop, options.time_sigma_s, presence)
@@ -62,7 +72,17 @@ def velocity_kernel(bins: int, sigma_bins: float) -> NDArray[np.float64]:
 def frames_within_reach(
     times_s: NDArray[np.float64], start: int, stop: int, sigma_s: float
 ) -> tuple[int, int]:
-    """Half-open range of frames that the smoothing of frames ``start`` to ``stop`` needs."""
+    """Half-open range of frames that the smoothing of some frames needs.
+
+    Parameters
+    ----------
+    times_s : float64 ndarray, (T,)
+        Times of all frames.
+    start, stop : int
+        Half-open range of frames that are smoothed.
+    sigma_s : float
+        Of the Gaussian on time, which is cut at four of it; 0: only the frames themselves.
+    """
     if sigma_s == 0:
         return start, stop
     reach = _REACH * sigma_s + 2 * _SLACK_S
@@ -80,11 +100,22 @@ def smooth_time(
     sigma_s: float,
     presence: Presence | None = None,
 ) -> NDArray[np.float64]:
-    """Gaussian mean over real times for frames ``start`` to ``stop``.
+    """Gaussian mean over real times, (..., stop - start).
 
-    ``values`` (..., n) holds the frames that :func:`frames_within_reach` names, from frame
-    ``first`` on. Times and presence are of all frames, so that the result does not depend
-    on how a recording is cut; the mean does not cross frames without a person.
+    Parameters
+    ----------
+    values : float64 ndarray, (..., n)
+        Frames that :func:`frames_within_reach` names.
+    times_s : float64 ndarray, (T,)
+        Times of all frames, so that the result does not depend on how a recording is cut.
+    first : int
+        First frame of ``values``.
+    start, stop : int
+        Half-open range of frames that are smoothed.
+    sigma_s : float
+        Of the Gaussian; 0: none.
+    presence : Presence, optional
+        Of all frames; the mean does not cross frames without a person.
     """
     if sigma_s == 0:
         return values[..., start - first : stop - first].copy()

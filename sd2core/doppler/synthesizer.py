@@ -64,7 +64,7 @@ class FrameScattering:
     quality: Quality  # visibility that was used
 
 
-def map_notes(prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: int) -> list[str]:
+def _map_notes(prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: int) -> list[str]:
     """Sentences about frames without a person, and about limits of single precision.
 
     There are none in ordinary scenes.
@@ -328,7 +328,7 @@ class Synthesizer:
                 "version": __version__,
                 "visible_share": _rounded(stretch.visible_share),
                 "beyond_share": _rounded(stretch.beyond_share),
-                "notes": map_notes(self.prepared, sensor, start, stop),
+                "notes": _map_notes(self.prepared, sensor, start, stop),
             },
             present=self.mesh.presence.measured[start:stop],
             limbs=stretch.limbs,
@@ -345,11 +345,26 @@ class Synthesizer:
         *,
         shares: bool = True,
     ) -> Stretch:
-        """Doppler values of frames ``start`` to ``stop`` (exclusive).
+        """Doppler values of some frames.
 
         They equal these columns of the whole map: smoothing over time also uses the frames
-        around them. With ``parts``, also those of each part of the body. Without ``shares``
-        only what moves is looked at, and the shares that are seen and beyond the axis are left out.
+        around them.
+
+        Parameters
+        ----------
+        sensor : VirtualSensor
+            Where the radar is.
+        start, stop : int
+            Half-open range of frames; IndexError for one that is empty or beyond the clip.
+        visibility : {"none", "facing", "depth", "exact", "frozen"}, optional
+            Otherwise that of the options; Sd2Error for any but ``none`` without faces.
+        progress : Progress
+            Called with frames done; may raise Cancelled.
+        parts : VertexParts, optional
+            With them also the values of each part of the body.
+        shares : bool
+            False if only what moves is to be looked at, and the shares that are seen and beyond the
+            axis are left out.
         """
         if not 0 <= start < stop <= self.mesh.frame_count:
             raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
@@ -432,9 +447,19 @@ class Synthesizer:
     ) -> CellUncertainty:
         """Uncertainty of the cells of :meth:`map` that follows from that of the mesh's velocities.
 
-        Model and limits are those of :mod:`sd2core.doppler.cell_uncertainty`, arguments
-        those of :meth:`map`. Raises Sd2Error if the mesh does not say how well its
-        velocities are known.
+        Model and limits are those of :mod:`sd2core.doppler.cell_uncertainty`.
+
+        Parameters
+        ----------
+        sensor : VirtualSensor
+            Where the radar is.
+        visibility, frames, progress
+            As for :meth:`map`.
+
+        Raises
+        ------
+        Sd2Error
+            If the mesh does not say how well its velocities are known.
         """
         start, stop = frames or (0, self.mesh.frame_count)
         if not 0 <= start < stop <= self.mesh.frame_count:

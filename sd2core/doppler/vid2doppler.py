@@ -37,11 +37,28 @@ def velocities(
 ) -> NDArray[np.float64]:
     """Velocity −(Δp·p)/|p|·fps of each vertex, then its zero-padded mean over five frames.
 
-    ``positions`` (n, 3, V) are those of frames from ``first`` on: at least from ``start -
-    3`` to ``stop + 2``, as far as the recording goes; the zero padding begins beyond
-    ``frame_count``. Presence is that of all frames of the recording: frames without a
-    person cut it into recordings of their own. The result (stop - start, V) is in m/s,
-    positive when approaching.
+    Parameters
+    ----------
+    positions : ndarray, (n, 3, V)
+        Vertices from frame ``first`` on: at least from ``start - 3`` to ``stop + 2``, as far as
+        the recording goes.
+    first : int
+        First frame of ``positions``.
+    start, stop : int
+        Half-open range of frames whose velocities are wanted.
+    frame_count : int
+        Frames of the recording, beyond which the zero padding begins.
+    sensor : float64 ndarray, (3,)
+        In the frame of the positions.
+    frames_per_s : float
+        Typical rate, which stands for all frames.
+    presence : Presence, optional
+        Of all frames of the recording: those without a person cut it into recordings of their own.
+
+    Returns
+    -------
+    float64 ndarray, (stop - start, V)
+        In m/s, positive when approaching.
     """
     low, high = max(start - TAPS // 2, 0), min(stop + TAPS // 2, frame_count)
     instant = np.zeros((stop - start + TAPS - 1, positions.shape[2]))
@@ -94,9 +111,24 @@ def count(
     scatterers: Scatterers,
     into: Counts,
 ) -> None:
-    """Count some frames by these velocities (n, V), as :func:`histogram.count` does.
+    """Count some frames by given velocities, as :func:`histogram.count` does.
 
-    The edges of the bins are of shape (bins + 1,).
+    Parameters
+    ----------
+    frames : Frames
+        The n frames with all vertices.
+    velocity_mps : float64 ndarray, (n, V)
+        From :func:`velocities`.
+    edges_mps : float64 ndarray, (bins + 1,)
+        Edges of the bins.
+    sensor : float64 ndarray, (3,)
+        In the frame of the positions.
+    counting : Counting
+        Range law, and what happens beyond the axis.
+    scatterers : Scatterers
+        Of these frames.
+    into : Counts
+        Written; zero at first.
     """
     numbers, beyond = place_in_bins(velocity_mps, edges_mps, counting)
     count_plain(

@@ -76,7 +76,19 @@ def labels_at(
     file_format: str | None = None,
     observation: str | None = None,
 ) -> Labels:
-    """Read labels of a ``labels.json``, a recording, a radar file or another program's file."""
+    """Read labels of a ``labels.json``, a recording, a radar file or another program's file.
+
+    Parameters
+    ----------
+    path : Path
+        Sd2Error if it does not exist, or cannot be read.
+    timebase : Timebase, optional
+        Times of frames, for tables that have frames only and for marks without a duration.
+    file_format : str, optional
+        Name of a program's format; by default found by kind, suffix and content.
+    observation : str, optional
+        Which one of a BORIS project with several.
+    """
     from sd2core.io.radar import holds_map, load_recorded_map
     from sd2core.labels.formats import read_labels
     from sd2core.recording.recording import is_recording, open_recording
@@ -181,8 +193,19 @@ def write(
 ) -> list[str]:
     """Write labels by the file's suffix; return the losses as sentences.
 
-    ``over`` is the digest of the file that they replace, where they were made of it: one that was
-    saved meanwhile is not replaced.
+    Parameters
+    ----------
+    path : Path
+        File to write.
+    labels : Labels
+        What is written.
+    timebase : Timebase or None
+        Times of frames; None suffices for a ``labels.json``, Sd2Error for other formats.
+    file_format : str, optional
+        Name of the format; by default by the suffix.
+    over : str, optional
+        Digest of the file that they replace, where they were made of it: Sd2Error if it was saved
+        meanwhile.
     """
     from sd2core.labels import files
     from sd2core.labels.formats import write_labels
