@@ -9,7 +9,8 @@ import torch
 from numpy.typing import NDArray
 
 from sd2core.classify.card import ClassifierCard
-from sd2core.classify.features import Features, Kind
+from sd2core.classify.defaults import FeatureKind
+from sd2core.classify.features import Features
 from sd2core.classify.live import TrainedClassifier
 from sd2core.classify.models import build
 from sd2core.maps import DopplerMap, MapKind
@@ -22,12 +23,12 @@ NULLED = (14, 15, 16)
 RATE_HZ = 30.0
 
 
-def features(kind: Kind = "columns", null_bins: tuple[int, ...] = NULLED) -> Features:
+def features(kind: FeatureKind = "columns", null_bins: tuple[int, ...] = NULLED) -> Features:
     return Features(kind, AXIS, null_bins, RATE_HZ)
 
 
 def classifier(
-    model: str = "lstm", kind: Kind = "columns", seed: int = 0, **card: Any
+    model: str = "lstm", kind: FeatureKind = "columns", seed: int = 0, **card: Any
 ) -> TrainedClassifier:
     shown = features(kind)
     with torch.random.fork_rng(devices=[]):
