@@ -13,6 +13,7 @@ and 5.725 to 5.875 GHz for industry, science and medicine); IEEE 802.11 (channel
 
 from __future__ import annotations
 
+from sd2core.plug_ins import Group
 from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS, RadarConfig, Sampling
 
 PAPER = "paper"
@@ -129,3 +130,17 @@ Examples
 >>> round(1e3 * RADARS["wifi-2.4ghz"].wavelength_m), RADARS["wifi-2.4ghz"].is_continuous
 (123, True)
 """
+
+RADAR_PLUG_INS = Group("radars", RadarConfig, RADARS)
+"""Radars by name of other packages."""
+
+
+def find_radar(name: str) -> RadarConfig | None:
+    """Radar of this name, of the program or of a plug-in; None if there is none.
+
+    Raises Sd2Error for a plug-in that cannot be used.
+    """
+    if name in RADARS:
+        return RADARS[name]
+    plug_in = RADAR_PLUG_INS.find(name)
+    return None if plug_in is None else plug_in.load()

@@ -114,8 +114,8 @@ def _add_window_commands(commands: argparse._SubParsersAction) -> None:
 def _doctor(options: Doctor) -> int:
     """Check the installation, and say how to mend it.
 
-    Looks at system libraries, display, OpenGL, fonts, compiled kernels, models, GPU and
-    room on the disk. The exit code is 1 where something must be mended.
+    Looks at system libraries, display, OpenGL, fonts, compiled kernels, models, GPU,
+    plug-ins and room on the disk. The exit code is 1 where something must be mended.
 
     --clean lists what the program keeps outside of recordings and can make again, such
     as compiled kernels and landmark models, and removes it. Settings, trained models,

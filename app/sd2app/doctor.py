@@ -9,13 +9,14 @@ import shutil
 import subprocess
 import sys
 from dataclasses import asdict, dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from sd2app.system_libraries import how_to_install, missing_libraries
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_cache, user_data
 from sd2core.files.resources import resource_path
 from sd2core.numerics.compiled import kernels_compiled, kernels_ready, worker_count
+from sd2core.plug_ins import Group
 from sd2core.version import __version__
 
 _FREE_GB = 2.0
@@ -64,6 +65,7 @@ def examine() -> list[Finding]:
         _bundled(),
         _landmark_models(),
         _gpu(),
+        *_plug_ins(),
         *_folders(),
     ]
 
@@ -170,6 +172,32 @@ def _gpu() -> Finding:
     if torch.cuda.is_available():
         return Finding("Learning", "ok", f"on {torch.cuda.get_device_name()}")
     return Finding("Learning", "ok", f"torch {torch.__version__} on the processor, no GPU")
+
+
+def _plug_ins() -> list[Finding]:
+    from sd2core.classify.defaults import CLASSIFIERS
+    from sd2core.cli.parser import COMMAND_PLUG_INS
+    from sd2core.denoise.registry import DENOISERS
+    from sd2core.io.readers import MESH_FILES, RADAR_FILES
+    from sd2core.labels.formats import LABEL_PLUG_INS
+    from sd2core.radar_profiles import RADAR_PLUG_INS
+
+    groups: tuple[Group[Any], ...] = (
+        RADAR_PLUG_INS, RADAR_FILES, MESH_FILES, LABEL_PLUG_INS, DENOISERS, CLASSIFIERS,
+        COMMAND_PLUG_INS,
+    )  # fmt: skip
+    found = []
+    for plug_in, made in (one for group in groups for one in group.loaded()):
+        if isinstance(made, Sd2Error):
+            remedy = made.remedy or f"Uninstall {plug_in.package}"
+            finding = Finding(
+                "Plug-in", "problem", str(Sd2Error(made.found, made.expected)), remedy
+            )
+        else:
+            words = f"{plug_in.name} ({plug_in.group.name}) of {plug_in.package}"
+            finding = Finding("Plug-in", "ok", words)
+        found.append(finding)
+    return found or [Finding("Plug-in", "ok", "none is installed")]
 
 
 def _folders() -> list[Finding]:

@@ -39,6 +39,7 @@ class ClassifierCard:
     about: Mapping[str, Any] = field(default_factory=dict)
     """``data``, ``command``, ``metrics`` and what else fits into JSON."""
     parameters: int = 0  # number of weights; known when the card comes from a file
+    package: str = ""  # Of the plug-in that has the network; empty: this program has it.
     path: Path | None = None
 
     def __post_init__(self) -> None:
@@ -113,6 +114,7 @@ class ClassifierCard:
             "title": self.title,
             "about": dict(self.about),
             "parameters": self.parameters,
+            **({"package": self.package} if self.package else {}),
         }
 
     @classmethod
@@ -145,5 +147,6 @@ class ClassifierCard:
                 title=str(content["title"]),
                 about=dict(content["about"]),
                 parameters=int(content["parameters"]),
+                package=str(content.get("package", "")),
                 path=path,
             )

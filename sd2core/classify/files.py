@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.classify.card import ClassifierCard
+from sd2core.classify.defaults import CLASSIFIERS
 from sd2core.denoise.files import readable, user_models_folder
 from sd2core.denoise.weights import SUFFIX, Shapes, read_header, read_network, write_weights
 from sd2core.errors import Sd2Error
@@ -27,7 +28,12 @@ def save_classifier(path: Path, trained: TrainedClassifier) -> ClassifierCard:
     from sd2core.denoise.model import parameter_count
 
     path = Path(path)
-    card = replace(trained.card, path=path, parameters=parameter_count(trained.network))
+    card = replace(
+        trained.card,
+        path=path,
+        parameters=parameter_count(trained.network),
+        package=CLASSIFIERS.package_of(trained.card.model),
+    )
     write_weights(path, trained.network, card.to_json())
     return card
 
@@ -44,6 +50,7 @@ def load_classifier(path: Path) -> TrainedClassifier:
     """Load a classifier. Raises Sd2Error if it is missing, damaged or inconsistent."""
     path = Path(path)
     card, shapes = _read_header(path)
+    CLASSIFIERS.check_installed(card.model, card.package, path)
 
     from sd2core.classify.live import TrainedClassifier
     from sd2core.classify.models import build

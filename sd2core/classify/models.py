@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from importlib import import_module
+from collections.abc import Iterator
 from typing import Any
 
 import torch
 from torch import Tensor, nn
 
-from sd2core.classify.defaults import MODELS, WIDTH
-from sd2core.denoise.registry import check_option
+from sd2core.classify.defaults import CLASSIFIERS, ENTRIES, WIDTH, model_names
+from sd2core.denoise.registry import Architecture, check_option
 from sd2core.denoise.s4_layer import S4Layer, S4Stack
 from sd2core.errors import Sd2Error
+from sd2core.plug_ins import PlugIn
 
 State = Any
 """What a network remembers of the frames before."""
@@ -114,38 +114,39 @@ class S4Classifier(S4Stack, Classifier):
         )
 
 
-_MODELS = {"lstm": "models.LstmClassifier", "s4": "models.S4Classifier",
-           "kernel": "kernel.KernelClassifier"}  # fmt: skip
-_OPTIONS: Mapping[str, Mapping[str, Any]] = {
-    "lstm": {"width": WIDTH, "depth": 2, "dropout": 0.2},
-    "s4": {"width": WIDTH, "depth": 2, "state_size": 16, "dropout": 0.2},
-    # The frames follow from the delay.
-    "kernel": {"frames": 29, "references": 1024},
-}
-
 _LARGEST = 1024
 """No option is a larger number: a damaged file must not ask for all the memory."""
 
 
 def options(name: str) -> dict[str, Any]:
     """Return the options of a model with their defaults."""
-    if name not in _MODELS:
-        raise Sd2Error(f"There is no classifier {name!r}", f"one of {', '.join(MODELS)}")
-    return dict(_OPTIONS[name])
+    return dict((ENTRIES[name] if name in ENTRIES else _plug_in(name).load()).options)
 
 
 def build(name: str, size: int, classes: int, **given: Any) -> Classifier:
-    """Build one of :data:`MODELS` with random weights from torch's generator.
+    """Build one of :data:`MODELS`, or of a plug-in, with random weights from torch's generator.
 
     ``size`` is the number of features per frame; ``given`` replaces :func:`options`.
     """
     known = options(name)
     for option, value in given.items():
         check_option(f"classifier {name}", option, value, known, _LARGEST)
-    module, _, class_name = _MODELS[name].partition(".")
-    made = getattr(import_module(f"sd2core.classify.{module}"), class_name)
-    built: Classifier = made(size, classes, **{**known, **given})
-    return built
+
+    def built(entry: Architecture) -> Classifier:
+        made: Classifier = entry.made(size, classes, **entry.fixed, **{**known, **given})
+        return made
+
+    if name in ENTRIES:
+        return built(ENTRIES[name])
+    made: Classifier = _plug_in(name).use(built, Classifier)
+    return made
+
+
+def _plug_in(name: str) -> PlugIn[Architecture]:
+    plug_in = CLASSIFIERS.find(name)
+    if plug_in is None:
+        raise Sd2Error(f"There is no classifier {name!r}", f"one of {', '.join(model_names())}")
+    return plug_in
 
 
 def parameter_groups(network: Classifier, rate: float, ssm_rate: float) -> list[dict[str, Any]]:

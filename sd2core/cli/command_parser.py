@@ -6,7 +6,7 @@ import argparse
 import inspect
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import MISSING
+from dataclasses import MISSING, dataclass
 from typing import Any, NamedTuple, NoReturn, TypeVar
 
 from sd2core.errors import Sd2Error
@@ -100,6 +100,27 @@ def _keywords(option: Option) -> dict[str, Any]:
     if required and not place.argument:
         about["required"] = True
     return about
+
+
+@dataclass(frozen=True)
+class AddedCommand:
+    """A command of ``sd2`` that another package adds.
+
+    Parameters
+    ----------
+    options : type of OptionRecord
+        Its options; the docstring has a word on each.
+    run : callable
+        Takes a record of them, and may return an exit code; its docstring is the help.
+    """
+
+    options: type[OptionRecord]
+    run: Callable[[Any], int | None]
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.options, type) and issubclass(self.options, OptionRecord)):
+            raise Sd2Error(f"The options of a command are {self.options!r}", "an OptionRecord")
+        add_options(CommandParser(), self.options)  # fails here, and not where all are listed
 
 
 class Command(NamedTuple):

@@ -6,7 +6,10 @@ import argparse
 from collections.abc import Sequence
 from importlib import import_module
 
-from sd2core.cli.command_parser import CommandParser
+from sd2core.cli.command_parser import AddedCommand, CommandParser, add_command
+from sd2core.errors import Sd2Error
+from sd2core.options.records import OptionRecord
+from sd2core.plug_ins import Group, PlugIn
 from sd2core.version import __version__
 
 _DESCRIPTION = """\
@@ -73,6 +76,12 @@ COMMANDS = {
 }
 """Commands, and what each does in a line, in the order of the help."""
 
+WINDOW_COMMANDS = ("open", "demo", "doctor")
+"""Commands that are not the library's; whoever calls :func:`build_parser` adds them."""
+
+COMMAND_PLUG_INS = Group("commands", AddedCommand, (*COMMANDS, *WINDOW_COMMANDS))
+"""Commands of other packages."""
+
 _MODULE_OF = {
     **dict.fromkeys(("import", "set", "relink"), "importing"),
     **dict.fromkeys(("warm-up", "fetch-models"), "preparing"),
@@ -86,7 +95,8 @@ def build_parser(
     """Parser of the library's commands, and where others are added, with their examples.
 
     Where the first of the ``typed`` words is a command, the others are left out, and where it asks
-    for help, all are but named: they take longer to load than most commands work.
+    for help, all are but named: they take longer to load than most commands work. Commands of
+    plug-ins are there where one is typed, or all are wanted.
     """
     parser = CommandParser(
         prog="sd2",
@@ -100,9 +110,51 @@ def build_parser(
     if name in ("-h", "--help"):
         for command, summary in COMMANDS.items():
             commands.add_parser(command, help=summary, add_help=False)
+        _add_usable(commands)
+        return parser, commands
+    if name in WINDOW_COMMANDS:
+        return parser, commands
+    plug_in = None if name in COMMANDS else COMMAND_PLUG_INS.find(name)
+    if plug_in is not None:
+        _add_named(commands, plug_in)
         return parser, commands
     wanted = [name] if name in COMMANDS else COMMANDS
     modules = (_MODULE_OF.get(one, one.replace("-", "_")) for one in wanted)
     for module in dict.fromkeys(modules):
         import_module(f"sd2core.cli.{module}").add_commands(commands)
+    if name not in COMMANDS and not name.startswith("-"):
+        _add_usable(commands)
     return parser, commands
+
+
+def _add_usable(commands: argparse._SubParsersAction) -> None:
+    """Add the commands of all plug-ins that can be used; `sd2 doctor` names the others."""
+    for plug_in, command in COMMAND_PLUG_INS.loaded():
+        if isinstance(command, AddedCommand):
+            _add(commands, plug_in, command)
+
+
+def _add_named(commands: argparse._SubParsersAction, plug_in: PlugIn[AddedCommand]) -> None:
+    """Add a command that is typed; one that cannot be used says why, whatever follows it."""
+    try:
+        _add(commands, plug_in, plug_in.load())
+    except Sd2Error as error:
+        refusal = error
+
+        def refuse(options: argparse.Namespace) -> int:
+            raise refusal
+
+        # No word that follows begins with this, so that none is an option.
+        refused = commands.add_parser(plug_in.name, prefix_chars="\0", add_help=False)
+        refused.add_argument("words", nargs="*")
+        refused.set_defaults(handler=refuse)
+
+
+def _add(
+    commands: argparse._SubParsersAction, plug_in: PlugIn[AddedCommand], command: AddedCommand
+) -> None:
+    def handler(options: OptionRecord) -> int | None:
+        code: int | None = plug_in.use(lambda made: made.run(options), int | None)
+        return code
+
+    add_command(commands, plug_in.name, options=command.options, handler=handler, about=command.run)

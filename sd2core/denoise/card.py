@@ -68,6 +68,7 @@ class ModelCard:
     # ``data``, ``command``, ``metrics``, ``limits`` and other content for JSON.
     about: Mapping[str, Any] = field(default_factory=dict)
     parameters: int = 0  # Number of learned parameters; known when the card comes from a file.
+    package: str = ""  # Of the plug-in that has the network; empty: this program has it.
     path: Path | None = None  # File that holds the card.
 
     def __post_init__(self) -> None:
@@ -143,6 +144,7 @@ class ModelCard:
             "title": self.title,
             "about": dict(self.about),
             "parameters": self.parameters,
+            **({"package": self.package} if self.package else {}),
         }
 
     @classmethod
@@ -181,5 +183,6 @@ class ModelCard:
                 title=str(content["title"]),
                 about=dict(content["about"]),
                 parameters=int(content["parameters"]),
+                package=str(content.get("package", "")),
                 path=path,
             )

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from sd2core.denoise.card import ModelCard
+from sd2core.denoise.registry import DENOISERS
 from sd2core.denoise.weights import SUFFIX, Shapes, read_header, read_network, write_weights
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular
@@ -43,7 +44,12 @@ def save_model(path: Path, trained: TrainedDenoiser) -> ModelCard:
     from sd2core.denoise.model import parameter_count
 
     path = Path(path)
-    card = replace(trained.card, path=path, parameters=parameter_count(trained.network))
+    card = replace(
+        trained.card,
+        path=path,
+        parameters=parameter_count(trained.network),
+        package=DENOISERS.package_of(trained.card.model),
+    )
     write_weights(path, trained.network, card.to_json())
     return card
 
@@ -81,6 +87,7 @@ def load_model(model: Path | str) -> TrainedDenoiser:
     """
     path = find_model(model)
     card, shapes = _read_header(path)
+    DENOISERS.check_installed(card.model, card.package, path)
 
     from sd2core.denoise.live import TrainedDenoiser
     from sd2core.denoise.registry import build

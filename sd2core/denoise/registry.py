@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from sd2core.errors import Sd2Error
+from sd2core.plug_ins import Group, PlugIn
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,11 +18,41 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class _Entry:
+class Architecture:
+    """Network that learns: a denoiser, or a classifier.
+
+    Parameters
+    ----------
+    place : str
+        ``package.module.Class`` of a :class:`~sd2core.denoise.model.Denoiser` or a
+        :class:`~sd2core.classify.models.Classifier`, imported when one is built.
+    summary : str
+        What it is, in a few words.
+    options : mapping
+        Its options with their defaults: whole numbers from 1 to 1024, shares, or true or false.
+        Of a denoiser, ``skip`` puts a linear map of each frame beside it, and ``live`` makes a
+        causal one as well, with ``bidirectional=False``.
+    fixed : mapping
+        Further arguments of the class.
+    """
+
     place: str
     summary: str
     options: Mapping[str, Any] = field(default_factory=dict)
     fixed: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if "." not in self.place:
+            raise Sd2Error(f"The place of a network is {self.place!r}", "package.module.Class")
+        if not isinstance(self.options, Mapping):
+            raise Sd2Error(f"The options of a network are {self.options!r}", "a mapping")
+
+    @property
+    def made(self) -> Callable[..., Any]:
+        """Class of the network."""
+        module, _, name = self.place.rpartition(".")
+        found: Callable[..., Any] = getattr(import_module(module), name)
+        return found
 
 
 _S4 = {
@@ -37,52 +68,61 @@ _S4 = {
 # ``live``: beside the one that looks both ways a causal one, for live frames.
 _BOTH_WAYS = {"bidirectional": True, "live": True}
 
-_ENTRIES: dict[str, _Entry] = {
-    "s4": _Entry(
-        "causal_models.S4Denoiser",
+_ENTRIES: dict[str, Architecture] = {
+    "s4": Architecture(
+        "sd2core.denoise.causal_models.S4Denoiser",
         "structured state space, HiPPO-LegS (the paper's model)",
         {**_S4, **_BOTH_WAYS},
         {"kernel": "legs"},
     ),
-    "s4d": _Entry(
-        "causal_models.S4Denoiser",
+    "s4d": Architecture(
+        "sd2core.denoise.causal_models.S4Denoiser",
         "structured state space, diagonal",
         {**_S4, **_BOTH_WAYS},
         {"kernel": "diagonal"},
     ),
-    "s4-serial": _Entry(
-        "causal_models.SerialS4Denoiser",
+    "s4-serial": Architecture(
+        "sd2core.denoise.causal_models.SerialS4Denoiser",
         "the paper's literal form: all cells one after another, one channel; slow",
         # A sample is a bin, not a frame.
         {**_S4, "dt_min": 1e-3, "dt_max": 1e-1},
         {"kernel": "legs"},
     ),
-    "gru": _Entry(
-        "causal_models.GruDenoiser",
+    "gru": Architecture(
+        "sd2core.denoise.causal_models.GruDenoiser",
         "gated recurrent network",
         {"channels": 144, "depth": 2, "dropout": 0.0, "skip": True},
     ),
-    "unet": _Entry(
-        "window_models.UNetDenoiser",
+    "unet": Architecture(
+        "sd2core.denoise.window_models.UNetDenoiser",
         "2D U-Net over windows of 72 frames",
         {"channels": 12, "depth": 3, "dropout": 0.0, "skip": True},
     ),
-    "swin": _Entry(
-        "window_models.SwinDenoiser",
+    "swin": Architecture(
+        "sd2core.denoise.window_models.SwinDenoiser",
         "Swin transformer over windows of 72 frames",
         {"channels": 48, "depth": 2, "dropout": 0.0, "skip": True},
     ),
-    "none": _Entry("filters.NoDenoiser", "no denoising"),
-    "median": _Entry(
-        "filters.MedianDenoiser", "median over frames and bins", {"frames": 5, "width": 3}
+    "none": Architecture("sd2core.denoise.filters.NoDenoiser", "no denoising"),
+    "median": Architecture(
+        "sd2core.denoise.filters.MedianDenoiser",
+        "median over frames and bins",
+        {"frames": 5, "width": 3},
     ),
-    "wiener": _Entry(
-        "filters.WienerDenoiser",
+    "wiener": Architecture(
+        "sd2core.denoise.filters.WienerDenoiser",
         "linear filter of least squared error",
         {"frames": 9, "width": 5},
     ),
-    "ridge": _Entry("filters.RidgeDenoiser", "ridge regression on the last frames", {"frames": 9}),
+    "ridge": Architecture(
+        "sd2core.denoise.filters.RidgeDenoiser",
+        "ridge regression on the last frames",
+        {"frames": 9},
+    ),
 }
+
+DENOISERS = Group("denoisers", Architecture, _ENTRIES)
+"""Networks of other packages."""
 
 FILTERS = ("none", "median", "wiener", "ridge")
 """Denoisers that are fitted by :func:`fit_filter` instead of trained."""
@@ -130,15 +170,27 @@ def build(name: str, bins: int = 32, parts: int = 1, more: int = 0, **given: Any
         When there is no such model or option, or an option is not of its kind, or for more bins
         than a map has.
     """
-    entry = _entry(name)
     if not 1 <= bins <= _MOST_BINS:
         raise Sd2Error(f"A model of maps of {bins} bins", f"from 1 to {_MOST_BINS:,} bins")
+    known = options(name)
     for option, value in given.items():
-        check_option(f"model {name}", option, value, entry.options, _LARGEST)
-    module, _, class_name = entry.place.partition(".")
-    found = getattr(import_module(f"sd2core.denoise.{module}"), class_name)
+        check_option(f"model {name}", option, value, known, _LARGEST)
+    from sd2core.denoise.model import Denoiser
+
+    if name in _ENTRIES:
+        return _built(name, _ENTRIES[name], bins, parts, more, given)
+    built: Denoiser = _plug_in(name).use(
+        lambda entry: _built(name, entry, bins, parts, more, given), Denoiser
+    )
+    return built
+
+
+def _built(
+    name: str, entry: Architecture, bins: int, parts: int, more: int, given: Mapping[str, Any]
+) -> Denoiser:
     from sd2core.denoise.model import Corrected, TwoNetworks
 
+    found = entry.made
     several = {} if name in FILTERS else {"parts": 0 if more else parts, "more": more}
     chosen = {**entry.options, **given}
     corrects, also_live = chosen.pop("skip", False), chosen.pop("live", False)
@@ -189,10 +241,26 @@ def fit_filter(
     return fitted, {option: getattr(fitted, option) for option in options(name)}
 
 
-def _entry(name: str) -> _Entry:
-    if name not in _ENTRIES:
-        raise Sd2Error(f"There is no model {name!r}", f"one of {', '.join(_ENTRIES)}")
-    return _ENTRIES[name]
+def is_network(name: str) -> bool:
+    """True for networks that are trained, those of plug-ins too."""
+    return name in MODELS or DENOISERS.find(name) is not None
+
+
+def network_names() -> tuple[str, ...]:
+    """Names of all networks that are trained."""
+    return (*MODELS, *DENOISERS.names())
+
+
+def _entry(name: str) -> Architecture:
+    return _ENTRIES[name] if name in _ENTRIES else _plug_in(name).load()
+
+
+def _plug_in(name: str) -> PlugIn[Architecture]:
+    plug_in = DENOISERS.find(name)
+    if plug_in is None:
+        known = ", ".join([*_ENTRIES, *DENOISERS.names()])
+        raise Sd2Error(f"There is no model {name!r}", f"one of {known}")
+    return plug_in
 
 
 def check_option(what: str, option: str, value: Any, known: Mapping[str, Any], most: int) -> None:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import zipfile
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular
 from sd2core.files.paths import PICKLE_SUFFIXES, is_pattern
 from sd2core.files.stores import read_attributes
 from sd2core.io.imu_columns import holds_inertial_signals
+from sd2core.io.readers import MESH_FILES, RADAR_FILES, plug_in_for
 from sd2core.pairs.summary import is_pair_store
+from sd2core.plug_ins import Group
 
 Kind = Literal["recording", "video", "mesh", "radar", "map", "imu", "pairs", "model", "dataset"]
 
@@ -50,12 +52,16 @@ def kind_of(path: Path) -> Kind:
         return "imu"
     if suffix == ".npz":
         return "map" if _is_doppler_map(path) else "mesh"
+    kind, said = _kind_by_plug_ins(path)
+    if kind is not None:
+        return kind
     raise Sd2Error(
         f"{path} is of no kind that is known",
         "a recording (.sd2), a video (.mp4, .mkv …), a mesh (.npz, .zarr, .obj, .ply, .glb, .pkl),"
         " a radar capture (a folder with radar.npy, the .h5 of a K60168A or an A121, the .bin of a"
         " DCA1000, or samples with a description: .npy, .h5, .sigmf-meta) or samples of an inertial"
         " sensor (.csv, .sto)",
+        said,
     )
 
 
@@ -97,10 +103,26 @@ def _kind_of_folder(folder: Path) -> Kind:
         return "mesh"
     if ".bin" in suffixes and suffixes & {".cfg", ".json"}:
         return "radar"
+    kind, said = _kind_by_plug_ins(folder)
+    if kind is not None:
+        return kind
     raise Sd2Error(
         f"The folder {folder} holds nothing that is known",
         "recording.json, zarr.json, radar.npy, or .obj/.ply/.glb files",
+        said,
     )
+
+
+def _kind_by_plug_ins(path: Path) -> tuple[Kind | None, str]:
+    """Kind of what a plug-in reads; without one, what is wrong with plug-ins."""
+    faults = []
+    groups: tuple[tuple[Kind, Group[Any]], ...] = (("mesh", MESH_FILES), ("radar", RADAR_FILES))
+    for kind, group in groups[path.is_dir() :]:  # a folder is no mesh of theirs
+        plug_in, said = plug_in_for(path, group)
+        if plug_in is not None:
+            return kind, ""
+        faults.append(said)
+    return None, " ".join(filter(None, faults))
 
 
 def _is_doppler_map(path: Path) -> bool:

@@ -16,6 +16,7 @@ from sd2core.io.mesh_arrays import RawMesh, read_npz, read_zarr, write_npz, writ
 from sd2core.io.mesh_checks import check_mesh, mark_empty_frames, uncertainty_of
 from sd2core.io.mesh_files import SURFACE_SUFFIXES, read_faces, read_mesh_files
 from sd2core.io.mesh_models import read_model_output
+from sd2core.io.readers import MESH_FILES, FileReader, MeshHints, plug_in_for
 from sd2core.io.stored_vertices import StoredVertices, real_type
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
@@ -93,7 +94,7 @@ def load_mesh(
     path = as_path(path)
     if scale is not None and not (np.isfinite(scale) and scale > 0):
         raise Sd2Error(f"The scale is {scale}", "a positive factor to metres, such as 0.001")
-    raw = _read(path, person, image_size, focal_px, distance_m, progress)
+    raw = _read(path, MeshHints(person, image_size, focal_px, distance_m, progress))
     source = str(path)
     if faces is not None:
         raw.faces = read_faces(Path(faces))
@@ -152,39 +153,52 @@ def save_mesh(mesh: MeshSequence, path: Path | str, progress: Progress = silent)
         )
 
 
-def _read(
-    path: Path,
-    person: int | str | None,
-    image_size: tuple[int, int] | None,
-    focal_px: float | None,
-    distance_m: float | None,
-    progress: Progress,
-) -> RawMesh:
-    if is_pattern(path):
-        return read_mesh_files(path, progress)
-    if not path.exists():
+def _read(path: Path, hints: MeshHints) -> RawMesh:
+    if not (is_pattern(path) or path.exists()):
         raise Sd2Error(f"{path} does not exist", f"a mesh: {_KNOWN}", "Check the path")
-    suffix = path.suffix.lower()
-    if path.is_dir():
-        markers = ("zarr.json", ".zgroup", ".zarray")
-        if suffix == ".zarr" or any((path / name).exists() for name in markers):
-            return read_zarr(path)
-        return read_mesh_files(path, progress)
-    if path.name.lower().endswith(".zarr.zip"):
-        return read_zarr(path)
-    if suffix == ".npz":
-        return read_npz(path)
-    if suffix in PICKLE_SUFFIXES:
-        return read_model_output(path, person, image_size, focal_px, distance_m)
-    if suffix in SURFACE_SUFFIXES:
-        return read_mesh_files(path, progress)
-    if suffix in {".pt", ".pth", ".ckpt"}:
-        raise Sd2Error(
-            f"{path} is a torch file",
-            f"a mesh: {_KNOWN}",
-            "Save the vertices as numpy.savez('mesh.npz', vertices=verts.cpu().numpy())",
-        )
-    raise Sd2Error(f"{path} is not a mesh of a kind that is known", f"a mesh: {_KNOWN}")
+    for reader in _READERS:
+        if reader.fits(path):
+            return reader.read(path, hints)
+    plug_in, said = plug_in_for(path, MESH_FILES)
+    if plug_in is not None:
+        read: RawMesh = plug_in.use(lambda reader: reader.read(path, hints), RawMesh)
+        return read
+    raise Sd2Error(f"{path} is not a mesh of a kind that is known", f"a mesh: {_KNOWN}", said)
+
+
+def _is_zarr(path: Path) -> bool:
+    if not path.is_dir():
+        return path.name.lower().endswith(".zarr.zip")
+    markers = ("zarr.json", ".zgroup", ".zarray")
+    return path.suffix.lower() == ".zarr" or any((path / name).exists() for name in markers)
+
+
+def _read_surfaces(path: Path, hints: MeshHints) -> RawMesh:
+    return read_mesh_files(path, hints.progress)
+
+
+def _read_model_output(path: Path, hints: MeshHints) -> RawMesh:
+    return read_model_output(path, hints.person, hints.image_size, hints.focal_px, hints.distance_m)
+
+
+def _refuse_torch(path: Path, hints: MeshHints) -> RawMesh:
+    raise Sd2Error(
+        f"{path} is a torch file",
+        f"a mesh: {_KNOWN}",
+        "Save the vertices as numpy.savez('mesh.npz', vertices=verts.cpu().numpy())",
+    )
+
+
+_READERS: tuple[FileReader[RawMesh], ...] = (
+    FileReader(_read_surfaces, looks=is_pattern),
+    FileReader(lambda path, hints: read_zarr(path), looks=_is_zarr),
+    FileReader(_read_surfaces, looks=Path.is_dir),
+    FileReader(lambda path, hints: read_npz(path), (".npz",)),
+    FileReader(_read_model_output, tuple(PICKLE_SUFFIXES)),
+    FileReader(_read_surfaces, SURFACE_SUFFIXES),
+    FileReader(_refuse_torch, (".pt", ".pth", ".ckpt")),
+)
+"""Readers of meshes; the first that fits is taken, and those of plug-ins after all of them."""
 
 
 def _as_vertices(raw: RawMesh, source: str) -> None:

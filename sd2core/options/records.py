@@ -296,7 +296,12 @@ def _options(kind: type, section: str = "") -> Iterator[Option]:
         choices = get_args(plain) if get_origin(plain) is Literal else ()
         factory = ready[name].default_factory
         default = ready[name].default if factory is MISSING else factory()
-        called, words = next(said[name] for said in map(_documented, kind.__mro__) if name in said)
+        said = [found[name] for found in map(_documented, kind.__mro__) if name in found]
+        if not said:
+            raise Sd2Error(
+                f"The docstring of {kind.__name__} says nothing of {name}", "words on each option"
+            )
+        called, words = said[0]
         if _is_said(default, choices):
             text = str(default) if choices else f"{default:g}"
             words = words.replace("{default}", text)

@@ -5,10 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import AfterValidator, Field, FiniteFloat, model_validator
+from pydantic_core import PydanticCustomError
 
 from sd2core.batch.plan import Section
-from sd2core.classify.defaults import DELAY_S, DELAYS_S, WIDTH, WIDTHS, FeatureKind
+from sd2core.classify.defaults import (
+    CLASSIFIERS,
+    DELAY_S,
+    DELAYS_S,
+    MODELS,
+    WIDTH,
+    WIDTHS,
+    FeatureKind,
+    model_names,
+)
 from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.denoise.card import Inputs
 from sd2core.files.paths import located_path
@@ -29,10 +39,16 @@ ADDED: tuple[Added, ...] = get_args(Added)
 OF_VIDEO: tuple[Added, ...] = tuple(one for one in ADDED if one != "simulated")
 
 
+def _learner_name(name: str) -> str:
+    if name != "ridge" and name not in MODELS and CLASSIFIERS.find(name) is None:
+        raise PydanticCustomError("name", f"one of ridge, {', '.join(model_names())}")
+    return name
+
+
 class Learner(Section):
     """Section ``[[classifiers]]``: what learns, and how."""
 
-    model: Literal["ridge", "lstm", "s4", "kernel"] = "ridge"
+    model: Annotated[str, AfterValidator(_learner_name)] = "ridge"
     """Ridge regression on what a window shows, or a model of ``sd2 classify train``."""
     window_s: Annotated[FiniteFloat, Field(gt=0, le=60)] = 3.0
     """Time that ridge regression looks at."""

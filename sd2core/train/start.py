@@ -137,7 +137,7 @@ def check(config: TrainConfig) -> None:
 
     Raises Sd2Error for paths that are no store of pairs, unknown models and their options.
     """
-    from sd2core.denoise.registry import MODELS, options
+    from sd2core.denoise.registry import is_network, network_names, options
     from sd2core.pairs.summary import is_pair_store
 
     for path in config.data.pairs:
@@ -148,8 +148,8 @@ def check(config: TrainConfig) -> None:
                 "a folder made by `sd2 simulate campaign` or `sd2 pairs`",
             )
     name = config.model.name
-    if name not in MODELS:
-        raise Sd2Error(f"model.name is {name!r}", f"one of {', '.join(MODELS)}")
+    if not is_network(name):
+        raise Sd2Error(f"model.name is {name!r}", f"one of {', '.join(network_names())}")
     known = options(name)
     for option in config.model.options:
         if option not in known:

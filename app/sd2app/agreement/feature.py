@@ -11,7 +11,7 @@ from sd2app.agreement.model import AgreementModel
 from sd2app.agreement.panel import AgreementPanel
 from sd2app.agreement.timeline import OtherTimeline
 from sd2app.feature import Action, Feature, Shell
-from sd2app.labels.import_dialog import LABEL_FILES
+from sd2app.labels.import_dialog import label_files
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import ask_file
@@ -62,7 +62,7 @@ class AgreementFeature(Feature):
 
     def _compare(self) -> None:
         parent = self._shell.dialog_parent
-        if path := ask_file(parent, "Compare with another's labels", LABEL_FILES):
+        if path := ask_file(parent, "Compare with another's labels", label_files()):
             self.model.open(path)
             self._shell.bring_up("Agree")
 

@@ -27,6 +27,7 @@ from sd2app.widgets.panel import FactRows, sentence, side_by_side
 from sd2app.widgets.run_panel import Button, RunPanel, RunView, RunWords
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
+from sd2core.classify.defaults import model_names
 from sd2core.cli.classify.train import Train
 
 _DATA = "Data sets and labelled radar files (*.h5 *.hdf5 *.npz)"
@@ -97,7 +98,8 @@ class ClassSetupView(TrainingForm):
         grid = grid_of(gaps_px=(8, 4), wide=(1, 3))
         grid.addWidget(QLabel("Maps", self), 0, 0)
         grid.addLayout(side_by_side(*self._boxes.values()), 0, 1, 1, 3)
-        network = self.choice("model", "Kind of network", MODEL_WORDS)
+        names = {name: MODEL_WORDS.get(name, name) for name in model_names()}
+        network = self.choice("model", "Kind of network", names)
         shown = self.choice("features", "What it is shown of each frame", FEATURE_WORDS)
         for row, (text, choice) in enumerate((("Network", network), ("Shown", shown)), start=1):
             grid.addWidget(QLabel(text, self), row, 0)

@@ -13,7 +13,7 @@ from PySide6.QtCore import QObject
 from sd2app.background.run_setup import RunSetup
 from sd2app.settings import Settings, StoredChoices
 from sd2app.widgets.text import counted, duration_text
-from sd2core.classify.defaults import DELAY_S, DELAYS_S, MODELS, WIDTH, pace_kind
+from sd2core.classify.defaults import CLASSIFIERS, DELAY_S, DELAYS_S, MODELS, WIDTH, pace_kind
 from sd2core.cli.classify.comparison import Table
 from sd2core.cli.classify.train import Train
 from sd2core.datasets.labelled_source import LabelledSource
@@ -41,7 +41,7 @@ _DEFAULTS: dict[str, Any] = {
 """Defaults of ``sd2 classify train``."""
 _NETWORK = ("model", "features", "width", "delay_s")
 _DATA, _PEOPLE = "classify/train/data", "classify/train/people"
-_CHOICES = {"model": MODELS, "features": FEATURES}
+_CHOICES = {"features": FEATURES}
 
 
 @dataclass(frozen=True)
@@ -99,6 +99,8 @@ class ClassSetup(RunSetup[DataSource]):
 
     def __init__(self, settings: Settings, parent: QObject) -> None:
         values = StoredChoices(settings, "classify/train", _DEFAULTS, _CHOICES)
+        if values["model"] not in MODELS and CLASSIFIERS.find(values["model"]) is None:
+            values.set("model", _DEFAULTS["model"])
         if values["delay_s"] not in DELAYS_S:
             values.set("delay_s", DELAY_S)
         people = _people(settings.stored(_PEOPLE, "{}"))

@@ -19,7 +19,7 @@ from sd2app.widgets.layouts import STRETCH, column_of, form_of
 from sd2app.widgets.panel import rule, say, sentence
 from sd2app.widgets.text import counted
 from sd2core.errors import Sd2Error
-from sd2core.labels.formats import FORMATS, LabelFormat, Loss, would_lose, write_labels
+from sd2core.labels.formats import LabelFormat, Loss, all_formats, would_lose, write_labels
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 
@@ -70,7 +70,8 @@ class LabelExportDialog(QDialog):
         self._runner = LatestRunner("labels", self, self._receive, self._refuse)
         self.setWindowTitle("Export labels")
         self._format = Choice("The program that is to read the file", self)
-        self._format.addItems([one.title for one in FORMATS])
+        self._formats = all_formats()
+        self._format.addItems([one.title for one in self._formats])
         self._format.currentIndexChanged.connect(self._look)
         self._about, self._said = sentence(""), sentence("")
         self._buttons = ExportButtons(self, self._ask)
@@ -83,7 +84,7 @@ class LabelExportDialog(QDialog):
     @property
     def format(self) -> LabelFormat:
         """Format chosen."""
-        return FORMATS[self._format.currentIndex()]
+        return self._formats[self._format.currentIndex()]
 
     def export(self, path: Path) -> None:
         """Write the file, with the usual suffix where the name has none."""

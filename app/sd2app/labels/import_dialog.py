@@ -18,14 +18,12 @@ from sd2app.widgets.layouts import column_of, form_of
 from sd2app.widgets.panel import FactRows, rule, say, sentence, title
 from sd2app.widgets.text import counted
 from sd2core.io.imu_columns import holds_inertial_signals
-from sd2core.labels.formats import FORMATS, format_for, read_labels
+from sd2core.labels.formats import FORMATS, all_formats, format_for, read_labels
 from sd2core.labels.formats.boris import observations
 from sd2core.labels.import_labels import Incoming, Way, set_after, take_in
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 
-LABEL_SUFFIXES = tuple(dict.fromkeys(suffix for one in FORMATS for suffix in one.suffixes))
-LABEL_FILES = f"Labels ({' '.join(f'*{suffix}' for suffix in LABEL_SUFFIXES)});;All files (*)"
 _WAYS: dict[Way, str] = {
     "add": "on tracks of their own",
     "replace": "instead of all labels of this recording",
@@ -34,9 +32,19 @@ _MOST_NAMED = 6
 _MOST_FACTS = 6
 
 
+def label_files() -> str:
+    """Files of labels, for a dialog."""
+    suffixes = dict.fromkeys(suffix for one in all_formats() for suffix in one.suffixes)
+    return f"Labels ({' '.join(f'*{suffix}' for suffix in suffixes)});;All files (*)"
+
+
 def is_label_file(path: Path) -> bool:
-    """True for a file of labels by its name; an inertial sensor's table is none by its heading."""
-    if path.suffix.lower() not in LABEL_SUFFIXES or path.name == "recording.json":
+    """True for a file of labels by its name; an inertial sensor's table is none by its heading.
+
+    Those that only plug-ins read are imported from the menu.
+    """
+    known = {suffix for one in FORMATS for suffix in one.suffixes}
+    if path.suffix.lower() not in known or path.name == "recording.json":
         return False
     return not holds_inertial_signals(path)
 
@@ -48,7 +56,7 @@ def import_labels(shell: Shell, edits: LabelEdits, path: Path | None = None) -> 
         return
     parent = shell.dialog_parent
     if path is None:
-        path = ask_file(parent, "Import labels", LABEL_FILES)
+        path = ask_file(parent, "Import labels", label_files())
         if path is None:
             return
     dialog = LabelImportDialog(path, edits.labels.labels, edits.playback.timebase, parent)
@@ -90,7 +98,7 @@ class LabelImportDialog(QDialog):
         self._format = Choice(
             "The program that the file is of",
             self,
-            {None: "found by name and content", **{one.name: one.title for one in FORMATS}},
+            {None: "found by name and content", **{one.name: one.title for one in all_formats()}},
             self._read_as,
         )
         self._observation = Choice("Which of the videos in the file", self)

@@ -13,14 +13,17 @@ from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence
 from sd2core.io.kinds import RADAR_SUFFIXES
+from sd2core.io.readers import RADAR_FILES, suffixes_of
 
 _SETUPS = "Configuration of the radar (*.cfg *.json);;All files (*)"
-_CAPTURES = (
-    f"Radar captures and recordings ({' '.join(f'*{one}' for one in sorted(RADAR_SUFFIXES))}"
-    " radar.npy recording.json live.json);;All files (*)"
-)
+_CAPTURES = "Radar captures and recordings ({} radar.npy recording.json live.json);;All files (*)"
 _WAYS = {"dca1000": "a TI radar with a DCA1000", "replay": "a capture, replayed at its own rate"}
 _NONE = "none chosen"
+
+
+def _captures() -> str:
+    suffixes = sorted(RADAR_SUFFIXES | suffixes_of(RADAR_FILES))
+    return _CAPTURES.format(" ".join(f"*{one}" for one in suffixes))
 
 
 class ListenDialog(QDialog):
@@ -87,7 +90,7 @@ class ListenDialog(QDialog):
             start = str(setup.setup or "")
             if path := ask_file(self, "Configuration that the radar runs with", _SETUPS, start):
                 setup.choose("setup", path)
-        elif path := ask_file(self, "Capture", _CAPTURES, str(setup.replay or "")):
+        elif path := ask_file(self, "Capture", _captures(), str(setup.replay or "")):
             setup.choose("replay", path)
 
     def _ask_folder(self) -> None:

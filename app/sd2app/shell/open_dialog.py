@@ -10,13 +10,10 @@ from sd2app.fit.request import REQUEST_NAME
 from sd2app.widgets.dialogs import accepted
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import MESH_SUFFIXES, RADAR_SUFFIXES, VIDEO_SUFFIXES, kind_of
+from sd2core.io.readers import MESH_FILES, RADAR_FILES, suffixes_of
 
 _OTHERS = {".npz", ".zip", ".csv", ".sto"}
-_SUFFIXES = sorted(VIDEO_SUFFIXES | MESH_SUFFIXES | RADAR_SUFFIXES | _OTHERS)
-_FILES = (
-    "Recordings, videos, meshes, radar, inertial sensors"
-    f" ({' '.join(f'*{one}' for one in _SUFFIXES)} recording.json);;All files (*)"
-)
+_SUFFIXES = VIDEO_SUFFIXES | MESH_SUFFIXES | RADAR_SUFFIXES | _OTHERS
 _CLOSED = ("recording.json", REQUEST_NAME, "zarr.json", "radar.npy")
 """Files of folders into which nobody has to look."""
 _KINDS = ("recording", "mesh", "radar")
@@ -29,7 +26,12 @@ class OpenDialog(QFileDialog):
     """
 
     def __init__(self, parent: QWidget, title: str, folder: Path | None) -> None:
-        super().__init__(parent, title, str(folder or ""), _FILES)
+        suffixes = sorted(_SUFFIXES | suffixes_of(MESH_FILES) | suffixes_of(RADAR_FILES))
+        files = (
+            "Recordings, videos, meshes, radar, inertial sensors"
+            f" ({' '.join(f'*{one}' for one in suffixes)} recording.json);;All files (*)"
+        )
+        super().__init__(parent, title, str(folder or ""), files)
         # Those of the systems know either files or folders.
         self.setOption(QFileDialog.Option.DontUseNativeDialog)
         self.setFileMode(QFileDialog.FileMode.ExistingFiles)

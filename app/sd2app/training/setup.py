@@ -12,6 +12,7 @@ from sd2app.settings import Settings, StoredChoices
 from sd2app.widgets.text import counted, duration_text
 from sd2core.denoise.card import PARTS_OF, ModelCard
 from sd2core.denoise.files import available_models
+from sd2core.denoise.registry import is_network
 from sd2core.errors import Sd2Error
 from sd2core.options.training import (
     DataConfig,
@@ -25,7 +26,6 @@ from sd2core.runs.pace import known_pace_s
 from sd2core.train.data import Split, split_subjects
 
 INPUTS = ("map", "limbs", "kinematics")
-MODELS = ("s4", "s4d", "gru", "unet", "swin", "s4-serial")
 _DATA = DataConfig(pairs=(Path(),))
 _PAIRS, _KNOWN = "training/pairs", "training/known_pairs"
 _MOST_KNOWN = 10
@@ -83,9 +83,11 @@ class TrainingSetupModel(RunSetup[Store]):
     kind = Store
 
     def __init__(self, settings: Settings, parent: QObject) -> None:
-        self.starts = {card.name: card for card in available_models() if card.model in MODELS}
-        known = {"model": MODELS, "inputs": INPUTS, "start": ("", *self.starts)}
+        self.starts = {card.name: card for card in available_models() if is_network(card.model)}
+        known = {"inputs": INPUTS, "start": ("", *self.starts)}
         values = StoredChoices(settings, "training", _DEFAULTS, known)
+        if not is_network(values["model"]):
+            values.set("model", _DEFAULTS["model"])
         stores = [Store(path) for path in settings.paths(_PAIRS)]
         super().__init__(settings, values, _PAIRS, stores, parent)
 

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QGridLayout, QWidget
 from sd2app.feature import Shell
 from sd2app.session.document import DocumentModel
 from sd2app.training.model import TrainingModel
-from sd2app.training.text import INPUT_WORDS, MODEL_WORDS, division_text
+from sd2app.training.text import INPUT_WORDS, MODEL_WORDS, division_text, model_name
 from sd2app.widgets.dialogs import ask_folder
 from sd2app.widgets.layouts import STRETCH, grid_of, pane, row_of
 from sd2app.widgets.model_page import model_title
@@ -15,6 +15,7 @@ from sd2app.widgets.panel import ElidedLabel, Fold, outlined, sentence, title
 from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
+from sd2core.denoise.registry import DENOISERS
 from sd2core.options.training import DataConfig, TrainingConfig
 
 _FIELDS = (
@@ -45,7 +46,7 @@ class TrainingSetupView(TrainingForm):
         )
         self._menu.aboutToShow.connect(self._fill_menu)
         self.column.addWidget(self._making_part())
-        names = {name: words[0] for name, words in MODEL_WORDS.items()}
+        names = {name: model_name(name) for name in (*MODEL_WORDS, *DENOISERS.names())}
         self._kind = self.choice("model", "Kind of model", names)
         self._about = sentence("")
         self._inputs = self.choice(
@@ -113,7 +114,7 @@ class TrainingSetupView(TrainingForm):
         for one in (self._kind, self._inputs):
             one.setEnabled(card is None)
         self._about.setText(
-            MODEL_WORDS[setup.value("model")][1]
+            MODEL_WORDS.get(setup.value("model"), ("", "Of a plug-in."))[1]
             if card is None
             else f"Goes on from {model_title(card)}, with its kind and its input."
         )

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from sd2core.classify.defaults import DELAY_S, DELAYS_S, WIDTH, WIDTHS, FeatureKind, Model
+from sd2core.classify.defaults import DELAY_S, DELAYS_S, WIDTH, WIDTHS, FeatureKind, model_name
 from sd2core.cli.classify.data import DATA_HELP, SourcesAndMaps, clips_of, split_of
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import finite, print_event, print_facts, print_json
 from sd2core.cli.recording_maps import parsed_maps
 from sd2core.options.bounds import LEARNING_RATE, SEED, STEPS
-from sd2core.options.kinds import Count
+from sd2core.options.kinds import Count, Typed
 from sd2core.options.records import Group, OptionRecord, Place, given
 from sd2core.options.shared import JsonAndProgress, KeptOut, Overwrite
 from sd2core.processes import INTERRUPTED
@@ -33,9 +33,10 @@ class Network(OptionRecord):
 
     Parameters
     ----------
-    model
-        two LSTM layers (the paper's), two S4 layers, or kernel ridge regression on windows of
-        twice the delay, which learns most of few recordings
+    model : NAME
+        lstm (two LSTM layers, the paper's), s4 (two S4 layers), kernel (kernel ridge regression on
+        windows of twice the delay, which learns most of few recordings), or that of a plug-in
+        (default: lstm)
     features
         input per frame: whole columns (the default), or the strongest bin (the paper's)
     width : N
@@ -47,7 +48,7 @@ class Network(OptionRecord):
 
     GROUP = Group("network")
 
-    model: Model = "lstm"
+    model: Annotated[str, Typed(model_name)] = "lstm"
     features: FeatureKind = "columns"
     width: Annotated[int, WIDTHS] = WIDTH
     delay_s: Annotated[float, DELAYS_S] = DELAY_S

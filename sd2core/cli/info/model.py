@@ -28,7 +28,8 @@ def describe_classifier_card(path: Path, card: ClassifierCard) -> Description:
     data = {"kind": "classifier", "path": str(path), **card.to_json()}
     shown = "whole columns" if card.features.kind == "columns" else "the strongest bin"
     facts = {
-        "model": f"{card.model}, shown {shown}; learnt from {' and '.join(card.trained_on)} maps",
+        "model": f"{card.model}{f' of {card.package}' if card.package else ''}, shown {shown};"
+        f" learnt from {' and '.join(card.trained_on)} maps",
         "classes": ", ".join(card.classes),
         "answers": f"{card.delay_s:g} s late" if card.delay_frames else "at once",
         **_axis_facts(card),
@@ -57,6 +58,7 @@ def describe_card(path: Path, card: ModelCard) -> Description:
 def model_words(card: ModelCard) -> str:
     """Kind of a denoiser and the data it learnt from."""
     words = f"{card.model}, {summary(card.model)}" if card.model in MODELS else card.model
+    words += f" of {card.package}" if card.package else ""
     source = "a simulated radar" if card.trained_on == "simulated" else "a real radar"
     return f"{words}; learnt from {source}"
 

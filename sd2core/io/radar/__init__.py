@@ -33,8 +33,9 @@ from sd2core.io.radar.infineon import (
 )
 from sd2core.io.radar.kkt import RecordedMap, load_kkt
 from sd2core.io.radar.sigmf import DATA, META
+from sd2core.io.readers import RADAR_FILES, FileReader, plug_in_for
 from sd2core.radar_config import RadarConfig
-from sd2core.radar_profiles import PAPER, RADARS
+from sd2core.radar_profiles import PAPER, RADAR_PLUG_INS, RADARS, find_radar
 
 __all__ = [
     "PAPER",
@@ -85,35 +86,16 @@ def load_capture(path: Path | str) -> RadarCapture:
     path = as_path(path).expanduser()
     if not path.exists():
         raise Sd2Error(f"{path} does not exist", SUPPORTED, "Check the path")
-    if is_growing(path):
-        return load_growing(path)
-    for one in (path, path / DATA_NAME):
-        if is_described(one):
-            return load_described(one)
-    if _is_acconeer(path):
-        return load_acconeer(path)
-    if holds_map(path):
-        raise Sd2Error(
-            f"{path} holds maps of a radar and no raw samples",
-            SUPPORTED,
-            "Open it in the window, or write its map with `sd2 radar FILE --out map.npz`",
-        )
-    if path.suffix.lower() == dca1000.SUFFIX:
-        return dca1000.load_dca1000(path)
-    folder = find_recording(path)
-    if folder is not None:
-        return load_infineon(folder)
-    if path.is_dir() and any(one.suffix.lower() == dca1000.SUFFIX for one in path.iterdir()):
-        return dca1000.load_dca1000(path)
-    if path.is_file() and is_describable(path):
-        raise Sd2Error(
-            f"{path} does not say what radar it is from",
-            f"its description, {description_of(path).name}, beside it",
-            f"Write it with `sd2 radar describe {path.name}`",
-        )
+    for reader in _READERS:
+        if reader.fits(path):
+            return reader.read(path)
+    plug_in, said = plug_in_for(path, RADAR_FILES)
+    if plug_in is not None:
+        read: RadarCapture = plug_in.use(lambda reader: reader.read(path), RadarCapture)
+        return read
     holds = sorted(entry.name for entry in path.iterdir())[:6] if path.is_dir() else []
     found = f"; it holds {', '.join(holds) or 'nothing'}" if path.is_dir() else ""
-    raise Sd2Error(f"{path} is not a radar recording that can be read{found}", SUPPORTED)
+    raise Sd2Error(f"{path} is not a radar recording that can be read{found}", SUPPORTED, said)
 
 
 def companions(path: Path) -> list[Path]:
@@ -172,6 +154,57 @@ def _is_acconeer(path: Path) -> bool:
         return False
 
 
+def _refuse_map(path: Path) -> RadarCapture:
+    raise Sd2Error(
+        f"{path} holds maps of a radar and no raw samples",
+        SUPPORTED,
+        "Open it in the window, or write its map with `sd2 radar FILE --out map.npz`",
+    )
+
+
+def _holds_infineon(path: Path) -> bool:
+    return find_recording(path) is not None
+
+
+def _load_infineon(path: Path) -> RadarCapture:
+    folder = find_recording(path)
+    assert folder is not None
+    return load_infineon(folder)
+
+
+def _holds_dca1000(path: Path) -> bool:
+    return path.is_dir() and any(one.suffix.lower() == dca1000.SUFFIX for one in path.iterdir())
+
+
+def _lacks_description(path: Path) -> bool:
+    return path.is_file() and is_describable(path)
+
+
+def _ask_description(path: Path) -> RadarCapture:
+    raise Sd2Error(
+        f"{path} does not say what radar it is from",
+        f"its description, {description_of(path).name}, beside it",
+        f"Write it with `sd2 radar describe {path.name}`",
+    )
+
+
+_READERS: tuple[FileReader[RadarCapture], ...] = (
+    FileReader(load_growing, looks=is_growing),
+    FileReader(load_described, looks=is_described),
+    FileReader(
+        lambda path: load_described(path / DATA_NAME),
+        looks=lambda path: is_described(path / DATA_NAME),
+    ),
+    FileReader(load_acconeer, looks=_is_acconeer),
+    FileReader(_refuse_map, looks=holds_map),
+    FileReader(dca1000.load_dca1000, (dca1000.SUFFIX,)),
+    FileReader(_load_infineon, looks=_holds_infineon),
+    FileReader(dca1000.load_dca1000, looks=_holds_dca1000),
+    FileReader(_ask_description, looks=_lacks_description),
+)
+"""Readers of captures; the first that fits is taken, and those of plug-ins after all of them."""
+
+
 def load_recorded_map(path: Path | str) -> RecordedMap:
     """Open a radar recording that holds a Doppler map and labels instead of samples.
 
@@ -183,7 +216,7 @@ def load_recorded_map(path: Path | str) -> RecordedMap:
 def named_radar(name: str) -> RadarConfig:
     """Radar to simulate, by its name or a file.
 
-    Names are those of :data:`~sd2core.radar_profiles.RADARS`; a file is a capture's
+    Names are those of :data:`~sd2core.radar_profiles.RADARS` and of plug-ins; a file is a capture's
     ``config.json``, of which one transmitter is simulated. Raises Sd2Error if there is no such
     file, or it describes no possible radar.
 
@@ -193,11 +226,11 @@ def named_radar(name: str) -> RadarConfig:
     >>> named_radar("iwr6843").sampling
     'complex'
     """
-    if name in RADARS:
-        return RADARS[name]
+    radar = find_radar(name)
+    if radar is not None:
+        return radar
     path = Path(name)
     if not path.exists() and not path.suffix:
-        raise Sd2Error(
-            f"There is no radar {name!r}", f"{', '.join(RADARS)}, or a capture's config.json"
-        )
+        known = ", ".join([*RADARS, *RADAR_PLUG_INS.names()])
+        raise Sd2Error(f"There is no radar {name!r}", f"{known}, or a capture's config.json")
     return replace(read_radar_config(path), transmitters=1)

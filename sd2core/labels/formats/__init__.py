@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sd2core.errors import Sd2Error
@@ -35,14 +35,18 @@ from sd2core.labels.formats.losses import (
     sentences,
 )
 from sd2core.labels.spans import Labels
+from sd2core.plug_ins import Group, PlugIn
 from sd2core.timebase import Timebase
 
 __all__ = [
     "ASPECTS",
     "FORMATS",
+    "LABEL_PLUG_INS",
     "Aspect",
     "LabelFormat",
+    "LabelProgram",
     "Loss",
+    "all_formats",
     "format_for",
     "read_labels",
     "sentences",
@@ -52,12 +56,28 @@ __all__ = [
 
 
 @dataclass(frozen=True)
-class _Program:
-    """Reader and writer of a format; the writer returns losses that depend on more than it."""
+class LabelProgram:
+    """Reader and writer of a format.
+
+    Parameters
+    ----------
+    about : LabelFormat
+        The format; a plug-in's has the plug-in's name.
+    read : callable
+        Takes the path, the recording's frame times and the id of an observation, each of which may
+        be None, and returns the labels.
+    write : callable
+        Takes the path, the labels, the frame times and the video, which may be None, and returns
+        the losses that depend on more than the format.
+    """
 
     about: LabelFormat
     read: Callable[[Path, Timebase | None, str | None], Labels]
     write: Callable[[Path, Labels, Timebase, Path | None], list[Loss]]
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.about, LabelFormat):
+            raise Sd2Error(f"A label format is {self.about!r}", "a LabelFormat")
 
 
 OWN = LabelFormat(
@@ -88,18 +108,34 @@ def _read_own(path: Path, timebase: Timebase | None, observation: str | None) ->
 _PROGRAMS = {
     program.about.name: program
     for program in (
-        _Program(OWN, _read_own, _write_own),
-        _Program(csv_table.FORMAT, csv_table.read, csv_table.write),
-        _Program(audacity.FORMAT, audacity.read, audacity.write),
-        _Program(elan.FORMAT, elan_reading.read, elan.write),
-        _Program(textgrid.FORMAT, textgrid.read, textgrid.write),
-        _Program(boris.FORMAT, boris.read, boris.write),
-        _Program(mne_annotations.FORMAT, mne_annotations.read, mne_annotations.write),
+        LabelProgram(OWN, _read_own, _write_own),
+        LabelProgram(csv_table.FORMAT, csv_table.read, csv_table.write),
+        LabelProgram(audacity.FORMAT, audacity.read, audacity.write),
+        LabelProgram(elan.FORMAT, elan_reading.read, elan.write),
+        LabelProgram(textgrid.FORMAT, textgrid.read, textgrid.write),
+        LabelProgram(boris.FORMAT, boris.read, boris.write),
+        LabelProgram(mne_annotations.FORMAT, mne_annotations.read, mne_annotations.write),
     )
 }
 
 FORMATS: tuple[LabelFormat, ...] = tuple(program.about for program in _PROGRAMS.values())
-"""All formats, in the order in which they are offered."""
+"""All formats of the program, in the order in which they are offered."""
+
+LABEL_PLUG_INS = Group("label_files", LabelProgram, _PROGRAMS)
+"""Formats of other packages."""
+
+
+def all_formats() -> tuple[LabelFormat, ...]:
+    """All formats, those of plug-ins last."""
+    return (*FORMATS, *_plugged_formats())
+
+
+def _plugged_formats() -> list[LabelFormat]:
+    return [
+        replace(program.about, name=plug_in.name)
+        for plug_in, program in LABEL_PLUG_INS.loaded()
+        if isinstance(program, LabelProgram)
+    ]
 
 
 def read_labels(
@@ -134,7 +170,12 @@ def read_labels(
     path = Path(path)
     chosen = format_for(path, writing=False) if format is None else _named(format)
     with errors_in(path):
-        return _PROGRAMS[chosen.name].read(path, timebase, observation)
+        if chosen.name in _PROGRAMS:
+            return _PROGRAMS[chosen.name].read(path, timebase, observation)
+        read: Labels = _plug_in(chosen.name).use(
+            lambda program: program.read(path, timebase, observation), Labels
+        )
+        return read
 
 
 def write_labels(
@@ -171,7 +212,12 @@ def write_labels(
     path = Path(path)
     chosen = format_for(path, writing=True) if format is None else _named(format)
     linked = None if media is None else Path(media)
-    unheld = _PROGRAMS[chosen.name].write(path, labels, timebase, linked)
+    if chosen.name in _PROGRAMS:
+        unheld = _PROGRAMS[chosen.name].write(path, labels, timebase, linked)
+    else:
+        unheld = _plug_in(chosen.name).use(
+            lambda program: program.write(path, labels, timebase, linked), list
+        )
     return losses_by_format(labels, chosen) + unheld
 
 
@@ -205,7 +251,10 @@ def format_for(path: Path, *, writing: bool) -> LabelFormat:
     suffix = path.suffix.lower()
     fitting = [one for one in FORMATS if suffix in one.suffixes]
     if not fitting:
-        known = ", ".join(dict.fromkeys(suffix for one in FORMATS for suffix in one.suffixes))
+        fitting = [one for one in _plugged_formats() if suffix in one.suffixes]
+        writing = True  # There is no looking into a file for them.
+    if not fitting:
+        known = ", ".join(dict.fromkeys(end for one in all_formats() for end in one.suffixes))
         raise Sd2Error(
             f"{path} has the suffix {suffix!r}",
             f"one of {known}",
@@ -222,9 +271,17 @@ def format_for(path: Path, *, writing: bool) -> LabelFormat:
 
 
 def _named(name: str) -> LabelFormat:
-    if name not in _PROGRAMS:
-        raise Sd2Error(f"A label format {name!r} is not known", f"one of {', '.join(_PROGRAMS)}")
-    return _PROGRAMS[name].about
+    if name in _PROGRAMS:
+        return _PROGRAMS[name].about
+    return replace(_plug_in(name).load().about, name=name)
+
+
+def _plug_in(name: str) -> PlugIn[LabelProgram]:
+    plug_in = LABEL_PLUG_INS.find(name)
+    if plug_in is None:
+        known = ", ".join([*_PROGRAMS, *LABEL_PLUG_INS.names()])
+        raise Sd2Error(f"A label format {name!r} is not known", f"one of {known}")
+    return plug_in
 
 
 def _format_of_text(path: Path) -> str:

@@ -1,0 +1,1 @@
+"""A package with one plug-in of each group."""
