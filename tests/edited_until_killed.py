@@ -17,7 +17,7 @@ from pathlib import Path
 from labelled import even, imported, random_edit
 
 from sd2core.labels import journal
-from sd2core.labels.recovery import Offer, RecoveryPlace, offers_in
+from sd2core.labels.recovery import Recoverable, RecoveryPlace, offers_in
 from sd2core.labels.spans import Labels
 
 FRAMES = even()
@@ -45,7 +45,7 @@ def edit_on(root: Path, told: int) -> None:
         os.write(told, b"%d\n" % (number + 1))
 
 
-def left_behind(root: Path) -> Offer | None:
+def left_behind(root: Path) -> Recoverable | None:
     """What is offered now that nobody edits."""
     offers = offers_in(root).offers
     return offers[0] if offers else None

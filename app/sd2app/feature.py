@@ -154,7 +154,7 @@ class Feature:
         """Each a ``Notice``, which lies over the content since it appears by itself."""
         return ()
 
-    def take_over(self) -> None:
+    def attach(self) -> None:
         """Follow a recording that has just been opened."""
 
     def drop_of(self, path: Path) -> Drop | None:

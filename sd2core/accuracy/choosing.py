@@ -16,7 +16,7 @@ from sd2core.numerics.map_accuracy import relative_l1
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 
-_MOST_TRIALS = 8
+_MAX_TRIALS = 8
 _MORE_TRIALS = 4
 
 _FREE_SHARE = 0.1
@@ -141,7 +141,7 @@ def _cheapest(
     ``tried`` gets all errors: on the frames to choose on where they are too large already, else on
     those to check on.
     """
-    plans = sorted(_candidates(survey, tolerance), key=survey.dearness)
+    plans = sorted(_candidates(survey, tolerance), key=survey.cost_key)
     forecast = {plan: survey.forecast_error(plan) for plan in plans}
 
     sample = survey.trial.sample
@@ -156,7 +156,7 @@ def _cheapest(
     safe = [plan for plan in plans if forecast[plan] <= tolerance]
     # What must hold if anything does.
     safe.append(min(plans, key=lambda plan: (forecast[plan], survey.settings_changed(plan))))
-    found = next(filter(holds, (*safe[: _MOST_TRIALS - 1], safe[-1])), None)
+    found = next(filter(holds, (*safe[: _MAX_TRIALS - 1], safe[-1])), None)
     if found is None:
         return min(tried, key=lambda plan: tried[plan].l1)
     # Changes do not quite add up: some of the cheaper plans may hold as well.
@@ -181,7 +181,7 @@ def _most_accurate(
 
     def beyond_budget_then_error(plan: AccuracyPlan) -> tuple[float, float, tuple[int, int]]:
         cost_ms = max(survey.forecast_ms(plan), budget_ms)
-        return cost_ms, survey.forecast_error(plan), survey.dearness(plan)
+        return cost_ms, survey.forecast_error(plan), survey.cost_key(plan)
 
     return min(plans, key=beyond_budget_then_error)
 

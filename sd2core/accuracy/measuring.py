@@ -42,7 +42,7 @@ REPEATS = 5
 
 _FRAMES = 6
 """Of FMCW plans."""
-_MOST_CUTS = 3
+_MAX_CUTS = 3
 """64 pieces per facet: beyond it a frame takes minutes."""
 
 
@@ -214,7 +214,7 @@ class _Waves:
         scene = WaveScene(self._mesh, PAPER_RADAR, self._sensor, "exact", wave)
         signals = []
         for time_s in self._mesh.times_s[list(self.frames)].tolist():
-            found = converged_frame(scene, time_s, most_cuts=_MOST_CUTS, go_on=go_on)
+            found = converged_frame(scene, time_s, most_cuts=_MAX_CUTS, go_on=go_on)
             signals.append(found.signal)
             for pieces, change in zip(found.pieces[1:], found.changes, strict=True):
                 self.convergence[pieces] = max(self.convergence.get(pieces, 0.0), change)

@@ -24,7 +24,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 
-MOST_PLACES = 3
+MAX_PLACES = 3
 """On which a plan is checked: each takes some hundred milliseconds."""
 
 _CHOOSING_FRAMES, _CHECKING_FRAMES = 250, 30
@@ -58,7 +58,7 @@ class PlacedPlan:
 
 def spread(sensors: Sequence[VirtualSensor]) -> list[VirtualSensor]:
     """Places on which a plan is checked: the first, the last and some in between."""
-    numbers = np.linspace(0, len(sensors) - 1, min(MOST_PLACES, len(sensors))).round().astype(int)
+    numbers = np.linspace(0, len(sensors) - 1, min(MAX_PLACES, len(sensors))).round().astype(int)
     return [sensors[number] for number in numbers.tolist()]
 
 

@@ -149,7 +149,7 @@ def _because(
     held = f"the tolerance of {percent(tolerance)}"
     if tried[plan].l1 > tolerance:
         return f", since no plan holds {held}"
-    if survey.dearness(lower) >= survey.dearness(plan):
+    if survey.cost_key(lower) >= survey.cost_key(plan):
         return ", since less would save nothing"
     error = tried[lower].l1 if lower in tried else survey.forecast_error(lower)
     if error > tolerance:

@@ -79,7 +79,7 @@ class Survey:
             count_ms -= min(max(saved, 0.0), 0.9 * per_vertex)
         return self.cost_share[plan.vertices_kept] * (mask_ms + count_ms) / worker_count()
 
-    def dearness(self, plan: AccuracyPlan) -> tuple[int, int]:
+    def cost_key(self, plan: AccuracyPlan) -> tuple[int, int]:
         """Sort key: cost in steps of 5 %, then the number of settings that differ from the base.
 
         The cost is a model's, since measured times differ each time.

@@ -23,12 +23,12 @@ _LARGEST_BUNDLE = 32
 submission costs some milliseconds."""
 
 _POLL_S = 0.2
-_MOST_RESUBMISSIONS = 20
+_MAX_RESUBMISSIONS = 20
 _REMEMBERED_HOMES = 1000
 
 
 @dataclass
-class Tally:
+class Counts:
     """Counts per step: tasks that were there, done, failed, or waiting for failed ones."""
 
     there: Counter[str] = field(default_factory=Counter)
@@ -79,7 +79,7 @@ class Driver:
         self._graph, self._open_pool = graph, open_pool
         self._pool: Pool | None = None
         self._on_failure, self._on_note, self._tick = on_failure, on_note, tick
-        self.tally = Tally()
+        self.tally = Counts()
         self.last: Task | None = None
         # Tasks in flight by key, each with others that have the same content.
         self.running: dict[str, list[Task]] = {}
@@ -211,7 +211,7 @@ class Driver:
         if self._graph.is_done(task):
             return Outcome()
         deaths = deaths_during(self._graph.folder.path, task.key) if ending.killed else 0
-        if deaths or self._resubmissions[task.key] >= _MOST_RESUBMISSIONS:
+        if deaths or self._resubmissions[task.key] >= _MAX_RESUBMISSIONS:
             return too_many_deaths(max(deaths, 1))
         return None
 

@@ -30,11 +30,11 @@ LONGEST_FRAMES = 18_000
 """Longest stretch: ten minutes at 30 frames/s, whose maps are a few MB, so that memory does not
 grow with the length of a clip."""
 
-Stretch = tuple[int, int]
+FrameRange = tuple[int, int]
 """Half-open range of frames of a clip."""
 
 
-def stretches_of(frames: int, longest: int = LONGEST_FRAMES) -> list[Stretch]:
+def stretches_of(frames: int, longest: int = LONGEST_FRAMES) -> list[FrameRange]:
     """Cut a clip into as few stretches as possible, of nearly equal lengths."""
     count = max(1, -(-frames // longest))
     edges = [frames * number // count for number in range(count + 1)]
@@ -68,7 +68,7 @@ def synthesise(
     mesh: MeshInput,
     sensor: VirtualSensor,
     section: Synthesis,
-    stretch: Stretch,
+    stretch: FrameRange,
     choosing: Choosing | None,
     out: Path,
 ) -> None:
@@ -109,7 +109,7 @@ def simulate(
     sensor: VirtualSensor,
     simulation: Simulation,
     axis: VelocityAxis,
-    stretch: Stretch,
+    stretch: FrameRange,
     out: Path,
 ) -> None:
     """Make the map that a radar would show of some frames and write it.

@@ -15,7 +15,7 @@ from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import Inspection, MeshInput, Origin, VideoInput, known_inspection
 from sd2core.batch.keys import key_of
 from sd2core.batch.plan import STEPS, BatchPlan, Step
-from sd2core.batch.synthesis import Choosing, Stretch, stretches_of
+from sd2core.batch.synthesis import Choosing, FrameRange, stretches_of
 from sd2core.batch.tasks import Task
 from sd2core.doppler.options import chosen_options
 from sd2core.errors import Sd2Error
@@ -38,7 +38,7 @@ class PlannedMap:
 
     placement: int  # 0 is the recording's own sensor; 1 and up are the places of the plan
     sensor: VirtualSensor
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[FrameRange, ...]
     synthesis: tuple[Task, ...]  # one per stretch
     denoising: Task | None = None  # covers all stretches, because a model carries its state on
     simulation: tuple[Task, ...] = ()  # one per stretch, or none
@@ -230,11 +230,11 @@ class TaskGraph:
         key = key_of("synthesise", {"mesh": mesh.identity, **self._scene, **about})
         return Choosing(self.folder.result("plans", key, ".json"), places, frames)
 
-    def _synthesis_task(self, where: _View, stretch: Stretch, choosing: Choosing | None) -> Task:
+    def _synthesis_task(self, where: _View, stretch: FrameRange, choosing: Choosing | None) -> Task:
         arguments = {"section": self.plan.synthesise, "choosing": choosing}
         return self._map_task("synthesise", "synthetic", where, stretch, self._scene, arguments)
 
-    def _simulation_task(self, where: _View, stretch: Stretch) -> Task:
+    def _simulation_task(self, where: _View, stretch: FrameRange) -> Task:
         assert self._simulation is not None
         assert self.plan.synthesise is not None
         axis = chosen_options(self.plan.synthesise).axis
@@ -247,7 +247,7 @@ class TaskGraph:
         step: Step,
         kind: str,
         where: _View,
-        stretch: Stretch,
+        stretch: FrameRange,
         content: dict[str, Any],
         arguments: dict[str, Any],
     ) -> Task:

@@ -17,7 +17,7 @@ from sd2core.body.track import TORSO_CORNERS, LandmarkTrack
 _ACROSS_SHARE = 0.5
 """Standard deviation of a landmark across the view over the lifter's: errors there are those of
 single frames, which smoothness sees through."""
-_LEAST_TRUST = 0.05
+_MIN_TRUST = 0.05
 _OUTSIDE = 0.05
 """Share of the picture's height beyond whose edges a landmark is surely a guess."""
 _DRAWN_IN = 0.4
@@ -119,7 +119,7 @@ def _trust(track: LandmarkTrack, drawn_in: float) -> Floats:
     beyond = np.maximum(-track.image_px, track.image_px - size).max(axis=2) / track.height
     beyond += drawn_in * (1.0 - track.visibility)
     inside = 1.0 - np.clip(beyond / _OUTSIDE, 0.0, 1.0)
-    return np.asarray(np.clip(track.visibility * inside, _LEAST_TRUST, 1.0), np.float64)
+    return np.asarray(np.clip(track.visibility * inside, _MIN_TRUST, 1.0), np.float64)
 
 
 def joined(pieces: Sequence[Evidence]) -> Evidence:

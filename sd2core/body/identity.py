@@ -36,7 +36,7 @@ _PARTS = (
 _EARS, _SHOULDERS = ([LANDMARK[f"{name}.L"], LANDMARK[f"{name}.R"]] for name in ("ear", "shoulder"))
 _CROWN = 0.4
 """Height of the crown above the ears, as a share of theirs above the shoulders."""
-_MOST_LOOKS = 6
+_MAX_LOOKS = 6
 _ANOTHER_LOOK = 0.93
 
 # Squares, and logarithms of their size: what people do from one look to the next, how much
@@ -130,7 +130,7 @@ class Looks:
         share *= looks.any(axis=1)
         self.recent = self.recent + share[:, None] * (looks - self.recent)
         if max((similarity(self.recent, each) for each in self.kept), default=0.0) < _ANOTHER_LOOK:
-            self.kept = [*self.kept, self.recent][-_MOST_LOOKS:]
+            self.kept = [*self.kept, self.recent][-_MAX_LOOKS:]
 
 
 @dataclass(frozen=True, eq=False)

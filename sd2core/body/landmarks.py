@@ -38,7 +38,7 @@ SIGHTINGS = "sightings.npz"
 
 _STRETCH_FRAMES = 256
 _SAVE_EVERY = 300
-_MOST_THREADS = 8
+_MAX_THREADS = 8
 
 
 def find_landmarks(
@@ -92,7 +92,7 @@ def find_landmarks(
     if not max_gap_s >= 0.0:
         raise Sd2Error(f"the longest gap to bridge is {max_gap_s} s", "0 s or more")
     if threads is None:
-        threads = min(worker_count(), _MOST_THREADS)
+        threads = min(worker_count(), _MAX_THREADS)
     store = search_store(workspace, video, person, silhouettes, models.name)
     sightings = _found(video, models, person, threads, progress_of("find"), on_frame, store)
     progress = progress_of("refine")

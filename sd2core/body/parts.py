@@ -43,7 +43,7 @@ _PART_OF = {
 _MIRRORED = np.array([PARTS.index(other_side(name)) for name in PARTS], np.uint8)
 
 _TIPS = 5
-_LEAST_SHARE = 0.6
+_MIN_SHARE = 0.6
 """Share of the vertices that the largest connected piece of a body must have."""
 _LIKE_A_BODY = 0.2
 """Greatest deviation (RMS) of the distances between the tips from those of the bundled body."""
@@ -196,7 +196,7 @@ class _Surface:
             return None
         _, piece = connected_components(graph, directed=False)
         vertices = np.flatnonzero(piece == np.bincount(piece).argmax())
-        if len(vertices) < max(_LEAST_SHARE * len(points_m), _TIPS + 1):
+        if len(vertices) < max(_MIN_SHARE * len(points_m), _TIPS + 1):
             return None
         graph = graph[vertices][:, vertices]
         middle = np.linalg.norm(points_m[vertices] - points_m.mean(axis=0), axis=1).argmin()

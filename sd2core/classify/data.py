@@ -26,7 +26,7 @@ BELOW_LOUDEST_DB = (20.0, 45.0)
 A K60168A's recordings of gestures have it at 23 to 27 dB, a simulated radar by its link
 budget at 36 dB (a person at 2.2 m), and synthetic maps and a campaign's targets have none.
 """
-_MOST_LOOKS = 8.0
+_MAX_LOOKS = 8.0
 """Noise of one look is exponential; of several, whose powers are averaged, less uneven."""
 
 UNKNOWN = -1
@@ -198,10 +198,10 @@ def clips_of_map(
     """
     own_hz = doppler.timebase.frames_per_s
     rate_hz = frame_rate_hz or own_hz
-    if not 1 / matching.MOST_RESAMPLED <= rate_hz / own_hz <= matching.MOST_RESAMPLED:
+    if not 1 / matching.MAX_RESAMPLED <= rate_hz / own_hz <= matching.MAX_RESAMPLED:
         raise Sd2Error(
             f"{subject}/{movement}: the {doppler.kind} map has {own_hz:.4g} frames/s",
-            f"{rate_hz:.4g} as the other maps, or up to {matching.MOST_RESAMPLED:g} times more or"
+            f"{rate_hz:.4g} as the other maps, or up to {matching.MAX_RESAMPLED:g} times more or"
             " less",
         )
     label, classes = frame_labels(doppler.timebase, labels)
@@ -313,7 +313,7 @@ def _check_denoiser(pairs: PairSet, denoiser: TrainedDenoiser | None) -> None:
 def with_noise_floor(clip: Clip, null_bins: Sequence[int], rng: np.random.Generator) -> Clip:
     """Add a random noise floor to a clip, as of a noisier receiver; ``null_bins`` stay empty."""
     level = clip.energies.max(initial=0.0) * 10.0 ** (-rng.uniform(*BELOW_LOUDEST_DB) / 10.0)
-    looks = _MOST_LOOKS ** rng.random()
+    looks = _MAX_LOOKS ** rng.random()
     noise = rng.gamma(looks, level / looks, clip.energies.shape).astype(np.float32)
     noise[:, list(null_bins)] = 0.0
     return replace(clip, energies=clip.energies + noise)

@@ -21,7 +21,7 @@ _RIDGE = 0.3
 _SHARPNESS = 8.0
 """Scores are about 0 and 1; as logits they are so much apart."""
 _SHARE = 3.0
-_LEAST_DEVIATION = 1e-3
+_MIN_DEVIATION = 1e-3
 _BLOCK = 2048
 
 
@@ -97,7 +97,7 @@ class KernelClassifier(Classifier):
             ]
         )
         deviation, self.mean = torch.std_mean(x, dim=0, correction=0)
-        self.scale = 1.0 / deviation.clamp(min=_LEAST_DEVIATION)
+        self.scale = 1.0 / deviation.clamp(min=_MIN_DEVIATION)
         x = (x - self.mean) * self.scale
         generator = torch.Generator().manual_seed(seed)
         count = len(self.windows)

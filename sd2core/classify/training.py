@@ -86,7 +86,7 @@ class Trained(NamedTuple):
     interrupted: bool
 
 
-class Material(NamedTuple):
+class TrainingArrays(NamedTuple):
     """Features and labels of clips."""
 
     features: list[NDArray[np.float32]]
@@ -96,7 +96,7 @@ class Material(NamedTuple):
     """Int64 (frames,); those of earlier frames, where answers are late."""
 
     @classmethod
-    def of(cls, clips: Sequence[Clip], features: Features, delay_frames: int) -> Material:
+    def of(cls, clips: Sequence[Clip], features: Features, delay_frames: int) -> TrainingArrays:
         """Compute features and labels of clips."""
         return cls(
             [np.pad(features.of(c.energies)[0], ((0, delay_frames), (0, 0))) for c in clips],
@@ -165,7 +165,7 @@ def train(
             again = [number for number, (one, clean) in enumerate(noisy) if one is not clean]
             own_weights = np.concatenate([own_weights, own_weights[again]])
             shown = [*training, *(shown[number] for number in again)]
-        material = Material.of(shown, features, delay_frames)
+        material = TrainingArrays.of(shown, features, delay_frames)
         if network.closed_form:
             say("start", steps=1, clips=len(training), frames=sum(map(len, training)))
             network.fit(
@@ -181,7 +181,7 @@ def train(
         loop = _ClassifierLoop(
             network,
             material,
-            Material.of(validation, features, delay_frames),
+            TrainingArrays.of(validation, features, delay_frames),
             of_classes,
             chosen,
             None if weights is None else own_weights * [len(clip) for clip in training],
@@ -241,8 +241,8 @@ class _ClassifierLoop(Loop):
     def __init__(
         self,
         network: Classifier,
-        material: Material,
-        validation: Material,
+        material: TrainingArrays,
+        validation: TrainingArrays,
         weights: torch.Tensor,
         chosen: TrainOptions,
         chances: NDArray[np.float64] | None,
@@ -363,7 +363,7 @@ def _schedule(share: float) -> float:
     return 0.02 + 0.98 * 0.5 * (1.0 + math.cos(math.pi * (share - rise) / (1.0 - rise)))
 
 
-def _score(network: Classifier, material: Material, classes: int) -> float:
+def _score(network: Classifier, material: TrainingArrays, classes: int) -> float:
     """Mean recall over classes of all frames."""
     network.eval()
     confusion = np.zeros((classes, classes), np.int64)

@@ -43,15 +43,15 @@ def progress_events(every_s: float, *, time_left: bool = False, **content: Any) 
 
     With ``time_left`` they say how many seconds are left (``left_s``) by the pace so far.
     """
-    from sd2core.runs.pace import Pace  # loads statistics
+    from sd2core.runs.pace import Throughput  # loads statistics
 
-    last_s, pace, pace_of = -1.0, Pace(), 0
+    last_s, pace, pace_of = -1.0, Throughput(), 0
 
     def report(done: int, total: int) -> None:
         nonlocal last_s, pace, pace_of
         now_s = time.monotonic()
         if total != pace_of:  # another kind of steps
-            pace, pace_of = Pace(), total
+            pace, pace_of = Throughput(), total
         pace.take(done, now_s)
         if now_s - last_s >= every_s or done == total:
             last_s = now_s

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from sd2core.train.folder import RunStatus, TrainingFolder
 
 
-Word = Literal["pause", "resume", "stop", "cancel"]
-WORDS: tuple[Word, ...] = get_args(Word)
+Command = Literal["pause", "resume", "stop", "cancel"]
+WORDS: tuple[Command, ...] = get_args(Command)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +79,7 @@ def _runs(options: Runs) -> None:
         _print_table(runs)
 
 
-def _steer(run: TrainingFolder, word: Word) -> None:
+def _steer(run: TrainingFolder, word: Command) -> None:
     state = run.state()
     if word == "cancel" and state in ("stopped", "died", "failed"):
         lock = run.lock()

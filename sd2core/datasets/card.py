@@ -12,7 +12,7 @@ import numpy as np
 from sd2core.datasets.layout import SPLITS, Header
 from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS
-from sd2core.datasets.splitting import RULE, borrowed, named_splits, split_people
+from sd2core.datasets.splitting import RULE, named_splits, reassigned, split_people
 from sd2core.files.atomic import atomic_write_json, atomic_write_text
 from sd2core.files.tables import counted
 from sd2core.mesh.vertex_parts import QUANTITIES
@@ -404,7 +404,7 @@ def _rule(card: dict[str, Any]) -> str:
     splits = {name: tuple(people) for name, people in card["splits"].items()}
     if splits != named_splits(split_people(card["subjects"])):
         return "The people who validate and test were named when the data set was written."
-    moved = borrowed(splits)
+    moved = reassigned(splits)
     if not moved:
         return RULE
     goes = "goes" if len(moved) == 1 else "go"

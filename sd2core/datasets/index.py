@@ -10,7 +10,7 @@ from sd2core.datasets.cutting import count_spans
 from sd2core.datasets.layout import Header
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import BACKGROUND, Source
-from sd2core.denoise.resample_to_model import MOST_RESAMPLED
+from sd2core.denoise.resample_to_model import MAX_RESAMPLED
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.vertex_parts import KINEMATICS
@@ -135,10 +135,10 @@ def check_fits(source: Source, header: Header) -> None:
             )
     rate_hz = next(iter(source.maps.values())).timebase.frames_per_s
     factor = rate_hz / header.frame_rate_hz
-    if len(source.times_s) > 1 and not 1 / MOST_RESAMPLED <= factor <= MOST_RESAMPLED:
+    if len(source.times_s) > 1 and not 1 / MAX_RESAMPLED <= factor <= MAX_RESAMPLED:
         raise Sd2Error(
             f"{title} has {rate_hz:.4g} frames/s",
-            f"{header.frame_rate_hz:g} frames/s, or up to {MOST_RESAMPLED:g} times more or less",
+            f"{header.frame_rate_hz:g} frames/s, or up to {MAX_RESAMPLED:g} times more or less",
         )
 
 

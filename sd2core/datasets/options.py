@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 from sd2core.errors import Sd2Error
 from sd2core.imu.mounting import checked_places
-from sd2core.imu.signals import LEAST_FRAMES
+from sd2core.imu.signals import MIN_FRAMES
 from sd2core.maps import MapKind
 from sd2core.mesh.vertex_parts import JOINTS, PARTS
 from sd2core.options.exporting import KINDS, Exporting, LabelRule, SpanOptions
@@ -92,7 +92,7 @@ class DatasetOptions:
                 f"Limb maps of {', '.join(self.kinds)} maps", "the kind synthetic, which they split"
             )
         checked_places(self.imu)
-        least = LEAST_FRAMES if self.imu else 1
+        least = MIN_FRAMES if self.imu else 1
         if self.length < least:
             raise Sd2Error(f"Segments are {self.length} frames long", f"{least} or more")
         segment_starts(0, self.length, self.overlap)  # refuses an overlap that cannot be

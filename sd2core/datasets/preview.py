@@ -26,13 +26,13 @@ EXAMPLES = 3
 """Segments per label."""
 
 _LOW_DB = -30.0
-_MOST_SEGMENTS = 1_000_000
+_MAX_SEGMENTS = 1_000_000
 """Are looked at when examples are chosen; of more, the first ones."""
-_MOST_LABELS = 16
+_MAX_LABELS = 16
 """Labels on a sheet: those of most segments."""
 _IN_A_BAND = 12
 _CELL_IN = (1.02, 0.86)
-_LEFT_IN, _LEAST_IN = 0.8, 8.6
+_LEFT_IN, _MIN_IN = 0.8, 8.6
 _PIXELS_PER_INCH = 150
 _INK, _MUTED, _NOTHING = "#1d232b", "#5a6370", "#eef0f3"
 _NO_COLOUR = "#8a8f98"
@@ -71,12 +71,12 @@ def examples_of(dataset: Dataset, each: int = EXAMPLES) -> list[Example]:
     """Choose segments that show their label well, of different people and places."""
     header = dataset.header
     columns = {
-        name: np.asarray(dataset[name][:_MOST_SEGMENTS])
+        name: np.asarray(dataset[name][:_MAX_SEGMENTS])
         for name in ("segment_label", "purity", "available", "subject", "placement", "range_m")
     }
     found = []
     counts = np.bincount(columns["segment_label"], minlength=len(header.labels))
-    for label in sorted(np.argsort(-counts, kind="stable")[:_MOST_LABELS].tolist()):
+    for label in sorted(np.argsort(-counts, kind="stable")[:_MAX_LABELS].tolist()):
         rows = np.flatnonzero(columns["segment_label"] == label)
         kinds = columns["available"][rows].sum(axis=1)
         # Those of most kinds first, then those that hold most of their label.
@@ -107,7 +107,7 @@ def draw_preview(title: str, header: Header, examples: list[Example], segments: 
     bands = _bands(examples)
     wide, high = _CELL_IN
     band_in = len(kinds) * high + 0.95
-    width = max(_LEFT_IN + max(map(len, bands)) * wide + 0.8, _LEAST_IN)
+    width = max(_LEFT_IN + max(map(len, bands)) * wide + 0.8, _MIN_IN)
     height = len(bands) * band_in + 0.95
     figure = Figure(figsize=(width, height), dpi=_PIXELS_PER_INCH)
     figure.set_facecolor("white")

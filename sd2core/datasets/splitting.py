@@ -42,7 +42,7 @@ def named_splits(split: Split) -> dict[str, tuple[str, ...]]:
     return dict(zip(SPLITS, (split.training, split.validation, split.test), strict=True))
 
 
-def borrowed(splits: Mapping[str, Sequence[str]]) -> list[str]:
+def reassigned(splits: Mapping[str, Sequence[str]]) -> list[str]:
     """Return the people that the rule alone would put elsewhere, in its order."""
     own = {name: [one for one in names if _own(one) == name] for name, names in splits.items()}
     return sorted(

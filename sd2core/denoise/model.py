@@ -9,7 +9,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-_LEAST_DEVIATION = 0.01
+_MIN_DEVIATION = 0.01
 
 DRAWN = 4
 """Maps as which kinematics are drawn, for networks of pictures."""
@@ -181,7 +181,7 @@ class Standard(nn.Module):
         last = values[:, values.shape[1] - self.count :]
         self.mean, deviation = last.mean(dim=0), last.std(dim=0)
         # What hardly ever changes is not blown up.
-        self.scale = 1.0 / deviation.clamp(min=_LEAST_DEVIATION)
+        self.scale = 1.0 / deviation.clamp(min=_MIN_DEVIATION)
 
     def forward(self, values: Tensor) -> Tensor:
         """Standardise (…, features)."""

@@ -132,7 +132,7 @@ MODELS = tuple(name for name in _ENTRIES if name not in FILTERS)
 
 _LARGEST = 1024
 """No option is a larger number: a damaged file must not ask for all the memory."""
-_MOST_BINS = 65_536  # of a map, for the same reason
+_MAX_BINS = 65_536  # of a map, for the same reason
 
 
 def options(name: str) -> dict[str, Any]:
@@ -170,8 +170,8 @@ def build(name: str, bins: int = 32, parts: int = 1, more: int = 0, **given: Any
         When there is no such model or option, or an option is not of its kind, or for more bins
         than a map has.
     """
-    if not 1 <= bins <= _MOST_BINS:
-        raise Sd2Error(f"A model of maps of {bins} bins", f"from 1 to {_MOST_BINS:,} bins")
+    if not 1 <= bins <= _MAX_BINS:
+        raise Sd2Error(f"A model of maps of {bins} bins", f"from 1 to {_MAX_BINS:,} bins")
     known = options(name)
     for option, value in given.items():
         check_option(f"model {name}", option, value, known, _LARGEST)

@@ -55,7 +55,7 @@ Stretch = NDArray[np.float32]
 SAME_RATE = 0.02
 """Relative difference of frame rates that does not affect a model."""
 
-MOST_RESAMPLED = 4.0
+MAX_RESAMPLED = 4.0
 """Largest ratio of frame rates for which a map is interpolated to the model's rate."""
 
 _UNEVEN = 0.5
@@ -110,10 +110,10 @@ def check_bins(doppler: DopplerMap, card: Card) -> None:
         )
     rate_hz = doppler.timebase.frames_per_s
     factor = rate_hz / card.frame_rate_hz
-    if len(doppler.timebase) > 1 and not 1 / MOST_RESAMPLED <= factor <= MOST_RESAMPLED:
+    if len(doppler.timebase) > 1 and not 1 / MAX_RESAMPLED <= factor <= MAX_RESAMPLED:
         raise Sd2Error(
             f"The map has {rate_hz:.4g} frames/s",
-            f"{card.frame_rate_hz:g} frames/s, for {model}, or up to {MOST_RESAMPLED:g} times"
+            f"{card.frame_rate_hz:g} frames/s, for {model}, or up to {MAX_RESAMPLED:g} times"
             " more or less",
             "Use a model for such maps",
         )

@@ -34,7 +34,7 @@ SLOWEST_DECAY = 1e-4
 LARGEST_LOG = 100.0
 STEP_RANGE = (1e-7, 1e2)
 DT_MIN, DT_MAX = 0.02, 1.0
-MOST_KEPT = 8
+MAX_KEPT = 8
 # Of longer kernels all layers' intermediate results together would leave the processor's cache.
 LONGEST_JOINED = 400
 
@@ -169,7 +169,7 @@ class StateSpace(nn.Module):
         held = tuple(self._parameters.values())
         counts = tuple(0 if p.is_inference() else p._version for p in held)
         same = counts == self._counts and all(map(operator.is_, held, self._held))
-        if not same or len(self._kept) > MOST_KEPT:
+        if not same or len(self._kept) > MAX_KEPT:
             self._forget()
             self._held, self._counts = held, counts
         if key not in self._kept:

@@ -25,7 +25,7 @@ Energies = NDArray[np.float32]
 _BLOCK = 512
 _GROUPS = 24
 _ROUNDS = 30
-_LEAST_SHOWN = 50
+_MIN_SHOWN = 50
 _APART = 3
 """Frames apart at which a cell's fluctuations are taken as independent, its mean as the same."""
 
@@ -55,7 +55,7 @@ class Texture:
     def fitted(cls, means: Energies, radar: Energies) -> Texture | None:
         """Fit it to a model's answers and a radar's maps, (…, frames, bins); None of too few."""
         shows = radar > 0
-        if min(shows.sum(), (~shows & (means > 0)).sum()) < _LEAST_SHOWN:
+        if min(shows.sum(), (~shows & (means > 0)).sum()) < _MIN_SHOWN:
             return None
         known = means > 0
         half, slope = _logistic(np.log(means[known], dtype=np.float64), shows[known])
@@ -135,7 +135,7 @@ def _change(radar: Energies, apart: int) -> float:
     """
     one, other = radar[..., :-apart, :], radar[..., apart:, :]
     both = (one > 0) & (other > 0)
-    if both.sum() < _LEAST_SHOWN:
+    if both.sum() < _MIN_SHOWN:
         return 0.0
     x, y = one[both].astype(np.float64), other[both].astype(np.float64)
     return float((((x - y) / (x + y)) ** 2).mean())

@@ -14,10 +14,10 @@ from sd2core.maps import DopplerMap
 
 Floats = NDArray[np.float64]
 
-WITHIN_S, LEAST_WITHIN_S = 5.0, 2.0
+WITHIN_S, MIN_WITHIN_S = 5.0, 2.0
 """How far to look for an offset, either way: usually, and at least, as a peak stands out only
 among others."""
-LEAST_CONFIDENCE = 0.9
+MIN_CONFIDENCE = 0.9
 """Chosen on takes of one person, judged on another's: docs/decisions/0056-alignment.md."""
 
 _STEP_S = 1.0 / 30.0
@@ -27,8 +27,8 @@ _MOMENT_S = 2.0 * math.sqrt(math.pi) * _SMOOTH_S
 """White noise that was smoothed has one independent value in so long."""
 _ONE_SIDED = 0.01
 """Share of the energy on one side of 0 m/s below which a map does not tell the sign."""
-_LEAST_OVERLAP_S = 3.0
-_LEAST_HALF_WIDTH_S = 0.2
+_MIN_OVERLAP_S = 3.0
+_MIN_HALF_WIDTH_S = 0.2
 _ALIKE = 0.99
 """Correlation of a mesh and a radar at best; nearer to 1, differences would mean too much."""
 _STILL_MPS = 1e-6
@@ -62,7 +62,7 @@ class Alignment:
                 f"The mesh and the radar fit best at {self.offset_s:+.2f} s, where the search ends."
                 " Search farther."
             )
-        if self.confidence >= LEAST_CONFIDENCE:
+        if self.confidence >= MIN_CONFIDENCE:
             return ""
         return (
             f"No offset stands out: {self.offset_s:+.2f} s and {self.other_s:+.2f} s fit nearly"
@@ -116,9 +116,9 @@ def align(
     >>> align(seen, seen.shifted(-1.2)).checked().offset_s
     1.2
     """
-    if not (LEAST_WITHIN_S <= within_s < math.inf and math.isfinite(around_s)):
+    if not (MIN_WITHIN_S <= within_s < math.inf and math.isfinite(around_s)):
         raise Sd2Error(
-            f"The search goes {within_s:g} s from {around_s:g} s", f"{LEAST_WITHIN_S:g} s or more"
+            f"The search goes {within_s:g} s from {around_s:g} s", f"{MIN_WITHIN_S:g} s or more"
         )
     (ours, start_s), (theirs, their_start_s) = _series(synthetic), _series(radar)
     for name, values in (("map of the mesh", ours), ("radar's map", theirs)):
@@ -127,7 +127,7 @@ def align(
     # A shift of so many steps is an offset of 0.
     unmoved = (their_start_s - start_s) / _STEP_S
     low, high = (unmoved + (around_s + end_s) / _STEP_S for end_s in (-within_s, within_s))
-    least = math.ceil(_LEAST_OVERLAP_S / _STEP_S)
+    least = math.ceil(_MIN_OVERLAP_S / _STEP_S)
     shifts = np.arange(
         max(math.ceil(low), least - theirs.shape[1]),
         min(math.floor(high), ours.shape[1] - least) + 1,
@@ -135,7 +135,7 @@ def align(
     longest = min(ours.shape[1], theirs.shape[1])
     if len(shifts) < 3 or longest < least:
         raise Sd2Error(
-            f"The mesh and the radar do not overlap by {_LEAST_OVERLAP_S:g} s at offsets up to"
+            f"The mesh and the radar do not overlap by {_MIN_OVERLAP_S:g} s at offsets up to"
             f" {within_s:g} s from {around_s:g} s",
             "two recordings of the same time",
             "Search farther",
@@ -226,7 +226,7 @@ def _moments(steps: Any) -> Any:
 
 def _own_width(evidence: Floats, best: int) -> tuple[int, int]:
     """Range of the peak: down on both sides until the curve rises again."""
-    least = round(_LEAST_HALF_WIDTH_S / _STEP_S)
+    least = round(_MIN_HALF_WIDTH_S / _STEP_S)
     begin, end = max(best - least, 0), min(best + least + 1, len(evidence))
     while begin > 0 and 0 < evidence[begin - 1] <= evidence[begin]:
         begin -= 1

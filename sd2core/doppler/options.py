@@ -22,7 +22,7 @@ from sd2core.sensor import VelocityAxis
 
 VelocityRule = Literal["central", "vid2doppler"]
 
-MOST_BINS = 254
+MAX_BINS = 254
 """Bin numbers are bytes, and two values say "beyond the axis" and "hidden"."""
 
 
@@ -109,8 +109,8 @@ class SynthesisOptions(OptionRecord):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.axis.bins > MOST_BINS:
-            raise Sd2Error(f"The velocity axis has {self.axis.bins} bins", f"up to {MOST_BINS}")
+        if self.axis.bins > MAX_BINS:
+            raise Sd2Error(f"The velocity axis has {self.axis.bins} bins", f"up to {MAX_BINS}")
         nulled = tuple(sorted({int(number) for number in self.null_bins}))
         if nulled and not 0 <= nulled[0] <= nulled[-1] < self.axis.bins:
             raise Sd2Error(f"null_bins is {nulled}", f"bins from 0 to {self.axis.bins - 1}")

@@ -38,7 +38,7 @@ _MARGIN = 0.1
 """Margin around the body, as a share of its extent."""
 _SURFACE_PIXELS = 800
 """Across a picture: twice what is shown, for smooth outlines."""
-_MOST_PIXELS = 800
+_MAX_PIXELS = 800
 """Across a picture of the video: twice what is printed."""
 _CENTRED: Any = {"ha": "center", "va": "center"}
 _CELL_SHARE = 0.018
@@ -306,7 +306,7 @@ def _surface(
 
 def _reduced(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """A picture (H, W, 3) no finer than a figure can show, by means of whole blocks of pixels."""
-    size = picture.shape[1] // _MOST_PIXELS
+    size = picture.shape[1] // _MAX_PIXELS
     if size < 2:
         return picture
     height, width = (side // size for side in picture.shape[:2])

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Row = Literal["video", "mesh", "overlay"]
 ROWS: tuple[Row, ...] = get_args(Row)
 Colour = Literal["plain", "velocity"]
-MOST_FRAMES = 100
+MAX_FRAMES = 100
 
 _RANGE = re.compile(r"(\d*):(\d*)(?::(\d+))?")
 _EXPECTED = "frame numbers such as 0,15,30 or a range such as 0:90:15 (from, to, step)"
@@ -95,8 +95,8 @@ class StripSource:
 
 def check_strip(source: StripSource, frames: Sequence[int], options: StripOptions) -> None:
     """Refuse what cannot be drawn."""
-    if not frames or len(frames) > MOST_FRAMES:
-        raise Sd2Error(f"A strip of {len(frames)} frames", f"1 to {MOST_FRAMES} frames")
+    if not frames or len(frames) > MAX_FRAMES:
+        raise Sd2Error(f"A strip of {len(frames)} frames", f"1 to {MAX_FRAMES} frames")
     for frame in frames:
         if not 0 <= frame < len(source.clock):
             raise Sd2Error(f"There is no frame {frame}", f"frames 0 to {len(source.clock) - 1}")

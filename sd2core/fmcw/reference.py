@@ -14,7 +14,7 @@ from sd2core.fmcw.wave import BeatSignal, GoOn, WaveScene
 CONVERGED_L1 = 2e-3
 """A tenth of the error that is looked for, 0.02."""
 
-_MOST_CUTS = 5
+_MAX_CUTS = 5
 _FACETS_PER_STEP = 20_000
 """Some 40 ms, and memory that does not grow with the cutting."""
 
@@ -40,7 +40,7 @@ def converged_frame(
     time_s: float,
     *,
     tolerance: float = CONVERGED_L1,
-    most_cuts: int = _MOST_CUTS,
+    most_cuts: int = _MAX_CUTS,
     go_on: GoOn | None = None,
 ) -> Converged:
     """Direct complex128 sum over facets, all edges halved until the Doppler marginal stays.

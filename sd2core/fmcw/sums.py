@@ -24,7 +24,7 @@ from sd2core.radar_config import SPEED_OF_LIGHT_MPS, RadarConfig
 NUFFT_TOLERANCE = 1e-9
 """Relative to the norm of the amplitudes; 1e-6 would save a tenth of the time."""
 
-_MOST_PLANS = 8
+_MAX_PLANS = 8
 
 
 class _Plans(threading.local):
@@ -192,7 +192,7 @@ def _transform(
     plans = _plans.made
     key = (shape, len(strengths))
     if key not in plans:
-        if len(plans) >= _MOST_PLANS:
+        if len(plans) >= _MAX_PLANS:
             plans.clear()
         plans[key] = finufft.Plan(
             1, shape, n_trans=len(strengths), eps=NUFFT_TOLERANCE, isign=1, nthreads=1

@@ -29,7 +29,7 @@ GRAVITY_MPS2 = 9.81
 UP: Vector = (0.0, -1.0, 0.0)
 """Upwards in the world, whose y axis points down, for a camera that is held level."""
 
-LEAST_FRAMES = 6
+MIN_FRAMES = 6
 """Frames on end from which something is known: as many as a quintic spline needs."""
 
 _USUAL_CUTOFF_HZ = 6.0
@@ -124,7 +124,7 @@ class RigidPath:
     def stretches(self) -> list[tuple[int, int]]:
         """Half-open runs of frames on end that are long enough to be differentiated."""
         found = clips(self.timebase.times_s, self.present, self.timebase.frames_per_s)
-        return [(start, stop) for start, stop in found if stop - start >= LEAST_FRAMES]
+        return [(start, stop) for start, stop in found if stop - start >= MIN_FRAMES]
 
 
 def usual_cutoff_hz(frames_per_s: float) -> float:
@@ -138,7 +138,7 @@ def usual_cutoff_hz(frames_per_s: float) -> float:
     return min(_USUAL_CUTOFF_HZ, frames_per_s / _USUAL_SHARE)
 
 
-def felt(
+def imu_signals(
     path: RigidPath, times_s: ArrayLike, cutoff_hz: float | None = None, up: Vector = UP
 ) -> InertialSignals:
     """Acceleration and turn rate that an ideal sensor feels on a path.
@@ -177,7 +177,7 @@ def felt(
     >>> turns = np.stack([c, zero, s, zero, zero - 1, zero, s, zero, -c], axis=1)
     >>> turns = turns.reshape(-1, 3, 3)
     >>> path = RigidPath(time, 0.5 * turns[:, :, 0], turns, np.ones(300, bool))
-    >>> one = felt(path, [5.0])
+    >>> one = imu_signals(path, [5.0])
     >>> print(*np.round(one.acceleration_mps2[0], 3) + 0.0)
     -0.5 9.81 0.0
     >>> print(*np.round(one.turn_rate_radps[0], 3) + 0.0)
@@ -289,7 +289,7 @@ def _felt_on_end(
 def _frames(times_s: Floats) -> int:
     """Number of frames at the typical rate between the first and the last time."""
     step_s = float(np.median(np.diff(times_s)))
-    return max(round(float(times_s[-1] - times_s[0]) / step_s) + 1, LEAST_FRAMES)
+    return max(round(float(times_s[-1] - times_s[0]) / step_s) + 1, MIN_FRAMES)
 
 
 def _quaternions(rotation: Floats) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from sd2core.errors import Sd2Error, wanted
 from sd2core.imu.mounting import mounted
 from sd2core.imu.sensor_errors import SensorErrors
-from sd2core.imu.signals import LEAST_FRAMES, UP, InertialSignals, felt, usual_cutoff_hz
+from sd2core.imu.signals import MIN_FRAMES, UP, InertialSignals, imu_signals, usual_cutoff_hz
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.sensor import Vector
@@ -17,7 +17,7 @@ from sd2core.timebase import Timebase
 from sd2core.version import __version__
 
 RATE_HZ = 100.0
-_MOST_HZ = 10_000.0
+_MAX_HZ = 10_000.0
 
 
 def virtual_imu(
@@ -42,8 +42,8 @@ def virtual_imu(
     rate_hz : float
         Samples per second, from the time of the first frame to that of the last.
     cutoff_hz : float, optional
-        Cut-off of the low pass, see :func:`sd2core.imu.signals.felt`; by default 6 Hz, or a fifth
-        of the mesh's frame rate if that is lower.
+        Cut-off of the low pass, see :func:`sd2core.imu.signals.imu_signals`; by default 6 Hz,
+        or a fifth of the mesh's frame rate if that is lower.
     up : tuple of 3 floats
         Direction upwards in the world; by default that of a camera held level.
     errors : SensorErrors, optional
@@ -70,8 +70,8 @@ def virtual_imu(
     ((1497, 3), (1497, 3))
     """
     wanted(mesh, MeshSequence, 'Read one with sd2.load_mesh("walk.npz")')
-    if not 0 < rate_hz <= _MOST_HZ:
-        raise Sd2Error(f"The rate is {rate_hz:g} Hz", f"above 0, up to {_MOST_HZ:,.0f} Hz")
+    if not 0 < rate_hz <= _MAX_HZ:
+        raise Sd2Error(f"The rate is {rate_hz:g} Hz", f"above 0, up to {_MAX_HZ:,.0f} Hz")
     cutoff_hz = usual_cutoff_hz(mesh.timebase.frames_per_s) if cutoff_hz is None else cutoff_hz
     if rate_hz < 2 * cutoff_hz:
         raise Sd2Error(
@@ -107,10 +107,10 @@ def _ideal(
     path = mounting.path(mesh, progress)
     if not path.stretches:
         raise Sd2Error(
-            f"{mesh.source or 'The mesh'} has no {LEAST_FRAMES} frames on end with a body",
-            f"{LEAST_FRAMES} at least",
+            f"{mesh.source or 'The mesh'} has no {MIN_FRAMES} frames on end with a body",
+            f"{MIN_FRAMES} at least",
         )
-    signals = felt(path, times.times_s, cutoff_hz, up)
+    signals = imu_signals(path, times.times_s, cutoff_hz, up)
     about = {
         "at": mounting.name,
         "axes": mounting.axes,

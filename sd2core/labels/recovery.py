@@ -46,7 +46,7 @@ class _NoHeadError(ValueError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Offer(Kept):
+class Recoverable(Kept):
     """Unsaved labels of a session, and the parts that they were read from.
 
     ``declined`` is True if the user discarded them.
@@ -64,7 +64,7 @@ class Found:
     subject of a note, and no version of this program could offer them.
     """
 
-    offers: tuple[Offer, ...] = ()
+    offers: tuple[Recoverable, ...] = ()
     notes: tuple[str, ...] = ()
     settled: tuple[Path, ...] = field(default=(), compare=False)
     damaged: tuple[Path, ...] = field(default=(), compare=False)
@@ -96,7 +96,7 @@ def search(folder: Path, *, declined: bool = False, without: Container[int] = ()
                 notes.append(note)
             if replayed.edits:
                 discarded = parts[0].suffix == DECLINED
-                offers.append(Offer(**vars(replayed), declined=discarded, files=tuple(parts)))
+                offers.append(Recoverable(**vars(replayed), declined=discarded, files=tuple(parts)))
             else:
                 (damaged if note else settled).extend(parts)
             break
@@ -226,7 +226,7 @@ class RecoveryPlace:
         """Find labels of earlier sessions; ``declined`` ones only when asked for."""
         return search(self._folder, declined=declined, without=self._begun)
 
-    def begin(self, labels: Labels, recovered: Offer | None = None) -> Journal:
+    def begin(self, labels: Labels, recovered: Recoverable | None = None) -> Journal:
         """Begin a session, with the labels of the user's file or of an offer.
 
         The files of the offer (``recovered``) are deleted once the new journal is on disk. Raises
@@ -252,13 +252,13 @@ class RecoveryPlace:
             path.rename(path.with_suffix(DAMAGED))
         return journal
 
-    def decline(self, offer: Offer) -> None:
+    def decline(self, offer: Recoverable) -> None:
         """Keep an offer's files, but offer it no more."""
         self._check_held()
         for path in offer.files:
             path.rename(path.with_suffix(DECLINED))
 
-    def delete(self, offer: Offer) -> None:
+    def delete(self, offer: Recoverable) -> None:
         """Delete the files of an offer."""
         self._check_held()
         for path in offer.files:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 _BUFFER_BYTES = 64 << 20
 """Frames that may wait for the disk."""
-_LEAST_FRAMES = 8
+_MIN_FRAMES = 8
 _SHOWN_FRAMES = 32
 """Frames that may wait for the map."""
 _KEPT_LATENCIES = 10_000
@@ -107,7 +107,7 @@ class Listening:
         self._channel = recording.channel
         self._like = like
         self._map = LiveMap(like.channel(*self._channel), axis, ProcessingOptions(CLUTTER))
-        size = max(_BUFFER_BYTES // head.frame_bytes, _LEAST_FRAMES)
+        size = max(_BUFFER_BYTES // head.frame_bytes, _MIN_FRAMES)
         self._to_store: queue.Queue[tuple[Frame, int]] = queue.Queue(size)
         self._to_show: queue.Queue[tuple[float, NDArray[Any], Frame]] = queue.Queue(_SHOWN_FRAMES)
         self._dropped = 0  # since the last frame that was taken

@@ -28,7 +28,7 @@ from sd2core.recording.recording import Recording, folder_named, open_recording
 
 RADAR_FOLDER = "radar"
 _LOCK_NAME = "listening.lock"
-_MOST_COUNT = 2**32 - 1
+_MAX_COUNT = 2**32 - 1
 
 
 class GrowingRecording:
@@ -135,7 +135,7 @@ class GrowingRecording:
                 f"A frame at {at_s:.6f} s follows one at {self._last_s:.6f} s",
                 "times that increase",
             )
-        counts = (min(one, _MOST_COUNT) for one in (dropped, lost, missing_bytes, self._session))
+        counts = (min(one, _MAX_COUNT) for one in (dropped, lost, missing_bytes, self._session))
         entry = np.array([(at_s, *counts)], ENTRY)
         with full_disk_named(self.radar / SAMPLES_NAME):
             _write(self._streams[0], np.ascontiguousarray(words).view(np.uint8).data.cast("B"))

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sd2core.errors import Sd2Error
 
-_MOST_LIMBS = 255
+_MAX_LIMBS = 255
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +30,8 @@ class VelocityUncertainty:
 
     def __post_init__(self) -> None:
         limbs = tuple(str(name) for name in self.limbs)
-        if not 0 < len(limbs) <= _MOST_LIMBS:
-            raise Sd2Error(f"The uncertainty names {len(limbs)} limbs", f"1 to {_MOST_LIMBS}")
+        if not 0 < len(limbs) <= _MAX_LIMBS:
+            raise Sd2Error(f"The uncertainty names {len(limbs)} limbs", f"1 to {_MAX_LIMBS}")
         which = np.array(self.vertex_limb)
         if which.ndim != 1 or which.dtype.kind not in "iu" or not which.size:
             raise Sd2Error(

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 _FARTHEST_M = (0.6, 1.2)
 """Right or left of the camera, above or below it."""
 _LATEST_S = 0.2
-_LEAST_CORRELATION = 0.3
+_MIN_CORRELATION = 0.3
 """Below it motion and radar have too little in common to tell anything."""
 _STARTS_M = ((0.0, 0.0), (0.2, 0.4), (-0.2, 0.4))
 
@@ -64,7 +64,7 @@ def estimate_place(seen: Sequence[Seen]) -> RadarPlace:
         ),
         key=lambda found: float(found.fun),
     )
-    if not -best.fun >= _LEAST_CORRELATION:
+    if not -best.fun >= _MIN_CORRELATION:
         return RadarPlace(correlation=before, correlation_before=before)
     x, y, offset_s = (round(float(value), 3) for value in best.x)
     return RadarPlace((x, y, 0.0), offset_s, -float(best.fun), before)

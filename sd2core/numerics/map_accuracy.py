@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_LEAST_PERCENT = 1e-3
+_MIN_PERCENT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -69,8 +69,8 @@ def percent(share: float) -> str:
         return "0 %"
     if value == float("inf"):
         return "∞ %"
-    if value < _LEAST_PERCENT:
-        return f"<{_LEAST_PERCENT:g} %"
+    if value < _MIN_PERCENT:
+        return f"<{_MIN_PERCENT:g} %"
     return f"{value:.0f} %" if value >= 9.95 else f"{value:.2g} %"
 
 

@@ -18,19 +18,19 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.texts import read_text
 
-Word = Literal["run", "pause", "stop", "cancel"]
-WORDS: tuple[Word, ...] = get_args(Word)
+Command = Literal["run", "pause", "stop", "cancel"]
+WORDS: tuple[Command, ...] = get_args(Command)
 
 _PAUSED_POLL_S = 0.1
 
 
-def write_control(path: Path, word: Word) -> None:
+def write_control(path: Path, word: Command) -> None:
     """Write the word that a run is to obey."""
     atomic_write_text(path, word + "\n")
 
 
-def read_control(path: Path) -> Word:
-    """Word that a run is to obey; ``run`` where there is none, or an unknown one."""
+def read_control(path: Path) -> Command:
+    """Command that a run is to obey; ``run`` where there is none, or an unknown one."""
     try:
         text = read_text(path, "a word").strip()
     except Sd2Error:
@@ -53,14 +53,14 @@ class Control:
         """True if Ctrl-C asked for the end."""
         return self._signal is signal.SIGINT
 
-    def word(self) -> Word:
+    def word(self) -> Command:
         """Current order. A signal means ``stop``, unless the file says ``cancel``."""
         word = read_control(self._path)
         if self._signal is not None and word != "cancel":
             return "stop"
         return word
 
-    def wait_while_paused(self) -> tuple[Word, float]:
+    def wait_while_paused(self) -> tuple[Command, float]:
         """Wait until the word is another than ``pause``; return it and the seconds that passed."""
         begun_s = time.monotonic()
         while (word := self.word()) == "pause":

@@ -21,7 +21,7 @@ from sd2core.files.atomic import atomic_write_json
 from sd2core.files.lock import FileLock, is_locked
 from sd2core.files.texts import first_fault, read_json
 from sd2core.processes import ProcessId
-from sd2core.runs.control import Word, write_control
+from sd2core.runs.control import Command, write_control
 from sd2core.version import __version__
 
 State = Literal[
@@ -165,7 +165,7 @@ class RunFolder:
                 "Copy the folder again",
             ) from error
 
-    def tell(self, word: Word) -> None:
+    def tell(self, word: Command) -> None:
         """Tell the process what to do.
 
         Raises Sd2Error when there is no run, or no process works on it.

@@ -21,10 +21,10 @@ Kind = tuple[str | int | None, ...]
 _SHORT_S = 3.0
 """Shorter work is mostly overhead, and does not replace what longer work has measured."""
 
-_MOST_KINDS = 200
+_MAX_KINDS = 200
 
 
-class Pace:
+class Throughput:
     """Seconds per item of work under way, counted from its first item on."""
 
     def __init__(self) -> None:
@@ -71,7 +71,7 @@ def keep_pace(kind: Kind, seconds: float, items: float) -> None:
     before = known.pop(name, (0.0, 0.0))
     now = float(f"{seconds / items:.4g}"), round(seconds, 3)
     known[name] = before if seconds < min(before[1], _SHORT_S) else now
-    newest = dict(list(known.items())[-_MOST_KINDS:])
+    newest = dict(list(known.items())[-_MAX_KINDS:])
     keep_text(_path(), json.dumps(newest, indent=1) + "\n")
 
 

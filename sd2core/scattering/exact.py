@@ -35,12 +35,12 @@ _ROUNDING = np.float32(1e-6)
 """Error of single-precision image coordinates, generously, relative to their size."""
 
 _COLUMNS_PER_ROOT, _ROWS_PER_ROOT = 4.0, 0.7
-_MOST_COLUMNS, _MOST_ROWS = 1024, 192
+_MAX_COLUMNS, _MAX_ROWS = 1024, 192
 """Cells of the image plane, per square root of the number of vertices, up to that many.
 
 Beginning a row costs more than passing over a vertex: few rows, finely divided."""
 
-MOST_CELLS = _MOST_COLUMNS * _MOST_ROWS
+MAX_CELLS = _MAX_COLUMNS * _MAX_ROWS
 
 LANES = 8
 """Vertices met at a time: as many as a vector register holds single-precision numbers."""
@@ -167,7 +167,7 @@ def _outcodes(image, depth, near, xmin, xmax, ymin, ymax, dmax, code):  # type: 
 @compiled
 def search_scratch(vertices):  # type: ignore[no-untyped-def]
     """Work space of :func:`search_view` for so many vertices."""
-    cell, start = np.empty(vertices, np.int32), np.empty(MOST_CELLS + 2, np.int32)
+    cell, start = np.empty(vertices, np.int32), np.empty(MAX_CELLS + 2, np.int32)
     order = np.empty(vertices + LANES, np.int32)
     sorted_image = np.empty((2, vertices + LANES), np.float32)
     sorted_depth = np.empty(vertices + LANES, np.float32)
@@ -222,8 +222,8 @@ def search_view(  # type: ignore[no-untyped-def]
         ymin, ymax = min(ymin, image[1, v]), max(ymax, image[1, v])
         dmax = max(dmax, depth[v])
     # Each axis has its own cell size: a standing body is narrow and tall.
-    columns = min(_MOST_COLUMNS, max(4, int(_COLUMNS_PER_ROOT * np.sqrt(owned_count))))
-    rows = min(_MOST_ROWS, max(4, int(_ROWS_PER_ROOT * np.sqrt(owned_count))))
+    columns = min(_MAX_COLUMNS, max(4, int(_COLUMNS_PER_ROOT * np.sqrt(owned_count))))
+    rows = min(_MAX_ROWS, max(4, int(_ROWS_PER_ROOT * np.sqrt(owned_count))))
     wide, high = xmax - xmin, ymax - ymin
     xscale = np.float32(columns) / wide if wide > 0 else np.float32(0)
     yscale = np.float32(rows) / high if high > 0 else np.float32(0)

@@ -19,7 +19,7 @@ from sd2core.pairs.segments import cut, segment_starts
 from sd2core.pairs.store import PairSet, Take, read_pairs
 from sd2core.sensor import VelocityAxis
 
-_LARGEST_WEIGHT, _LEAST_LEVEL = 8.0, 1e-3
+_LARGEST_WEIGHT, _MIN_LEVEL = 8.0, 1e-3
 
 RANGE_LAW = 4.0
 """Echo power falls with the fourth power of the range (radar equation)."""
@@ -80,7 +80,7 @@ class TrainingData:
     split: Split
     training: Windows
     validation: Segments
-    learnt_takes: tuple[Take, ...]  # sources of the training segments
+    training_takes: tuple[Take, ...]  # sources of the training segments
     parts: tuple[str, ...] = ()  # of the body, whose limb maps are the input; none: the map is
 
     @property
@@ -265,7 +265,7 @@ def frame_weights(windows: Windows, axis: VelocityAxis) -> NDArray[np.float32]:
     shares = np.convolve(np.pad(counts, 1, mode="edge"), [0.25, 0.5, 0.25], mode="valid")
     of_frame = np.where(empty, np.count_nonzero(empty), shares[ranks])
     weights = 1.0 / np.sqrt(np.maximum(of_frame, 1.0))
-    weights /= np.maximum(windows.levels, _LEAST_LEVEL * (windows.levels.mean() or 1.0))
+    weights /= np.maximum(windows.levels, _MIN_LEVEL * (windows.levels.mean() or 1.0))
     return np.minimum(weights / weights.mean(), _LARGEST_WEIGHT).astype(np.float32)
 
 

@@ -12,9 +12,9 @@ import torch
 
 from sd2core.errors import Sd2Error
 from sd2core.options.training import TrainConfig
-from sd2core.runs.control import Control, Word
+from sd2core.runs.control import Command, Control
 from sd2core.runs.folder import State
-from sd2core.runs.pace import Pace
+from sd2core.runs.pace import Throughput
 from sd2core.runs.progress import ProgressWriter
 from sd2core.train.checkpoint import Checkpoint, moments_of, set_moments, write_checkpoint
 from sd2core.train.folder import TrainingFolder
@@ -22,7 +22,7 @@ from sd2core.train.learner import Learner
 from sd2core.train.loop import Loop, Outcome
 from sd2core.train.ranks import Ranks
 from sd2core.train.steps import Batches, optimiser_of, rate_factor, set_rate
-from sd2core.train.validate import Exam, Validation, validate
+from sd2core.train.validate import Validation, Validator, validate
 
 _LINE_S = 0.5
 """Lines of single steps are at least so far apart."""
@@ -43,7 +43,7 @@ class DenoiserLoop(Loop):
         control: Control,
         learner: Learner,
         batches: Batches,
-        exam: Exam,
+        validator: Validator,
         start: Checkpoint,
         save_best: Callable[[Validation, Validation | None, int], None],
         ranks: Ranks,
@@ -60,15 +60,15 @@ class DenoiserLoop(Loop):
             patience=training.early_stopping_epochs,
         )
         self._config, self._folder, self._writer, self._control = config, folder, writer, control
-        self._network, self._batches, self._exam = learner.network, batches, exam
+        self._network, self._batches, self._exam = learner.network, batches, validator
         self._about, self._save_best = start.about, save_best
         self._ranks, self._mixed = ranks, mixed
-        self._device = exam.inputs.device
+        self._device = validator.inputs.device
         self._learner = ranks.together(learner, self._device)
         self._optimiser = optimiser_of(self._network, training)
         if start.moments:
             set_moments(self._optimiser, start.moments)
-        self._pace = Pace()
+        self._pace = Throughput()
         self._share, self._rate, self._said_s = 0.0, 0.0, -math.inf
         squares = self.position.squares
         # On the device: nothing waits for it between the lines of progress.
@@ -196,11 +196,11 @@ class DenoiserLoop(Loop):
             **self._times(),
         )
 
-    def _pause(self) -> Word:
+    def _pause(self) -> Command:
         self._keep()
         self._writer.say("paused")
         self._set_state("paused")
-        word: Word
+        word: Command
         word, seconds = self._ranks.agreed(*self._control.wait_while_paused())
         self.leave_out(seconds)
         self._writer.say("resumed")

@@ -10,37 +10,37 @@ from sd2core.mesh.vertex_parts import mirrored_columns
 from sd2core.options.training import TrainConfig
 from sd2core.train.data import Windows, frame_weights
 from sd2core.train.steps import Batch
-from sd2core.train.validate import Exam
+from sd2core.train.validate import Validator
 
 _SHARP = 4
 """Power of the energies whose mean velocity is nearly that of the strongest."""
 
 
 class Learner(nn.Module):
-    """Denoiser with all that it learns from, on the device of ``exam``.
+    """Denoiser with all that it learns from, on the device of ``validator``.
 
-    ``windows`` hold energies; the scaling of the validation (``exam``) compresses them. All
+    ``windows`` hold energies; the scaling of the validation (``validator``) compresses them. All
     frames are brought to the device: they are a few hundred MB at most.
     """
 
     def __init__(
-        self, network: Denoiser, windows: Windows, exam: Exam, config: TrainConfig
+        self, network: Denoiser, windows: Windows, validator: Validator, config: TrainConfig
     ) -> None:
         super().__init__()
-        device = exam.inputs.device
+        device = validator.inputs.device
         self.network = network.to(device)
-        self._exam = exam
+        self._exam = validator
         self._range_factor = config.data.range_factor
         self._velocity_weight = config.training.velocity_weight
         # Not buffers: they belong to no checkpoint, and need not be broadcast.
-        scaling = exam.scaling
+        scaling = validator.scaling
         self._inputs = torch.from_numpy(scaling.compress_input(windows.inputs)).to(device)
         self._targets = torch.from_numpy(scaling.target.compress(windows.targets)).to(device)
         self._weights: torch.Tensor | None = None  # (frames,)
         if config.training.balanced:
-            self._weights = torch.from_numpy(frame_weights(windows, exam.axis)).to(device)
+            self._weights = torch.from_numpy(frame_weights(windows, validator.axis)).to(device)
         self._frames = torch.arange(windows.length, device=device)
-        self._counted = torch.tensor(exam.counted, device=device)
+        self._counted = torch.tensor(validator.counted, device=device)
         self._mirror: tuple[torch.Tensor, ...] = ()
         if scaling.more:
             self._mirror = tuple(torch.from_numpy(each).to(device) for each in mirrored_columns())

@@ -36,7 +36,7 @@ from sd2core.train.loop import Outcome
 from sd2core.train.machine import device_of, machine_words, precision_of, settled
 from sd2core.train.ranks import Ranks, joined, others
 from sd2core.train.steps import Batches
-from sd2core.train.validate import Exam, Validation
+from sd2core.train.validate import Validation, Validator
 
 _SHOWS = 0.4
 """Share of the frames in which a cell must show, or it is empty in a denoised map."""
@@ -104,8 +104,8 @@ def carry_out(
     model = None if config.model.start is None else _start(config.model.start, data)
     with settled(config.machine, threads), ExitStack() as stack:
         scaling = Scaling.fitted(
-            (take.inputs(parts) for take in data.learnt_takes),
-            (take.radar for take in data.learnt_takes),
+            (take.inputs(parts) for take in data.training_takes),
+            (take.radar for take in data.training_takes),
             data.pairs.null_bins,
             parts=maps_in(parts),
         )
@@ -114,12 +114,14 @@ def carry_out(
             scaling = replace(scaling, input=model.card.scaling.input)
         network = _network(config, data, scaling, model, start)
         machine = machine_words(kind, precision, threads)
-        learnt_pairs = [(take.synthetic, take.radar) for take in data.learnt_takes]
+        learnt_pairs = [(take.synthetic, take.radar) for take in data.training_takes]
         known = KnownMovements.of(learnt_pairs, data.pairs.axis)
         if model is not None and known is not None:
             known = known.together(model.card.known)
         facts = _Facts(config, data, scaling, command, machine, known)
-        exam = Exam.of(data.validation, scaling, data.pairs.axis, data.pairs.null_bins).on(device)
+        validator = Validator.of(
+            data.validation, scaling, data.pairs.axis, data.pairs.null_bins
+        ).on(device)
         if ranks.count > 1:
             if meeting is None:
                 beside = others(ranks.count, _beside, folder.path, config, resume)
@@ -132,9 +134,9 @@ def carry_out(
             folder,
             writer,
             control,
-            Learner(network, data.training, exam, config),
+            Learner(network, data.training, validator, config),
             Batches(order, data.training, rank, ranks.count),
-            exam,
+            validator,
             start or Checkpoint({}, {}, Position(), {"data_digest": digest, "threads": threads}),
             lambda found, live, epoch: facts.save(folder.best, network, found, live, epoch),
             ranks,
@@ -316,7 +318,7 @@ class _Facts:
     def _data_words(self) -> str:
         pairs, split = self.data.pairs, self.data.split
         names = ", ".join(path.name for path in self.config.data.pairs)
-        frames = sum(len(take.times_s) for take in self.data.learnt_takes)
+        frames = sum(len(take.times_s) for take in self.data.training_takes)
         few = len(split.training) <= _NAMED
         people = f" ({', '.join(split.training)})" if few else ""
         return (

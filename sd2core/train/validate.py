@@ -32,7 +32,7 @@ class Validation:
 
 
 @dataclass(frozen=True, eq=False)
-class Exam:
+class Validator:
     """Segments that a model is validated on."""
 
     inputs: torch.Tensor  # compressed, (segments, length, features)
@@ -43,14 +43,14 @@ class Exam:
     axis: VelocityAxis
     counted: tuple[int, ...]  # bins that are not nulled
 
-    def on(self, device: torch.device) -> Exam:
+    def on(self, device: torch.device) -> Validator:
         """Copy on a device."""
         return replace(self, inputs=self.inputs.to(device), targets=self.targets.to(device))
 
     @classmethod
     def of(
         cls, segments: Segments, scaling: Scaling, axis: VelocityAxis, null_bins: tuple[int, ...]
-    ) -> Exam:
+    ) -> Validator:
         """Build it from segments of energies.
 
         Parameters
@@ -75,31 +75,31 @@ class Exam:
 
 
 def validate(
-    model: Denoiser, exam: Exam, keep_on: Callable[[], bool] = lambda: True
+    model: Denoiser, validator: Validator, keep_on: Callable[[], bool] = lambda: True
 ) -> Validation | None:
     """Measure a model; no result (None) if ``keep_on``, asked between batches, says False."""
     training = model.training
     model.eval()
     squares, cells = 0.0, 0
     found = []
-    bins = exam.axis.bins
-    nulled = [number for number in range(bins) if number not in exam.counted]
+    bins = validator.axis.bins
+    nulled = [number for number in range(bins) if number not in validator.counted]
     try:
         with torch.no_grad():
-            for start in range(0, len(exam.inputs), _BATCH):
+            for start in range(0, len(validator.inputs), _BATCH):
                 if not keep_on():
                     return None
                 batch = slice(start, start + _BATCH)
-                answer = model(exam.inputs[batch]).float()
-                difference = (answer - exam.targets[batch])[..., list(exam.counted)]
+                answer = model(validator.inputs[batch]).float()
+                difference = (answer - validator.targets[batch])[..., list(validator.counted)]
                 squares += float(difference.double().square().sum())
                 cells += difference.numel()
-                energies = exam.scaling.target.expand(answer.cpu().numpy())
+                energies = validator.scaling.target.expand(answer.cpu().numpy())
                 energies[..., nulled] = 0.0
                 found.append(energies)
     finally:
         model.train(training)
     answers = np.concatenate(found)
-    peaks_mps = peak_velocity_mps(answers.reshape(-1, bins), exam.axis)
-    error = velocity_error(peaks_mps, exam.peaks_mps)
+    peaks_mps = peak_velocity_mps(answers.reshape(-1, bins), validator.axis)
+    error = velocity_error(peaks_mps, validator.peaks_mps)
     return Validation((squares / cells) ** 0.5, error.mae_mps, answers)

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 from batches import memory, ten_times_the_tasks, two_against_one
 
-LEAST_GAIN = 1.8
-MOST_GROWTH = 10.5
-MOST_MB = 1000.0
+MIN_GAIN = 1.8
+MAX_GROWTH = 10.5
+MAX_MB = 1000.0
 
 
 @pytest.mark.benchmark(group="batch")
@@ -23,7 +23,7 @@ def test_two_processes(benchmark: Any, tmp_path: Path, capsys: pytest.CaptureFix
     with capsys.disabled():
         print(f"\n{found.tasks} maps: two processes are {found.ratio:.2f} times as fast as one")
     assert found.tasks >= 200
-    assert found.ratio >= LEAST_GAIN
+    assert found.ratio >= MIN_GAIN
 
 
 @pytest.mark.benchmark(group="batch")
@@ -33,7 +33,7 @@ def test_ten_times_the_tasks(
     found = benchmark.pedantic(lambda: ten_times_the_tasks(tmp_path, 10, 8, 3), rounds=1)
     with capsys.disabled():
         print(f"\n{found.tasks} maps take {found.ratio:.2f} times what a tenth of them does")
-    assert found.ratio <= MOST_GROWTH
+    assert found.ratio <= MAX_GROWTH
 
 
 @pytest.mark.benchmark(group="batch")
@@ -47,4 +47,4 @@ def test_memory(benchmark: Any, tmp_path: Path, capsys: pytest.CaptureFixture[st
         for one in found:
             peak_mb = max(one.peak_mb.values())
             print(f"\n{one.recordings} of {one.minutes:g} min: {peak_mb:.0f} MB at most")
-    assert all(max(one.peak_mb.values()) <= MOST_MB for one in found)
+    assert all(max(one.peak_mb.values()) <= MAX_MB for one in found)

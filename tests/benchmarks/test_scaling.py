@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from scaling import BUDGET_BYTES, Scaling, scalings
 
-MOST_GROWTH = 11.0
+MAX_GROWTH = 11.0
 
 
 @pytest.mark.parametrize("visibility", ["facing", "exact"])
@@ -30,7 +30,7 @@ def test_scaling(benchmark: Any, visibility: str, capsys: pytest.CaptureFixture[
             print(f"  per factor of ten: {grown} times the cost")
     vertices, frames, places = found
     for scaling in found:
-        assert max(scaling.growth) <= MOST_GROWTH, scaling.what
+        assert max(scaling.growth) <= MAX_GROWTH, scaling.what
     for scaling in (frames, places):
         last = scaling.points[-1]
         assert last.peak_bytes <= BUDGET_BYTES * 1.5, scaling.what

@@ -26,7 +26,7 @@ from sd2core.sensor import VirtualSensor
 
 PAPER = PRESETS["paper"]
 TOLERANCE = 0.05
-MOST_OF_FEW, MOST_OF_MANY = 1.5, 1.0
+MAX_OF_FEW, MAX_OF_MANY = 1.5, 1.0
 CLIPS = {
     "sample": lambda: open_recording(resource_path("swipes.sd2")).load_mesh(),
     "ellipsoid of 1,000 vertices": lambda: body(1000, 450),
@@ -48,9 +48,7 @@ def maps_s(mesh: MeshSequence, options: SynthesisOptions, sensors: list[VirtualS
 
 @pytest.mark.benchmark(group="tolerance")
 @pytest.mark.parametrize("name", CLIPS)
-@pytest.mark.parametrize(
-    ("count", "most"), [(1, MOST_OF_FEW), (9, MOST_OF_FEW), (60, MOST_OF_MANY)]
-)
+@pytest.mark.parametrize(("count", "most"), [(1, MAX_OF_FEW), (9, MAX_OF_FEW), (60, MAX_OF_MANY)])
 def test_maps_of_many_places(
     benchmark: Any, name: str, count: int, most: float, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -26,8 +26,8 @@ __all__ = ["BodyMotion", "drive_bodies", "load_motions", "minutes", "moved_trans
 Floats = NDArray[np.float64]
 
 _GLITCH_MPS = 18.0
-_LEAST_S = 1.0
-_MOST_S = 20.0
+_MIN_S = 1.0
+_MAX_S = 20.0
 """Of one recording; what follows is much alike."""
 _NEAR_M = 4.0
 
@@ -74,7 +74,7 @@ def _drive(out: Path, own: Sequence[Trial]) -> list[str]:
             continue
         found = _clip(points_m, rate_hz)
         if found is None:
-            notes.append(f"{trial.name}: shorter than {_LEAST_S} s without a jump")
+            notes.append(f"{trial.name}: shorter than {_MIN_S} s without a jump")
         else:
             clips[trial] = found
     if all(path_of(out, trial).exists() for trial in clips):
@@ -108,9 +108,9 @@ def _clip(points_m: Floats, rate_hz: float) -> tuple[SkeletonClip, Floats] | Non
     edges = np.concatenate([[0], np.flatnonzero(fast) + 1, [len(turned)]])
     longest = int(np.argmax(np.diff(edges)))
     start, stop = edges[longest : longest + 2]
-    if stop - start < _LEAST_S * rate_hz:
+    if stop - start < _MIN_S * rate_hz:
         return None
-    kept = turned[start : min(stop, start + round(_MOST_S * rate_hz))]
+    kept = turned[start : min(stop, start + round(_MAX_S * rate_hz))]
     shift_m = np.array([0.0, 0.0, _NEAR_M - kept[..., 2].min()])
     return SkeletonClip(np.arange(len(kept)) / rate_hz, kept + shift_m), shift_m
 

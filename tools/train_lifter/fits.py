@@ -27,7 +27,7 @@ from tools.train_lifter.takes import Take
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
-_LEAST_MPS = 0.01
+_MIN_MPS = 0.01
 _WITHIN = 0.68
 
 
@@ -128,7 +128,7 @@ def fit_law(takes: Sequence[Take], lifter: Lifter, progress: Progress = silent) 
             for fit in fits
         ]
     )
-    logarithms = np.log(errors + _LEAST_MPS)
+    logarithms = np.log(errors + _MIN_MPS)
     centred = (terms - terms.mean(axis=0)).reshape(-1, 2)
     powers = np.linalg.lstsq(centred, (logarithms - logarithms.mean(axis=0)).ravel())[0]
     ratios = errors / np.exp(terms @ powers)

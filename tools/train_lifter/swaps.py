@@ -28,7 +28,7 @@ _TOLD_BY = tuple(
 _CLEAR = 0.05
 """Share of the person's height by which one side must be nearer than the other."""
 _UNTOUCHED = 0.3
-_MOST_STRETCHES = 3
+_MAX_STRETCHES = 3
 _THINNED = 0.3
 _SAME_VISIBILITY = 0.15
 _JITTER = 0.02
@@ -119,7 +119,7 @@ def _put_in(rng: np.random.Generator, one: Known) -> Known:
     """One to three mirrored stretches of any length, of the whole body or of parts."""
     seen, wrong = Seen(*(np.array(part) for part in one.seen)), one.mirrored.copy()
     frames = len(wrong)
-    for _ in range(int(rng.integers(1, _MOST_STRETCHES + 1))):
+    for _ in range(int(rng.integers(1, _MAX_STRETCHES + 1))):
         length = int(np.exp(rng.uniform(0.0, np.log(frames + 1))))
         start = int(rng.integers(-(length // 2), frames))
         stretch = slice(max(start, 0), max(start + length, 0))

@@ -77,7 +77,7 @@ class MeasuredModel(ReportingModel):
 
     # --- requests -------------------------------------------------------------------------
 
-    def take_over(self, mesh: MeshSequence | None, options: SynthesisOptions) -> None:
+    def attach(self, mesh: MeshSequence | None, options: SynthesisOptions) -> None:
         """Take over another scene, or none."""
         self._meter.cancel()
         self._memory.cancel()

@@ -143,12 +143,12 @@ class AccuracyModel(ReportingModel):
 
     # --- requests -------------------------------------------------------------------------
 
-    def take_over(self, mesh: MeshSequence | None, options: SynthesisOptions) -> None:
+    def attach(self, mesh: MeshSequence | None, options: SynthesisOptions) -> None:
         """Take over another scene, or none."""
         self.hold()
         self._scene = None if mesh is None else (mesh, options)
         self._forget()
-        self.measured.take_over(mesh, options)
+        self.measured.attach(mesh, options)
         self.plan_changed.emit()
         self.changed.emit()
 

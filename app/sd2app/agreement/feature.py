@@ -74,6 +74,6 @@ class AgreementFeature(Feature):
             "other labels": OtherTimeline(s, self.model),
         }
 
-    def take_over(self) -> None:
+    def attach(self) -> None:
         """Forget the comparison of the recording before."""
         self.model.clear()

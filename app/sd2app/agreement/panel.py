@@ -16,7 +16,7 @@ from sd2app.widgets.panel import ElidedLabel, FactRows, rule, sentence, title
 from sd2app.widgets.text import counted
 from sd2core.labels.agreement import kappa_words
 
-_MOST_FACTS, _MOST_LABELS = 10, 12
+_MAX_FACTS, _MAX_LABELS = 10, 12
 _NOTHING = (
     "Choose the file of another person who labelled this recording. Agreement is measured frame by"
     " frame and span by span, and their labels are shown below yours."
@@ -35,8 +35,8 @@ class AgreementPanel(QWidget):
         self._model = model
         self._name = ElidedLabel(self, "title")
         self._verdict, self._where = sentence("", "plain"), sentence("", "plain")
-        self._facts = FactRows(_MOST_FACTS, at_the_edge=True, parent=self)
-        self._labels = FactRows(_MOST_LABELS, at_the_edge=True, parent=self)
+        self._facts = FactRows(_MAX_FACTS, at_the_edge=True, parent=self)
+        self._labels = FactRows(_MAX_LABELS, at_the_edge=True, parent=self)
         self._nothing = sentence(_NOTHING)
         self._result = self._lay_out_result(action)
         file = "compare_labels", "File…"
@@ -65,7 +65,7 @@ class AgreementPanel(QWidget):
         if model.active:
             self._verdict.setText(verdict(model))
             self._facts.show_facts(facts(model))
-            self._labels.show_facts(label_facts(model)[:_MOST_LABELS])
+            self._labels.show_facts(label_facts(model)[:_MAX_LABELS])
             self._follow_cursor()
 
     def _follow_cursor(self) -> None:

@@ -14,7 +14,7 @@ from sd2app.background.latest import LatestRunner
 from sd2core.errors import Sd2Error
 from sd2core.processes import ProcessId
 from sd2core.runs.command_folder import CommandFolder, last_output
-from sd2core.runs.control import Word, read_control, write_control
+from sd2core.runs.control import Command, read_control, write_control
 from sd2core.runs.folder import LIVE, RunFolder, State
 from sd2core.runs.progress import ProgressTail
 
@@ -97,7 +97,7 @@ class _Found(NamedTuple):
     exists: bool
     state: State | None
     process: ProcessId | None
-    word: Word
+    word: Command
     events: list[dict[str, Any]]
     facts: Any
 
@@ -138,7 +138,7 @@ class RunMonitor(QObject, Generic[F]):
         self.loaded = False  # true once the folder has been read
         self.text = ""  # why it failed
         self._has_begun = False
-        self._wish: Word | None = None
+        self._wish: Command | None = None
         self._cancelled_s: float | None = None
         self._stopped_s: float | None = None
         self._looker = LatestRunner("run", self, self._take, self._fail)
@@ -185,7 +185,7 @@ class RunMonitor(QObject, Generic[F]):
 
     # --- steering ---------------------------------------------------------------------------
 
-    def tell(self, word: Word) -> None:
+    def tell(self, word: Command) -> None:
         """Give the process an order, or raise OSError; only a cancel may follow a stop."""
         if not self.under_way or (self._wish in ("stop", "cancel") and word != "cancel"):
             return
@@ -293,7 +293,7 @@ class RunMonitor(QObject, Generic[F]):
             return state
         return "died"
 
-    def _phase_under_way(self, word: Word) -> Phase:
+    def _phase_under_way(self, word: Command) -> Phase:
         if not self.history.begun:
             return "starting"
         if word == "cancel":

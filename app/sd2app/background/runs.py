@@ -15,7 +15,7 @@ from sd2app.background.run_setup import RunSetup
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
 from sd2core.processes import ProcessId
-from sd2core.runs.control import Word
+from sd2core.runs.control import Command
 
 _LIST_MS = 3000
 
@@ -30,7 +30,7 @@ class KnownRun(NamedTuple):
     live: bool
 
 
-class Sentences(NamedTuple):
+class Messages(NamedTuple):
     """Remarks about a run of one kind; ``{}`` stands for its name."""
 
     busy: str  # why no other can be started
@@ -56,7 +56,7 @@ class Runs(QObject, Generic[Run]):
         follow: Callable[..., Run],
         settings: Settings,
         remembered: str,
-        sentences: Sentences,
+        sentences: Messages,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
@@ -144,7 +144,7 @@ class Runs(QObject, Generic[Run]):
         self.follow(self._monitor_of(path, self, process=process), under_way=True)
         self.refresh()
 
-    def tell(self, word: Word) -> None:
+    def tell(self, word: Command) -> None:
         """Give the run in view an order."""
         run = self.run
         if run is not None:

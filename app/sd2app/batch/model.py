@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject
 
 from sd2app.background.latest import LatestRunner
-from sd2app.background.runs import KnownRun, Runs, Sentences
+from sd2app.background.runs import KnownRun, Messages, Runs
 from sd2app.batch.results import BatchResults
 from sd2app.batch.run import BatchMonitor, plan_of
 from sd2app.batch.setup import BatchSetupModel
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from sd2core.batch.estimate import BatchEstimate
     from sd2core.batch.plan import BatchPlan
 
-_SENTENCES = Sentences(
+_SENTENCES = Messages(
     busy="A process is at work in {} already.",
     found="{} is at work. File → Batch… shows it.",
     finished="{} has come to its end. File → Batch… opens results.",

@@ -17,7 +17,7 @@ from sd2core.files.texts import whole_lines
 from sd2core.placements.placements import Place
 from sd2core.sensor import Vector, VirtualSensor, spherical_from_position
 
-_MOST_ROWS = 50_000
+_MAX_ROWS = 50_000
 """Limit of shown rows; the file has all."""
 _COLUMNS = ("Recording", "Subject", "Place", "Seen from the body", "Maps")
 
@@ -97,7 +97,7 @@ def _rows(file: Path) -> list[Result]:
             row = _row(line)
             if row is not None:
                 rows.setdefault((row.recording, row.placement or 0), row)
-            if len(rows) >= _MOST_ROWS:
+            if len(rows) >= _MAX_ROWS:
                 break
     return list(rows.values())
 

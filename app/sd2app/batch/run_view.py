@@ -25,7 +25,7 @@ from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.run_panel import Button, RunView, RunWords
 from sd2app.widgets.table import RecordTable
 
-_MOST_STEPS = 6
+_MAX_STEPS = 6
 _NO_DATASET = "No data set has been exported here yet."
 _FAILURES, _FAILURES_PAGE = "Failures", 2
 _WORDS = RunWords(
@@ -55,7 +55,7 @@ class BatchRunView(RunView[BatchMonitor]):
 
     def _bars(self) -> QGridLayout:
         self._steps: list[tuple[QLabel, ProgressBar, QLabel]] = []
-        for _ in range(_MOST_STEPS):
+        for _ in range(_MAX_STEPS):
             widgets = (QLabel(self), ProgressBar("", height_px=12), sentence(""))
             widgets[2].setWordWrap(False)
             self._steps.append(widgets)

@@ -49,7 +49,7 @@ _STEP_TEXT: dict[OptionalStep, tuple[str, str]] = {
     "export": ("Export as", "Segments of all maps with their labels, to learn from"),
 }
 _FORMAT_TEXT = {"zarr": "Zarr", "h5": "HDF5", "npz": "NPZ"}
-_MOST_FACTS = 8
+_MAX_FACTS = 8
 
 
 class BatchSetupView(QWidget):
@@ -61,7 +61,7 @@ class BatchSetupView(QWidget):
         self._list = _Paths(self._drop, self)
         self._list.itemSelectionChanged.connect(self._follow_selection)
         self._total = title("", "What the batch would take")
-        self._facts = FactRows(_MOST_FACTS, at_the_edge=False, parent=self)
+        self._facts = FactRows(_MAX_FACTS, at_the_edge=False, parent=self)
         self._problem = sentence("")
         estimate = (rule(), self._total, self._facts, self._problem, STRETCH)
         parts = (self._recordings_row(), (self._list, 1), self._form(), *estimate, self._buttons())
@@ -148,7 +148,7 @@ class BatchSetupView(QWidget):
         made = None if why_not else batch.estimate
         self._total.setVisible(made is not None)
         self._total.setText("" if made is None else estimate_headline(made))
-        self._facts.show_facts(() if made is None else estimate_facts(made)[:_MOST_FACTS])
+        self._facts.show_facts(() if made is None else estimate_facts(made)[:_MAX_FACTS])
         text = why_not if made is None else unusable_text(made)
         bad = made is not None or batch.refused
         bad |= any(entry.problem for entry in self._setup.data)

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 from PySide6.QtCore import QObject
 
 from sd2app.background.run_monitor import CommandRun, History
-from sd2app.background.runs import KnownRun, Runs, Sentences, free_folder
+from sd2app.background.runs import KnownRun, Messages, Runs, free_folder
 from sd2app.settings import Settings
 from sd2app.training.command_runs import known_commands
 from sd2app.training.model import quoted
@@ -27,7 +27,7 @@ from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder, last_o
 _OF_TERMINALS = {"json", "progress_json"}
 _OPENED = ("recording", "recordings", "mesh", "path", "paths")
 """Names of arguments that the open recording is for."""
-_SENTENCES = Sentences(
+_SENTENCES = Messages(
     busy="{} is under way. Wait for it, or stop it.",
     found="{} is under way. File → Any command… shows it.",
     finished="{} is done. File → Any command… shows what it printed.",

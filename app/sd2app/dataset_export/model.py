@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 from PySide6.QtCore import QObject
 
 from sd2app.background.latest import Emit, LatestRunner
-from sd2app.background.runs import KnownRun, Runs, Sentences, free_folder
+from sd2app.background.runs import KnownRun, Messages, Runs, free_folder
 from sd2app.dataset_export.run import Exported, ExportRun
 from sd2app.session.tasks import Job, TaskList
 from sd2app.settings import Settings
@@ -41,7 +41,7 @@ MAPS: dict[str, tuple[MapKind, ...]] = {
 }
 """Kinds of maps that are chosen together; a radar's map is simulated or real."""
 
-_SENTENCES = Sentences(
+_SENTENCES = Messages(
     busy="",
     found="{} is being written. File → Export data set… shows how far it is.",
     finished="",

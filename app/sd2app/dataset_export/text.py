@@ -10,7 +10,7 @@ from sd2app.widgets.text import counted
 if TYPE_CHECKING:
     from sd2core.datasets.forecast import Forecast
 
-_MOST_NAMED = 4
+_MAX_NAMED = 4
 
 
 def size_words(forecast: Forecast, length: int) -> str:
@@ -45,8 +45,8 @@ def split_words(forecast: Forecast) -> str:
 def inertial_words(places: Sequence[str]) -> str:
     """Places of inertial sensors that can be exported: ``at head, left wrist``."""
     names = [place.replace("-", " ") for place in places]
-    more = len(names) - _MOST_NAMED
-    listed = ", ".join(names[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - _MAX_NAMED
+    listed = ", ".join(names[:_MAX_NAMED]) + (f" and {more} more" if more > 0 else "")
     return f"at {listed}" if names else "none placed"
 
 

@@ -18,7 +18,7 @@ from sd2app.session.session import Session
 from sd2core.errors import Sd2Error
 from sd2core.figures.maps import Levels, MapRow, draw_maps, save_maps
 from sd2core.figures.strip_source import (
-    MOST_FRAMES,
+    MAX_FRAMES,
     Row,
     StripOptions,
     StripSource,
@@ -262,7 +262,7 @@ class StripModel(DrawnFigure):
     def choose(self, **changes: object) -> None:
         """Choose other frames, no more than can be drawn."""
         choice = replace(self.choice, **changes)
-        count = min(max(choice.count, 1), MOST_FRAMES)
+        count = min(max(choice.count, 1), MAX_FRAMES)
         super().choose(**{**changes, "count": count, "step": max(choice.step, 1)})
 
     def set_options(self, **changes: object) -> None:

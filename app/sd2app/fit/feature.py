@@ -69,7 +69,7 @@ class FitFeature(Feature):
         """Offer of a fit."""
         return (FitOffer(self.on_screen, self.new_from_video),)
 
-    def take_over(self) -> None:
+    def attach(self) -> None:
         """Follow the fit again: staying elsewhere was a wish about the recording before."""
         self.on_screen.set_following(True)
 

@@ -16,7 +16,7 @@ from sd2app.widgets.text import clock_text
 from sd2core.errors import Sd2Error
 from sd2core.files.edit_lock import BEAT_EVERY_S, edit_lock
 from sd2core.labels.journal import Journal
-from sd2core.labels.recovery import Found, Offer, RecoveryPlace, offers_in
+from sd2core.labels.recovery import Found, Recoverable, RecoveryPlace, offers_in
 from sd2core.labels.spans import Labels
 from sd2core.recording.edited import differing, edited_fields
 from sd2core.recording.recording import Recording
@@ -45,8 +45,8 @@ class LabelAutosave(QObject):
         self._journal: Journal | None = None
         self._keeping = True
         self._refusal = ""
-        self._offers: tuple[Offer, ...] = ()
-        self._wanted: Offer | None = None
+        self._offers: tuple[Recoverable, ...] = ()
+        self._wanted: Recoverable | None = None
         self._recording: Recording | None = None  # the one that the history is of
         self._others: dict[str, Any] = {}  # its other fields, as they are saved or kept
         self._step = 0  # of the history
@@ -69,16 +69,16 @@ class LabelAutosave(QObject):
         return self._document.content is not None and bool(self._refusal)
 
     @property
-    def offer(self) -> Offer | None:
+    def offer(self) -> Recoverable | None:
         """Unsaved labels of an earlier session that are offered, or None."""
         return self._offers[0] if self._offers else None
 
     # --- opening and closing --------------------------------------------------------------
 
-    def take_over(self) -> None:
+    def attach(self) -> None:
         """Begin a session for the recording just opened, unless another window has its labels."""
         recording = self._document.recording
-        if recording is not None and not self._document.goes_on:
+        if recording is not None and not self._document.same_recording:
             self.close()
             self.waiting = Found()
             self._others = edited_fields(recording)
@@ -212,11 +212,11 @@ class LabelAutosave(QObject):
         offers = sorted((*own.offers, *others.offers), key=lambda one: -one.time_unix_s)
         return Found(tuple(offers), (*own.notes, *others.notes))
 
-    def is_of_open(self, offer: Offer) -> bool:
+    def is_of_open(self, offer: Recoverable) -> bool:
         """True if the offer is for the open recording."""
         return self._place is not None and self._place.recording == offer.recording
 
-    def give_up(self, offer: Offer) -> None:
+    def give_up(self, offer: Recoverable) -> None:
         """Discard an offer; one that was discarded before is deleted."""
         own = self._place if self.is_of_open(offer) else None
         place = own or RecoveryPlace(self._root, offer.recording)
@@ -232,14 +232,14 @@ class LabelAutosave(QObject):
         self.waiting = Found(tuple(one for one in self.waiting.offers if one != offer))
         self.changed.emit()
 
-    def ask_for(self, offer: Offer) -> None:
+    def ask_for(self, offer: Recoverable) -> None:
         """Offer these labels, now or when their recording is open."""
         self._wanted = offer
         if self._place is not None and self._place.held:
             self._look_for_offers(self._place)
             self.changed.emit()
 
-    def changed_others(self, offer: Offer) -> list[str]:
+    def changed_others(self, offer: Recoverable) -> list[str]:
         """Name what an offer changes besides labels, in words."""
         recording = self._document.recording
         if offer.others is None or recording is None:
@@ -287,7 +287,9 @@ class LabelAutosave(QObject):
         self._offers = tuple(self._other_than_open(place, (*asked, *others)))
         self.notes = found.notes
 
-    def _other_than_open(self, place: RecoveryPlace, offers: Iterable[Offer]) -> Iterable[Offer]:
+    def _other_than_open(
+        self, place: RecoveryPlace, offers: Iterable[Recoverable]
+    ) -> Iterable[Recoverable]:
         """Offers that differ from what is open; the others are deleted as redundant."""
         for offer in offers:
             if offer.labels != self._document.labels or self.changed_others(offer):

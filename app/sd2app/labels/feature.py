@@ -385,9 +385,9 @@ class LabelsFeature(Feature):
         if brought and recording is not None and recording.unlabelled:
             self.model.set_labels(document.labels)
 
-    def take_over(self) -> None:
+    def attach(self) -> None:
         """Show the labels of the recording that was opened."""
-        self.autosave.take_over()
+        self.autosave.attach()
         self._follow_capture()
 
     def drop_of(self, path: Path) -> Drop | None:

@@ -28,8 +28,8 @@ _WAYS: dict[Way, str] = {
     "add": "on tracks of their own",
     "replace": "instead of all labels of this recording",
 }
-_MOST_NAMED = 6
-_MOST_FACTS = 6
+_MAX_NAMED = 6
+_MAX_FACTS = 6
 
 
 def label_files() -> str:
@@ -75,8 +75,8 @@ def _spans(found: Incoming) -> str:
 
 
 def _names(names: Sequence[str]) -> str:
-    more = len(names) - _MOST_NAMED
-    shown = ", ".join(names[:_MOST_NAMED])
+    more = len(names) - _MAX_NAMED
+    shown = ", ".join(names[:_MAX_NAMED])
     return f"{shown} and {more} more" if more > 0 else shown
 
 
@@ -104,7 +104,7 @@ class LabelImportDialog(QDialog):
         self._observation = Choice("Which of the videos in the file", self)
         self._observation.currentTextChanged.connect(self._observe)
         self._observation_name = QLabel("Observation", self)
-        self._facts = FactRows(_MOST_FACTS, at_the_edge=False, parent=self)
+        self._facts = FactRows(_MAX_FACTS, at_the_edge=False, parent=self)
         self._said, self._consequence = sentence(""), sentence("")
         self._way = Choice("What becomes of the labels that are there", self, _WAYS)
         self._way.show_value("add" if labels.spans else "replace")

@@ -26,7 +26,7 @@ from sd2app.widgets.text import clock_text, counted
 from sd2core.errors import Sd2Error
 from sd2core.labels.comparison import compare
 from sd2core.labels.files import write_labels
-from sd2core.labels.recovery import Offer
+from sd2core.labels.recovery import Recoverable
 
 _SAID = (
     "Edits that were not saved when the program ended. Open a recording to see what they change."
@@ -36,7 +36,7 @@ _ROW_PX, _MARGIN_PX = 24, 16
 _HEADINGS = ("Recording", "Edits that were not saved", "Holds", "")
 
 
-def _edits_text(offer: Offer) -> str:
+def _edits_text(offer: Recoverable) -> str:
     """Number of edits, and time and name of the last."""
     edits, until = counted(offer.edits, "edit"), clock_text(offer.time_unix_s)
     return f"{edits} until {until}, the last “{offer.last}”"
@@ -91,7 +91,7 @@ class LabelNotice(Notice):
             button.setVisible(name in shown)
         self.show_words(head, "\n".join(filter(None, (text, *autosave.notes))))
 
-    def _offered(self, offer: Offer, others: list[str]) -> str:
+    def _offered(self, offer: Recoverable, others: list[str]) -> str:
         """Offer, compared with what is open."""
         holds, difference = offer.labels, compare(self._document.labels, offer.labels)
         spans = counted(len(holds.spans), "span")
@@ -171,7 +171,7 @@ class RecoverLabelsDialog(QDialog):
         self._follow()
 
     @property
-    def offer(self) -> Offer | None:
+    def offer(self) -> Recoverable | None:
         """Offer of the current row."""
         item = self._list.currentItem()
         return None if item is None else item.data(0, Qt.ItemDataRole.UserRole)

@@ -16,7 +16,7 @@ HEADER_PX = 24
 """Height of the title row of a map, which is all of a folded one."""
 BELOW_PX = 4
 """Room below a map: the border that is dragged."""
-LEAST_PX = HEADER_PX + 72 + BELOW_PX
+MIN_PX = HEADER_PX + 72 + BELOW_PX
 _KEPT = "maps/arrangement"
 
 
@@ -30,7 +30,7 @@ class Row(NamedTuple):
 def heights_px(rows: Sequence[Row], room_px: int) -> list[int]:
     """Heights of all maps; they fill the room, or exceed it where each is as low as allowed."""
     heights = [
-        HEADER_PX if row.folded else 0 if row.wanted_px is None else max(row.wanted_px, LEAST_PX)
+        HEADER_PX if row.folded else 0 if row.wanted_px is None else max(row.wanted_px, MIN_PX)
         for row in rows
     ]
     open_rows = [index for index, row in enumerate(rows) if not row.folded]
@@ -38,7 +38,7 @@ def heights_px(rows: Sequence[Row], room_px: int) -> list[int]:
     left = room_px - sum(heights)
     for count, index in enumerate(sharing):
         share = left // (len(sharing) - count)
-        grown = max(heights[index] + share, heights[index], LEAST_PX)
+        grown = max(heights[index] + share, heights[index], MIN_PX)
         left -= grown - heights[index]
         heights[index] = grown
     return heights
@@ -71,7 +71,7 @@ class Arrangement(QObject):
 
     def set_height(self, name: str, height_px: int | None) -> None:
         """Give a map a height; None lets it share what is left over."""
-        wanted_px = None if height_px is None else max(height_px, LEAST_PX)
+        wanted_px = None if height_px is None else max(height_px, MIN_PX)
         self._set(name, self._rows[name]._replace(wanted_px=wanted_px))
 
     def move(self, name: str, other: str, below: bool) -> None:

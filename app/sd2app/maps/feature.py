@@ -127,7 +127,7 @@ class MapsFeature(Feature):
         self._spectrum = SpectrumView(self._session)
         return {"spectrum": pane((self._spectrum, 1), levels)}
 
-    def take_over(self) -> None:
+    def attach(self) -> None:
         """Compute the map of the recording that was opened."""
         self._session.follow_capture(new=True)
-        self.synthesis.take_over()
+        self.synthesis.attach()

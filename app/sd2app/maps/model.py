@@ -158,7 +158,7 @@ class SynthesisModel(QObject):
 
     # --- requests -------------------------------------------------------------------------
 
-    def take_over(self) -> None:
+    def attach(self) -> None:
         """Start on the mesh of the document that is open now."""
         self._stop()
         self._synthesizers = None
@@ -169,7 +169,7 @@ class SynthesisModel(QObject):
         options = replace(PRESETS["paper"], count=self._session.document.count)
         if mesh is not None and mesh.faces is None:
             options = replace(options, visibility="none")
-        self._accuracy.take_over(mesh, options)
+        self._accuracy.attach(mesh, options)
         if mesh is None:
             self._announce()
             return
@@ -195,7 +195,7 @@ class SynthesisModel(QObject):
         self._synthesizers.limbs = synthesizers.limbs
         self._prefetcher.forget()
         self._partial.mark_stale()
-        self._accuracy.take_over(mesh, options)
+        self._accuracy.attach(mesh, options)
         self._follow()
 
     def made_by(self) -> tuple[Callable[[], Synthesizer], VirtualSensor] | None:

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QToolButton
 
 from sd2app.session.session import Session
 
-_LEAST_M = 0.05
+_MIN_M = 0.05
 """A sensor as near as this sees what the radar sees."""
 
 
@@ -31,7 +31,7 @@ class RadarPlaceBadge(QToolButton):
         """Say where the sensor stands; True if that changed."""
         maps = self._session.maps
         away_m = math.hypot(*self._session.sensor.sensor.position_m)
-        apart = maps.synthetic.map is not None and maps.real.map is not None and away_m >= _LEAST_M
+        apart = maps.synthetic.map is not None and maps.real.map is not None and away_m >= _MIN_M
         go = "Go to the radar's place"
         words: tuple[str, ...] = (
             f"Synthetic: seen from {away_m:.1f} m beside the radar · {go}",

@@ -9,7 +9,7 @@ from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QFrame, QMenu, QScrollArea, QScrollBar, QWidget
 
-from sd2app.maps.arrangement import BELOW_PX, HEADER_PX, LEAST_PX, Arrangement, heights_px
+from sd2app.maps.arrangement import BELOW_PX, HEADER_PX, MIN_PX, Arrangement, heights_px
 from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.difference_view import DifferenceView
 from sd2app.maps.heatmap import HeatmapView
@@ -66,7 +66,7 @@ class MapStack(QScrollArea):
         self._bar.valueChanged.connect(self.verticalScrollBar().setValue)
         self.verticalScrollBar().valueChanged.connect(self._bar.setValue)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.setMinimumHeight(LEAST_PX)
+        self.setMinimumHeight(MIN_PX)
         for name, view in self._named.items():
             view.setParent(self._content)
             view.menu_parts = (partial(self._fill_menu, name),)
@@ -153,7 +153,7 @@ class MapStack(QScrollArea):
     def scroll(self, angle: int) -> bool:
         """Scroll by a turn of the wheel, in Qt's units; False where all maps are in view."""
         bar = self.verticalScrollBar()
-        bar.setValue(bar.value() - round(angle / _NOTCH * LEAST_PX / 2))
+        bar.setValue(bar.value() - round(angle / _NOTCH * MIN_PX / 2))
         return bar.maximum() > 0
 
     def under(self, name: str, y_px: float) -> tuple[str, bool] | None:
@@ -186,7 +186,7 @@ class MapStack(QScrollArea):
         inner = self.verticalScrollBar()
         self._bar.setRange(inner.minimum(), inner.maximum())
         self._bar.setPageStep(inner.pageStep())
-        self._bar.setSingleStep(LEAST_PX)
+        self._bar.setSingleStep(MIN_PX)
         self._bar.setGeometry(self.width() - MARGIN_PX, 0, MARGIN_PX, self.height())
         self._bar.setVisible(inner.maximum() > 0)
         self.arranged.emit()

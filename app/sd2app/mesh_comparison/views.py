@@ -23,9 +23,9 @@ from sd2core.mesh.presence import runs
 _TITLE_PX = 24
 _GREY = 56
 """Grey value of the ground without a video."""
-_LEAST_OPACITY = 0.2
+_MIN_OPACITY = 0.2
 """Lowest opacity, so that the compared meshes stay visible."""
-_LEAST_MPS = 0.2
+_MIN_MPS = 0.2
 """Smallest range of the velocity axis."""
 
 
@@ -76,7 +76,7 @@ class ComparedPicture(Canvas):
         else:
             picture = np.full((camera.height, camera.width, 3), _GREY, np.uint8)
         box = paint_picture(painter, ground, picture)
-        opacity = max(self._overlay.style.opacity, _LEAST_OPACITY)
+        opacity = max(self._overlay.style.opacity, _MIN_OPACITY)
         draw_mesh(painter, box, comparison.mesh(self._number), time_s, camera, colour, opacity)
 
 
@@ -103,7 +103,7 @@ class JointCurves(SeekingPlot):
         painter.drawText(heading, AT_RIGHT, "towards the sensor +  /  away −   m/s")
         curves = [self._comparison.curve(number) for number in (0, 1)]
         known = np.concatenate([velocity[np.isfinite(velocity)] for _, velocity in curves])
-        limit = max(1.1 * float(np.abs(known).max(initial=0.0)), _LEAST_MPS)
+        limit = max(1.1 * float(np.abs(known).max(initial=0.0)), _MIN_MPS)
 
         def y_of(velocity_mps: float) -> float:
             return plot.center().y() - velocity_mps / limit * plot.height() / 2

@@ -20,7 +20,7 @@ _STEEPEST_DEG = 89.5
 _NEAREST_M = 0.05
 _FARTHEST_M = 500.0
 _ORBIT_DEG_PER_PX = 0.35
-_LEAST_PX_PER_M = 4.0
+_MIN_PX_PER_M = 4.0
 _FARTHEST_DRAG_M = 60.0
 
 Preset = Literal["overview", "camera", "sensor", "side", "top"]
@@ -182,7 +182,7 @@ def drag_along(
     slope = np.array([unit @ right, unit @ down])
     climb = float(unit @ forward)
     heading = slope / depth - flat * climb / depth**2  # of the line's picture, at its start
-    if np.linalg.norm(heading) * pose.pixels_per_tangent < _LEAST_PX_PER_M:
+    if np.linalg.norm(heading) * pose.pixels_per_tangent < _MIN_PX_PER_M:
         return None
     heading /= np.linalg.norm(heading)
     wanted = float(pose.tangents(x_px, y_px) @ heading)

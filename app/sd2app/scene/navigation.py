@@ -20,7 +20,7 @@ from sd2app.session.undo import Edits
 _BUTTONS = (Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton, Qt.MouseButton.RightButton)
 Constraint = Literal["view", "vertical", "sight"]
 
-LEAST_GRAB_PX = 14.0
+MIN_GRAB_PX = 14.0
 _MARKER_PX = 9.0
 _CLICK_PX = 4.0
 """Movement below which a press counts as a click."""
@@ -72,7 +72,7 @@ class Navigator:
         if not depth > 0.0 or not scene.sensor_shown:
             return False
         radius_px = scene.sensor_radius_m / scene.pose.metres_per_pixel(position_m)
-        return math.hypot(x - x_px, y - y_px) <= max(LEAST_GRAB_PX, radius_px)
+        return math.hypot(x - x_px, y - y_px) <= max(MIN_GRAB_PX, radius_px)
 
     def marker_at(self, x_px: float, y_px: float) -> int | None:
         """Number of the planned place within reach of a pointer, the nearest to it."""

@@ -24,7 +24,7 @@ from sd2app.scene.backend import GL_BROKEN, GL_MISSING, NoOpenGL, Prepare, missi
 
 _IDLE_MS = 160
 _SUPERSAMPLING = 2
-_MOST_PIXELS = 4_000_000
+_MAX_PIXELS = 4_000_000
 
 
 class ImageBackend(QWidget):
@@ -115,7 +115,7 @@ class ImageBackend(QWidget):
         size = QSize(max(self.width(), 1), max(self.height(), 1))
         target = QSize(round(size.width() * ratio), round(size.height() * ratio))
         factor = _SUPERSAMPLING if self._fine else 1
-        if factor**2 * target.width() * target.height() > _MOST_PIXELS:
+        if factor**2 * target.width() * target.height() > _MAX_PIXELS:
             factor = 1
         width, height = factor * target.width(), factor * target.height()
         window.SetSize(width, height)

@@ -13,7 +13,7 @@ from sd2app.widgets.inputs import NumberBox
 from sd2app.widgets.layouts import column_of, form_of
 from sd2app.widgets.panel import sentence, show_words, side_by_side
 from sd2app.widgets.plot import Themed
-from sd2core.doppler.alignment import LEAST_WITHIN_S
+from sd2core.doppler.alignment import MIN_WITHIN_S
 
 _ABOUT = (
     "Mean velocity and motion of the synthetic map, compared with the radar's at each time offset."
@@ -30,7 +30,7 @@ class AlignmentDialog(QDialog):
         self._chart = ChartView(display, "Correlation over offsets", offset_chart(model))
         self._result, self._problem = sentence("", "plain"), sentence("", "warning")
         self._within = NumberBox(
-            LEAST_WITHIN_S, 600.0, " s", "How far from the present offset to search, either way",
+            MIN_WITHIN_S, 600.0, " s", "How far from the present offset to search, either way",
             decimals=1, step=1.0,
         )  # fmt: skip
         self._within.show_value(model.within_s)

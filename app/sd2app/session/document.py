@@ -53,7 +53,9 @@ class DocumentModel(QObject):
         self.content: Content | None = None  # all parts; None while nothing is open
         self.clutter: Clutter = CLUTTER  # method that removes static echoes from the capture
         self.count: HowCounted = "expected"  # of vertices whose mesh states its uncertainty
-        self.goes_on = False  # the recording is the one that was open before, with other files
+        self.same_recording = (
+            False  # the recording is the one that was open before, with other files
+        )
         self.growing = False  # a radar is listened to, and adds frames
         self._base: Recording | None = None
         self._runner = ListedRunner("open", jobs, self, self._receive)
@@ -185,7 +187,7 @@ class DocumentModel(QObject):
             return
         if before is not None:
             before.close()
-        self.goes_on = False
+        self.same_recording = False
         self._tell_opened(unsaved=False)
 
     def grow(self, radar_map: DopplerMap) -> None:
@@ -234,9 +236,9 @@ class DocumentModel(QObject):
         before, self.content = self.content, content
         if before is not None and before.video is not content.video:
             before.close()
-        self.goes_on = before is not None and content.recording is self._base
-        unsaved = self.goes_on and self.modified
-        if before is not None and self.goes_on:
+        self.same_recording = before is not None and content.recording is self._base
+        unsaved = self.same_recording and self.modified
+        if before is not None and self.same_recording:
             _keep_edits(before.recording, content.recording)
         self.growing = False
         self._tell_opened(unsaved)

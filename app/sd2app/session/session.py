@@ -66,7 +66,7 @@ class Session:
         """True while a mesh is open."""
         return self.document.mesh is not None
 
-    def take_over(self) -> None:
+    def attach(self) -> None:
         """Put clock, time window, video and sensor on the recording that was opened."""
         content = self.document.content
         assert content is not None

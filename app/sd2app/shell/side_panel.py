@@ -17,7 +17,7 @@ from sd2app.widgets.panel import outlined, title
 
 _SHOWN, _FOLDED = "panel/shown", "panel/folded"
 _RAIL_PX, _BUTTON_PX, _ICON_PX = 44, 36, 20
-_MOST_SHARE = 0.42
+_MAX_SHARE = 0.42
 """Share of the window that a panel with a width of its own takes before the user says so."""
 _ANY_WIDTH_PX = (1 << 24) - 1  # Qt's largest
 _STEPS = {Qt.Key.Key_Up: -1, Qt.Key.Key_Down: 1}
@@ -239,7 +239,7 @@ class PageWidths(QObject):
         *others, beside, now_px = self._splitter.sizes()
         all_px = sum(others) + beside + now_px
         usual_px = self._usual.get(self._shown, 0)
-        usual_px = max(min(usual_px, round(_MOST_SHARE * all_px)), self._otherwise_px)
+        usual_px = max(min(usual_px, round(_MAX_SHARE * all_px)), self._otherwise_px)
         wide_px = self._settings.stored(self._name(self._shown), usual_px)
         part = self._splitter.widget(self._splitter.count() - 1)
         assert part is not None

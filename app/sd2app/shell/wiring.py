@@ -159,7 +159,7 @@ class Features:
 
 def _take_over(session: Session, features: Features) -> None:
     if session.has_content():
-        session.take_over()
+        session.attach()
         # Each of them uses what those before it have taken over.
         for feature in (
             features.labels,
@@ -168,7 +168,7 @@ def _take_over(session: Session, features: Features) -> None:
             features.maps,
             features.fit,
         ):
-            feature.take_over()
+            feature.attach()
 
 
 def side_pages(features: Features, views: Mapping[str, QWidget]) -> dict[str, QWidget]:

@@ -70,6 +70,6 @@ class SuggestionsFeature(Feature):
         """The bar below the maps."""
         return {"suggestions": SuggestionBar(self.model, self._shell.action)}
 
-    def take_over(self) -> None:
+    def attach(self) -> None:
         """Begin without suggestions."""
         self.model.open()

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sd2app.background.runs import KnownRun, Sentences
+from sd2app.background.runs import KnownRun, Messages
 from sd2app.widgets.text import clock_text
 from sd2core.runs.command_folder import CommandFolder, commands_in
 
-SENTENCES = Sentences(
+SENTENCES = Messages(
     busy="{} is under way. Wait for it, or stop it.",
     found="{} is under way. The Train panel shows it.",
     finished="{} is done. The Train panel shows what came of it.",

@@ -11,7 +11,7 @@ from typing import Literal
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.runs import KnownRun, Runs, Sentences, free_folder
+from sd2app.background.runs import KnownRun, Messages, Runs, free_folder
 from sd2app.settings import Settings
 from sd2app.training.pair_maker import PairMaker
 from sd2app.training.run import TrainingMonitor
@@ -32,7 +32,7 @@ Closing = Literal["ask", "keep", "stop"]
 
 CLOSING: tuple[Closing, ...] = ("ask", "keep", "stop")
 """Choices for a run under way when the window is closed."""
-_SENTENCES = Sentences(
+_SENTENCES = Messages(
     busy="{} is being trained. Wait for it, or stop it.",
     found="{} is being trained. The Train panel shows it.",
     finished="{} is trained. The Train panel puts its model to use.",

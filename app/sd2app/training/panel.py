@@ -33,7 +33,7 @@ from sd2app.widgets.run_panel import Button, RunPanel, RunView, RunWords
 
 _CLOSING_TEXT = {"ask": "ask", "keep": "keep training", "stop": "stop, keep the best"}
 _PAD = 1.12
-_LEAST_RATIO = 1.6
+_MIN_RATIO = 1.6
 
 
 class TrainingPanel(RunPanel):
@@ -174,7 +174,7 @@ def training_chart(history: TrainingHistory) -> Chart:
     )
     return Chart(
         Scale(0.0, last or 1.0, whole=last >= 2),
-        Scale.around(shown, _PAD, _LEAST_RATIO, tick_text),
+        Scale.around(shown, _PAD, _MIN_RATIO, tick_text),
         "epochs",
         "RMSE",
         curves,

@@ -10,14 +10,14 @@ from typing import Any, ClassVar, Literal, NamedTuple, TypeVar, get_args
 from sd2app.background.run_monitor import History, RunMonitor, reason_in
 from sd2core.errors import Sd2Error
 from sd2core.options.training import TrainConfig
-from sd2core.runs.pace import Pace
+from sd2core.runs.pace import Throughput
 from sd2core.train.config import read_config
 from sd2core.train.folder import TrainingFolder
 
 Outcome = Literal["finished", "stopped", "cancelled", "failed"]
 T = TypeVar("T")
 
-_MOST_POINTS = 2000
+_MAX_POINTS = 2000
 """Limit of kept steps; beyond it, every second one is dropped."""
 
 
@@ -27,7 +27,7 @@ class StepHistory(History):
     def __init__(self) -> None:
         self.begun = False
         self.steps_done = self.total = 0  # a total of 0 is not known
-        self._pace = Pace()
+        self._pace = Throughput()
         self._stride, self._skipped = 1, 0
 
     @property
@@ -52,7 +52,7 @@ class StepHistory(History):
         if self._skipped >= self._stride:
             self._skipped = 0
             points.append(point)
-            if len(points) > _MOST_POINTS:
+            if len(points) > _MAX_POINTS:
                 del points[1::2]
                 self._stride *= 2
 

@@ -28,7 +28,7 @@ from sd2core.train.data import Split, split_subjects
 INPUTS = ("map", "limbs", "kinematics")
 _DATA = DataConfig(pairs=(Path(),))
 _PAIRS, _KNOWN = "training/pairs", "training/known_pairs"
-_MOST_KNOWN = 10
+_MAX_KNOWN = 10
 _DEFAULTS: dict[str, str | int | float] = {
     "model": "s4",
     "inputs": "map",
@@ -101,7 +101,7 @@ class TrainingSetupModel(RunSetup[Store]):
     def keep(self, data: tuple[Store, ...]) -> None:
         """Learn from these pairs, and remember them, also after they are removed."""
         known = [*(store.path for store in reversed(data)), *self._settings.paths(_KNOWN)]
-        self._settings.set_paths(_KNOWN, list(dict.fromkeys(known))[:_MOST_KNOWN])
+        self._settings.set_paths(_KNOWN, list(dict.fromkeys(known))[:_MAX_KNOWN])
         super().keep(data)
 
     @property

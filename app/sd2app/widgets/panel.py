@@ -174,7 +174,7 @@ class FactRows(QWidget):
                 label.setVisible(row < len(facts))
 
 
-_LEAST_LETTERS = 7
+_MIN_LETTERS = 7
 """Of a text that is cut short; fewer say nothing."""
 
 
@@ -209,7 +209,7 @@ class ElidedLabel(QLabel):
             text = self.fontMetrics().elidedText(
                 self.text(), Qt.TextElideMode.ElideRight, self.width()
             )
-            cut = text != self.text() and len(text) < _LEAST_LETTERS
+            cut = text != self.text() and len(text) < _MIN_LETTERS
             painter.drawText(self.rect(), int(self.alignment()), "…" if cut else text)
 
 

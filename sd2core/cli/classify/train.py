@@ -104,7 +104,7 @@ def _train(options: Train) -> int:
     from sd2core.classify.splitting import split_clips
     from sd2core.classify.training import train
     from sd2core.files.atomic import atomic_write_text
-    from sd2core.runs.pace import Pace
+    from sd2core.runs.pace import Throughput
 
     known = clips_of(options.data, maps, options.denoiser)
     parts = split_clips(
@@ -122,7 +122,7 @@ def _train(options: Train) -> int:
     chosen = _options(options)
     with _watching(options, chosen.steps) as watch:
         made = train(parts.training, parts.validation, known, chosen, about=about, watch=watch)
-    pace = Pace()
+    pace = Throughput()
     for event in made.events:
         if event["event"] == "step":
             pace.take(event["step"], event["elapsed_s"])

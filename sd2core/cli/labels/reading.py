@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sd2core.recording.recording import Recording
     from sd2core.timebase import Timebase
 
-_MOST_FRAMES = 100_000_000
+_MAX_FRAMES = 100_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,11 +144,11 @@ def with_rate(options: FrameTimes, timebase: Timebase | None, *labels: Labels) -
         return timebase
     end_s = max((span.end_s for one in labels for span in one.spans), default=0.0)
     frames = max(math.ceil(end_s * options.fps - 1e-6), 1)
-    if frames > _MOST_FRAMES:
+    if frames > _MAX_FRAMES:
         raise Sd2Error(
             f"The labels end at {end_s:g} s; at {options.fps:g} frames/s these are"
             f" {frames:,} frames",
-            f"up to {_MOST_FRAMES:,}",
+            f"up to {_MAX_FRAMES:,}",
         )
     return Timebase.regular(frames, options.fps)
 

@@ -17,7 +17,7 @@ from sd2core.options.records import ARGUMENT, OptionError
 from sd2core.options.shared import Json, Overwrite
 
 if TYPE_CHECKING:
-    from sd2core.labels.recovery import Offer
+    from sd2core.labels.recovery import Recoverable
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +82,7 @@ def _recover(options: Recover) -> None:
         _print(offers)
 
 
-def _write(out: Path, options: Recover, offers: tuple[Offer, ...]) -> None:
+def _write(out: Path, options: Recover, offers: tuple[Recoverable, ...]) -> None:
     from sd2core.labels.files import write_labels
 
     if not offers:
@@ -98,7 +98,7 @@ def _write(out: Path, options: Recover, offers: tuple[Offer, ...]) -> None:
         print(f"Wrote {out} with {counted(len(offers[0].labels.spans), 'span')}")
 
 
-def _print(offers: tuple[Offer, ...]) -> None:
+def _print(offers: tuple[Recoverable, ...]) -> None:
     rows = [("until", "edits", "last edit", "spans", "", "recording")]
     rows += [
         (
@@ -114,7 +114,7 @@ def _print(offers: tuple[Offer, ...]) -> None:
     print_rows(rows, right=(1, 3))
 
 
-def _data(offer: Offer) -> dict[str, Any]:
+def _data(offer: Recoverable) -> dict[str, Any]:
     return {
         "recording": str(offer.recording),
         **picked(offer, "edits", "last", "time_unix_s"),

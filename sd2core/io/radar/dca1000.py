@@ -39,7 +39,7 @@ _EXPECTED = "samples of a DCA1000 (.bin) with the .cfg or .mmwave.json of the ra
 _PART = re.compile(r"(?P<base>.+)_Raw_(?P<number>\d{1,6})", re.IGNORECASE)
 _WORD = np.dtype("<i2")
 _JUDGED_WORDS = 1 << 18
-_MOST_FRAMES = 10**8
+_MAX_FRAMES = 10**8
 
 
 def load_dca1000(path: Path) -> RadarCapture:
@@ -205,7 +205,7 @@ def _frame_count(
     _check_lanes(setup, str(setup_path))
     if any(size % _WORD.itemsize for size in sizes):
         raise Sd2Error(f"{parts[0]} has {total:,} bytes", f"whole words and {told}", remedy)
-    if not 0 < frames < _MOST_FRAMES or (left and setup.frames):
+    if not 0 < frames < _MAX_FRAMES or (left and setup.frames):
         raise Sd2Error(f"{parts[0]} has {total:,} bytes in {len(parts)} parts", told, remedy)
     if setup.frames and frames > setup.frames:
         raise Sd2Error(

@@ -46,9 +46,9 @@ _WORDS: dict[Word, np.dtype[Any]] = {
 }
 _FULL_SCALE = np.float32(2.0**15)  # of int16
 _EXPECTED = f"a radar capture that `sd2 listen` wrote: {HEAD_NAME}, {SAMPLES_NAME}, {INDEX_NAME}"
-_MOST_FRAMES = 3 * 10**7
-_MOST_FRAME_BYTES = 2**30
-_MOST_BITS = 32
+_MAX_FRAMES = 3 * 10**7
+_MAX_FRAME_BYTES = 2**30
+_MAX_BITS = 32
 
 
 class GrowingHead(BaseModel):
@@ -133,10 +133,10 @@ def read_head(folder: Path) -> GrowingHead:
     with errors_in(path):
         with faults_in(path, _EXPECTED):
             head = GrowingHead.model_validate(read_json(path, _EXPECTED))
-        if head.frame_bytes > _MOST_FRAME_BYTES or head.radar.adc_bits > _MOST_BITS:
+        if head.frame_bytes > _MAX_FRAME_BYTES or head.radar.adc_bits > _MAX_BITS:
             raise Sd2Error(
                 f"Frames have {head.frame_bytes:,} bytes, of {head.radar.adc_bits} bits",
-                f"at most {_MOST_FRAME_BYTES:,} bytes, of {_MOST_BITS} bits",
+                f"at most {_MAX_FRAME_BYTES:,} bytes, of {_MAX_BITS} bits",
             )
         if head.word == "uint16" and head.radar.sampling != "real":
             raise Sd2Error(f"It holds {head.radar.sampling} samples as uint16", "real ones")
@@ -168,10 +168,10 @@ def load_growing(path: Path) -> RadarCapture:
     folder = folder_of(path)
     head = read_head(folder)
     frames = frame_count(folder, head)
-    if not 0 < frames <= _MOST_FRAMES:
+    if not 0 < frames <= _MAX_FRAMES:
         raise Sd2Error(
             f"{folder} holds {frames:,} whole frames of {head.frame_bytes:,} bytes",
-            f"1 to {_MOST_FRAMES:,} frames",
+            f"1 to {_MAX_FRAMES:,} frames",
         )
     entries = read_entries(folder, frames)
     with errors_in(folder / INDEX_NAME):

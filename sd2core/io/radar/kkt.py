@@ -43,7 +43,7 @@ TRACK = "Radar file"
 
 _RANGES = _DOPPLERS = 32
 _STILL = _DOPPLERS // 2
-_MOST_FRAMES = 100_000
+_MAX_FRAMES = 100_000
 _COUNTER = 2**16
 _GROUP, _NAME = "DATA_CONFIG", "Gesture_name"
 _EXPECTED = "DS1 and LABEL, as in a gesture recording of a K60168A"
@@ -175,9 +175,9 @@ def _values(file: h5py.File, path: Path) -> NDArray[np.floating]:
             f"floating-point numbers, (2, {_RANGES} ranges, {_DOPPLERS} Doppler bins, frames)",
             "Other sensors' recordings cannot be read",
         )
-    if shape[3] > _MOST_FRAMES:
+    if shape[3] > _MAX_FRAMES:
         raise Sd2Error(
-            f"DS1 of {path} has {shape[3]:,} frames", f"up to {_MOST_FRAMES:,}, about an hour"
+            f"DS1 of {path} has {shape[3]:,} frames", f"up to {_MAX_FRAMES:,}, about an hour"
         )
     values: NDArray[np.floating] = dataset[0]
     good = np.isfinite(values) & (values >= 0)

@@ -49,7 +49,7 @@ class Desk:
         self.failures, self.notes = [], []
         self.trade.failed.connect(self.failures.append)
         self.trade.noted.connect(self.notes.append)
-        self.trade.take_over(still_mesh(), PRESETS["paper"])
+        self.trade.attach(still_mesh(), PRESETS["paper"])
         self.trade.measured.rest_at(HERE)
 
     def choose(self, qtbot, sensor=HERE):
@@ -316,7 +316,7 @@ def test_another_scene_forgets_everything(desk, qtbot):
     trade = desk.trade
     desk.choose(qtbot)
     trade.use(COUNTING[0])
-    trade.take_over(None, PRESETS["paper"])
+    trade.attach(None, PRESETS["paper"])
     assert trade.in_use is None
     assert trade.frames == 0
     assert not trade.measured.can_measure

@@ -44,7 +44,7 @@ class Desk:
     def __init__(self, qtbot: Any, parent: QObject) -> None:
         self.qtbot, self.said = qtbot, list[str]()
         self.session = build_session(parent, Settings.forgetful())
-        self.session.document.opened.connect(self.session.take_over)
+        self.session.document.opened.connect(self.session.attach)
         self.model = ImuModel(self.session, parent)
         self.model.failed.connect(self.said.append)
         self.model.noted.connect(self.said.append)

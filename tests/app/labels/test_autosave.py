@@ -23,7 +23,7 @@ from sd2app.session.tasks import TaskList
 from sd2app.settings import Settings
 from sd2core.labels import edits as core_edits
 from sd2core.labels.files import read_labels, write_labels
-from sd2core.labels.recovery import Found, Offer, RecoveryPlace, offers_in
+from sd2core.labels.recovery import Found, Recoverable, RecoveryPlace, offers_in
 from sd2core.recording.recording import Recording
 
 
@@ -45,7 +45,7 @@ class Desk:
 
     def _take_over(self) -> None:
         self.playback.set_timebase(self.document.content.timebase)
-        self.session.take_over()
+        self.session.attach()
 
     def open(self, path: Path) -> Desk:
         with self.qtbot.waitSignal(self.document.opened, timeout=10_000):
@@ -110,7 +110,7 @@ def recording(mesh: Path) -> Path:
     return Recording.create(mesh.with_name("walk.sd2"), mesh=mesh).folder
 
 
-def left(root: Path) -> list[Offer]:
+def left(root: Path) -> list[Recoverable]:
     """What a process that ended now would leave behind."""
     offers = []
     for folder in root.iterdir():

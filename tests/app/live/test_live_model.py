@@ -33,7 +33,7 @@ def session(qtbot) -> Iterator[Session]:
     parent = QObject()
     made = build_session(parent, Settings.forgetful())
     # As the window does it.
-    made.document.opened.connect(made.take_over)
+    made.document.opened.connect(made.attach)
     made.document.opened.connect(lambda: made.follow_capture(new=True))
     made.document.changed.connect(made.follow_capture)
     yield made

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.maps.arrangement import HEADER_PX, LEAST_PX, Arrangement, Row, heights_px
+from sd2app.maps.arrangement import HEADER_PX, MIN_PX, Arrangement, Row, heights_px
 from sd2app.settings import Settings
 
 NAMES = ("synthetic", "denoised", "real")
@@ -19,12 +19,12 @@ ROWS = st.lists(
 def test_maps_fill_the_room_and_are_never_too_low(rows, room_px):
     heights = heights_px(rows, room_px)
     for row, height in zip(rows, heights, strict=True):
-        assert height == HEADER_PX if row.folded else height >= max(LEAST_PX, row.wanted_px or 0)
+        assert height == HEADER_PX if row.folded else height >= max(MIN_PX, row.wanted_px or 0)
     if any(not row.folded for row in rows):
         assert sum(heights) >= room_px
     # Beyond the room they reach only where each is as low as it may be.
     if sum(heights) > room_px:
-        least = [max(LEAST_PX, row.wanted_px or 0) for row in rows if not row.folded]
+        least = [max(MIN_PX, row.wanted_px or 0) for row in rows if not row.folded]
         assert sum(heights) == sum(least) + HEADER_PX * sum(row.folded for row in rows)
 
 

@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from sd2app.scene.camera import EyePose
-from sd2app.scene.navigation import LEAST_GRAB_PX, Navigator
+from sd2app.scene.navigation import MIN_GRAB_PX, Navigator
 from sd2app.scene.scene import Scene
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.placements import Place
@@ -86,8 +86,8 @@ def test_the_grip_is_wide_enough_for_a_hand(hand: Hand) -> None:
     far = replace(hand.scene.pose, distance_m=200.0)
     hand.scene.pose = far
     where = hand.sensor_px
-    assert hand.navigator.sensor_at(where[0] + LEAST_GRAB_PX - 1, where[1])
-    assert not hand.navigator.sensor_at(where[0] + LEAST_GRAB_PX + 3, where[1])
+    assert hand.navigator.sensor_at(where[0] + MIN_GRAB_PX - 1, where[1])
+    assert not hand.navigator.sensor_at(where[0] + MIN_GRAB_PX + 3, where[1])
 
 
 def test_shift_keeps_the_sensor_on_its_vertical(hand: Hand) -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from moving_spheres import swinging_sphere
 
 from sd2core.accuracy import Choice, places
-from sd2core.accuracy.places import MOST_PLACES, choose_for_places, spread
+from sd2core.accuracy.places import MAX_PLACES, choose_for_places, spread
 from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.trial import synthesizer_for
 from sd2core.doppler import PRESETS
@@ -39,7 +39,7 @@ def test_places_to_check_on_are_the_ends_and_the_middle(count: int) -> None:
     sensors = [VirtualSensor((float(number), 0.0, 0.0)) for number in range(count)]
     chosen = [int(one.position_m[0]) for one in spread(sensors)]
     assert chosen == sorted({*chosen})
-    assert len(chosen) == min(count, MOST_PLACES)
+    assert len(chosen) == min(count, MAX_PLACES)
     assert {chosen[0], chosen[-1]} == {0, count - 1}
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2core.datasets.splitting import borrowed, number_of, split_people
+from sd2core.datasets.splitting import number_of, reassigned, split_people
 from sd2core.errors import Sd2Error
 from sd2core.train.data import Split
 
@@ -48,7 +48,7 @@ def test_the_number_rules_and_exceptions_are_named(people: list[str]) -> None:
     split = split_people(people)
     rule = {name: by_number(name) for name in people}
     moved = {name for name, part in part_of(split).items() if part != rule[name]}
-    assert {*borrowed(as_dict(split))} == moved
+    assert {*reassigned(as_dict(split))} == moved
     counts = [sum(part == one for part in rule.values()) for one in ("test", "validation")]
     if all(1 <= count <= max(1, len(people) // 3) for count in counts) and len(people) > 2:
         assert not moved

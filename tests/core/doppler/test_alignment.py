@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
-from sd2core.doppler.alignment import LEAST_CONFIDENCE, align
+from sd2core.doppler.alignment import MIN_CONFIDENCE, align
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
@@ -47,7 +47,7 @@ def test_a_known_offset_is_found(seed: int, offset_s: float, ours_hz: float, the
     radar = seen(velocity, offset_s + np.arange(0.0, 15.0, 1.0 / theirs_hz), 0.1, seed)
     found = align(video, radar)
     assert found.problem == ""
-    assert found.confidence >= LEAST_CONFIDENCE
+    assert found.confidence >= MIN_CONFIDENCE
     # Well within a frame of the faster of the two.
     assert found.offset_s == pytest.approx(offset_s, abs=0.025)
     assert found.checked() is found

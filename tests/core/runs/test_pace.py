@@ -8,13 +8,13 @@ import pytest
 
 from sd2core.options.training import DataConfig, MachineConfig, ModelConfig, TrainConfig
 from sd2core.runs import pace as module
-from sd2core.runs.pace import Pace, keep_pace, known_pace_s
+from sd2core.runs.pace import Throughput, keep_pace, known_pace_s
 
 KIND = ("fit", "medium")
 
 
 def test_the_first_item_warms_up() -> None:
-    pace = Pace()
+    pace = Throughput()
     assert (pace.each_s, pace.left_s(10)) == (None, None)
     pace.take(3, 60.0)  # a resumed run, and long preparations
     assert pace.each_s is None
@@ -42,7 +42,7 @@ def test_paces_are_kept_by_kind() -> None:
 
 
 def test_the_kinds_of_long_ago_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_MOST_KINDS", 2)
+    monkeypatch.setattr(module, "_MAX_KINDS", 2)
     for number in (1, 2, 1, 3):
         keep_pace(("kind", number), 10.0, 10)
     assert [known_pace_s(("kind", number)) for number in (1, 2, 3)] == [1.0, None, 1.0]

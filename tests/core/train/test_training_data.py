@@ -125,17 +125,17 @@ class TestSegments:
         path = write_pairs(tmp_path / "p.zarr", ("s1",), takes=5, placements=2)
         data = prepare(read_pairs(path), DataConfig((path,)))
         assert data.split.by_take
-        assert {take.name for take in data.learnt_takes} == {"t0", "t1", "t2", "t3"}
+        assert {take.name for take in data.training_takes} == {"t0", "t1", "t2", "t3"}
         several = write_pairs(tmp_path / "several.zarr", ("s1", "s2"), takes=3)
         data = prepare(read_pairs(several), DataConfig((several,), (), ()))
-        assert [take.title for take in data.learnt_takes] == ["s1/t0", "s1/t1", "s2/t0", "s2/t1"]
+        assert [take.title for take in data.training_takes] == ["s1/t0", "s1/t1", "s2/t0", "s2/t1"]
 
     def test_a_lone_take_is_split_by_time(self, tmp_path: Path) -> None:
         lone = write_pairs(tmp_path / "lone.zarr", ("s1",), takes=1, frames=400)
         pairs = read_pairs(lone)
         data = prepare(pairs, DataConfig((lone,)))
         assert data.split.by_take
-        (whole,), (learnt,) = pairs.takes, data.learnt_takes
+        (whole,), (learnt,) = pairs.takes, data.training_takes
         np.testing.assert_array_equal(learnt.radar, whole.radar[:320])
         assert len(data.validation) == 2  # of 72 frames, overlapping: the last 80
         np.testing.assert_array_equal(data.validation.targets[-1], whole.radar[-72:])

@@ -36,7 +36,7 @@ from sd2core.runs.progress import Event, ProgressTail, last_of, read_events, sta
 from sd2core.train.config import config_text
 from sd2core.train.folder import TrainingFolder
 from sd2core.train.start import Ending, begin, go_on
-from sd2core.train.validate import Exam, Validation
+from sd2core.train.validate import Validation, Validator
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 SMALL: dict[str, dict[str, Any]] = {
@@ -253,8 +253,10 @@ class TestLearning:
     ) -> None:
         errors = iter([0.5, 0.4, 0.6, 0.4, 0.5, 0.1])
 
-        def told(model: object, exam: Exam, *_: object) -> Validation:
-            return Validation(next(errors), 1.0, np.zeros(tuple(exam.targets.shape), np.float32))
+        def told(model: object, validator: Validator, *_: object) -> Validation:
+            return Validation(
+                next(errors), 1.0, np.zeros(tuple(validator.targets.shape), np.float32)
+            )
 
         monkeypatch.setattr("sd2core.train.denoiser_loop.validate", told)
         ending = begin(settings(pairs, early_stopping_epochs=3, epochs=6), tmp_path / "run")

@@ -13,7 +13,7 @@ from PySide6.QtGui import QCursor, QGuiApplication, QImage, QWheelEvent
 from PySide6.QtWidgets import QApplication
 from window_models import models_of
 
-from sd2app.maps.arrangement import HEADER_PX, LEAST_PX
+from sd2app.maps.arrangement import HEADER_PX, MIN_PX
 from sd2app.maps.radar_place import RadarPlaceBadge
 from sd2app.maps.spectrum import SpectrumView
 from sd2app.video.view import VideoView
@@ -91,7 +91,7 @@ def test_the_handle_folds_and_opens(stack, qtbot):
     assert view.height() == HEADER_PX
     assert stack.arrangement.row("real").folded
     qtbot.mouseClick(view, LEFT, pos=HANDLE)
-    assert view.height() >= LEAST_PX
+    assert view.height() >= MIN_PX
 
 
 def test_a_double_click_on_the_title_enlarges_and_escape_goes_back(window, stack, qtbot):

@@ -12,7 +12,7 @@ from sd2app.widgets.notices import Notice
 from sd2app.widgets.text import clock_text
 
 _REMARK_MS = 12_000
-_MOST_LINES = 6
+_MAX_LINES = 6
 _NOTHING = "Nothing was said yet."
 
 
@@ -28,7 +28,7 @@ class MessageNotice(Notice):
     def _refresh(self) -> None:
         messages = self._messages
         lines, several = messages.lines, len(messages.lines) > 1 and messages.failed
-        shown = list(lines[-_MOST_LINES:])
+        shown = list(lines[-_MAX_LINES:])
         if several:
             shown = [f"• {line}" for line in shown]
         if len(lines) > len(shown):
