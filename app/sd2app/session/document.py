@@ -53,9 +53,7 @@ class DocumentModel(QObject):
         self.content: Content | None = None  # all parts; None while nothing is open
         self.clutter: Clutter = CLUTTER  # method that removes static echoes from the capture
         self.count: HowCounted = "expected"  # of vertices whose mesh states its uncertainty
-        self.same_recording = (
-            False  # the recording is the one that was open before, with other files
-        )
+        self.same_recording = False  # as was open before, with other files
         self.growing = False  # a radar is listened to, and adds frames
         self._base: Recording | None = None
         self._runner = ListedRunner("open", jobs, self, self._receive)
