@@ -68,7 +68,7 @@ $(COMPILED): $(PROGRAM) $(KERNELS)
 # Needs a connection once; `sd2 fit` fetches them as well, and says what to do without one.
 .PHONY: landmark-models
 landmark-models: $(PROGRAM)
-	@$(BIN)/sd2 fetch-models --if-missing > /dev/null || echo "(Only \`sd2 fit\` needs them.)"
+	@$(BIN)/sd2 doctor --fetch-models --if-missing > /dev/null || echo "(Only \`sd2 fit\` needs them.)"
 
 demo: system-packages $(COMPILED)
 	@scripts/activation.sh

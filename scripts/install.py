@@ -59,7 +59,7 @@ def main() -> int:
     BUILD.mkdir(exist_ok=True)
     if extra == "kernels":
         print("Compiling the kernels (half a minute, once)", flush=True)
-        code = run([str(PYTHON.with_name("sd2")), "warm-up"], waiting="the compiler")
+        code = run([str(PYTHON.with_name("sd2")), "doctor", "--warm-up"], waiting="the compiler")
         return explain(code) if code else 0
     free_gb = shutil.disk_usage(ROOT).free / 1e9
     if free_gb < NEEDED_GB[extra]:

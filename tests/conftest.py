@@ -81,4 +81,4 @@ def models() -> LandmarkModels:
     except Sd2Error as error:
         if required:
             pytest.fail(str(error))
-        pytest.skip(f"needs the landmark models, see `sd2 fetch-models` ({error})")
+        pytest.skip(f"needs the landmark models, see `sd2 doctor --fetch-models` ({error})")

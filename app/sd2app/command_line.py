@@ -15,9 +15,10 @@ from sd2app.plain_imports import plain_imports
 from sd2app.system_libraries import explain_missing, missing_libraries
 from sd2core.cli import build_parser, run
 from sd2core.cli.command_parser import add_command
+from sd2core.cli.preparing import JOBS, Doctor, do_job
 from sd2core.errors import Sd2Error
-from sd2core.options.records import ARGUMENTS, OptionError, Place
-from sd2core.options.shared import Json, Overwrite
+from sd2core.options.records import ARGUMENTS, Place
+from sd2core.options.shared import Overwrite
 
 _EXAMPLES = """\
   sd2 demo                                    look at the bundled sample recording
@@ -66,32 +67,6 @@ class Demo(Screenshot):
     out: Annotated[Path | None, Place(one_of="instead")] = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class Doctor(Json):
-    """Options of ``sd2 doctor``.
-
-    Parameters
-    ----------
-    json
-        print JSON, for other programs; an error as well
-    clean
-        remove caches, after asking
-    yes
-        with --clean, do not ask
-    """
-
-    json: Annotated[bool, Place(one_of="instead")] = False
-    clean: Annotated[bool, Place(one_of="instead")] = False
-    yes: bool = False
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.yes and not self.clean:
-            raise OptionError(
-                "--yes is given without --clean", remedy="Add --clean, or leave it out"
-            )
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one ``sd2`` command and return its exit code."""
     typed = sys.argv[1:] if arguments is None else arguments
@@ -108,26 +83,23 @@ def full_parser(typed: Sequence[str] = ()) -> argparse.ArgumentParser:
 def _add_window_commands(commands: argparse._SubParsersAction) -> None:
     add_command(commands, "open", options=Open, handler=_open)
     add_command(commands, "demo", options=Demo, handler=_demo)
-    add_command(commands, "doctor", options=Doctor, handler=_doctor)
+    add_command(commands, "doctor", options=Doctor, handler=_doctor, description=JOBS)
 
 
 def _doctor(options: Doctor) -> int:
     """Check the installation, and say how to mend it.
 
-    Looks at system libraries, display, OpenGL, fonts, compiled kernels, models, GPU,
-    plug-ins and room on the disk. The exit code is 1 where something must be mended.
-
-    --clean lists what the program keeps outside of recordings and can make again, such
-    as compiled kernels and landmark models, and removes it. Settings, trained models,
-    runs, and edits that were not saved stay.
+    Without one of these it looks at system libraries, display, OpenGL, fonts, compiled
+    kernels, models, GPU, plug-ins and room on the disk. The exit code is 1 where
+    something must be mended.
 
       sd2 doctor
+      sd2 doctor --warm-up
+      sd2 doctor --fetch-models
+      sd2 doctor --fetch-models --from mediapipe-0.10.21-….whl
       sd2 doctor --clean    (before pip uninstall sd2-studio)
     """
-    if options.clean:
-        from sd2core.cli.caches import remove_caches
-
-        remove_caches(ask=not options.yes)
+    if do_job(options):
         return 0
     from sd2app.doctor import report
 

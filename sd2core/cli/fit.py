@@ -107,7 +107,7 @@ def _fit(options: Fit) -> None:
     Finds the person, 33 landmarks in every frame, and the body and motion that fit
     them. The size of everything follows from the person's height: say it with
     --stature-m where you know it, every velocity is proportional to it. At first use
-    the landmark models are fetched (77 MB; `sd2 fetch-models`).
+    the landmark models are fetched (77 MB; `sd2 doctor --fetch-models`).
 
     It can be stopped at any moment: what is done stays in FILE.partial, and the same
     command goes on from there.

@@ -71,8 +71,8 @@ COMMANDS = {
     "eval": "measure denoisers on people that they have not learnt from",
     "study": "find out whether synthetic data help a classifier on a real radar",
     "batch": "fit, synthesise, denoise and export many recordings from many places",
-    "warm-up": "compile the numerical kernels once, after installing",
-    "fetch-models": "fetch the landmark models that `sd2 fit` needs, once",
+    "warm-up": "compile the numerical kernels: part of `sd2 doctor` now",
+    "fetch-models": "fetch the landmark models that `sd2 fit` needs: part of `sd2 doctor` now",
 }
 """Commands, and what each does in a line, in the order of the help."""
 

@@ -1,8 +1,9 @@
-"""``sd2 warm-up`` and ``sd2 fetch-models``: what is prepared once, after installing."""
+"""What an installation needs done now and then, as `sd2 doctor` does it; and its older commands."""
 
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +11,87 @@ from typing import Annotated
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
-from sd2core.options.records import OptionRecord, Place
+from sd2core.options.records import OptionError, OptionRecord, Place
+from sd2core.options.shared import Json
+
+JOBS = r"""--warm-up compiles the numerical kernels once, after installing. That takes about half
+a minute and is kept on disk. Without it everything works as well: the kernels are
+compiled in the background while a slower form serves.
+
+--fetch-models fetches the landmark models that `sd2 fit` needs, once. Person detector
+and full model are part of the Python package mediapipe, the heavy model of the npm
+package @mediapipe/pose (Apache-2.0). pip and npm download them (36 and 41 MB; without
+npm pip brings it, 61 MB), nothing is installed, and 37 MB are kept in the user's cache.
+`sd2 fit` fetches what it needs by itself. Without a connection, fetch them elsewhere
+and name them with --from:
+
+  pip download mediapipe==0.10.21 --no-deps --only-binary=:all: \
+      --platform manylinux_2_28_x86_64 --python-version 3.11
+  npm pack @mediapipe/pose@0.5.1675469404
+
+--clean lists what the program keeps outside of recordings and can make again, such
+as compiled kernels and landmark models, and removes it. Settings, trained models,
+runs, and edits that were not saved stay."""
+"""What `sd2 doctor` does beside looking at the installation."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doctor(Json):
+    """Options of ``sd2 doctor``.
+
+    Parameters
+    ----------
+    json
+        print JSON, for other programs; an error as well
+    warm_up
+        compile the numerical kernels
+    fetch_models
+        fetch the landmark models that `sd2 fit` needs
+    source : PATH
+        with --fetch-models, take them from the wheel or the npm archive, a model file out of one,
+        or a folder with them
+    if_missing
+        with --fetch-models, do nothing when they are there already
+    clean
+        remove caches, after asking
+    yes
+        with --clean, do not ask
+    """
+
+    json: Annotated[bool, Place(one_of="instead")] = False
+    warm_up: Annotated[bool, Place(one_of="instead")] = False
+    fetch_models: Annotated[bool, Place(one_of="instead")] = False
+    source: Annotated[Path | None, Place(("--from",))] = None
+    if_missing: bool = False
+    clean: Annotated[bool, Place(one_of="instead")] = False
+    yes: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, is_given, job, is_asked_for in (
+            ("--from", self.source is not None, "--fetch-models", self.fetch_models),
+            ("--if-missing", self.if_missing, "--fetch-models", self.fetch_models),
+            ("--yes", self.yes, "--clean", self.clean),
+        ):
+            if is_given and not is_asked_for:
+                raise OptionError(
+                    f"{name} is given without {job}", remedy=f"Add {job}, or leave it out"
+                )
+
+
+def do_job(options: Doctor) -> bool:
+    """Compile, fetch or clean, if one of these is asked for; False if none is."""
+    if options.warm_up:
+        _compile()
+    elif options.fetch_models:
+        _fetch(options.source, if_missing=options.if_missing)
+    elif options.clean:
+        from sd2core.cli.caches import remove_caches
+
+        remove_caches(ask=not options.yes)
+    else:
+        return False
+    return True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,31 +111,44 @@ class FetchModels(OptionRecord):
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``warm-up`` and ``fetch-models``."""
+    """Add ``warm-up`` and ``fetch-models``, which `sd2 doctor` has taken over."""
     add_command(commands, "warm-up", options=OptionRecord, handler=_warm_up)
-    add_command(commands, "fetch-models", options=FetchModels, handler=_fetch)
+    add_command(commands, "fetch-models", options=FetchModels, handler=_fetch_models)
 
 
-def _fetch(options: FetchModels) -> None:
-    r"""Fetch the landmark models that `sd2 fit` needs, once.
+def _warm_up(options: OptionRecord) -> None:
+    """Compile the numerical kernels: part of `sd2 doctor` now.
 
-    Person detector and full model are part of the Python package mediapipe, the heavy
-    model of the npm package @mediapipe/pose (Apache-2.0). pip and npm download them
-    (36 and 41 MB; without npm pip brings it, 61 MB), nothing is installed, and 37 MB
-    are kept in the user's cache. `sd2 fit` fetches what it needs by itself. Without a
-    connection, fetch them elsewhere:
-
-      pip download mediapipe==0.10.21 --no-deps --only-binary=:all: \
-          --platform manylinux_2_28_x86_64 --python-version 3.11
-      npm pack @mediapipe/pose@0.5.1675469404
-
-      sd2 fetch-models
-      sd2 fetch-models --from mediapipe-0.10.21-….whl
-      sd2 fetch-models --from mediapipe-pose-0.5.1675469404.tgz
+    Type `sd2 doctor --warm-up`, which does the same.
     """
+    _say_new_name("warm-up")
+    _compile()
+
+
+def _fetch_models(options: FetchModels) -> None:
+    """Fetch the landmark models that `sd2 fit` needs: part of `sd2 doctor` now.
+
+    Type `sd2 doctor --fetch-models`, which does the same and has the same options.
+    """
+    _say_new_name("fetch-models")
+    _fetch(options.source, if_missing=options.if_missing)
+
+
+def _say_new_name(job: str) -> None:
+    print(f"sd2: `sd2 {job}` is part of `sd2 doctor` now: `sd2 doctor --{job}`", file=sys.stderr)
+
+
+def _compile() -> None:
+    from sd2core.numerics.compiled import warm_up
+
+    with progress_bar("Compiling", unit="module") as progress:
+        warm_up(progress)
+
+
+def _fetch(source: Path | None, *, if_missing: bool) -> None:
     from sd2core.body.landmark_models import LANDMARKERS, fetch_models, landmark_models
 
-    if options.if_missing:
+    if if_missing:
         try:
             there = [landmark_models(download=False, model=model) for model in LANDMARKERS]
         except Sd2Error:
@@ -63,18 +157,5 @@ def _fetch(options: FetchModels) -> None:
             print(f"The landmark models are in {there[0].detector.parent}")
             return
     with progress_bar("Fetching the landmark models", unit="B") as progress:
-        folder = fetch_models(progress, source=options.source)
+        folder = fetch_models(progress, source=source)
     print(f"Fetched the landmark models into {folder}")
-
-
-def _warm_up(options: OptionRecord) -> None:
-    """Compile the numerical kernels once, after installing.
-
-    Takes about half a minute the first time and keeps the result on disk. Without
-    it everything works as well: the kernels are compiled in the background while
-    a slower form serves.
-    """
-    from sd2core.numerics.compiled import warm_up
-
-    with progress_bar("Compiling", unit="module") as progress:
-        warm_up(progress)

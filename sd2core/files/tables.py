@@ -23,9 +23,9 @@ def numbers_table(rows: Sequence[Sequence[str]]) -> list[str]:
     return text_table(rows, range(1, len(rows[0])))
 
 
-def markdown_table(rows: Sequence[Sequence[str]]) -> list[str]:
-    """The same in Markdown."""
-    rule = ["---", *["---:"] * (len(rows[0]) - 1)]
+def markdown_table(rows: Sequence[Sequence[str]], names: int = 1) -> list[str]:
+    """The same in Markdown; the first ``names`` columns are of words."""
+    rule = [*["---"] * names, *["---:"] * (len(rows[0]) - names)]
     return [f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:])]
 
 

@@ -1,6 +1,6 @@
 """Raw samples of a moving mesh by facets, NUFFT and threads, for any mesh and sensor.
 
-A simpler path, which tests compare with, is ``tools/build_sample/signal.py``. Source of every
+A simpler path, which tests compare with, is ``tests/facet_signal.py``. Source of every
 formula: :class:`WaveOptions`.
 """
 

@@ -249,12 +249,12 @@ def driven_clips(
         driven.append(puppet.pose(clip, partial(progress, done)))
         done += len(clip.times_s) - 1
     place = place or estimate_place(
-        [_seen_of(one, stretch) for one, stretch in zip(driven, stretches, strict=True)]
+        [seen_of(one, stretch) for one, stretch in zip(driven, stretches, strict=True)]
     )
     return driven, place
 
 
-def _seen_of(driven: DrivenClip, stretch: MarsStretch) -> Seen:
+def seen_of(driven: DrivenClip, stretch: MarsStretch) -> Seen:
     """What body and radar say of one stretch, to find the radar's place by."""
     clip = driven.clip
     velocity_mps = np.full(stretch.frame_count, np.nan)

@@ -38,6 +38,7 @@ from sd2core.body.landmark_files import RefinedStretches, search_store
 from sd2core.body.landmark_models import DEFAULT_MODEL, landmark_models
 from sd2core.body.landmarks import DEFAULT_SILHOUETTES, SIGHTINGS, find_landmarks
 from sd2core.body.refining import Stretch
+from sd2core.body.roi import Sightings
 from sd2core.body.track import LandmarkTrack
 from sd2core.files.resources import resource_path
 from sd2core.io.video import VideoReader, open_video
@@ -170,14 +171,19 @@ def there_and_back(count: int, frames: int) -> NDArray[np.intp]:
 def _fill(store: ArrayStore, video: VideoReader, track: LandmarkTrack) -> None:
     """As if they had been found."""
     rows = there_and_back(len(track), len(video))
-    nobody = np.zeros((0, 4))
-    store.write(
-        SIGHTINGS, {"frames": np.zeros(0, np.intp), "rois": nobody, "confidence": np.zeros(0)}
+    sightings = Sightings(  # of the first frame, where alone somebody was searched for
+        np.zeros(1, np.intp),
+        np.zeros((1, 4)),
+        np.ones(1),
+        np.zeros(1, bool),
+        np.zeros((1, 4), bool),
     )
+    store.write(SIGHTINGS, vars(sightings))
+    drawn = track.silhouette_frames[:8]
+    drawn = drawn[drawn < len(video)]
     refined = RefinedStretches(store, video, _STRETCH_FRAMES)
     for start in range(0, len(video), _STRETCH_FRAMES):
         part = rows[start : start + _STRETCH_FRAMES]
-        first = not start
         refined.add(
             start,
             Stretch(
@@ -186,8 +192,8 @@ def _fill(store: ArrayStore, video: VideoReader, track: LandmarkTrack) -> None:
                 world_m=track.world_m[part],
                 visibility=track.visibility[part],
                 confidence=track.confidence[part],
-                silhouette_frames=track.silhouette_frames[:8] if first else np.zeros(0, np.intp),
-                silhouettes=track.silhouettes[: 8 if first else 0],
+                silhouette_frames=drawn if not start else drawn[:0],
+                silhouettes=track.silhouettes[: 0 if start else len(drawn)],
             ),
         )
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from facet_visibility import facet_visibility
 from numpy.typing import NDArray
 from velocity_response import velocity_response
 
@@ -23,7 +24,6 @@ from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
-from tools.build_sample.facets import facet_visibility
 
 CAMERA, AXIS = VirtualSensor(), VelocityAxis()
 NULLED = [14, 15, 16]

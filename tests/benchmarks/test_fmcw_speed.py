@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from facet_visibility import facet_visibility
 from longer_walk import FRAMES, LAST, POSES, longer_walk
 from numpy.typing import NDArray
 from timing import best_s
@@ -31,7 +32,6 @@ from sd2core.progress import Cancelled
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
-from tools.build_sample.facets import facet_visibility
 
 FACETS = 7400
 CAMERA = VirtualSensor()

@@ -9,6 +9,8 @@ from decimal import Decimal, localcontext
 import numpy as np
 import pytest
 from extreme_tables import DIGITS, PI, exact_mean_phasor, exact_phasor, exact_ranges
+from facet_scatterers import mean_phasor
+from facet_visibility import facet_visibility
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -25,8 +27,6 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import SPEED_OF_LIGHT_MPS, RadarConfig
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
-from tools.build_sample.facets import facet_visibility
-from tools.build_sample.scatterers import mean_phasor
 
 DOUBLE = 2.0**-53
 WAVELENGTHS_M = (1e-3, 5e-3, 1.0)

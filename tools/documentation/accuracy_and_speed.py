@@ -11,7 +11,6 @@ from collections.abc import Iterator
 
 from matplotlib.figure import Figure
 
-from sd2core.accuracy.cache import this_machine
 from sd2core.accuracy.choosing import choose
 from sd2core.accuracy.measuring import measure
 from sd2core.accuracy.plans import AccuracyPlan, reference_plan
@@ -25,7 +24,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import warm_up
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
-from tools.documentation.measured import write_page
+from tools.documentation.pages import filled, table, write_filled
 from tools.documentation.places import BENCHMARKS, IMAGES, SHARED
 
 sys.path.insert(0, str(BENCHMARKS))
@@ -38,58 +37,20 @@ PAPER = PRESETS["paper"]
 NEARER = 0.6
 """A table shows the plans that have at most this share of the error of the one above."""
 
-INTRODUCTION = """\
-# Accuracy and speed
-
-What does a Doppler map cost that is off by at most so much, and which plan computes it? Measured by
-
-```
-make accuracy
-```
-
-on {machine}, for two meshes: the bundled sample (simulated) and a walk (fitted to a real video). No
-radar takes part. `sd2 ladder MESH` and the Accuracy panel measure the same on a
-scene of one's own ([choose accuracy](how-to/choose-accuracy.md)).
-
-**L1** is what [a tolerance](concepts/tolerance.md) is about. **Peak** is the error of a frame's
-strongest bin that 95 % of the frames stay within. Times are per frame, on all cores. References are
-*{counting}* in double precision, and
-*{fmcw}*. Plans are named without
-counting by vertex, which is common to them, and without what becomes of velocities beyond the axis.
-A *mask kept* serves while the sensor is dragged.
-
-Pictures show all plans. Tables begin with the cheapest, and go on with those that no other beats in
-both cost and error and whose error is at most {nearer} of that above.
-"""
-
-LIMITS = """\
-## What this cannot say
-
-Maps of one mesh are compared. How well a mesh follows the person is in [fitting](fitting.md), how
-near a map comes to a real radar's in [nulling](nulling.md) and [real pairs](real-pairs.md). Other
-scenes may need other plans.
-"""
-
 
 def main() -> None:
     """Measure everything and write the page."""
     warm_up()
-    introduction = INTRODUCTION.format(
-        machine=this_machine(),
+    write_filled(
+        "accuracy-and-speed.md",
         counting=reference_plan("histogram"),
         fmcw=reference_plan("fmcw"),
         nearer=_percent(NEARER),
+        scenes="\n".join(_scene(*scene) for scene in _scenes()),
+        budget=BUDGET_BYTES >> 20,
+        scaling=_scaling(),
+        **_precision(),
     )
-    parts = [introduction]
-    for name, title, mesh, sensor in _scenes():
-        print(title, file=sys.stderr)
-        parts += [f"## {title}\n", *_tolerances(mesh, sensor)]
-        for family in ("histogram", "fmcw"):
-            measurement = measure(mesh, sensor, family=family)  # type: ignore[arg-type]
-            parts += _measured(measurement, f"trade-{name}-{family}.png")
-    parts += _scaling()
-    parts += [*_precision(), LIMITS]
-    write_page("accuracy-and-speed.md", "\n".join(parts))
 
 
 def _scenes() -> Iterator[tuple[str, str, MeshSequence, VirtualSensor]]:
@@ -100,85 +61,80 @@ def _scenes() -> Iterator[tuple[str, str, MeshSequence, VirtualSensor]]:
         yield "walk", "A walk (mesh fitted to a real video)", load_mesh(walk), VirtualSensor()
 
 
-def _tolerances(mesh: MeshSequence, sensor: VirtualSensor) -> Iterator[str]:
+def _scene(name: str, title: str, mesh: MeshSequence, sensor: VirtualSensor) -> str:
+    """Costs of tolerances, and the best plans of either family, on one scene."""
+    print(title, file=sys.stderr)
+    tolerances, measured = _tolerances(mesh, sensor), []
+    for family in ("histogram", "fmcw"):
+        measurement = measure(mesh, sensor, family=family)  # type: ignore[arg-type]
+        measured.append(_measured(measurement, f"trade-{name}-{family}.png"))
+    return filled(
+        "accuracy-and-speed-scene.md",
+        title=title,
+        tolerances=tolerances,
+        measured="\n".join(measured),
+    )
+
+
+def _tolerances(mesh: MeshSequence, sensor: VirtualSensor) -> str:
     """Cost of each tolerance on one scene."""
     survey = survey_scene(mesh, sensor, PAPER)
-    yield "What a tolerance costs (times are forecast; errors are of frames not used to choose):\n"
-    yield "| tolerance | plan | ms | L1 |"
-    yield "|---|---|---|---|"
+    rows = [["tolerance", "plan", "ms", "L1"]]
     for tolerance in TOLERANCES:
         choice = choose(mesh, sensor, tolerance=tolerance, survey=survey)
-        held = "" if choice.holds else "not held: "
-        yield (
-            f"| {_percent(tolerance)} | {held}{_words(choice.plan)} | {choice.cost_ms:.2g}"
-            f" | {_percent(choice.errors.l1)} |"
-        )
-    yield ""
+        plan = ("" if choice.holds else "not held: ") + _words(choice.plan)
+        l1 = _percent(choice.errors.l1)
+        rows.append([_percent(tolerance), plan, f"{choice.cost_ms:.2g}", l1])
+    return table(rows, names=2)
 
 
-def _measured(measurement: Measurement, picture: str) -> Iterator[str]:
+def _measured(measurement: Measurement, picture: str) -> str:
     """Picture of all plans of a family, and table of the best."""
     save_figure(plot_cost_and_error(measurement), IMAGES / picture)
-    what = {"histogram": "Counting", "fmcw": "FMCW signal"}[measurement.family]
-    yield f"### {what}: the best of {len(measurement.results)} plans\n"
-    yield f"![error against cost]({IMAGES.name}/{picture})\n"
+    converged = ""
     if measurement.convergence:
         pieces, change = measurement.convergence[-1]
-        yield f"{pieces} pieces per facet changed the reference by {_percent(change)}.\n"
-    yield "| plan | ms | L1 | peak, m/s |"
-    yield "|---|---|---|---|"
+        converged = f"{pieces} pieces per facet changed the reference by {_percent(change)}.\n\n"
+    rows = [["plan", "ms", "L1", "peak, m/s"]]
     above = float("inf")
     for result in measurement.front:
-        cost, errors = result.cost, result.errors
+        cost, errors = f"{result.cost.all_cores_ms.median:.3g}", result.errors
         if errors.l1 <= NEARER * above:
             above = errors.l1
-            yield (
-                f"| {_words(result.plan)} | {cost.all_cores_ms.median:.3g}"
-                f" | {_percent(errors.l1)} | {errors.peak_mps.p95:.2g} |"
-            )
-    yield ""
+            peak = f"{errors.peak_mps.p95:.2g}"
+            rows.append([_words(result.plan), cost, _percent(errors.l1), peak])
+    return filled(
+        "accuracy-and-speed-family.md",
+        what={"histogram": "Counting", "fmcw": "FMCW signal"}[measurement.family],
+        plans=len(measurement.results),
+        picture=picture,
+        converged=converged,
+        table=table(rows),
+    )
 
 
-def _scaling() -> Iterator[str]:
+def _scaling() -> str:
     found = [scaling for sight in ("facing", "exact") for scaling in scalings(sight)]
     save_figure(_scaling_plot(found), IMAGES / "scaling.png")
-    yield "## Ten times as much\n"
-    yield f"![cost and memory against size]({IMAGES.name}/scaling.png)\n"
-    yield (
-        "A simulated ellipsoid sways. *Growth* is the most that ten times the size cost; the budget"
-        f" for prepared frames was {BUDGET_BYTES >> 20} MiB.\n"
-    )
-    yield "| what | sizes | growth | longest, s | most memory, MB |"
-    yield "|---|---|---|---|---|"
+    rows = [["what", "sizes", "growth", "longest, s", "most memory, MB"]]
     for scaling in found:
         first, last = scaling.points[0], scaling.points[-1]
-        yield (
-            f"| {scaling.what} | {first.size:,} to {last.size:,} | {max(scaling.growth):.1f}"
-            f" | {last.seconds:.3g} | {max(p.peak_bytes for p in scaling.points) / 1e6:.0f} |"
-        )
-    yield ""
+        most_mb = max(point.peak_bytes for point in scaling.points) / 1e6
+        numbers = f"{max(scaling.growth):.1f}", f"{last.seconds:.3g}", f"{most_mb:.0f}"
+        rows.append([scaling.what, f"{first.size:,} to {last.size:,}", *numbers])
+    return table(rows, names=2)
 
 
-def _precision() -> Iterator[str]:
+def _precision() -> dict[str, str]:
     """Errors of single precision far from the origin, and the cost of double, on the sample."""
     mesh = open_recording(resource_path("swipes.sd2")).load_mesh()
-    yield "## Single and double precision\n"
-    yield (
-        "The sample's body so far from the clip's origin; error of the worst vertex's velocity, in"
-        " bins of 0.125 m/s. Where more than 0.01 is predicted, frames are counted in double"
-        " precision ([decision 13](decisions/0013-single-and-double-precision.md)).\n"
-    )
-    yield "| from the origin, m | predicted | single | double | is used |"
-    yield "|---|---|---|---|---|"
+    rows = [["from the origin, m", "predicted", "single", "double", "is used"]]
     for at in errors(mesh):
-        yield (
-            f"| {at.away_m:g} | {at.predicted:.0e} | {at.single:.0e} | {at.double:.0e}"
-            f" | {at.used} |"
-        )
-    ratios = ", ".join(
-        f"{cost.ratio:.2f} ({cost.what})" for cost in costs(in_both_precisions(mesh))
-    )
-    yield f"\nDouble takes so many times as long: {ratios}.\n"
+        off = (f"{value:.0e}" for value in (at.predicted, at.single, at.double))
+        rows.append([f"{at.away_m:g}", *off, at.used])
+    found = costs(in_both_precisions(mesh))
+    ratios = ", ".join(f"{cost.ratio:.2f} ({cost.what})" for cost in found)
+    return {"precision": table(rows), "ratios": ratios}
 
 
 def _scaling_plot(found: list[Scaling]) -> Figure:

@@ -23,10 +23,10 @@ import numpy as np
 
 from sd2core.doppler.alignment import align
 from sd2core.errors import Sd2Error
-from sd2core.files.tables import markdown_table
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.pairs.store import PairSet, Take, read_pairs
 from sd2core.timebase import Timebase
+from tools.documentation.pages import table
 
 OFFSETS_S = (-3.0, -2.25, -1.5, -0.75, 0.0, 0.75, 1.5, 2.25, 3.0)
 
@@ -137,16 +137,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("pairs", type=Path, nargs="+", metavar="PAIRS")
     options = parser.parse_args()
-    table = []
+    found = []
     for path in options.pairs:
         pairs = read_pairs(path)
         for subject in pairs.subjects:
-            table += rows(f"{path.stem}, {subject}", tried(pairs, subject, OFFSETS_S))
+            found += rows(f"{path.stem}, {subject}", tried(pairs, subject, OFFSETS_S))
     heading = (
         "person", "maps", "tried", "refused", "within 0.1 s, all", "of those not refused",
         "median error",
     )  # fmt: skip
-    print(*markdown_table((heading, *table)), sep="\n")
+    print(table((heading, *found)))
 
 
 if __name__ == "__main__":

@@ -15,13 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.accuracy.cache import this_machine
 from sd2core.body.parts import synthetic_map
 from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL, load_model
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.doppler import Synthesizer
 from sd2core.files.resources import resource_path
-from sd2core.files.tables import markdown_table
 from sd2core.fmcw import doppler_map
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.sequence import MeshSequence
@@ -33,7 +31,7 @@ from sd2core.simulate.campaign.radar import TargetOptions, radar_target
 from sd2core.simulate.campaign.takes import OPTIONS
 from sd2core.train.evaluation import Evaluation, Group, Score, evaluate
 from tools.documentation.long_sequences import long_sequences
-from tools.documentation.measured import write_page
+from tools.documentation.pages import page_parser, spread, table, write_filled
 from tools.documentation.places import BUILD, SHARED
 from tools.documentation.runs import (
     ERRORS,
@@ -44,7 +42,6 @@ from tools.documentation.runs import (
     run_of,
     sd2,
     settings,
-    spread,
     timed,
     train,
 )
@@ -70,88 +67,6 @@ ON_MARS = {
 _WEIGHT = ("--velocity-weight", "1")
 _WORSE = 1.05
 
-PAGE = """\
-# The denoiser
-
-How near do denoisers bring a synthetic map to a radar's? Nobody who is judged was learnt from.
-*Peak*: velocity of the strongest bin, *mean*: of the whole column, both where the radar shows
-movement; *map*: all cells; ± is over {seeds} seeds. *None* is the synthetic map; median, Wiener and
-ridge are filters. *Kinematics*: how the joints move ([decision 52](decisions/0052-limb-maps.md)).
-Made by
-
-```sh
-make denoiser
-```
-
-with `--minutes {minutes:g} --seeds {seeds}`, on {machine}, after `make fitting`.
-
-## The sample
-
-Its radar is **simulated**: a rough surface, three receivers ([decision
-26](decisions/0026-the-simulated-campaign.md)). *Fit*: the recording's mesh, which is `sd2 fit` of
-its own video; *true*: the body that the radar saw. `denoiser` and `denoiser-limbs` are the bundled
-models for the map and for kinematics.
-
-{sample}
-
-Wanted, for the fit: peak −25 %, mean −40 %.
-
-## Recorded motion
-
-{clips} rendered videos of people who move as recorded people did whom nothing here learnt from; the
-radar is **simulated**, drawn for each clip: rough or smooth, 1 to 12 looks. *Exact*: the true body;
-*fitted*: what `sd2 fit` makes of the video. *Worse*: share of clips in which peak / mean / map are
-worse than without a denoiser by more than 5 %; the worst ratio in brackets. Of maps the shape
-counts (L1 at equal energy: no map made from a mesh knows the radar's gain).
-
-{motion}
-
-Of these the walks towards and away from the radar, peak and mean:
-
-{walks}
-
-Wanted: no worse than none; fitted −30 %.
-
-## Networks at equal time
-
-The paper's protocol, **simulated**: `sd2 simulate campaign --protocol paper --minutes 72`, one of
-six people judged. {minutes:g} minutes of processor time each, on one thread.
-
-{networks}
-
-{leader} The S4's file also holds one that looks back only, for live frames: validation errors of
-the peak {live} m/s, of the one that looks both ways {whole}.
-
-## A real radar
-
-MARS: a body driven by a Kinect's skeleton, and what a **real** 77 GHz radar saw of the same
-person, 10 frames/s ([decision 27](decisions/0027-real-pairs.md)). Each of three persons is judged
-by models that learnt from the two others alone, {minutes:g} minutes each. The weight of the
-velocities and the dropout were chosen by persons 1 and 4: only person 2 is new to them. How much
-of it the radar's few points allow: [real pairs](real-pairs.md#what-the-radar-allows).
-
-{mars}
-
-{gain} Wanted: −35 %, a correlation of 0.84, and peaks nearer than `ridge`'s.
-
-## Long sequences
-
-{long}
-
-## Texture
-
-A radar's map scatters about the mean that a network predicts; `--texture` draws it
-([decision 73](decisions/0073-texture.md)). Share of cells that show something; how far the
-strongest tenth of those is above the weakest, over the mean; how much they change from frame to
-frame, |x − y| / (x + y):
-
-{texture}
-
-## What this cannot say
-
-- Three persons before one real radar, who exercise; nothing about swipes before a real radar.
-- Differences within the spread of the seeds rank nothing.
-"""
 
 NOT_LONG = """\
 **Not measured yet**: this page was made with `--no-long`. Whether a state space leads on segments
@@ -160,8 +75,7 @@ of 288 to 4,608 frames is open."""
 
 def main() -> None:
     """Make what is missing, measure everything and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--folder", type=Path, default=BUILD / "denoiser")
+    parser = page_parser(__doc__, "denoiser")
     parser.add_argument("--minutes", type=float, default=2.0, help="of training, each run")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument(
@@ -178,10 +92,10 @@ def main() -> None:
     networks = _networks(folder, paper, options)
     mars = _mars(folder, options)
     whole, live = _live_errors(folder, options.seeds)
-    page = PAGE.format(
+    write_filled(
+        "denoiser.md",
         seeds=options.seeds,
         minutes=options.minutes,
-        machine=this_machine(),
         sample=_sample(_judged(bundled, pairs, _sample_takes())),
         clips=len(REAL_MOTION),
         motion=_motion(exact, fitted),
@@ -206,7 +120,6 @@ def main() -> None:
             }
         ),
     )
-    write_page("denoiser.md", page)
 
 
 # --- the bundled models -----------------------------------------------------------------------
@@ -283,7 +196,7 @@ def _sample(evaluation: Evaluation) -> str:
             for of in ("peak", "mean")
         ]
         rows.append([_name(group), *cells])
-    return "\n".join(markdown_table(rows))
+    return table(rows)
 
 
 def _motion(*evaluations: Evaluation) -> str:
@@ -305,7 +218,7 @@ def _motion(*evaluations: Evaluation) -> str:
                 for of in ("peak", "mean")
             ]
             rows.setdefault(_name(group), [_name(group)]).extend([*cells, worse])
-    return "\n".join(markdown_table(list(rows.values())))
+    return table(rows.values())
 
 
 def _ratios(score: Score, none: Score) -> list[float]:
@@ -330,7 +243,7 @@ def _walks(*evaluations: Evaluation) -> str:
                 )
                 cells.append(_relative(float(mine), float(none)))
             rows.setdefault(_name(group), [_name(group)]).extend(cells)
-    return "\n".join(markdown_table(list(rows.values())))
+    return table(rows.values())
 
 
 # --- networks ---------------------------------------------------------------------------------
@@ -350,7 +263,7 @@ def _networks(folder: Path, campaign: Path, options: argparse.Namespace) -> dict
 
 def _table(evaluation: Mapping[str, Any]) -> str:
     rows = [[run_of(group), *errors_of(group)] for group in evaluation["groups"]]
-    return "\n".join(markdown_table([["model", *ERRORS.values()], *rows]))
+    return table([["model", *ERRORS.values()], *rows])
 
 
 def _leader(evaluation: Mapping[str, Any]) -> str:
@@ -422,7 +335,7 @@ def _mars_table(evaluations: Mapping[str, Mapping[str, Any]]) -> str:
                     spread(group["mean_correlation"], 2),
                 ]
             )
-    return "\n".join(markdown_table(list(rows.values())))
+    return table(rows.values())
 
 
 def _gain(evaluations: Mapping[str, Mapping[str, Any]]) -> str:

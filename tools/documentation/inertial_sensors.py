@@ -28,11 +28,11 @@ from scipy.spatial.transform import Rotation
 
 import sd2core as sd2
 from sd2core.files.hdf5_files import open_hdf5_file
-from sd2core.files.tables import markdown_table
 from sd2core.imu.mounting import mounted
 from sd2core.imu.signals import GRAVITY_MPS2, InertialSignals, RigidPath, felt, low_pass
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
+from tools.documentation.pages import table
 
 Floats = NDArray[np.float64]
 
@@ -294,7 +294,7 @@ def _print_board(path: Path) -> None:
                 f"{one.samples:,}",
             ]
         )
-    print(*markdown_table(rows), sep="\n")
+    print(table(rows))
 
 
 def _print_foot(folder: Path) -> None:
@@ -304,7 +304,7 @@ def _print_foot(folder: Path) -> None:
             acceleration, turn_rate, shift_s = foot_beside(folder, side, vertex)
             values = f"{acceleration:.3f}", f"{turn_rate:.3f}", f"{1000 * shift_s:.1f} ms"
             rows.append([f"{side}, {place}", *values])
-    print(*markdown_table(rows), sep="\n")
+    print(table(rows))
 
 
 def main() -> None:
@@ -321,9 +321,9 @@ def main() -> None:
         command.set_defaults(work=lambda options: work(*(getattr(options, one) for one in files)))
 
     def print_fit(true: Path, fitted: Path) -> None:
-        print(*markdown_table(fit_rows(sd2.load_mesh(true), sd2.load_mesh(fitted))), sep="\n")
+        print(table(fit_rows(sd2.load_mesh(true), sd2.load_mesh(fitted))))
 
-    add("derivatives", (), lambda: print(*markdown_table(derivative_rows()), sep="\n"))
+    add("derivatives", (), lambda: print(table(derivative_rows())))
     add("board", ("recording",), _print_board)
     add("foot", ("folder",), _print_foot)
     add("fit", ("true_mesh", "fitted_mesh"), print_fit)

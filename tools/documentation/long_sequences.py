@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 from sd2core.denoise.files import load_model
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.figure_files import save_figure
-from sd2core.files.tables import markdown_table
 from sd2core.pairs.store import read_pairs
+from tools.documentation.pages import filled, table
 from tools.documentation.places import IMAGES
 from tools.documentation.runs import evaluated, sd2, settings
 
@@ -28,18 +28,6 @@ SETTINGS = {"30 frames/s, 32 bins": (30, 32, 160, 48), "120 frames/s, 128 bins":
 MODELS = ("s4", "s4d", "gru", "unet", "swin")
 _WINDOWED = ("unet", "swin")
 _FRAMES = 4608
-
-TEXT = """\
-{first} Segments of 72 to 4,608 frames; {minutes:g} minutes of training each, on one thread; a batch
-has 4,608 frames. S4 and S4D look both ways, and begin with a memory of up to 0.7 segments; the GRU
-looks back only; U-Net and Swin transformer take windows of 72 frames. The campaigns have as many
-frames, varied swipes before a **simulated** radar; at 120 frames/s a frame has room for 21 chirps.
-One seed. *Memory*: of the whole training process. *Time*: a frame of a map of 4,608.
-
-{table}
-
-![Error of the mean velocity by the length of the segments](images/denoiser-lengths.png)
-"""
 
 
 class _Run(NamedTuple):
@@ -79,7 +67,7 @@ def long_sequences(folder: Path, minutes: float) -> str:
             took = f"{1e6 * _frame_s(run):.0f} µs"
             rows.append([run.model, f"{run.length:,}", *_errors(score), memory, took])
     _draw(found)
-    return TEXT.format(first=_first(found), minutes=minutes, table="\n".join(markdown_table(rows)))
+    return filled("long-sequences.md", first=_first(found), minutes=minutes, table=table(rows))
 
 
 def _errors(score: dict[str, Any]) -> list[str]:

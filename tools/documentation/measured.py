@@ -26,7 +26,7 @@ OLD = {
     "accuracy-and-speed.md": "needs an idle machine; how the plain map is counted was rearranged",
     "performance.md": "needs an idle machine for an hour",
     "scale.md": "needs an idle machine; batches changed in what they check",
-    "fitting.md": "ten idle minutes; only how its commands are declared has changed",
+    "fitting.md": "ten idle minutes; only its commands and how tables are written have changed",
     "range-synthesis.md": _HOURS,
     "real-pairs.md": "a quarter of an hour; nothing that it measures was meant to change",
     "paper.md": _HOURS,

@@ -1,7 +1,7 @@
 """Makes ``paper.md`` and its pictures: ``make paper``, half an hour after ``make classifier``.
 
-The SD² paper's figures and tables, and its sentences in ``paper_lines.md`` with their places in
-the program. Runs and campaigns stay in ``build/paper`` (or ``--folder``), the study of
+The SD² paper's figures and tables, and its sentences in ``texts/paper-lines.md`` with their places
+in the program. Runs and campaigns stay in ``build/paper`` (or ``--folder``), the study of
 classifiers where ``make classifier`` keeps it; what is there is not made again. ``--only`` renews
 some sections, and leaves the others as the page has them.
 """
@@ -25,7 +25,6 @@ from sd2core.denoise.files import load_model
 from sd2core.denoise.metrics import VelocityError, peak_error, stands_out
 from sd2core.figures.maps import Levels, MapRow, draw_maps
 from sd2core.files.figure_files import save_figure
-from sd2core.files.tables import markdown_table
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.pairs.store import PairSet, Take, read_pairs
 from sd2core.simulate.campaign.making import make_campaign
@@ -33,12 +32,13 @@ from sd2core.simulate.campaign.protocol import PAPER, Protocol
 from sd2core.simulate.campaign.takes import Campaign
 from sd2core.timebase import Timebase
 from tools.documentation.measured import write_page
+from tools.documentation.pages import TEXTS, filled, page_parser, sections, spread, spread_of, table
 from tools.documentation.paper_bodies import draw_bodies
 from tools.documentation.places import BUILD, DOCS, IMAGES, REPOSITORY
-from tools.documentation.runs import Job, evaluated, sections, settings, spread, timed, train
+from tools.documentation.runs import Job, evaluated, settings, timed, train
 
 PAGE = DOCS / "paper.md"
-LINES = Path(__file__).with_name("paper_lines.md")
+LINES = TEXTS / "paper-lines.md"
 DROPOUT = 0.1
 TITLES = {"s4": "S4", "swin": "Swin transformer", "unet": "U-Net"}
 PRINTED = {"s4": (1.0126, 1.6329), "swin": (1.1640, 1.8734), "unet": (1.5835, 2.6549)}
@@ -58,73 +58,6 @@ PAPER_NETWORK = "LSTM 16, strongest bin, at once"
 SHOWN_MINUTES = 3.0
 """Of a campaign, for two takes of everybody; a longer one begins with the same ones."""
 
-HEAD = """\
-# The paper, line by line
-
-What "SD²: Synthetic Doppler Spectrum Denoiser using SSM" shows and says, and where this program
-does it. Made by
-
-```sh
-make paper
-```
-
-on {machine}. **No real radar has part in this page, but in the paper's own numbers**: its data are
-not published, and `sd2 simulate campaign --protocol paper` stands in
-([decision 26](decisions/0026-the-simulated-campaign.md)). Beside a real radar:
-[denoisers on a real radar](denoiser.md#a-real-radar), [real gestures](real-gestures.md).
-
-"""
-
-PICTURES = """
-![Five frames of a horizontal swipe](images/paper-mesh.png)
-
-**Figure 2.** Frames 100, 110, … 140 of the bundled sample, which is simulated; dots are vertices,
-coloured by their velocity towards the sensor.
-
-![Distance of the body's surface from sensors at two ranges](images/paper-range.png)
-
-**Figure 4.** Frame {frame} from {near:g} and {far:g} m. From {far:g} m the synthetic map of the
-recording keeps {share:.1f} % of its energy; the radar equation gives ({near:g} / {far:g})⁴ =
-{law:.1f} % where the trunk is.
-
-![Doppler maps of a take of horizontal and one of vertical swipes](images/paper-swipes.png)
-
-**Figure 7.** Horizontal and vertical swipes by one person: the **simulated** radar, and synthetic
-of a body with the errors of a fit.
-
-"""
-
-DENOISERS = """
-`--order random --seed {seed} --minutes {campaign_minutes:g}`, six people: four are learnt from, one
-chooses the best epoch, one is judged. Each model: {seeds} seeds, {minutes:g} minutes of processor
-time on one thread, a dropout of {dropout:g}, about as many parameters: {epochs}. S4 sees only the
-past, its rivals whole windows; [looking ahead](denoiser.md#networks-at-equal-time) it does better.
-
-![One take: synthetic, denoised by three models, and the simulated radar](images/paper-denoised.png)
-
-**Figure 6.** The liveliest take of the person judged. The radar is **simulated**.
-
-**Table 1.** Error of the velocity of the strongest bin, m/s, in {moving:,} of {frames:,} frames in
-which the **simulated** radar shows movement; ± is over the seeds. *S4 to it*: S4's MAE compared
-with this one's. *None*: the synthetic map.
-
-{table}
-{findings}
-
-"""
-
-CLASSIFIERS = """
-To and fro, unseen people, per cent of frames, means over {seeds} seeds: what rows, the true
-classes, are taken for, horizontal / vertical / background. The paper's radar is real, ours
-**simulated**; *the paper's network* is that of its 5.1, here: [classifier](classifier.md).
-
-{table}
-
-Denoised is what the bundled denoiser makes. That it helps on a real radar is the paper's finding;
-here it has not been shown.
-
-"""
-
 
 @dataclass(frozen=True)
 class Section:
@@ -137,7 +70,7 @@ class Section:
 def main() -> None:
     """Measure what is asked for and write the page."""
     options = _options()
-    page = HEAD.format(machine=this_machine())
+    page = filled("paper-head.md", machine=this_machine())
     kept = sections(PAGE.read_text("utf-8")) if PAGE.exists() else {}
     for name, section in SECTIONS.items():
         missing = f"\nNot measured yet: `python -m tools.documentation.paper --only {name}`.\n\n"
@@ -170,9 +103,8 @@ def _link(match: re.Match[str]) -> str:
 
 
 def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = page_parser(__doc__, "paper")
     parser.add_argument("--only", nargs="+", choices=SECTIONS, default=tuple(SECTIONS))
-    parser.add_argument("--folder", type=Path, default=BUILD / "paper", help="of denoisers")
     parser.add_argument(
         "--protocols",
         type=Path,
@@ -208,7 +140,7 @@ def _pictures(options: argparse.Namespace) -> str:
         )
     ]
     _save_maps("paper-swipes.png", rows, "Figure 7 on simulated people before a simulated radar")
-    return PICTURES.format(**bodies)
+    return filled("paper-pictures.md", **bodies)
 
 
 def protocol_campaign(out: Path, protocol: Protocol, minutes: float) -> Path:
@@ -254,7 +186,8 @@ def _denoisers(options: argparse.Namespace) -> str:
     judged = read_pairs(campaign).of(evaluation["subjects"])
     _compare(judged, {name: folder / those[0].name for name, those in runs.items()})
     bin_mps = judged.axis.bin_width_mps
-    return DENOISERS.format(
+    return filled(
+        "paper-denoisers.md",
         seed=SEED,
         campaign_minutes=options.campaign_minutes,
         seeds=options.seeds,
@@ -308,7 +241,7 @@ def table_1(evaluation: Mapping[str, Any], nothing: VelocityError) -> str:
     still = (f"{nothing.mae_mps:.3f}", f"{nothing.sd_mps:.3f}")
     rows.append(["nothing moves", "", "", "", *still, _change(ours["s4"], nothing.mae_mps)])
     rows[-1].append(_change(nothing.mae_mps, ours["none"]))
-    return "\n".join(markdown_table(rows)) + "\n"
+    return table(rows) + "\n"
 
 
 def findings(evaluation: Mapping[str, Any], bin_mps: float) -> str:
@@ -336,8 +269,10 @@ def _classifiers(options: argparse.Namespace) -> str:
     """Tables 2 and 3."""
     told = json.loads((options.study / "study.json").read_text("utf-8"))
     totals = {one["title"]: one["seeds"] for one in told["totals"]}
-    return CLASSIFIERS.format(
-        seeds=told["plan"]["seeds"], table=tables_2_and_3(told["classes"], totals)
+    return filled(
+        "paper-classifiers.md",
+        seeds=told["plan"]["seeds"],
+        table=tables_2_and_3(told["classes"], totals),
     )
 
 
@@ -349,9 +284,7 @@ def tables_2_and_3(classes: Sequence[str], totals: Mapping[str, Any]) -> str:
         return np.array([np.array(seed["frames"])[np.ix_(at, at)] for seed in totals[title]])
 
     def mean(title: str) -> str:
-        values = [100.0 * mean_recall(one) for one in confusions(title)]
-        sd = f" ± {np.std(values, ddof=1):.1f}" if len(values) > 1 else ""
-        return f"{np.mean(values):.1f}{sd}"
+        return spread_of([100.0 * mean_recall(one) for one in confusions(title)], 1)
 
     rows = [["true"], *([name] for name in CLASSES), ["mean"], ["the paper's network, mean"]]
     for words, title in ADDED.items():
@@ -361,7 +294,7 @@ def tables_2_and_3(classes: Sequence[str], totals: Mapping[str, Any]) -> str:
             row += [" / ".join(f"{value:.1f}" for value in values) for values in (given, found)]
         rows[-2] += [f"{np.diagonal(GIVEN[words]).mean():.1f}", mean(title)]
         rows[-1] += ["", mean(PAPER_NETWORK) if title == "radar alone" else ""]
-    return "\n".join(markdown_table(rows))
+    return table(rows)
 
 
 SECTIONS = {

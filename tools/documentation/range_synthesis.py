@@ -6,65 +6,25 @@ stay in ``build/range-synthesis`` (or ``--folder``); what is there is not made a
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping
 from itertools import chain
-from pathlib import Path
 from typing import Any
 
-from sd2core.accuracy.cache import this_machine
-from sd2core.files.tables import markdown_table
 from sd2core.pairs.store import read_pairs
-from tools.documentation.measured import write_page
-from tools.documentation.places import BUILD
+from tools.documentation.pages import page_parser, table, write_filled
 from tools.documentation.runs import ERRORS, Job, campaign_of, errors_of, evaluated, settings, train
 
 PLACES = 3
 
-PAGE = """\
-# Range synthesis: does a denoiser profit from moved sensors?
-
-Does it help to learn from the same motions as seen from several places? On a **simulated** radar.
-Made by
-
-```sh
-make range-synthesis
-```
-
-with `--minutes {minutes:g} --epochs {epochs} --seeds {seeds}`, on {machine}.
-
-A campaign of {minutes:g} minutes of six people (`sd2 simulate campaign --sensors {places}`): every
-take is seen from beside the camera, and from two more sensors 1.5 to 4 m away, up to 45° aside, 10°
-below to 25° above; both maps are those of the moved sensor. An S4 (dropout 0.1) learns either from
-the first sensor of each take (`--placements first`) or from all {places} (`--placements all`), with
-{seeds} seeds and equally many steps ({epochs} epochs of all, {places} times as many of the first):
-more to see of the same motions, not more time.
-
-Judged where one person, of whom nothing was learnt, moves: {first_moving:,} frames beside the
-camera, {all_moving:,} from all sensors. *None* is the synthetic map, *ridge* a linear filter;
-*peak* is the velocity of the strongest bin, *mean* that of the whole column, *map* all cells. What
-the last two rows differ by is to be held against ±, the standard deviation over seeds.
-
-{table}
-
-## What this cannot say
-
-- Whether moved sensors help a real radar: the
-  [simulation](decisions/0026-the-simulated-campaign.md) knows nothing of rooms or antennas.
-- {seeds} seeds and one person: differences that small may be chance.
-- What they do for a classifier is in [the gesture classifier](classifier.md).
-"""
-
 
 def main() -> None:
     """Make what is missing, measure and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--folder", type=Path, default=BUILD / "range-synthesis")
+    parser = page_parser(__doc__, "range-synthesis")
     parser.add_argument("--minutes", type=float, default=24.0, help="of all people")
     parser.add_argument("--epochs", type=int, default=80, help="of all sensors")
     parser.add_argument("--seeds", type=int, default=2)
     options = parser.parse_args()
-    folder: Path = options.folder
+    folder = options.folder
     campaign = campaign_of(folder, options.minutes, "--seed", 3, "--sensors", PLACES)
     jobs = {
         which: [
@@ -88,15 +48,14 @@ def main() -> None:
         for judged in ("first", "all")
     }
     pairs = read_pairs(campaign)
-    page = PAGE.format(
+    write_filled(
+        "range-synthesis.md",
         minutes=pairs.placements(first_only=True).frames / pairs.frame_rate_hz / 60.0,
         epochs=options.epochs,
         seeds=options.seeds,
-        machine=this_machine(),
         places=PLACES,
         **results(evaluations),
     )
-    write_page("range-synthesis.md", page)
 
 
 def results(evaluations: Mapping[tuple[str, str], Mapping[str, Any]]) -> dict[str, Any]:
@@ -116,7 +75,7 @@ def results(evaluations: Mapping[tuple[str, str], Mapping[str, Any]]) -> dict[st
         cells = (errors_of(groups[learnt, judged][name]) for judged in ("first", "all"))
         rows.append([title, *chain.from_iterable(cells)])
     return {
-        "table": "\n".join(markdown_table(rows)),
+        "table": table(rows),
         "first_moving": evaluations["first", "first"]["moving_frames"],
         "all_moving": evaluations["first", "all"]["moving_frames"],
     }

@@ -6,7 +6,6 @@ files. Trainings stay in ``build/real-gestures`` (or ``--folder``).
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.accuracy.cache import this_machine
 from sd2core.classify.data import ClipSet
 from sd2core.classify.live import TrainedClassifier, judge
 from sd2core.classify.metrics import Score, mean_recall
@@ -27,14 +25,13 @@ from sd2core.classify.training import TrainOptions, train
 from sd2core.cli.classify.data import clips_of
 from sd2core.datasets.labelled import unfolded
 from sd2core.datasets.labelled_source import LabelledSource
-from sd2core.files.tables import markdown_table
 from sd2core.io.radar.kkt import RecordedMap, load_kkt
 from sd2core.labels.matching import match_spans
 from sd2core.labels.suggest import suggest_spans
 from sd2core.options.suggesting import SuggestOptions
 from sd2core.study.plan import Learner
-from tools.documentation.measured import write_page
-from tools.documentation.places import BUILD, SHARED
+from tools.documentation.pages import page_parser, spread_of, table, write_filled
+from tools.documentation.places import SHARED
 from tools.documentation.runs import sd2
 
 SPLITS = 3
@@ -50,55 +47,6 @@ GRID = [
         (6.0, 7.0, 8.0, 9.0), (4.0, 5.0, 6.0), (0.1, 0.2), (0.1, 0.2, 0.3), (0.0, 0.1, 0.2, 0.3)
     )
 ]
-
-PAGE = """\
-# Gestures that a real radar saw
-
-How well are gestures found and told apart in maps of a real radar? Measured by
-
-```
-make real-gestures
-```
-
-on {machine}, with {files} files of KaiKuTek's K60168A ([what they
-hold](formats.md#recordings-of-maps-k60168a)). They are real, and of **one person**; a file lasts
-2.5 s and has one labelled gesture or none (background). Files are divided {splits} times, drawn
-anew; spreads are standard deviations over these.
-
-## Suggestions from motion
-
-With the default options, all files; matched from an IoU of 0.5 on
-([decision 51](decisions/0051-still-echoes-and-real-gestures.md)).
-
-{now}
-
-**F1 {default} in half of the files with the default options, {chosen} with those chosen on the
-other half** out of {grid} combinations. The defaults were found with all of these files in view.
-
-## Classifiers
-
-`{command}`,
-learnt from four fifths of the files, in per cent: mean over classes of the share of frames found,
-and of whole gestures, by what most of their frames were taken for.
-
-{networks}
-
-Class by class, {best}, the best of these:
-
-{classes}
-
-## Gestures found by a classifier
-
-`{kernel}` learns from some of the files and is asked for the others, so that each is
-asked for once; {splits} times, divided anew. Spans as of `sd2 classify apply` with
-`--min-duration-s {shortest} --merge-gap-s {gap}`; matched from an IoU of 0.5 on.
-
-{spans}
-
-**What this cannot say.** Anything about other people; and which network is the better where the
-spreads, of few files, overlap. The kernel's window and smoothing, and the two options above, were
-chosen with these files in view.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +81,7 @@ class Found:
 
 def main() -> None:
     """Measure and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--folder", type=Path, default=BUILD / "real-gestures")
+    parser = page_parser(__doc__, "real-gestures")
     parser.add_argument(
         "--data",
         type=Path,
@@ -162,24 +109,23 @@ def main() -> None:
     names = " ".join(folder.name for folder in options.data)
     told = json.loads((options.folder / "study.json").read_text("utf-8"))
     networks, best_network, classes = _classified(told)
-    page = PAGE.format(
+    write_filled(
+        "real-gestures.md",
         files=len(paths),
-        machine=this_machine(),
         splits=SPLITS,
-        now="\n".join(markdown_table(_by_gesture(usual, recorded))),
+        now=table(_by_gesture(usual, recorded)),
         grid=len(GRID),
-        chosen=_spread([one.f1(files)[AT] for one, files in zip(best, judged, strict=True)], 2),
-        default=_spread([usual.f1(files)[AT] for files in judged], 2),
+        chosen=spread_of([one.f1(files)[AT] for one, files in zip(best, judged, strict=True)], 2),
+        default=spread_of([usual.f1(files)[AT] for files in judged], 2),
         command=f"sd2 classify table {names} --out tables {' '.join(map(str, how))}",
-        networks="\n".join(markdown_table(networks)),
+        networks=table(networks),
         best=best_network,
-        classes="\n".join(markdown_table(classes)),
+        classes=table(classes),
         kernel=KERNEL_NAME,
         shortest=SPANS.min_duration_s,
         gap=SPANS.merge_gap_s,
-        spans="\n".join(markdown_table(_found_by_kernel(known, paths, recorded))),
+        spans=table(_found_by_kernel(known, paths, recorded)),
     )
-    write_page("real-gestures.md", page)
 
 
 def _found_by_kernel(
@@ -206,8 +152,8 @@ def _found_by_kernel(
         rows.append(
             [
                 words,
-                _spread([100.0 * one.mean_recall for one in scores], 1),
-                _spread([100.0 * mean_recall(one.gestures) for one in scores], 1),
+                spread_of([100.0 * one.mean_recall for one in scores], 1),
+                spread_of([100.0 * mean_recall(one.gestures) for one in scores], 1),
                 *(f"{count / SPLITS:.1f}" for count in (labels, suggested, matched)),
                 f"{2 * matched / (labels + suggested):.2f}",
                 f"{2 * named / (labels + suggested):.2f}",
@@ -247,8 +193,8 @@ def _classified(told: dict[str, Any]) -> tuple[list[list[str]], str, list[list[s
         scores = [Score.from_json(one) for one in total["seeds"]]
         frames = [100.0 * one.mean_recall for one in scores]
         gestures = [100.0 * mean_recall(one.gestures) for one in scores]
-        latency = _spread([one.latency_s for one in scores], 2)
-        networks.append([name, _spread(frames, 1), _spread(gestures, 1), latency])
+        latency = spread_of([one.latency_s for one in scores], 2)
+        networks.append([name, spread_of(frames, 1), spread_of(gestures, 1), latency])
         if np.mean(frames) > best:
             best, name_of_best, scores_of_best = float(np.mean(frames)), name, scores
     classes = [[name] for name in ("class", *told["classes"], "all together")]
@@ -257,13 +203,9 @@ def _classified(told: dict[str, Any]) -> tuple[list[list[str]], str, list[list[s
         right, judged = np.diagonal(counts, axis1=1, axis2=2), counts.sum(axis=2)
         classes[0].append(what)
         for row, own, all_ in zip(classes[1:-1], right.T, judged.T, strict=True):
-            row.append(_spread(100.0 * own / all_, 1) if all_.all() else "")
-        classes[-1].append(_spread(100.0 * right.sum(axis=1) / judged.sum(axis=1), 1))
+            row.append(spread_of(100.0 * own / all_, 1) if all_.all() else "")
+        classes[-1].append(spread_of(100.0 * right.sum(axis=1) / judged.sum(axis=1), 1))
     return networks, name_of_best, classes
-
-
-def _spread(values: Sequence[float] | NDArray[np.float64], digits: int) -> str:
-    return f"{np.mean(values):.{digits}f} ± {np.std(values, ddof=1):.{digits}f}"
 
 
 if __name__ == "__main__":

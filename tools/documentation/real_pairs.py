@@ -9,7 +9,6 @@ own points agree with one another, which no denoiser can exceed. The pairs stay 
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +18,6 @@ from numpy.typing import NDArray
 
 from sd2core.denoise.card import DENOISER_PARTS
 from sd2core.doppler import Synthesizer
-from sd2core.files.tables import markdown_table
 from sd2core.io.radar.mars import MarsPart, MarsStretch, mars_parts, read_mars
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS
@@ -36,8 +34,8 @@ from sd2core.mocap.radar_place import RadarPlace, estimate_place
 from sd2core.pairs.store import PairSet, read_pairs
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
-from tools.documentation.measured import write_page
-from tools.documentation.places import BUILD, SHARED
+from tools.documentation.pages import page_parser, table, write_filled
+from tools.documentation.places import SHARED
 from tools.documentation.runs import sd2
 
 Maps = list[NDArray[np.float32]]
@@ -50,57 +48,6 @@ RIDGE = 10.0
 HALVINGS = 8
 _POINT_ARRAYS = ("point_rows", "point_mps", "point_intensity")
 MARS = [SHARED / "paired" / name for name in ("mars_subject1", "mars_subject4")]
-
-PAGE = """\
-# Real pairs
-
-What are pairs with a **real** radar worth, and how much can a denoiser make of them? A body driven
-by a Kinect's skeleton gives the synthetic map; a 77 GHz radar saw the same person at 10 frames/s
-([decision 27](decisions/0027-real-pairs.md)). What trained denoisers make of them:
-[denoisers on a real radar](denoiser.md#a-real-radar). Made by
-
-```sh
-python -m tools.documentation.real_pairs
-```
-
-from the MARS recordings of two persons (rehabilitation exercises, about 2 m away). Nothing here
-depends on the machine.
-
-## What the input may be made of
-
-Mean velocity per frame of the input against that of the radar's points, in frames that have some,
-by person and part of the recordings. *From the Kinect*: the radar taken to be where the Kinect
-is, else where it stands as estimated from the pairs ([decision 52](decisions/0052-limb-maps.md)).
-
-{inputs}
-
-Where the radar was found beside the Kinect:
-
-{places}
-
-## What the least denoiser makes of it
-
-A linear map (ridge regression) from five frames of the input to the radar's mean velocity, learnt
-from the other person: of the map of the body, or of the maps of its parts (*limbs*), left and right
-sides together or apart. *Own other minutes*: a quarter of the person's takes by the other three.
-A denoiser has to beat this.
-
-{linear}
-
-## What the radar allows
-
-A frame has few points. They are parted at random into two halves, eight times: *halves* is the
-correlation of their mean velocities, *all points* that of as many points with as many others
-(Spearman and Brown), *at most* its root: what an estimate could reach that knew all that the points
-have in common.
-
-{ceiling}
-
-## What this cannot say
-
-- Two persons, who exercise and do not swipe; nothing about gestures.
-- A Kinect's skeleton drives the body: the fit of a video errs otherwise ([fitting](fitting.md)).
-"""
 
 
 def skeleton_cloud(clip: SkeletonClip) -> MeshSequence:
@@ -196,11 +143,6 @@ def inputs(people: Sequence[Parts]) -> tuple[str, str]:
             for name, choices in WAYS.items():
                 rows[name] += errors(body_maps(clips, choices, place), radar)
     return table([head, *rows.values()]), "\n".join(notes)
-
-
-def table(rows: Sequence[Sequence[str]]) -> str:
-    """Rows in Markdown."""
-    return "\n".join(markdown_table(rows))
 
 
 def place_words(place: RadarPlace) -> str:
@@ -311,9 +253,8 @@ def ceiling(people: Sequence[Parts]) -> str:
 
 def main() -> None:
     """Make the pairs if they are missing, measure and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = page_parser(__doc__.splitlines()[0], "real-pairs")
     parser.add_argument("recordings", type=Path, nargs="*", default=MARS, help="folders of MARS")
-    parser.add_argument("--folder", type=Path, default=BUILD / "real-pairs")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     pairs = options.folder / "mars.zarr"
@@ -323,10 +264,13 @@ def main() -> None:
         [read_mars(folder, name) for name in mars_parts(folder)] for folder in options.recordings
     ]
     of_inputs, places = inputs(people)
-    page = PAGE.format(
-        inputs=of_inputs, places=places, linear=linear(read_pairs(pairs)), ceiling=ceiling(people)
+    write_filled(
+        "real-pairs.md",
+        inputs=of_inputs,
+        places=places,
+        linear=linear(read_pairs(pairs)),
+        ceiling=ceiling(people),
     )
-    write_page("real-pairs.md", page)
 
 
 if __name__ == "__main__":

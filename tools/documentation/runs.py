@@ -1,10 +1,9 @@
-"""Trainings that pages of the documentation are about, their errors, and parts of such pages."""
+"""Trainings that pages of the documentation are about, and their errors."""
 
 from __future__ import annotations
 
 import json
 import os
-import re
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,6 +15,7 @@ from typing import Any
 
 from sd2core.runs.progress import read_events, standing
 from sd2core.train.folder import TrainingFolder
+from tools.documentation.pages import spread
 
 PILOT_EPOCHS = 4
 
@@ -119,18 +119,6 @@ def errors_of(group: Mapping[str, Any]) -> list[str]:
 def run_of(group: Mapping[str, Any]) -> str:
     """Name of the run without its seed, or of the filter."""
     return group["models"][0]["name"].rpartition("-")[0] if group["trained"] else group["name"]
-
-
-def spread(values: Mapping[str, Any], digits: int = 3) -> str:
-    """Mean over trainings, and their standard deviation where there are several."""
-    sd = values["sd"]
-    return f"{values['mean']:.{digits}f}" + (f" ± {sd:.{digits}f}" if sd is not None else "")
-
-
-def sections(page: str) -> dict[str, str]:
-    """Text below every heading of the second level, up to the next."""
-    _, *parts = re.split(r"^## (.+)\n", page, flags=re.MULTILINE)
-    return dict(zip(parts[::2], parts[1::2], strict=True))
 
 
 def _finished(run: Path) -> bool:

@@ -33,6 +33,7 @@ from sd2core.numerics.compiled import warm_up
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
 from tools.documentation.measured import write_page
+from tools.documentation.pages import filled, table
 from tools.documentation.places import BENCHMARKS
 
 sys.path.insert(0, str(BENCHMARKS))
@@ -54,20 +55,6 @@ RECORDINGS, FRAMES, PLACES = 1_000_000, 1800, 8
 CHOSEN = "synthesise, 2 %"
 
 _TIMED_FRAMES = (450, 120)
-
-INTRODUCTION = """\
-# Batches at scale
-
-What does `sd2 batch` cost, and what would a million recordings need? Measured by
-
-```
-make scale
-```
-
-on {machine}, with copies of the bundled sample and computed meshes of any length (all simulated).
-How batches work: [decision 39](decisions/0039-batches.md).
-"""
-
 
 LITTLE = """
 **Measured in little (`--quick`), beside other work: these are not the final figures.**
@@ -160,69 +147,46 @@ def _page(root: Path, sizes: Sizes) -> str:
     fits = _fits(folder("fits"), sizes.fit_frames)
     long = _long_fits(folder("long fits"), sizes.long_frames) if fits else []
     costs = _costs(folder("costs"), fits)
-    files = files_per_second(folder("files"))
+    files_per_s = files_per_second(folder("files"))[0]
     own_s = statistics.median(ten.own_s) / ten.tasks
-    return "\n".join(
-        [
-            INTRODUCTION.format(machine=this_machine()) + (LITTLE if sizes is QUICK else ""),
-            _processes(two, ten, there_s, sizes.frames),
-            _memory(used, fits, long),
-            _million(costs, two, own_s, files),
-        ]
+    return filled(
+        "scale.md",
+        machine=this_machine(),
+        little=LITTLE if sizes is QUICK else "",
+        processes=_processes(two, ten, there_s, sizes.frames),
+        memory=_memory(used),
+        fits=_fit_memory(fits, long),
+        recordings=RECORDINGS,
+        frames=FRAMES,
+        places=PLACES,
+        together=two.ratio / 2,
+        **_million(costs, own_s, files_per_s),
     )
 
 
 def _processes(two: Compared, ten: Compared, there_s: float, frames: int) -> str:
-    rows = (
-        (
-            f"{two.tasks} maps of 5,000 vertices and {frames} frames: two processes against one",
-            f"{two.ratio:.2f} times as fast",
-            "≥ 1.8",
-        ),
-        (
-            f"{ten.tasks} quick maps against a tenth of them",
-            f"{ten.ratio:.2f} times the time",
-            "≤ 10.5",
-        ),
-        ("a map that is there already", f"{1e3 * there_s:.2f} ms", ""),
-    )
-    return "\n".join(
-        [
-            "## Processes and tasks",
-            "",
-            "| what | measured | wanted |",
-            "|---|---|---|",
-            *(f"| {what} | {measured} | {wanted} |" for what, measured, wanted in rows),
-            "",
-        ]
-    )
+    rows = [["what", "measured", "wanted"]]
+    what = f"{two.tasks} maps of 5,000 vertices and {frames} frames: two processes against one"
+    rows.append([what, f"{two.ratio:.2f} times as fast", "≥ 1.8"])
+    what = f"{ten.tasks} quick maps against a tenth of them"
+    rows.append([what, f"{ten.ratio:.2f} times the time", "≤ 10.5"])
+    rows.append(["a map that is there already", f"{1e3 * there_s:.2f} ms", ""])
+    return table(rows)
 
 
-def _memory(used: list[Memory], fits: list[Fitted], long: list[LongFit]) -> str:
-    rows = [
-        f"| {one.recordings} × {one.minutes:g} min | {one.vertices:,}, {one.how or 'exact'}"
-        f" | {one.peak_mb['synthesise']:.0f} | {max(one.peak_mb.values()):.0f} |"
-        for one in used
-    ]
-    return "\n".join(
-        [
-            "## Memory of one process",
-            "",
-            "At most, in MB; wanted: 1 GB, whatever the recordings.",
-            "",
-            "| recordings | vertices, visibility | maps | denoised, exported |",
-            "|---|---|---|---|",
-            *rows,
-            "",
-            *_fit_memory(fits, long),
-        ]
-    )
+def _memory(used: list[Memory]) -> str:
+    rows = [["recordings", "vertices, visibility", "maps", "denoised, exported"]]
+    for one in used:
+        what = f"{one.recordings} × {one.minutes:g} min", f"{one.vertices:,}, {one.how or 'exact'}"
+        peaks_mb = one.peak_mb["synthesise"], max(one.peak_mb.values())
+        rows.append([*what, *(f"{peak_mb:.0f}" for peak_mb in peaks_mb)])
+    return table(rows, names=2)
 
 
-def _fit_memory(fits: list[Fitted], long: list[LongFit]) -> list[str]:
+def _fit_memory(fits: list[Fitted], long: list[LongFit]) -> str:
     """Real fits, and long ones whose landmarks are there already."""
     if not long:
-        return []
+        return ""
     sizes = ", ".join(f"{one.peak_mb:.0f} MB with {one.frames:,} frames" for one in fits)
     few, many = (max(one.peak_mb.values()) for one in (long[0], long[-1]))
     each_mb = (many - few) / (long[-1].frames - long[0].frames)
@@ -230,15 +194,15 @@ def _fit_memory(fits: list[Fitted], long: list[LongFit]) -> list[str]:
     if each_mb > 0:
         hours = (long[-1].frames + (1000 - many) / each_mb) / (30 * 3600)
         reached = f": 1 GB would be reached with {hours:.1f} hours of video at 30 frames/s"
-    return [
+    return (
         f"A fit of the sample's video takes {sizes}; of landmarks that are there already,"
         f" {few:.0f} MB with {long[0].frames:,} and {many:.0f} MB with {long[-1].frames:,}"
-        f"{reached}.",
-        "",
-    ]
+        f"{reached}.\n\n"
+    )
 
 
-def _million(costs: list[Cost], two: Compared, own_s: float, files: tuple[float, float]) -> str:
+def _million(costs: list[Cost], own_s: float, files_per_s: float) -> dict[str, object]:
+    """Tables and figures of the estimated batch."""
     by_step = {one.step: one for one in costs}
     count = {"fit": RECORDINGS, "synthesise": RECORDINGS * PLACES, "denoise": RECORDINGS * PLACES}
     count = {step: tasks for step, tasks in count.items() if step in by_step}
@@ -248,44 +212,26 @@ def _million(costs: list[Cost], two: Compared, own_s: float, files: tuple[float,
     # What each part lets through, in cores that it keeps at work.
     full = {
         "the process that schedules": total_s / (tasks * own_s),
-        "a file system that writes no faster than the disk here": total_s / (tasks / files[0]),
+        "a file system that writes no faster than the disk here": total_s / (tasks / files_per_s),
     }
     first = min(full, key=lambda part: full[part])
-    rows = [
-        f"| {step} | {1e3 * by_step[step].frame_s:.3f} ms"
-        f" | {seconds[step] / 3600:,.0f} | {bytes_words(size[step])} |"
-        for step in count
-    ]
-    machines = [
-        f"| {number:,} | {total_s / number / 3600:,.0f} h |"
-        f" {tasks * own_s / (total_s / number):.0%} |"
-        for number in (64, 256, 1024, 4096)
-    ]
-    chosen_ms = 1e3 * by_step[CHOSEN].frame_s
-    lines = [
-        "## A million recordings",
-        "",
-        f"{RECORDINGS:,} videos of {FRAMES:,} frames, each from {PLACES} placements, on processors"
-        " like this one, without what they lose to each other (two here do"
-        f" {two.ratio / 2:.0%} of twice the work of one):",
-        "",
-        "| step | per frame | hours of one core | written |",
-        "|---|---|---|---|",
-        *rows,
-        f"| all | | {total_s / 3600:,.0f} | {bytes_words(sum(size.values()))} |",
-        "",
-        f"With a plan chosen for 2 % tolerance, synthesis takes {chosen_ms:.3f} ms per frame.",
-        "",
-        "| cores | time | load of the scheduler |",
-        "|---|---|---|",
-        *machines,
-        "",
-        f"Processors limit it up to {full[first]:,.0f} cores, from there on {first}: divide the"
-        f" recordings over several plans. The disk here takes {files[0]:,.0f} files a second;"
-        " neither a cluster nor a network file system was measured.",
-        "",
-    ]
-    return "\n".join(lines)
+    steps = [["step", "per frame", "hours of one core", "written"]]
+    for step in count:
+        frame = f"{1e3 * by_step[step].frame_s:.3f} ms"
+        steps.append([step, frame, f"{seconds[step] / 3600:,.0f}", bytes_words(size[step])])
+    steps.append(["all", "", f"{total_s / 3600:,.0f}", bytes_words(sum(size.values()))])
+    machines = [["cores", "time", "load of the scheduler"]]
+    for number in (64, 256, 1024, 4096):
+        time_s = total_s / number
+        machines.append([f"{number:,}", f"{time_s / 3600:,.0f} h", f"{tasks * own_s / time_s:.0%}"])
+    return {
+        "steps": table(steps),
+        "chosen_ms": 1e3 * by_step[CHOSEN].frame_s,
+        "machines": table(machines),
+        "full": full[first],
+        "first": first,
+        "files_per_s": files_per_s,
+    }
 
 
 def _costs(folder: Path, fits: list[Fitted]) -> list[Cost]:

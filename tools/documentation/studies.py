@@ -11,15 +11,13 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from sd2core.accuracy.cache import this_machine
 from sd2core.cli.output import progress_bar
-from sd2core.files.tables import markdown_table
 from sd2core.study.certainty import Gain
 from sd2core.study.plan import StudyPlan, read_study
 from sd2core.study.report import TITLES, findings_of
 from sd2core.study.run import run_study
 from tools.documentation.denoiser import MARS
-from tools.documentation.measured import write_page
+from tools.documentation.pages import table, write_filled
 from tools.documentation.places import BUILD, IMAGES, REPOSITORY
 from tools.documentation.runs import sd2
 from tools.studies.hand_gestures import make_pairs
@@ -28,47 +26,6 @@ FOLDER = BUILD / "studies"
 PLANS = REPOSITORY / "tools" / "studies"
 _SHARE = 0.1
 _VARIANTS = ("places", "shapes", "mirrored")
-
-PAGE = """\
-# Do synthetic data help a real classifier?
-
-The paper's claim, tried on **real** radars by [`sd2 study`](formats.md#plan-of-a-study). Made by
-
-```sh
-python -m tools.documentation.studies
-```
-
-on {machine}. How it is judged: [decision 75](decisions/0075-studies.md).
-
-`tools/studies/mars.toml`: three people do ten exercises before a 77 GHz radar ([decision
-27](decisions/0027-real-pairs.md)); a body driven by a Kinect's skeleton stands for the video, so
-that errors of fits are not in it. `tools/studies/k60168a.toml`: one person's gestures before a
-60 GHz radar, and the same gestures as `tools/studies/hand_gestures.py` **simulates** them.
-
-{studies}
-
-With the kernel classifier, which finds more, nothing is gained: at {share:.0%} of the radar's data
-{kernel}.
-
-## What each kind of added data gives
-
-MARS at {share:.0%} of the radar's data: points of frames over the radar alone, with 95 % intervals
-over takes. Beside the filmed movements, these were added: other *speeds* (0.8, 1.25); the same as
-`sd2 pairs vary` **simulates** them, seen from other *places*, on bodies of other
-*shapes*, or *mirrored*.
-
-{augmentations}
-
-The radar's texture holds its detector: a cell shows, or does not, by a law of its mean.
-
-## What this cannot say
-
-- Three people and one, two radars; nothing about bodies fitted to videos.
-- MARS: how movements are grouped, what added frames weigh and the speeds at which they are played
-  were chosen in view of these people: a fourth person has not been judged.
-- K60168A: the program's gestures were made in view of these files, of which nothing says how the
-  hand moves, and corrected once (before, the kernel lost 1.8 points by them).
-"""
 
 
 def study_section(folder: Path, name: str) -> str:
@@ -108,7 +65,7 @@ def augmentations(share: float) -> str:
         changed = {"shares": (share,), "added": added, **changes}
         gains = _gains(plan.model_copy(update=changed))
         rows.append([name, *(_gain(gains[one]) for one in added)])
-    return "\n".join(markdown_table(rows))
+    return table(rows)
 
 
 def _gain(gain: Gain) -> str:
@@ -128,14 +85,13 @@ def main() -> None:
     for variant in _VARIANTS:
         out = FOLDER / f"mars-{variant}.zarr"
         sd2("pairs", "vary", *MARS, "--by", variant, "--limbs", "--out", out)
-    page = PAGE.format(
-        machine=this_machine(),
+    write_filled(
+        "studies.md",
         studies="\n\n".join(sections),
         share=_SHARE,
         kernel=by_kernel(_SHARE),
         augmentations=augmentations(_SHARE),
     )
-    write_page("studies.md", page)
 
 
 if __name__ == "__main__":

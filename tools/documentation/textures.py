@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from sd2core.denoise.files import load_model
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.texture import Texture
-from sd2core.files.tables import markdown_table
 from sd2core.pairs.segments import LENGTH
 from sd2core.pairs.store import Take, read_pairs
+from tools.documentation.pages import table
 
 Maps = list[NDArray[np.float32]]
 _STRONG = 0.5
@@ -44,7 +44,7 @@ def texture_table(models: Mapping[str, tuple[Path, Path, str | None]]) -> str:
         for name, maps in (("the radar's", radar), ("drawn", drawn), ("the mean", means)):
             found = _statistics(*([one[:, counted] for one in each] for each in (means, maps)))
             rows.append([f"{title}: {name}", *(f"{value:.2f}" for value in found)])
-    return "\n".join(markdown_table(rows))
+    return table(rows)
 
 
 def _answer(model: TrainedDenoiser, take: Take) -> NDArray[np.float32]:

@@ -14,13 +14,8 @@ from sd2core.cli.output import print_json, progress_bar
 from sd2core.cli.output_folders import check_output
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
-from tools.command_line import (
-    add_json,
-    positive_int,
-    run_tool,
-)
-from tools.fitting.clips import ALL_CLIPS, CLIPS, REAL_MOTION, TUNING, clip_named, make_fit_truth
-from tools.fitting.error_check import compare_errors
+from tools.command_line import add_json, run_tool
+from tools.fitting.clips import CLIPS, REAL_MOTION, TUNING, clip_named, make_fit_truth
 from tools.fitting.error_measurement import measure_errors
 from tools.fitting.report import as_dict
 from tools.fitting.report_text import as_markdown, as_text
@@ -52,12 +47,11 @@ def _add_clips(commands: argparse._SubParsersAction) -> None:
             "already are kept, so a run that was stopped goes on where it was."
         ),
         examples=(
-            "  python -m tools.fitting clips --list\n"
             "  python -m tools.fitting clips truth\n"
             "  python -m tools.fitting clips truth --clips still,walk"
         ),
     )
-    parser.add_argument("out", type=Path, nargs="?", metavar="OUT", help="the folder to fill")
+    parser.add_argument("out", type=Path, metavar="OUT", help="the folder to fill")
     parser.add_argument(
         "--clips",
         metavar="NAMES",
@@ -75,7 +69,6 @@ def _add_clips(commands: argparse._SubParsersAction) -> None:
             " `python -m tools.motion_capture drive` made"
         ),
     )
-    parser.add_argument("--list", action="store_true", help="name the clips and make nothing")
 
 
 def _add_score(commands: argparse._SubParsersAction) -> None:
@@ -149,38 +142,20 @@ def _add_errors(commands: argparse._SubParsersAction) -> None:
         handler=_errors,
         description=(
             "Compares fits of the clips with the true bodies: place, turns of the trunk,\n"
-            "directions of the limbs, shape. With --check bodies that are disturbed accordingly\n"
-            "are scored as the fits are."
+            "directions of the limbs, shape."
         ),
         examples=(
             "  python -m tools.fitting clips truth\n"
             "  python -m tools.fitting score truth --keep fits\n"
-            "  python -m tools.fitting errors truth fits --out fit_errors.json --check 4"
+            "  python -m tools.fitting errors truth fits --out fit_errors.json"
         ),
     )
     parser.add_argument("truth", type=Path, metavar="TRUTH", help="folder of the clips")
     parser.add_argument("fits", type=Path, metavar="FITS", help="folder that score --keep filled")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="to write (.json)")
-    parser.add_argument(
-        "--check",
-        type=positive_int,
-        metavar="N",
-        help="also score bodies that are disturbed N times, beside the fits",
-    )
-    add_json(parser)
 
 
 def _clips(options: argparse.Namespace) -> None:
-    if options.list:
-        width = max(len(clip.name) for clip in ALL_CLIPS)
-        for clip in ALL_CLIPS:
-            print(
-                f"{clip.name:<{width}}  {clip.person}, {clip.room}, at {clip.distance_m:g} m,"
-                f" camera {clip.camera_m:g} m high"
-            )
-        return
-    if options.out is None:
-        raise Sd2Error("No folder is given", "python -m tools.fitting clips OUT")
     names = [name for name in (options.clips or "").split(",") if name]
     standard = CLIPS if options.motions is None else (*CLIPS, *REAL_MOTION)
     clips = TUNING if names == ["tuning"] else [clip_named(name) for name in names] or standard
@@ -220,25 +195,6 @@ def _errors(options: argparse.Namespace) -> None:
     with progress_bar("Measuring", unit="clip") as progress:
         errors = measure_errors(truths, options.fits, progress)
     errors.save(options.out)
-    likeness = []
-    if options.check:
-        with progress_bar("Checking", unit="clip") as progress:
-            likeness = compare_errors(truths, options.fits, errors, options.check, progress)
-    if options.json:
-        print_json(
-            {
-                "path": str(options.out),
-                **errors.provenance,
-                "likeness": [one._asdict() for one in likeness],
-            }
-        )
-        return
-    if likeness:
-        print(f"{'':66s}  fits  disturbed: mean, least to most")
-    for what, unit, measured, drawn in likeness:
-        name = f"{what} ({unit})" if unit else what
-        mean = sum(drawn) / len(drawn)
-        print(f"{name:66s}{measured:6.3f}  {mean:.3f}, {min(drawn):.3f} to {max(drawn):.3f}")
     print(f"Wrote {options.out}: {len(truths)} clips, {errors.provenance['frames']} frames")
 
 

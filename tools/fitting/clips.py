@@ -216,7 +216,6 @@ def clip_named(name: str) -> Clip:
     raise Sd2Error(
         f"There is no clip {name!r}",
         ", ".join(clip.name for clip in (*CLIPS, *REAL_MOTION)),
-        "See --list",
     )
 
 

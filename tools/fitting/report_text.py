@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from sd2core.files.tables import markdown_table, text_table
 from tools.fitting.clip_score import ClipScore
 from tools.fitting.real_score import RealScore
 from tools.fitting.report import Row, clip_table, gesture_table, reach_table
@@ -48,12 +49,7 @@ def as_text(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> str:
         reach.append([row.what, _measured(row), row.wanted, met, row.detail])
     parts = []
     for heading, rows in _tables(reach, gesture_table(scores), scores, real):
-        widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-        lines = [
-            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-            for row in rows
-        ]
-        parts.append("\n".join([heading, *(f"  {line}" for line in lines)]))
+        parts.append("\n".join([heading, *(f"  {line}" for line in text_table(rows, ()))]))
     return "\n\n".join(parts)
 
 
@@ -67,9 +63,7 @@ def as_markdown(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> 
     gestures = [one for one in gesture_table(scores) if one["speed"] == "all"]
     parts = []
     for heading, rows in _tables(reach, gestures, scores, real):
-        lines = [f"| {' | '.join(row)} |" for row in rows]
-        lines.insert(1, "|" + "---|" * len(rows[0]))
-        parts.append("\n".join([f"**{heading}**", "", *lines]))
+        parts.append("\n".join([f"**{heading}**", "", *markdown_table(rows)]))
     return "\n\n".join(parts) + "\n"
 
 

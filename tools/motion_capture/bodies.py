@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import partial
 from pathlib import Path
@@ -21,7 +21,7 @@ from sd2core.progress import Progress, silent
 from tools.motion_capture.catalogue import RATE_HZ, Trial, trials
 from tools.motion_capture.points import MARKERS
 
-__all__ = ["BodyMotion", "drive_bodies", "load_motions", "minutes", "moved_transforms"]
+__all__ = ["BodyMotion", "drive_bodies", "load_motions", "moved_transforms"]
 
 Floats = NDArray[np.float64]
 
@@ -121,8 +121,3 @@ def moved_transforms(transforms: Floats, turn: Floats, shift_m: Floats) -> Float
     moved[..., :3] = product(turn, transforms[..., :3])
     moved[..., 3] = applied(turn, transforms[..., 3]) + shift_m
     return moved
-
-
-def minutes(motions: Iterable[BodyMotion]) -> float:
-    """Length of all motions together."""
-    return sum(len(motion) for motion in motions) / RATE_HZ / 60.0

@@ -11,7 +11,6 @@ from typing import get_args
 
 from sd2core.body.landmark_models import DEFAULT_MODEL, LandmarkModel
 from sd2core.body.lifter import Lifter
-from sd2core.body.track import LANDMARKS
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.cli.output_folders import check_output
@@ -25,7 +24,6 @@ from tools.command_line import (
 from tools.motion_capture.bodies import load_motions
 from tools.train_lifter.data import load_takes, make_lifter_data
 from tools.train_lifter.deeds import Manner
-from tools.train_lifter.emulate import landmark_offsets
 from tools.train_lifter.fits import fit_law, repaired
 from tools.train_lifter.pairs import make_pairs
 from tools.train_lifter.score import score
@@ -123,15 +121,6 @@ def _add_commands(kinds: argparse._SubParsersAction) -> None:
     scoring.add_argument("data", type=Path, metavar="DATA", help="folder of the takes")
     scoring.add_argument("--lifter", type=Path, metavar="FILE", help="(default: the bundled one)")
     add_json(scoring)
-    offsets = add_command(
-        kinds,
-        "offsets",
-        "measure where the landmark model puts each landmark beside our keypoint",
-        handler=_offsets,
-        description="Prints thousandths of the stature, at rest: to the left, down, backwards.",
-        examples="  python -m tools.train_lifter offsets people",
-    )
-    offsets.add_argument("data", type=Path, metavar="DATA", help="folder of the takes")
 
 
 def _add_motion(parser: argparse.ArgumentParser) -> None:
@@ -268,11 +257,6 @@ def _score(options: argparse.Namespace) -> None:
     for part, shares in sides.items():
         print(f"{part:15s}" + "".join(f"{100.0 * share:6.1f} %" for share in shares))
     print(f"Nothing moves: {found.still_mps:.3f} m/s over all landmarks")
-
-
-def _offsets(options: argparse.Namespace) -> None:
-    for name, offset in zip(LANDMARKS, landmark_offsets(_takes(options.data)), strict=True):
-        print(f"{name:14s}" + "".join(f"{1000.0 * value:8.1f}" for value in offset))
 
 
 def _takes(folder: Path) -> list[Take]:

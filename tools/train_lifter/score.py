@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sd2core.body.lifter import Lifter, by_landmark, spread
 from sd2core.body.lifter_features import rate
 from sd2core.body.track import LANDMARKS, TORSO_CORNERS
+from sd2core.compare.measures import correlation, rms
 from tools.train_lifter.examples import Batch, Example, batch, example
 from tools.train_lifter.fits import repaired
 from tools.train_lifter.takes import Take
@@ -129,15 +130,15 @@ def score(lifter: Lifter, takes: Sequence[Take]) -> Score:
         fast = np.abs(v) > _FAST_MPS
         from_edge = np.broadcast_to(away[:, None], chosen.shape)[chosen]
         joints[joint] = JointScore(
-            _rms(e),
-            _rms(v),
-            _correlation(v, v + e),
+            rms(e),
+            rms(v),
+            correlation(v, v + e),
             1.0 + float((e[fast] * v[fast]).sum() / max((v[fast] ** 2).sum(), 1e-12)),
             float((np.abs(e) <= sigma[:, rows][chosen]).mean()),
-            _rms(e[from_edge < _EDGE]) / max(_rms(e[from_edge >= _MIDDLE]), 1e-12),
-            100.0 * _rms(depth[:, rows][chosen]),
+            rms(e[from_edge < _EDGE]) / max(rms(e[from_edge >= _MIDDLE]), 1e-12),
+            100.0 * rms(depth[:, rows][chosen]),
         )
-    still_mps = _rms(np.concatenate(still)) if still else float("nan")
+    still_mps = rms(np.concatenate(still)) if still else float("nan")
     likeness = _by_likeness(np.concatenate(distances), np.concatenate(squares))
     return Score(joints, likeness, still_mps)
 
@@ -178,13 +179,3 @@ def _inside(take: Take) -> NDArray[np.bool_]:
     places = take.camera.project(take.keypoints_m.astype(np.float64))
     size = (take.camera.width, take.camera.height)
     return np.asarray(((places >= 0.0) & (places <= size)).all(axis=-1))
-
-
-def _rms(values: NDArray[np.floating]) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")
-
-
-def _correlation(one: NDArray[np.floating], other: NDArray[np.floating]) -> float:
-    if not one.std() or not other.std():
-        return float("nan")
-    return float(np.corrcoef(one, other)[0, 1])

@@ -1,4 +1,4 @@
-"""``python -m sd2core.cli`` and ``sd2 warm-up``."""
+"""``python -m sd2core.cli`` and ``sd2 doctor --warm-up``."""
 
 from __future__ import annotations
 
@@ -22,11 +22,16 @@ def test_the_module_runs_the_librarys_commands() -> None:
     assert "campaign" in done.stdout
 
 
-def test_warm_up(sd2: Sd2, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_kernels_are_compiled(sd2: Sd2, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[Progress] = []
     monkeypatch.setattr("sd2core.numerics.compiled.warm_up", calls.append)
-    assert sd2("warm-up").code == 0
-    assert len(calls) == 1
+    done = sd2("doctor", "--warm-up")
+    assert (done.code, done.out, done.err) == (0, "", "")
+    older = sd2("warm-up")
+    assert (older.code, older.out, older.err.count("\n")) == (0, "", 1)
+    assert "`sd2 doctor --warm-up`" in older.err
+    assert "`sd2 doctor --warm-up`" in sd2("warm-up", "--help").out
+    assert len(calls) == 2
 
 
 def test_a_command_that_is_typed_is_loaded_alone() -> None:

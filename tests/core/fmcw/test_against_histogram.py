@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from facet_visibility import facet_visibility
 from velocity_response import velocity_response
 
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
@@ -24,7 +25,6 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
-from tools.build_sample.facets import facet_visibility
 
 AXIS = VelocityAxis()
 FRAMES = 60

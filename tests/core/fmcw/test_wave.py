@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from facet_scatterers import facet_scatterers, mean_phasor
+from facet_signal import echo
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -38,8 +40,6 @@ from sd2core.progress import Cancelled
 from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS, RadarConfig
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
-from tools.build_sample.scatterers import facet_scatterers, mean_phasor
-from tools.build_sample.signal import echo
 
 CAMERA = VirtualSensor()
 LAMBDA_M = PAPER_RADAR.wavelength_m

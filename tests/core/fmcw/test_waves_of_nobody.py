@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from facet_signal import simulate_capture
+from facet_visibility import facet_visibility
 from test_wave import SILENT, sheet
 
 from sd2core.errors import Sd2Error
@@ -22,8 +24,6 @@ from sd2core.io.radar import load_capture, write_capture
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.sensor import VirtualSensor
-from tools.build_sample.facets import facet_visibility
-from tools.build_sample.signal import simulate_capture
 
 FRAMES = 15
 THERE = np.ones(FRAMES, bool)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from facet_visibility import facet_visibility
 
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.scattering.facets import visible_facets
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
-from tools.build_sample.facets import facet_visibility
 
 BALL = trimesh.creation.icosphere(subdivisions=3)
 POINTS = np.asarray(BALL.vertices)

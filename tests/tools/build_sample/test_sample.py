@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from facet_visibility import facet_visibility
 
 from sd2core.doppler import Synthesizer
 from sd2core.errors import Sd2Error
@@ -19,7 +20,6 @@ from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.sensor import VirtualSensor
 from tools.build_sample.__main__ import main
-from tools.build_sample.facets import facet_visibility
 from tools.build_sample.render import Camera
 from tools.build_sample.sample import (
     FRAMES_PER_S,

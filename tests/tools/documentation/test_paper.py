@@ -5,7 +5,8 @@ import re
 import pytest
 
 from sd2core.denoise.metrics import VelocityError
-from tools.documentation.paper import LINES, findings, linked, sections, table_1
+from tools.documentation.pages import sections
+from tools.documentation.paper import LINES, findings, linked, table_1
 
 
 def evaluation(**mae_mps: float) -> dict:

@@ -180,10 +180,13 @@ def test_what_cannot_be_scored_is_explained(
     assert found in outcome.err
 
 
-def test_the_clips_are_listed(fitting: Tool) -> None:
-    outcome = fitting("clips", "--list")
-    assert outcome.code == 0
-    assert "walk-aside" in outcome.out
+def test_a_clip_that_is_not_there_is_named_with_those_that_are(
+    fitting: Tool, tmp_path: Path
+) -> None:
+    outcome = fitting("clips", tmp_path / "clips", "--clips", "dance-2")
+    assert outcome.code == 1
+    assert "no clip 'dance-2'" in outcome.err
+    assert "walk-aside" in outcome.err
 
 
 def test_fits_that_are_missing_are_named(fitting: Tool, tmp_path: Path) -> None:

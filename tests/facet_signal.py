@@ -1,4 +1,4 @@
-"""Raw samples of an FMCW radar from a moving scene, for the bundled sample.
+"""Raw samples of an FMCW radar from a moving scene by a simple path, to compare the program with.
 
 Beat signal of one scatterer after M. A. Richards, *Fundamentals of Radar Signal
 Processing*: cos(2 pi (f_c tau + S tau t)) with the round-trip delay tau, the
@@ -17,6 +17,7 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
+from facet_scatterers import Scatterers, point_scatterers, scatterers_at
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
@@ -29,7 +30,6 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.radar_config import SPEED_OF_LIGHT_MPS, RadarConfig
 from sd2core.sensor import VirtualSensor
-from tools.build_sample.scatterers import Scatterers, point_scatterers, scatterers_at
 
 _CHUNK = 4096
 """Scatterers per matrix product: their phasors stay in the cache."""
@@ -95,7 +95,7 @@ def capture_scene(
     Parameters
     ----------
     scatterers_at : callable
-        Time in seconds → :class:`~tools.build_sample.scatterers.Scatterers`.
+        Time in seconds → :class:`~facet_scatterers.Scatterers`.
     times_s : float64 array, shape (frames,)
         Middle of every frame's burst of chirps, increasing.
     there : bool array, shape (frames,), optional

@@ -9,6 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from facet_scatterers import (
+    Scatterers,
+    facet_scatterers,
+    mean_phasor,
+    point_scatterers,
+    scatterers_at,
+)
+from facet_signal import capture_scene, echo, simulate_capture
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -23,14 +31,6 @@ from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS
 from sd2core.radar_profiles import RADARS
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
-from tools.build_sample.scatterers import (
-    Scatterers,
-    facet_scatterers,
-    mean_phasor,
-    point_scatterers,
-    scatterers_at,
-)
-from tools.build_sample.signal import capture_scene, echo, simulate_capture
 
 CAMERA = VirtualSensor()
 SILENT = SignalOptions(snr_db=math.inf)

@@ -1,4 +1,4 @@
-"""Reflecting centres of the sample's scene: facets, each with its phase in closed form."""
+"""Reflecting centres of a scene: facets, each with its phase in closed form."""
 
 from __future__ import annotations
 
