@@ -11,7 +11,8 @@ from torch import Tensor, nn
 
 from sd2core.classify.defaults import MODELS, WIDTH
 from sd2core.denoise.registry import check_option
-from sd2core.denoise.s4_layer import S4Layer, S4Stack
+from sd2core.denoise.s4_layer import S4Layer
+from sd2core.denoise.s4_stack import S4Stack
 from sd2core.errors import Sd2Error
 
 State = Any
