@@ -10,7 +10,8 @@ from torch import Tensor, nn
 
 from sd2core.classify.defaults import CLASSIFIERS, ENTRIES, WIDTH, model_names
 from sd2core.denoise.registry import Architecture, check_option
-from sd2core.denoise.s4_layer import S4Layer, S4Stack
+from sd2core.denoise.s4_layer import S4Layer
+from sd2core.denoise.s4_stack import S4Stack
 from sd2core.errors import Sd2Error
 from sd2core.plug_ins import PlugIn
 

@@ -7,8 +7,9 @@ from typing import Any, Literal
 from torch import Tensor, nn
 
 from sd2core.denoise.model import Denoiser, State
-from sd2core.denoise.s4_layer import S4Layer, S4Stack
+from sd2core.denoise.s4_layer import S4Layer
 from sd2core.denoise.s4_space import DT_MAX, DT_MIN
+from sd2core.denoise.s4_stack import S4Stack
 
 
 class S4Denoiser(S4Stack, Denoiser):

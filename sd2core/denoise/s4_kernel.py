@@ -28,78 +28,6 @@ from sd2core.denoise.s4_functions import (
 from sd2core.errors import Sd2Error
 
 
-def legs_matrices(state_size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """HiPPO-LegS in its own (dense, real) basis: x′ = A x + B u; A is (N, N), B is (N,).
-
-    A[n, k] = −√((2n + 1)(2k + 1)) below the diagonal, −(n + 1) on it and 0 above, and
-    B[n] = √(2n + 1). The SD² paper prints A without its minus sign; that system has eigenvalues
-    1 … N instead of −1 … −N, and its kernel grows past 1e48.
-    """
-    order = np.arange(state_size)
-    root = np.sqrt(2 * order + 1.0)
-    matrix = -np.tril(root[:, None] * root[None, :], -1) - np.diag(order + 1.0)
-    return matrix, root
-
-
-@dataclass(frozen=True, eq=False)
-class NPLR:
-    """Normal-plus-low-rank form A = V (Λ − p pᵀ) V*, one of each conjugate pair of Λ kept."""
-
-    # Λ, (N/2,): every real part is −1/2, imaginary parts positive and ascending.
-    poles: NDArray[np.complex128]
-    # p = V* P, (N/2,), with P[n] = √(n + 1/2). The phases of V are chosen so that it is real and
-    # positive, which makes the form unique.
-    low_rank: NDArray[np.float64]
-    inputs: NDArray[np.complex128]  # V* B, (N/2,), which is √2 p.
-    basis: NDArray[np.complex128]  # Columns of V that belong to `poles`, (N, N/2); orthonormal.
-
-
-@lru_cache(maxsize=16)
-def legs_nplr(state_size: int) -> NPLR:
-    """HiPPO-LegS of an even size N as a normal matrix less one of rank one, in double precision.
-
-    A + P Pᵀ is −1/2 plus a skew-symmetric matrix, so the basis that diagonalises it is unitary
-    and loses nothing, while A itself has eigenvectors too ill-conditioned for any use.
-    """
-    if state_size < 2 or state_size % 2:
-        raise Sd2Error(
-            found=f"a state of size {state_size}",
-            expected="an even size of 2 or more: the poles come in conjugate pairs",
-            remedy="Take the next even size.",
-        )
-    matrix, inputs = legs_matrices(state_size)
-    low_rank = np.sqrt(np.arange(state_size) + 0.5)
-    skew = matrix + np.outer(low_rank, low_rank) + 0.5 * np.eye(state_size)
-    skew = 0.5 * (skew - skew.T)
-    frequencies, vectors = np.linalg.eigh(-1j * skew)
-    kept = slice(state_size // 2, None)
-    vectors = _orthonormal_with_conjugates(vectors[:, kept])
-    projected = vectors.conj().T @ low_rank
-    basis = vectors * (projected / np.abs(projected))
-    form = NPLR(
-        poles=-0.5 + 1j * frequencies[kept],
-        low_rank=np.abs(projected),
-        inputs=basis.conj().T @ inputs,
-        basis=basis,
-    )
-    for values in (form.poles, form.low_rank, form.inputs, form.basis):
-        values.flags.writeable = False
-    return form
-
-
-def _orthonormal_with_conjugates(vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Half of a unitary basis whose other half is its conjugate, to the last digit.
-
-    `eigh` knows nothing of conjugates: at N = 256 the slowest vector and its conjugate are
-    orthogonal to 1e-12 only. √2 times real and imaginary parts should be an orthogonal matrix;
-    one Newton step towards the nearest squares the error.
-    """
-    real = np.sqrt(2.0) * np.hstack((vectors.real, vectors.imag))
-    real = real @ (1.5 * np.eye(len(real)) - 0.5 * real.T @ real)
-    half = vectors.shape[1]
-    return (real[:, :half] + 1j * real[:, half:]) / np.sqrt(2.0)
-
-
 class StateMatrix(NamedTuple):
     """A = V (Λ − p pᵀ) V* and V* B, all (…, N/2); of every conjugate pair one is kept."""
 
@@ -108,33 +36,17 @@ class StateMatrix(NamedTuple):
     inputs: Tensor  # V* B, complex.
 
 
-def legs_state_matrix(state_size: int, device: torch.device | str | None = None) -> StateMatrix:
-    """Normal-plus-low-rank form of HiPPO-LegS as complex128 tensors."""
-    form = legs_nplr(state_size)
-    return StateMatrix(
-        torch.tensor(form.poles, device=device),
-        torch.tensor(form.low_rank, device=device),
-        torch.tensor(form.inputs, device=device),
-    )
-
-
 def legs_kernel(
     C: Tensor, dt: Tensor | float, length: int, matrix: StateMatrix | None = None
 ) -> Tensor:
-    """Kernel of S4: k[l] = C Āˡ B̄ of the HiPPO-LegS matrix, discretised bilinearly.
+    """Kernel of S4: k[l] = C Āˡ B̄ of A and B as in `legs_matrices`, discretised bilinearly.
 
-    x′ = A x + B u, y = C x with (Gu et al. 2022, S4, equation 2)::
-
-        A[n, k] = −√((2n + 1)(2k + 1)) for n > k, −(n + 1) for n = k, 0 for n < k
-        B[n]    = √(2n + 1)
-        Ā = (I − Δ/2 A)⁻¹ (I + Δ/2 A),   B̄ = (I − Δ/2 A)⁻¹ Δ B      (equation 3)
-
-    The SD² paper prints A without its minus sign; that kernel grows past 1e48.
+    Ā = (I − Δ/2 A)⁻¹ (I + Δ/2 A) and B̄ = (I − Δ/2 A)⁻¹ Δ B (Gu et al. 2022, S4, equation 3).
 
     Parameters
     ----------
     C : (H, N) or (N,) float32 or float64
-        In the dense basis of A and B above. N is even.
+        In the dense basis of A and B. N is even.
     dt : (H,) or () float
         Δ, above 0.
     matrix : StateMatrix, optional
@@ -147,13 +59,6 @@ def legs_kernel(
     if matrix is None:
         matrix = legs_state_matrix(C.shape[-1], C.device)
     return nplr_kernel(matrix, to_normal_basis(C), dt, length, C.dtype)
-
-
-def to_normal_basis(C: Tensor) -> Tensor:
-    """Change C from the dense basis to the normal one, C V: (…, N) real → (…, N/2) complex128."""
-    form = legs_nplr(C.shape[-1])
-    basis = torch.view_as_real(torch.tensor(form.basis, device=C.device)).flatten(1)  # (N, N)
-    return torch.view_as_complex((C.double() @ basis).unflatten(-1, (-1, 2)))
 
 
 def nplr_kernel(
@@ -248,3 +153,92 @@ def check_length(length: int) -> None:
             expected="at least one frame",
             remedy="Give a recording with frames.",
         )
+
+
+def legs_state_matrix(state_size: int, device: torch.device | str | None = None) -> StateMatrix:
+    """Normal-plus-low-rank form of HiPPO-LegS as complex128 tensors."""
+    form = legs_nplr(state_size)
+    return StateMatrix(
+        torch.tensor(form.poles, device=device),
+        torch.tensor(form.low_rank, device=device),
+        torch.tensor(form.inputs, device=device),
+    )
+
+
+def to_normal_basis(C: Tensor) -> Tensor:
+    """Change C from the dense basis to the normal one, C V: (…, N) real → (…, N/2) complex128."""
+    form = legs_nplr(C.shape[-1])
+    basis = torch.view_as_real(torch.tensor(form.basis, device=C.device)).flatten(1)  # (N, N)
+    return torch.view_as_complex((C.double() @ basis).unflatten(-1, (-1, 2)))
+
+
+def legs_matrices(state_size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """HiPPO-LegS in its own (dense, real) basis: x′ = A x + B u; A is (N, N), B is (N,).
+
+    A[n, k] = −√((2n + 1)(2k + 1)) below the diagonal, −(n + 1) on it and 0 above, and
+    B[n] = √(2n + 1) (Gu et al. 2022, S4, equation 2). The SD² paper prints A without its minus
+    sign; that system has eigenvalues 1 … N instead of −1 … −N, and its kernel grows past 1e48.
+    """
+    order = np.arange(state_size)
+    root = np.sqrt(2 * order + 1.0)
+    matrix = -np.tril(root[:, None] * root[None, :], -1) - np.diag(order + 1.0)
+    return matrix, root
+
+
+@dataclass(frozen=True, eq=False)
+class NPLR:
+    """Normal-plus-low-rank form A = V (Λ − p pᵀ) V*, one of each conjugate pair of Λ kept."""
+
+    # Λ, (N/2,): every real part is −1/2, imaginary parts positive and ascending.
+    poles: NDArray[np.complex128]
+    # p = V* P, (N/2,), with P[n] = √(n + 1/2). The phases of V are chosen so that it is real and
+    # positive, which makes the form unique.
+    low_rank: NDArray[np.float64]
+    inputs: NDArray[np.complex128]  # V* B, (N/2,), which is √2 p.
+    basis: NDArray[np.complex128]  # Columns of V that belong to `poles`, (N, N/2); orthonormal.
+
+
+@lru_cache(maxsize=16)
+def legs_nplr(state_size: int) -> NPLR:
+    """HiPPO-LegS of an even size N as a normal matrix less one of rank one, in double precision.
+
+    A + P Pᵀ is −1/2 plus a skew-symmetric matrix, so the basis that diagonalises it is unitary
+    and loses nothing, while A itself has eigenvectors too ill-conditioned for any use.
+    """
+    if state_size < 2 or state_size % 2:
+        raise Sd2Error(
+            found=f"a state of size {state_size}",
+            expected="an even size of 2 or more: the poles come in conjugate pairs",
+            remedy="Take the next even size.",
+        )
+    matrix, inputs = legs_matrices(state_size)
+    low_rank = np.sqrt(np.arange(state_size) + 0.5)
+    skew = matrix + np.outer(low_rank, low_rank) + 0.5 * np.eye(state_size)
+    skew = 0.5 * (skew - skew.T)
+    frequencies, vectors = np.linalg.eigh(-1j * skew)
+    kept = slice(state_size // 2, None)
+    vectors = _orthonormal_with_conjugates(vectors[:, kept])
+    projected = vectors.conj().T @ low_rank
+    basis = vectors * (projected / np.abs(projected))
+    form = NPLR(
+        poles=-0.5 + 1j * frequencies[kept],
+        low_rank=np.abs(projected),
+        inputs=basis.conj().T @ inputs,
+        basis=basis,
+    )
+    for values in (form.poles, form.low_rank, form.inputs, form.basis):
+        values.flags.writeable = False
+    return form
+
+
+def _orthonormal_with_conjugates(vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Half of a unitary basis whose other half is its conjugate, to the last digit.
+
+    `eigh` knows nothing of conjugates: at N = 256 the slowest vector and its conjugate are
+    orthogonal to 1e-12 only. √2 times real and imaginary parts should be an orthogonal matrix;
+    one Newton step towards the nearest squares the error.
+    """
+    real = np.sqrt(2.0) * np.hstack((vectors.real, vectors.imag))
+    real = real @ (1.5 * np.eye(len(real)) - 0.5 * real.T @ real)
+    half = vectors.shape[1]
+    return (real[:, :half] + 1j * real[:, half:]) / np.sqrt(2.0)

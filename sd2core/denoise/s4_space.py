@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import operator
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Literal
+from collections.abc import Iterator, Sequence
+from typing import Literal
 
 import torch
 from torch import Tensor, nn
 
+from sd2core.denoise.kept import Keeping
 from sd2core.denoise.s4_kernel import (
     StateMatrix,
     diagonal_kernel,
@@ -34,12 +34,11 @@ SLOWEST_DECAY = 1e-4
 LARGEST_LOG = 100.0
 STEP_RANGE = (1e-7, 1e2)
 DT_MIN, DT_MAX = 0.02, 1.0
-MAX_KEPT = 8
 # Of longer kernels all layers' intermediate results together would leave the processor's cache.
 LONGEST_JOINED = 400
 
 
-class StateSpace(nn.Module):
+class StateSpace(Keeping):
     """Learned state spaces of H channels, with their kernel and their recurrence.
 
     Learned per channel: the step Δ (as its logarithm), the poles Λ (the decay as the logarithm of
@@ -84,9 +83,6 @@ class StateSpace(nn.Module):
             )
         first = legs_state_matrix(state_size)
         self.kernel_name = kernel
-        self._kept: dict[int | str, Any] = {}
-        self._held: tuple[Tensor, ...] = ()
-        self._counts: tuple[int, ...] = ()
         pairs = state_size // 2
         log_dt = torch.empty(channels).uniform_(math.log(dt_min), math.log(dt_max))
         self.log_dt = nn.Parameter(log_dt)
@@ -100,12 +96,6 @@ class StateSpace(nn.Module):
         else:
             self.frequency = _per_channel(torch.pi * torch.arange(pairs), channels)
             self.outputs = nn.Parameter(torch.randn(channels, pairs, 2) * math.sqrt(0.5))
-
-    def ssm_parameters(self) -> Iterator[nn.Parameter]:
-        """Parameters that shape the dynamics: all but C and D."""
-        for name, parameter in self.named_parameters():
-            if name not in ("outputs", "skip"):
-                yield parameter
 
     def dt(self) -> Tensor:
         """Step size Δ per channel, (H,) float64, within `STEP_RANGE`."""
@@ -122,23 +112,6 @@ class StateSpace(nn.Module):
         inputs = torch.view_as_complex(self.inputs.double())
         return StateMatrix(self.poles(), self.low_rank.double(), inputs)
 
-    # What follows from the parameters alone is kept while nothing is being learned.
-
-    def kernel(self, length: int) -> Tensor:
-        """Convolution kernel, (H, length), D included, of the parameters' type."""
-        kernel: Tensor = self._keep(length, lambda: self(length))
-        return kernel
-
-    def recurrence(self) -> Recurrence:
-        """Recurrence of the same systems, one frame at a time."""
-        recurrence: Recurrence = self._keep("recurrence", self._made_recurrence)
-        return recurrence
-
-    def block(self) -> Block:
-        """Recurrence of the same systems, a block of frames at a time."""
-        block: Block = self._keep("block", lambda: block_of(self.recurrence()))
-        return block
-
     def forward(self, length: int) -> Tensor:
         """Work out the kernel anew: `kernel` without what is kept."""
         if self.kernel_name == "legs":
@@ -149,6 +122,29 @@ class StateSpace(nn.Module):
             kernel = diagonal_kernel(self.poles(), ones, outputs, self.dt(), length)
         return torch.cat((kernel[:, :1] + self.skip[:, None], kernel[:, 1:]), 1)
 
+    # What follows from the parameters alone is kept while nothing is being learned.
+
+    def kernel(self, length: int) -> Tensor:
+        """Convolution kernel, (H, length), D included, of the parameters' type."""
+        kernel: Tensor = self.keep(length, lambda: self(length))
+        return kernel
+
+    def recurrence(self) -> Recurrence:
+        """Recurrence of the same systems, one frame at a time."""
+        recurrence: Recurrence = self.keep("recurrence", self._made_recurrence)
+        return recurrence
+
+    def block(self) -> Block:
+        """Recurrence of the same systems, a block of frames at a time."""
+        block: Block = self.keep("block", lambda: block_of(self.recurrence()))
+        return block
+
+    def ssm_parameters(self) -> Iterator[nn.Parameter]:
+        """Parameters that shape the dynamics: all but C and D."""
+        for name, parameter in self.named_parameters():
+            if name not in ("outputs", "skip"):
+                yield parameter
+
     def _made_recurrence(self) -> Recurrence:
         if self.kernel_name == "legs":
             outputs = to_normal_basis(self.outputs)
@@ -156,45 +152,6 @@ class StateSpace(nn.Module):
         outputs = torch.view_as_complex(self.outputs.double())
         ones = torch.ones_like(outputs)
         return diagonal_recurrence(self.poles(), ones, outputs, self.dt(), self.skip)
-
-    def learning(self) -> bool:
-        """Whether the parameters may be about to change, so that nothing is kept."""
-        return self.training or torch.is_grad_enabled()
-
-    def _keep(self, key: int | str, make: Callable[[], Any]) -> Any:
-        if self.learning():
-            return make()
-        # Parameters count what is done to them in place; all else that can change them goes
-        # through the methods below.
-        held = tuple(self._parameters.values())
-        counts = tuple(0 if p.is_inference() else p._version for p in held)
-        same = counts == self._counts and all(map(operator.is_, held, self._held))
-        if not same or len(self._kept) > MAX_KEPT:
-            self._forget()
-            self._held, self._counts = held, counts
-        if key not in self._kept:
-            self._kept[key] = make()
-        return self._kept[key]
-
-    def _forget(self) -> None:
-        self._kept, self._held, self._counts = {}, (), ()
-
-    def train(self, mode: bool = True) -> StateSpace:
-        """Set the mode as `nn.Module.train` does, and drop what was derived from the weights."""
-        self._forget()
-        super().train(mode)
-        return self
-
-    def _apply(self, *args: Any, **options: Any) -> Any:
-        self._forget()
-        return super()._apply(*args, **options)
-
-    def _load_from_state_dict(self, *args: Any, **options: Any) -> None:
-        self._forget()
-        super()._load_from_state_dict(*args, **options)
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_kept": {}, "_held": (), "_counts": ()}
 
 
 def _per_channel(values: Tensor, channels: int) -> nn.Parameter:

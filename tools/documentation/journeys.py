@@ -1,0 +1,205 @@
+"""Draw the ways through the house: `python -m tools.documentation.journeys`.
+
+Writes docs/images/house/NAME.svg for docs/architecture.md. Every station is a function that is
+there, under its file; its column says whose hands the thing is in. The background is white, so
+that drawings read alike on light and dark pages.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from operator import attrgetter
+from pathlib import Path
+
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from sd2core.files.figure_files import save_figure
+from tools.documentation.places import IMAGES, REPOSITORY
+
+HOUSE = IMAGES / "house"
+MOST_STATIONS = 12
+_INK, _GREY = "#222222", "#767676"
+_FACES = ("#e3ecf7", "#fdeccd", "#e6f2e4", "#f3e4e1")
+_WIDTH_IN, _ROW_IN, _BOX_IN = 9.6, 0.66, (2.3, 0.46)
+
+
+@dataclass(frozen=True)
+class Station:
+    """A function by its file, the column it stands in, and what it does to the thing."""
+
+    column: int
+    file: str  # from app/ or the root of the repository on
+    function: str
+    words: str
+    later: bool = False  # not called by the one before, but when the user asks for it
+
+    def found(self) -> object:
+        """The function itself; AttributeError or ModuleNotFoundError if there is none."""
+        module = import_module(self.file.removesuffix(".py").replace("/", "."))
+        return attrgetter(self.function)(module)
+
+
+@dataclass(frozen=True)
+class Journey:
+    """Stations in the order in which they are called, and the names of their columns."""
+
+    columns: tuple[str, ...]
+    stations: tuple[Station, ...]
+
+
+JOURNEYS = {
+    "array": Journey(
+        ("video", "body", "mesh", "map"),
+        (
+            Station(0, "sd2core/io/video.py", "VideoReader.read", "a picture, (height, width, 3)"),
+            Station(
+                1, "sd2core/body/person_tracker.py", "PersonTracker.step", "where the person is"
+            ),
+            Station(1, "sd2core/body/refining.py", "Refiner.stretch", "landmarks, (T, 33, 2)"),
+            Station(
+                1,
+                "sd2core/body/landmark_repair.py",
+                "repair_landmarks",
+                "sides, spikes, gaps put right",
+            ),
+            Station(1, "sd2core/body/lifter.py", "LiftedInParts.part", "depth of each landmark"),
+            Station(1, "sd2core/body/solve.py", "solve", "angles of the joints, by Gauss–Newton"),
+            Station(2, "sd2core/body/fitted.py", "FittedMotion.mesh", "vertices, (T, V, 3)"),
+            Station(2, "sd2core/io/mesh.py", "save_mesh", "a file, which load_mesh reads"),
+            Station(
+                3,
+                "sd2core/doppler/prepared.py",
+                "PreparedMesh.counted",
+                "moving vertices of a block",
+            ),
+            Station(
+                3, "sd2core/doppler/masks.py", "VisibilityMasks.for_rows", "which the sensor sees"
+            ),
+            Station(
+                3,
+                "sd2core/doppler/frame_counts.py",
+                "FrameCounts.count",
+                "velocities counted in bins",
+            ),
+            Station(3, "sd2core/doppler/smoothing.py", "smooth", "DopplerMap.values, (bins, T)"),
+        ),
+    ),
+    "label": Journey(
+        ("window", "models", "library", "disk"),
+        (
+            Station(0, "sd2app/labels/actions.py", "LabelActions", "the action that has the key"),
+            Station(0, "sd2app/labels/feature.py", "LabelsFeature._use_label", "mark, or relabel?"),
+            Station(
+                1, "sd2app/labels/marking.py", "LabelMarking.mark", "begins; pressed again, ends"
+            ),
+            Station(1, "sd2app/labels/edits.py", "LabelEdits.apply", "refused where read-only"),
+            Station(2, "sd2core/labels/edits.py", "create", "old labels to new ones, pure"),
+            Station(1, "sd2app/labels/edits.py", "LabelEdits.make", "a step of the undo history"),
+            Station(1, "sd2app/labels/autosave.py", "LabelAutosave.keep", "before it is shown"),
+            Station(3, "sd2core/labels/journal.py", "Journal.write", "a record, flushed to disk"),
+            Station(
+                1, "sd2app/labels/model.py", "LabelsModel.set_labels", "changed: all views redraw"
+            ),
+            Station(0, "sd2app/shell/files.py", "FilesFeature.save", "Ctrl+S", later=True),
+            Station(
+                2, "sd2core/recording/recording.py", "Recording.save", "unless changed by others"
+            ),
+            Station(3, "sd2core/labels/files.py", "write_labels", "the file of labels, replaced"),
+        ),
+    ),
+    "drag": Journey(
+        ("views", "models", "background thread", "library"),
+        (
+            Station(0, "sd2app/scene/view.py", "SceneView.eventFilter", "the pointer moves"),
+            Station(0, "sd2app/scene/navigation.py", "Navigator.move", "pixels to metres"),
+            Station(1, "sd2app/session/undo.py", "Edits.drag_sensor", "one step in the end"),
+            Station(1, "sd2app/session/sensor.py", "SensorModel.set_sensor", "changed"),
+            Station(1, "sd2app/maps/model.py", "SynthesisModel._follow", "asks for a sweep"),
+            Station(1, "sd2app/maps/quality.py", "preview_quality", "as exact as time allows"),
+            Station(1, "sd2app/background/latest.py", "LatestRunner.submit", "the newest wins"),
+            Station(2, "sd2app/maps/quality.py", "compute_part", "frames of a map"),
+            Station(
+                3,
+                "sd2core/doppler/synthesizer.py",
+                "Synthesizer.stretch",
+                "as in the first picture",
+            ),
+            Station(
+                1, "sd2app/maps/partial_map.py", "PartialMap.take", "back in the window's thread"
+            ),
+            Station(1, "sd2app/session/maps.py", "MapModel.set_map", "changed"),
+            Station(0, "sd2app/maps/heatmap.py", "HeatmapView.paint", "pixels"),
+        ),
+    ),
+    "training": Journey(
+        ("command", "data", "network", "disk"),
+        (
+            Station(0, "sd2core/cli/train.py", "_train", "options to settings"),
+            Station(3, "sd2core/train/start.py", "begin", "a locked folder, config.toml"),
+            Station(0, "sd2core/train/run.py", "carry_out", "all that follows"),
+            Station(1, "sd2core/train/data.py", "prepare", "pairs to segments, people split"),
+            Station(1, "sd2core/denoise/scaling.py", "Scaling.fitted", "energies to levels"),
+            Station(2, "sd2core/denoise/registry.py", "build", "the network by its name"),
+            Station(
+                2, "sd2core/train/denoiser_loop.py", "DenoiserLoop.step", "a batch: loss, descent"
+            ),
+            Station(2, "sd2core/train/learner.py", "Learner.forward", "errors of the answers"),
+            Station(2, "sd2core/denoise/s4_layer.py", "S4Layer.forward", "(B, L, H) to (B, L, H)"),
+            Station(1, "sd2core/train/validate.py", "validate", "epoch's end: people kept out"),
+            Station(3, "sd2core/denoise/files.py", "save_model", "best.safetensors"),
+            Station(3, "sd2core/train/checkpoint.py", "write_checkpoint", "last.safetensors"),
+        ),
+    ),
+}
+
+
+def drawing(journey: Journey) -> Figure:
+    """Stations from top to bottom, each in its column, with arrows from one to the next."""
+    height_in = _ROW_IN * (len(journey.stations) + 0.6)
+    figure = Figure(figsize=(_WIDTH_IN, height_in))
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set(xlim=(0, _WIDTH_IN), ylim=(height_in, 0))
+    axes.axis("off")
+    column_in = _WIDTH_IN / len(journey.columns)
+    for column, name in enumerate(journey.columns):
+        x = (column + 0.5) * column_in
+        axes.text(x, 0.16, name, ha="center", va="center", fontsize=10, weight="bold")
+        axes.plot([x, x], [0.3, height_in], ":", color=_GREY, lw=0.6, zorder=0)
+    before = None
+    for row, station in enumerate(journey.stations):
+        x, y = (station.column + 0.5) * column_in, _ROW_IN * (row + 1)
+        corner = x - _BOX_IN[0] / 2, y - _BOX_IN[1] / 2
+        face = _FACES[station.column]
+        axes.add_patch(Rectangle(corner, *_BOX_IN, facecolor=face, edgecolor=_GREY, lw=0.6))
+        for below_in, text, size_pt, colour in (
+            (-0.14, station.function, 8, _INK),
+            (0.0, station.file.partition("/")[2], 6.5, _GREY),
+            (0.14, station.words, 7, _INK),
+        ):
+            axes.text(
+                x, y + below_in, text, ha="center", va="center", fontsize=size_pt, color=colour
+            )
+        if before is not None and not station.later:
+            arrow = {"arrowstyle": "->", "color": _INK, "lw": 0.8, "shrinkA": 0, "shrinkB": 0}
+            axes.annotate("", (x, corner[1]), before, arrowprops=arrow)
+        before = (x, y + _BOX_IN[1] / 2)
+    return figure
+
+
+def path_of(name: str) -> Path:
+    """File of a journey's drawing."""
+    return HOUSE / f"{name}.svg"
+
+
+def main() -> None:
+    """Draw all."""
+    HOUSE.mkdir(exist_ok=True)
+    for name, journey in JOURNEYS.items():
+        save_figure(drawing(journey), path_of(name), {"made by": "tools.documentation.journeys"})
+        print(path_of(name).relative_to(REPOSITORY))
+
+
+if __name__ == "__main__":
+    main()
