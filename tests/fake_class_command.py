@@ -16,6 +16,8 @@ from pathlib import Path
 from sd2core.runs.command_folder import CommandFolder
 
 STEPS = 6
+STEP_S = "SD2_FAKE_STEP_S"
+"""Variable of the environment with the time of a step, where the command line has none."""
 
 
 def say(event, **content):
@@ -24,7 +26,7 @@ def say(event, **content):
 
 def main() -> int:
     parser = argparse.ArgumentParser()
-    parser.add_argument("--step-s", type=float, default=0.0)
+    parser.add_argument("--step-s", type=float, default=float(os.environ.get(STEP_S, 0)))
     parser.add_argument("--fail", default="")
     parser.add_argument("--die-at", type=int, default=0)
     parser.add_argument("folder", type=Path)

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from functools import cache
 
 from guide_pages import REPOSITORY, sd2_arguments
+from parsers import arguments_of, options_of
 
 from sd2app.command_line import full_parser
 from sd2app.manual.markup import commands_of
@@ -74,11 +75,7 @@ def _fault_of_command(words: list[str]) -> str | None:
 
 def _fault_of_arguments(parser: argparse.ArgumentParser, words: list[str]) -> str | None:
     """First of the words that this command does not understand."""
-    takes_words = any(
-        not action.option_strings
-        for action in parser._actions
-        if not isinstance(action, argparse._SubParsersAction)
-    )
+    takes_words = any(not action.option_strings for action in arguments_of(parser))
     words = list(words)
     while words:
         name, attached, value = words.pop(0).partition("=")
@@ -86,7 +83,7 @@ def _fault_of_arguments(parser: argparse.ArgumentParser, words: list[str]) -> st
             if not (takes_words or _STANDS_FOR_ANYTHING.match(name)):
                 return f"{parser.prog} takes no word such as {name}"
             continue
-        action = parser._option_string_actions.get(name)
+        action = options_of(parser).get(name)
         if action is None:
             return f"{parser.prog} has no {name}"
         if attached:
@@ -144,7 +141,7 @@ def _fault_of_tool(words: list[str]) -> str | None:
 
 @cache
 def _sd2_options() -> frozenset[str]:
-    return frozenset(name for one in parsers_of() for name in one._option_string_actions)
+    return frozenset(name for one in parsers_of() for name in options_of(one))
 
 
 @cache

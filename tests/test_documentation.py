@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from guide_pages import REPOSITORY, Page, pages_to_follow, sd2_arguments
 from named_commands import PARSER, fault_of, parsers_of
+from parsers import arguments_of
 
 from sd2app.manual.markup import commands_of
 from sd2core.cli.running import attach_negative_values
@@ -58,7 +59,7 @@ def test_what_prose_names_is_there(document: Path) -> None:
 def test_what_help_texts_name_is_there() -> None:
     faults = []
     for parser in parsers_of():
-        own = [action.help or "" for action in parser._actions]
+        own = [action.help or "" for action in arguments_of(parser)]
         groups = [group.description or "" for group in parser._action_groups]
         for text in (parser.description or "", *groups, *own):
             named = [" ".join(code.split()) for code in re.findall(r"`([^`]+)`", text)]

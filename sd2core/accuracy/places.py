@@ -99,7 +99,7 @@ def choose_for_places(
     """
     check_wish(tolerance)
     options = check_options(mesh, options)
-    search = _Search(mesh, places, tolerance, options, progress)
+    search = PlanSearch(mesh, places, tolerance, options, progress)
     if frames < _FEWEST_FRAMES:
         return search.top(f"{frames:,} frames of maps are too few to choose a plan for")
     reference_s, top_s = search.reference_s(), search.frame_s(search.most_accurate)
@@ -120,7 +120,7 @@ def choose_for_places(
     return held or search.top(why)
 
 
-class _Search:
+class PlanSearch:
     """Plans tried on one mesh from some places."""
 
     def __init__(

@@ -88,7 +88,7 @@ def test_the_estimate_of_choosing(
     choose(mesh, sensor, tolerance=TOLERANCE)
 
     def work() -> float:
-        search = places._Search(mesh, [sensor], TOLERANCE, PAPER, silent)
+        search = places.PlanSearch(mesh, [sensor], TOLERANCE, PAPER, silent)
         estimated_s = places._CHOOSING_FRAMES * search.reference_s()
         begun_s = time.process_time()
         choose(mesh, sensor, tolerance=TOLERANCE)

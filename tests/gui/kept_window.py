@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import enum
 import shutil
+import sys
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any
 
+import fake_class_command
 import numpy as np
 from PySide6.QtCore import QByteArray, QCoreApplication, QEvent, QModelIndex
 from PySide6.QtGui import QAction, QUndoStack
@@ -51,7 +53,10 @@ def new_window(qtbot: Any, fake: Any, fake_models: Any, fake_classes: Any) -> Ma
     window = MainWindow(
         Settings.forgetful(),
         Parts(
-            accuracy=fake.library, denoisers=fake_models.library, classifiers=fake_classes.library
+            accuracy=fake.library,
+            denoisers=fake_models.library,
+            classifiers=fake_classes.library,
+            learn_command=(sys.executable, "-u", fake_class_command.__file__),
         ),
     )
     window.resize(1280, 800)

@@ -25,6 +25,7 @@ from sd2app.widgets.dialogs import ask_file
 from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2app.widgets.model_menu import ModelButton, ModelMenu, Words
 from sd2core.errors import Sd2Error
+from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 
 _FILES = "Classifiers (*.safetensors)"
 _WORDS = Words(
@@ -52,12 +53,15 @@ class ClassifyFeature(Feature):
         edits: LabelEdits,
         library: ClassifierLibrary,
         suggest: Callable[[ClassifyModel], object],
+        command: Sequence[str] | None,
         parent: QObject,
     ) -> None:
         self._session, self._shell, self._suggest = session, shell, suggest
         self._labels, self._edits = labels, edits
         self.model = ClassifyModel(session, standing, labels, library, parent)
-        self.training = ClassTraining(session.settings, self.model.use, parent)
+        self.training = ClassTraining(
+            session.settings, self.model.use, parent, command=command or COMMAND_IN_FOLDER
+        )
         self.model.failed.connect(shell.warn)
         report(shell, self.training)
         self.changing = (self.model.changed,)

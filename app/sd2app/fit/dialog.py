@@ -34,7 +34,7 @@ class PersonPicker(Canvas):
 
     def __init__(self, setup: FitSetupModel, palette: Palette, parent: QWidget) -> None:
         super().__init__(parent)
-        self._setup = setup
+        self.setup = setup
         self._colours = palette
         self._from: QPointF | None = None
         self._to = QPointF()
@@ -47,7 +47,7 @@ class PersonPicker(Canvas):
     @property
     def box(self) -> QRectF:
         """Rectangle of the picture."""
-        size = self._setup.size
+        size = self.setup.size
         if size is None:
             return QRectF()
         scale = min(self.width() / size[0], self.height() / size[1])
@@ -57,7 +57,7 @@ class PersonPicker(Canvas):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Set a corner of the rectangle."""
-        if event.button() == Qt.MouseButton.LeftButton and self._setup.picture is not None:
+        if event.button() == Qt.MouseButton.LeftButton and self.setup.picture is not None:
             self._from = self._to = event.position()
             self.update()
 
@@ -74,35 +74,35 @@ class PersonPicker(Canvas):
         corner, self._from = self._from, None
         end = event.position()
         self.update()
-        box, size = self.box, self._setup.size
+        box, size = self.box, self.setup.size
         if size is None:
             return
         if (end - corner).manhattanLength() < 6:
-            self._setup.change(person=None)
+            self.setup.change(person=None)
             return
         scale = size[0] / box.width()
         (x0, y0), (x1, y1) = (
             ((point.x() - box.x()) * scale, (point.y() - box.y()) * scale)
             for point in (corner, end)
         )
-        self._setup.set_person(x0, y0, x1, y1)
+        self.setup.set_person(x0, y0, x1, y1)
 
     def paint(self, painter: QPainter) -> None:
         """Paint the picture, dimmed outside the rectangle."""
         painter.fillRect(self.rect(), QColor(self._colours.well))
-        picture = self._setup.picture
+        picture = self.setup.picture
         if picture is None:
             painter.setPen(QColor(self._colours.muted))
-            text = "Reading the video…" if self._setup.reading else ""
+            text = "Reading the video…" if self.setup.reading else ""
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, text)
             return
         paint_picture(painter, self.rect(), picture)
         rectangle = self._rectangle()
         if rectangle is None:
             return
-        person = self._setup.choices.person
+        person = self.setup.choices.person
         drawn_here = self._from is not None or (
-            person is not None and person.frame == self._setup.frame
+            person is not None and person.frame == self.setup.frame
         )
         if drawn_here:
             self._dim_around(painter, rectangle)
@@ -122,7 +122,7 @@ class PersonPicker(Canvas):
         """Rectangle on the widget: the one being drawn, else the chosen one."""
         if self._from is not None:
             return QRectF(self._from, self._to).normalized().intersected(self.box)
-        person, size = self._setup.choices.person, self._setup.size
+        person, size = self.setup.choices.person, self.setup.size
         if person is None or size is None:
             return None
         box = self.box
@@ -140,7 +140,7 @@ class NewFromVideoDialog(QDialog):
 
     def __init__(self, setup: FitSetupModel, palette: Palette, parent: QWidget) -> None:
         super().__init__(parent)
-        self._setup = setup
+        self.setup = setup
         self.setWindowTitle("New from video")
         self._build_picture(palette)
         self._build_form()
@@ -153,10 +153,10 @@ class NewFromVideoDialog(QDialog):
     # --- building -------------------------------------------------------------------------
 
     def _build_picture(self, palette: Palette) -> None:
-        self.picker = PersonPicker(self._setup, palette, self)
+        self.picker = PersonPicker(self.setup, palette, self)
         self._slider = QSlider(Qt.Orientation.Horizontal, self)
         self._slider.setAccessibleName("Frame")
-        self._slider.valueChanged.connect(self._setup.show_frame)
+        self._slider.valueChanged.connect(self.setup.show_frame)
         self._where = QLabel(self)
         self._where.setObjectName("muted")
         self._where.setMinimumWidth(
@@ -164,7 +164,7 @@ class NewFromVideoDialog(QDialog):
         )
 
     def _build_form(self) -> None:
-        setup = self._setup
+        setup = self.setup
         self._video = ElidedLabel(self)
         self._folder = ElidedLabel(self)
         other, elsewhere = "Take another video", "Save elsewhere"
@@ -219,7 +219,7 @@ class NewFromVideoDialog(QDialog):
     # --- following the model --------------------------------------------------------------
 
     def _refresh(self) -> None:
-        setup, choices = self._setup, self._setup.choices
+        setup, choices = self.setup, self.setup.choices
         self._video.setText(setup.video.name if setup.video is not None else "none")
         self._folder.setText(str(choices.folder) if choices.folder is not None else "")
         self._other_folder.setEnabled(choices.folder is not None)
@@ -248,7 +248,7 @@ class NewFromVideoDialog(QDialog):
         self._show_message()
 
     def _show_message(self) -> None:
-        setup = self._setup
+        setup = self.setup
         text, role = "", "muted"
         if setup.problem:
             text, role = setup.problem, "warning"
@@ -265,14 +265,14 @@ class NewFromVideoDialog(QDialog):
     # --- what is clicked ------------------------------------------------------------------
 
     def _ask_video(self) -> None:
-        start = str(self._setup.video.parent) if self._setup.video is not None else ""
+        start = str(self.setup.video.parent) if self.setup.video is not None else ""
         if path := ask_file(self, "Video of a person", VIDEOS, start):
-            self._setup.choose_video(path)
+            self.setup.choose_video(path)
 
     def _ask_folder(self) -> None:
-        start = str(self._setup.choices.folder)
+        start = str(self.setup.choices.folder)
         if folder := ask_new(self, "Save recording as", start, "Recording (*.sd2)"):
-            self._setup.change(folder=folder)
+            self.setup.change(folder=folder)
 
 
 def _hint(text: str) -> QLabel:

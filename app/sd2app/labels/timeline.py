@@ -64,7 +64,7 @@ class LabelTimeline(ZoomedPlot):
         super().__init__(session)
         self._edits, self._dragging, self._loop = edits, dragging, loop
         self._labels = labels = edits.labels
-        self._buttons = buttons
+        self.buttons = buttons
         self._pressed: Decision | None = None
         self._target: HitTarget | None = None
         self._pointer_px = 0.0
@@ -102,7 +102,7 @@ class LabelTimeline(ZoomedPlot):
             colour, palette = model.colour_of(mark.label), self._session.display.palette
             paint_span(painter, box, f"{mark.label} …", colour, palette, selected=True)
         paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
-        self._buttons.paint(painter, scale, plot, rows, self._session.display.palette)
+        self.buttons.paint(painter, scale, plot, rows, self._session.display.palette)
 
     def _paint_rows(self, painter: QPainter) -> None:
         """Paint the parts that do not move: names, rows, spans."""
@@ -207,7 +207,7 @@ class LabelTimeline(ZoomedPlot):
             self.mousePressEvent(event)
 
     def _button_at(self, place: QPointF) -> Decision | None:
-        return self._buttons.at(place, self.scale, self.plot_rect(), self.rows)
+        return self.buttons.at(place, self.scale, self.plot_rect(), self.rows)
 
     def _click(self, target: HitTarget, modifiers: Qt.KeyboardModifier) -> None:
         if target.part != "name" and modifiers & Qt.KeyboardModifier.ShiftModifier and target.span:

@@ -59,7 +59,8 @@ class DifferenceView(HeatmapView):
         colours = self._display.palette
         return signed_table(colours.real, colours.level, colours.denoised)
 
-    def _status(self) -> str:
+    def status(self) -> str:
+        """What was done to the maps before they are compared."""
         return "both as strong altogether, relative to the radar's 0 dB"
 
     def _paint_corner(self, painter: QPainter, box: QRectF, left: float) -> float:

@@ -190,7 +190,7 @@ class HeatmapView(TrackMouse, MapWidget):
         left += self._place_button(left)
         room = self.width() - 16 - left - self._paint_corner(painter, box, left)
         status = painter.fontMetrics().elidedText(
-            self._status(), Qt.TextElideMode.ElideRight, int(max(room - 16, 40))
+            self.status(), Qt.TextElideMode.ElideRight, int(max(room - 16, 40))
         )
         painter.drawText(QRectF(left, 0, self.width(), HEADER_PX), AT_LEFT, status)
 
@@ -221,7 +221,7 @@ class HeatmapView(TrackMouse, MapWidget):
         painter.drawText(box, AT_RIGHT, text)
         return width
 
-    def _status(self) -> str:
+    def status(self) -> str:
         """Carrier and quality of the map, and the reason where nothing shows."""
         strongest_db, lowest_db = self.track.strongest_db, self._display.levels.low_db
         carrier_hz = None if self.track.map is None else self.track.map.carrier_hz

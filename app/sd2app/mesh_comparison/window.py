@@ -38,7 +38,7 @@ class ComparisonWindow(QWidget):
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent, Qt.WindowType.Window)
-        self._model, self._attempt, self._session = model, attempt, session
+        self.model, self._attempt, self._session = model, attempt, session
         model.setParent(self)
         simulated = " (simulated)" if session.document.simulated else ""
         self.setWindowTitle(f"{session.document.title}{simulated}: compare meshes")
@@ -68,7 +68,7 @@ class ComparisonWindow(QWidget):
             Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
         self._reference.setMinimumContentsLength(14)
-        self._reference.currentIndexChanged.connect(self._model.set_reference)
+        self._reference.currentIndexChanged.connect(self.model.set_reference)
         tip = "Write maps and velocities of both (.png, .svg, .pdf)"
         self._export = outlined("Export figure…", tip, self._ask, self)
         against = QLabel("measured against", self)
@@ -78,7 +78,7 @@ class ComparisonWindow(QWidget):
     # --- following the model --------------------------------------------------------------
 
     def _refresh(self) -> None:
-        model, comparison = self._model, self._model.comparison
+        model, comparison = self.model, self.model.comparison
         self._reference.offer(list(model.labels), model.reference)
         self._reference.setEnabled(comparison is not None)
         self._export.setEnabled(comparison is not None and not model.busy)
@@ -88,7 +88,7 @@ class ComparisonWindow(QWidget):
         self._notes.setVisible(bool(self._notes.text()))
 
     def _words(self) -> str:
-        model = self._model
+        model = self.model
         if model.busy:
             return "Comparing…"
         if model.problem:
@@ -106,10 +106,10 @@ class ComparisonWindow(QWidget):
     def _ask(self) -> None:
         name = self._session.document.file_name("-comparison")
         if path := ask_figure(self, "Export comparison", name):
-            self._attempt(lambda: self._model.save_figure(path))
+            self._attempt(lambda: self.model.save_figure(path))
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Stop comparing, and discard the results."""
-        self._model.close()
+        self.model.close()
         event.accept()
         self.closed.emit()

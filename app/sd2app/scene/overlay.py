@@ -62,7 +62,7 @@ class Overlay(Canvas):
     def __init__(self, scene: Scene, navigator: Navigator, theme: Themed, parent: QWidget) -> None:
         super().__init__(parent)
         self._theme = theme
-        self._reading, self._read_at = "", QPointF()
+        self.reading, self._read_at = "", QPointF()
         self._scene = scene
         self._navigator = navigator
         self.message = ""
@@ -97,14 +97,14 @@ class Overlay(Canvas):
             self._state = state
             self._kept = None
         self.paint_kept(painter, self._paint_all)
-        if self._reading:
+        if self.reading:
             area, colours = QRectF(self.rect()), self._theme.palette
-            paint_readout(painter, area, self._read_at, (self._reading,), colours)
+            paint_readout(painter, area, self._read_at, (self.reading,), colours)
 
     def show_reading(self, place_px: tuple[float, float], text: str) -> None:
         """Show what is read of the mesh beside the pointer; an empty text ends it."""
-        if text or self._reading:
-            self._reading, self._read_at = text, QPointF(*place_px)
+        if text or self.reading:
+            self.reading, self._read_at = text, QPointF(*place_px)
             self.update()
 
     def _paint_all(self, painter: QPainter) -> None:

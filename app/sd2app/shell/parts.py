@@ -26,6 +26,7 @@ class Parts:
     fit_command: Sequence[str] | None = None
     denoisers: DenoiserLibrary | None = None
     train_command: Sequence[str] | None = None
+    learn_command: Sequence[str] | None = None  # of classifiers and studies, in a folder
     recovery: Path | None = None
     batch_command: Sequence[str] | None = None
     classifiers: ClassifierLibrary | None = None

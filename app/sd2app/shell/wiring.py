@@ -94,9 +94,12 @@ class Features:
             labels.edits,
             parts.classifiers or core_classifiers(process),
             lambda finder: self.suggestions.model.start(finder),
+            parts.learn_command,
             parent,
         )
-        self.study = StudyFeature(session, shell, self.classify.training.setup, parent)
+        self.study = StudyFeature(
+            session, shell, self.classify.training.setup, parts.learn_command, parent
+        )
         finders = (self.classify.model,)
         self.suggestions = SuggestionsFeature(session, shell, labels.edits, finders, parent)
         self.agreement = AgreementFeature(session, shell, labels.model, parent)

@@ -15,6 +15,7 @@ from sd2app.study.page import StudyRunView, StudySetupView
 from sd2app.study.runs import StudyRuns
 from sd2app.widgets.dialogs import ask_file
 from sd2app.widgets.run_panel import RunPanel
+from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 
 _RESULTS, _PLANS = "Results (*.json)", "Plans of studies (*.toml)"
 
@@ -22,9 +23,16 @@ _RESULTS, _PLANS = "Results (*.json)", "Plans of studies (*.toml)"
 class StudyFeature(Feature):
     """Runs of studies, on the labelled data of the classifiers or by plans."""
 
-    def __init__(self, session: Session, shell: Shell, data: ClassSetup, parent: QObject) -> None:
+    def __init__(
+        self,
+        session: Session,
+        shell: Shell,
+        data: ClassSetup,
+        command: Sequence[str] | None,
+        parent: QObject,
+    ) -> None:
         self._session, self._shell = session, shell
-        self.runs = StudyRuns(session.settings, data, parent)
+        self.runs = StudyRuns(session.settings, data, parent, command=command or COMMAND_IN_FOLDER)
         report(shell, self.runs)
         self.closing, self.running = (self.runs,), (self.runs,)  # runs go on
 

@@ -16,7 +16,7 @@ from fake_accuracy import (
     result_of,
     stale,
 )
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, QSettings
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.session.tasks import TaskList
@@ -108,10 +108,10 @@ def test_the_tolerance_is_kept_from_one_start_to_the_next(desk, qtbot):
 
 
 @pytest.mark.parametrize("stored", ["nonsense", -1, 0, 7])
-def test_a_stored_tolerance_that_is_none_is_not_taken(stored):
-    settings = Settings.forgetful()
-    settings._store.setValue("tolerance", stored)
-    assert settings.tolerance == DEFAULT_TOLERANCE
+def test_a_stored_tolerance_that_is_none_is_not_taken(stored, tmp_path):
+    store = QSettings(str(tmp_path / "settings.ini"), QSettings.Format.IniFormat)
+    store.setValue("tolerance", stored)
+    assert Settings(store).tolerance == DEFAULT_TOLERANCE
 
 
 def test_another_tolerance_asks_for_a_choice_and_surveys_the_place_once(desk, qtbot):

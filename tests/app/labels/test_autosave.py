@@ -5,11 +5,13 @@ from __future__ import annotations
 import errno
 import os
 import random
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from labelled import even, imported, random_edit
+from left_behind import end_process
 from PySide6.QtCore import QTimer
 
 from sd2app.labels.autosave import LabelAutosave
@@ -23,7 +25,7 @@ from sd2app.session.tasks import TaskList
 from sd2app.settings import Settings
 from sd2core.labels import edits as core_edits
 from sd2core.labels.files import read_labels, write_labels
-from sd2core.labels.recovery import Found, Recoverable, RecoveryPlace, offers_in
+from sd2core.labels.recovery import Found, Recoverable, offers_in
 from sd2core.recording.recording import Recording
 
 
@@ -63,10 +65,7 @@ class Desk:
 
     def crash(self) -> None:
         """What the end of a process does."""
-        if self.session._journal is not None:
-            self.session._journal._close_stream()
-        self.session._place.release()
-        self.session._journal = self.session._place = None
+        end_process(self.session, self.root)
 
     @property
     def spans(self) -> list[tuple[str, int, int]]:
@@ -112,13 +111,10 @@ def recording(mesh: Path) -> Path:
 
 def left(root: Path) -> list[Recoverable]:
     """What a process that ended now would leave behind."""
-    offers = []
-    for folder in root.iterdir():
-        if next(folder.glob("*.journal"), None) is not None:
-            place = RecoveryPlace(root, folder)
-            place._folder = folder
-            offers += place.offers().offers
-    return offers
+    copy = shutil.copytree(root, root.with_name("of a process that ended"), dirs_exist_ok=True)
+    found = offers_in(copy).offers
+    shutil.rmtree(copy)
+    return list(found)
 
 
 class TestEveryEdit:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+from finding import named
 
 from sd2app.labels.export_dialog import LabelExportDialog
 from sd2app.labels.import_dialog import LabelImportDialog, is_label_file
@@ -54,7 +55,8 @@ def test_the_preview_says_what_becomes_of_everything(importing, tmp_path) -> Non
     }
     assert model.way == "add"
     assert "Nothing that is there changes" in model.consequence()
-    model._way.setCurrentIndex(model._way.findData("replace"))
+    way = named(model, "What becomes of the labels", Choice)
+    way.setCurrentIndex(way.findData("replace"))
     assert model.consequence().startswith("The 1 span of this recording go")
 
 
@@ -67,7 +69,8 @@ def test_a_bad_file_is_refused_in_the_cores_words(importing, tmp_path) -> None:
     assert "Expected" in model.problem
     # It is a table after all.
     path.write_text("start_s,end_s,label\n1,2,wave\n")
-    model._format.setCurrentIndex(model._format.findData("csv"))
+    (format,) = (one for one in model.findChildren(Choice) if one.findData("csv") >= 0)
+    format.setCurrentIndex(format.findData("csv"))
     assert model.problem == ""
 
 
@@ -91,7 +94,7 @@ def test_of_several_videos_in_a_file_one_is_chosen(importing, tmp_path, qtbot) -
     model = importing(path)
     assert model.observations == (name, "later")
     assert model.incoming.labels.spans[0].start_s == 1.0
-    model._observation.setCurrentText("later")
+    named(model, "Which of the videos", Choice).setCurrentText("later")
     qtbot.waitUntil(lambda: model.incoming is not None, timeout=10_000)
     assert model.incoming.labels.spans[0].start_s == 2.0
 

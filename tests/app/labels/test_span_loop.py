@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from PySide6.QtCore import QTimer
 
 from sd2app.labels.loop import SpanLoop
 from sd2app.labels.marking import LONGEST_MS, Reaction
@@ -40,7 +41,7 @@ def playback(qtbot, monkeypatch):
 def pass_by(playback: PlaybackModel, qtbot, seconds: float) -> None:
     """Let time go by, and the clock see it."""
     seen = []
-    playback._timer.timeout.connect(lambda: seen.append(1))
+    playback.findChild(QTimer).timeout.connect(lambda: seen.append(1))
     Turned.elapsed_s += seconds
     qtbot.waitUntil(lambda: len(seen) >= 1, timeout=5000)
 

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from parsers import arguments_of
 
 from sd2app.command_line import full_parser
 from sd2app.manual.help import HELP
@@ -186,7 +187,7 @@ def test_every_command_has_a_page_of_its_help() -> None:
             parser = stack.pop()
             stack += commands_of(parser).values()
             assert f"{parser.prog}\n" in text
-            for action in parser._actions:
+            for action in arguments_of(parser):
                 assert all(option in text for option in action.option_strings)
         assert max(map(len, text.splitlines())) < 100
 

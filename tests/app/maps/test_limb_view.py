@@ -180,9 +180,11 @@ def test_a_denoiser_of_parts_gets_them(context, denoisers, qtbot, body):
     np.testing.assert_allclose(
         context.denoised.map.values, fading(moved, np.float32(2.0)), rtol=1e-4, atol=1e-7
     )
+    assert context.synthesis.split
     context.denoise.use(None)
+    context.edits.place_sensor(VirtualSensor((0.4, 0.0, 0.3)))
     rest(context, qtbot)
-    assert not context.synthesis._wanting_limbs
+    assert not context.synthesis.split
 
 
 def test_a_denoiser_of_parts_says_what_it_lacks(context, denoisers, qtbot, ball):

@@ -61,15 +61,16 @@ def open_ball(context, qtbot, ball):
 
 
 def test_rough_comes_before_exact(context, qtbot, ball):
-    ranks = []
-    context.synthetic.changed.connect(
-        lambda: (
-            ranks.append(context.synthesis._partial.quality.copy()) if context.synthetic.map else 0
-        )
-    )
+    ranks = [np.zeros(len(load_mesh(ball).times_s), int)]
+
+    def note(part) -> None:
+        ranks.append(ranks[-1].copy())
+        ranks[-1][part.start : part.start + part.stretch.values.shape[1]] = part.quality
+
+    context.synthesis.painted.connect(note)
     open_ball(context, qtbot, ball)
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
-    assert (ranks[0] == ROUGH).all()
+    assert (ranks[1] == ROUGH).all()
     assert (ranks[-1] == FINAL).all()
     lowest = [quality.min() for quality in ranks]
     assert lowest == sorted(lowest)
@@ -87,7 +88,7 @@ def test_every_sweep_of_a_fast_hand_is_for_one_placement(context, qtbot, ball):
     open_ball(context, qtbot, ball)
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
     shown = []
-    context.synthetic.changed.connect(lambda: shown.append(context.synthesis._partial.sensor))
+    context.synthesis.painted.connect(lambda part: shown.append(part.sensor))
     context.edits.begin_sensor_drag()
     for step in range(200):
         context.edits.drag_sensor((step * 0.005, 0.0, 0.0))

@@ -117,7 +117,7 @@ def test_a_process_that_dies_or_does_not_start_is_told(made, qtbot, tmp_path) ->
     maker.make(place)
     qtbot.waitUntil(lambda: maker.out is None, timeout=10_000)
     assert maker.told == ["ü"]
-    maker._command = ("/no/such/program",)
+    maker = PairMaker(tmp_path / "pairs", None, ("/no/such/program",))
     with pytest.raises(Sd2Error, match="cannot be started"):
         maker.make(place)
     assert maker.out is None

@@ -303,7 +303,8 @@ def test_one_person_is_divided_by_takes_and_that_is_said(made, qtbot, tmp_path) 
 
 def test_the_command_is_one_that_sd2_takes(made) -> None:
     """What the panel copies is parsed into the settings that it shows."""
-    model = made()
+    settings = Settings.forgetful()
+    model = made(settings=settings)
     chosen = {
         "model": "gru", "batch_size": 8, "learning_rate": 0.001, "range_factor": 1.5,
         "early_stopping_epochs": 9, "seed": 4,
@@ -315,7 +316,7 @@ def test_the_command_is_one_that_sd2_takes(made) -> None:
     typed = record_of(full_parser().parse_args(words[1:]))
     assert _config(typed) == model.setup.config
     # And what is kept is there at the next start.
-    again = made(settings=model._settings)
+    again = made(settings=settings)
     assert {name: again.setup.value(name) for name in chosen} == chosen
     assert [store.path for store in again.setup.data] == list(model.setup.config.data.pairs)
 

@@ -29,9 +29,9 @@ AROUND = [VirtualSensor(place) for place in ((0.0, 0.0, 0.0), (2.0, 0.0, 2.0), (
 @pytest.fixture
 def free(monkeypatch: pytest.MonkeyPatch) -> None:
     """Choosing costs nothing, and every plan but the most accurate as little."""
-    monkeypatch.setattr(places._Search, "reference_s", lambda _: 0.0)
+    monkeypatch.setattr(places.PlanSearch, "reference_s", lambda _: 0.0)
     costs = {TOP: 1.0, AccuracyPlan(): 0.5}
-    monkeypatch.setattr(places._Search, "frame_s", lambda _, plan: costs.get(plan, 0.1))
+    monkeypatch.setattr(places.PlanSearch, "frame_s", lambda _, plan: costs.get(plan, 0.1))
 
 
 @given(st.integers(1, 500))
@@ -91,14 +91,14 @@ def test_a_plan_that_fails_elsewhere_is_chosen_anew_there(monkeypatch: pytest.Mo
 @pytest.mark.usefixtures("free")
 def test_what_is_chosen_and_is_not_cheaper_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     costs = {TOP: 1.0, AccuracyPlan(): 0.1}
-    monkeypatch.setattr(places._Search, "frame_s", lambda _, plan: costs.get(plan, 0.2))
+    monkeypatch.setattr(places.PlanSearch, "frame_s", lambda _, plan: costs.get(plan, 0.2))
     found = choose_for_places(swinging_sphere(45), AROUND, 10**6, 0.3, PAPER)
     assert found.plan == AccuracyPlan()
     assert 0 < found.error_l1 <= 0.3
 
 
 def test_few_frames_are_not_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(places._Search, "reference_s", None)
+    monkeypatch.setattr(places.PlanSearch, "reference_s", None)
     found = choose_for_places(swinging_sphere(30), AROUND, 90, 0.02, PAPER)
     assert (found.plan, found.error_l1) == (TOP, 0.0)
     assert "too few" in found.reasons[0]
@@ -108,13 +108,13 @@ def test_where_choosing_takes_longer_than_it_saves_nothing_is_chosen(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(places, "survey_scene", None)
-    monkeypatch.setattr(places._Search, "frame_s", lambda _, plan: 1e-3 if plan == TOP else 5e-4)
-    monkeypatch.setattr(places._Search, "reference_s", lambda _: 10.0)
+    monkeypatch.setattr(places.PlanSearch, "frame_s", lambda _, plan: 1e-3 if plan == TOP else 5e-4)
+    monkeypatch.setattr(places.PlanSearch, "reference_s", lambda _: 10.0)
     dear = choose_for_places(swinging_sphere(30), AROUND, 10_000, 0.3, PAPER)
     assert dear.plan == TOP
     assert "longer than it saves" in dear.reasons[0]
     # A check takes a fraction of choosing: it pays earlier.
-    monkeypatch.setattr(places._Search, "reference_s", lambda _: 0.02)
+    monkeypatch.setattr(places.PlanSearch, "reference_s", lambda _: 0.02)
     checked = choose_for_places(swinging_sphere(30), AROUND, 10_000, 0.3, PAPER)
     assert checked.plan == AccuracyPlan()
     assert 0 < checked.error_l1 <= 0.3
@@ -124,7 +124,7 @@ def test_where_choosing_takes_longer_than_it_saves_nothing_is_chosen(
 
 @pytest.mark.parametrize("frames", [1, 3, 30])
 def test_costs_are_of_this_mesh(frames: int) -> None:
-    search = places._Search(swinging_sphere(frames), AROUND, 0.1, PAPER, silent)
+    search = places.PlanSearch(swinging_sphere(frames), AROUND, 0.1, PAPER, silent)
     assert search.reference_s() > 0
     assert search.frame_s(TOP) > 0
     assert search.frame_s(search.plain) > 0

@@ -7,7 +7,10 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
+from parsers import arguments_of, groups_of, options_of
+
 from sd2app.command_line import full_parser
+from sd2app.manual.markup import commands_of
 from sd2core.cli.output_folders import OUTPUTS
 
 WITHOUT_FACTS = {"labels figure", "strip", "warm-up", "fetch-models", "open", "demo"}
@@ -58,19 +61,18 @@ def walk(
     parser: argparse.ArgumentParser, path: tuple[str, ...] = ()
 ) -> Iterator[tuple[str, argparse.ArgumentParser]]:
     """Every command that does something, by its words."""
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for name, inner in action.choices.items():
-                yield from walk(inner, (*path, name))
-            return
-    yield " ".join(path), parser
+    inner = commands_of(parser)
+    for name, command in inner.items():
+        yield from walk(command, (*path, name))
+    if not inner:
+        yield " ".join(path), parser
 
 
 COMMANDS = dict(walk(full_parser()))
 ARGUMENTS = [
     (f"{name}: {argument.option_strings or argument.dest}", argument)
     for name, parser in COMMANDS.items()
-    for argument in parser._actions
+    for argument in arguments_of(parser)
     if argument.dest != "help"
 ]
 OPTIONS_WITH_VALUE = [
@@ -96,14 +98,14 @@ def test_help_begins_in_lower_case_and_ends_without_a_full_stop() -> None:
 
 def test_groups_have_names_from_a_small_set() -> None:
     for name, parser in COMMANDS.items():
-        titles = [group.title for group in parser._action_groups if group._group_actions]
+        titles = groups_of(parser)
         assert set(titles) <= GROUPS, name
         assert len(titles) == len(set(titles)), name
 
 
 def test_facts_are_printed_as_json_on_request() -> None:
     for name in COMMANDS.keys() - WITHOUT_FACTS:
-        (json,) = [one for one in COMMANDS[name]._actions if "--json" in one.option_strings]
+        json = options_of(COMMANDS[name])["--json"]
         assert json.nargs == 0, name
 
 
@@ -162,6 +164,6 @@ def test_values_have_a_name_or_are_listed() -> None:
 
 def test_outputs_that_exist_are_refused_by_all_commands_alike() -> None:
     for name, parser in COMMANDS.items():
-        actions = {action.dest for action in parser._actions}
+        actions = {action.dest for action in arguments_of(parser)}
         if actions & {*OUTPUTS}:
             assert ("overwrite" in actions) == (name not in GO_ON), name

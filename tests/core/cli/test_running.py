@@ -11,7 +11,9 @@ from pathlib import Path
 
 import pytest
 from cli_outcome import Sd2
+from parsers import arguments_of
 
+from sd2app.manual.markup import commands_of
 from sd2core.cli import build_parser, run
 from sd2core.cli.running import attach_negative_values
 from sd2core.errors import Sd2Error
@@ -146,12 +148,7 @@ def test_version(sd2: Sd2) -> None:
 
 
 def commands(parser: argparse.ArgumentParser) -> list[argparse.ArgumentParser]:
-    children = [
-        child
-        for action in parser._actions
-        if isinstance(action, argparse._SubParsersAction)
-        for child in action.choices.values()
-    ]
+    children = commands_of(parser).values()
     return [*children, *(inner for child in children for inner in commands(child))]
 
 
@@ -160,7 +157,7 @@ def test_every_command_explains_itself() -> None:
         text = command.format_help()
         assert command.description, command.prog
         assert max(map(len, text.splitlines())) <= 100, command.prog
-        for action in command._actions:
+        for action in arguments_of(command):
             assert action.help or action.metavar in {"PATH", "RECORDING", "FOLDER", "COMMAND"}, (
                 f"{command.prog}: {action.dest} has no help"
             )

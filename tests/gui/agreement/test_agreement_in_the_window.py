@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from finding import words_in
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QFileDialog, QToolButton
 from window_models import models_of
@@ -39,7 +40,7 @@ def test_side_by_side_and_from_one_difference_to_the_next(compared, qtbot) -> No
     assert [one.frames for one in c.agreement.disagreements] == [15]
     qtbot.keyClick(compared, Qt.Key.Key_N, SHIFT)
     assert c.playback.frame == 30
-    assert "You: back." in panel._where.text()
+    assert any("You: back." in words for words in words_in(panel, "plain"))
     c.playback.seek_frame(59)
     qtbot.keyClick(compared, Qt.Key.Key_P, SHIFT)
     assert c.playback.frame == 30

@@ -9,9 +9,18 @@ import sys
 from pathlib import Path
 
 import pytest
+from finding import named
 from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QListWidget, QToolButton
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QFileDialog,
+    QLabel,
+    QListWidget,
+    QPlainTextEdit,
+    QTextBrowser,
+    QToolButton,
+)
 from window_models import models_of
 
 from sd2app.background import run_monitor
@@ -22,6 +31,8 @@ from sd2app.batch.model import BatchModel
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
+from sd2app.widgets.inputs import Choice
+from sd2app.widgets.table import RecordTable
 from sd2core.batch.plan_file import read_plan
 from sd2core.mesh.vertex_parts import KINEMATICS
 from sd2core.placements.placements import PlacementGrid, write_placements
@@ -87,6 +98,11 @@ def words(dialog: BatchWindow) -> str:
     return "\n".join(one.text() for one in dialog.findChildren(QLabel) if one.isVisible())
 
 
+def text_of(dialog: BatchWindow, name: str) -> str:
+    """What a page of the window says."""
+    return named(dialog, name, QPlainTextEdit).toPlainText()
+
+
 def ready(qtbot, batch: BatchModel) -> None:
     qtbot.waitUntil(lambda: not batch.why_not_start, timeout=20_000)
 
@@ -133,9 +149,9 @@ def test_a_batch_is_set_up_started_and_its_results_opened(
     click(dialog, "Open folder")
     assert shown == [tmp_path / "made"]
     click(dialog, "Data set")
-    assert "A data set" in dialog._run._card.toPlainText()
+    assert "A data set" in named(dialog, "What the data set holds", QTextBrowser).toPlainText()
     click(dialog, "Results")
-    table = dialog._run._table
+    table = dialog.findChild(RecordTable)
     table.selectRow(3)
     with qtbot.waitSignal(models_of(window).document.opened, timeout=20_000):
         click(dialog, "Open in the window")
@@ -173,11 +189,11 @@ def test_failures_and_their_reasons_are_shown_and_a_batch_is_stopped(opened, qtb
     )
     assert "At work" in words(dialog)
     assert "1:00 so far" in words(dialog)
-    failures = dialog._run._failures.toPlainText()
+    failures = text_of(dialog, "What could not be done")
     assert "synthesise from place 2: It is damaged" in failures
     click(dialog, "Failures (1)")
     click(dialog, "Log")
-    qtbot.waitUntil(lambda: "looked at" in dialog._run._log.toPlainText(), timeout=20_000)
+    qtbot.waitUntil(lambda: "looked at" in text_of(dialog, "Log"), timeout=20_000)
     click(dialog, "Stop")
     assert "Stopping" in words(dialog)
     assert not button(dialog, "Stop").isEnabled()
@@ -193,7 +209,7 @@ def test_placements_of_the_recording_or_of_a_file_are_taken(opened, qtbot, tmp_p
     dialog = window.findChild(BatchWindow)
     qtbot.waitUntil(lambda: not setup.problem, timeout=20_000)
     assert setup.plan().placement_count == 3
-    choice = dialog._setup._placements
+    choice = named(dialog, "Where sensors are put", Choice)
     assert "3 placements" in choice.currentText()
     # The plan is followed, as long as its recording is open.
     context.edits.plan_placements(PlacementGrid((1.0,)))
@@ -244,7 +260,7 @@ def test_a_batch_begins_with_planned_places_and_the_model_in_use(
     assert plan.plan().denoise.model == next(
         name for name, card in c.denoise.by_name().items() if card.path == own
     )
-    choice = window.findChild(BatchWindow)._setup._model
+    choice = named(window.findChild(BatchWindow), "Model to denoise with", Choice)
     assert choice.currentText() == plan.value("model")
     assert not plan.plan().synthesise.limbs
     # One that takes the map of each part of the body has them made.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import sys
 from dataclasses import replace
 
 import fake_class_command
@@ -23,9 +22,10 @@ from sd2app.classify.strip import ClassPlot, ClassReadout, ClassStrip, stacked_i
 from sd2app.labels.timeline import LabelTimeline
 from sd2app.suggestions.bar import SuggestionBar
 from sd2app.widgets.chart import ChartView
-from sd2app.widgets.inputs import Choice, TypedLine
+from sd2app.widgets.inputs import Choice, NumberBox, TypedLine
 from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2core.classify.defaults import WIDTH, pace_kind
+from sd2core.classify.files import user_classifiers_folder
 from sd2core.files.resources import resource_path
 from sd2core.runs.pace import keep_pace
 
@@ -217,7 +217,7 @@ def test_how_sure_it_must_be_is_typed(classified, qtbot):
     found(classified, qtbot)
     many = len(c.suggestions.pending)
     sure = sorted(span.confidence for span in c.suggestions.pending)
-    box = bar._threshold
+    (box,) = bar.findChildren(NumberBox)
     assert box.suffix() == " %"
     box.setFocus()
     box.selectAll()
@@ -272,7 +272,6 @@ def test_what_is_no_classifier_is_said(window, tmp_path):
 def trainable(window, tmp_path, qtbot):
     """The page of classifiers with data, and a command that learns nothing."""
     training = models_of(window).class_training
-    training._command = (sys.executable, "-u", fake_class_command.__file__)
     key(window, "C", SHIFT)
     panel = window.findChild(ClassPanel)
     assert panel.isVisible()
@@ -296,7 +295,7 @@ def test_trained_by_clicks_watched_and_used(trainable, fake_classes, qtbot):
     qtbot.keyClick(curve, Qt.Key.Key_Right)
     assert curve.pointed.y == 70
     assert "Recall 70.0 %" in curve.accessibleDescription()
-    kept = training._folder / f"{training.run.folder.path.name}.safetensors"
+    kept = user_classifiers_folder() / f"{training.run.folder.path.name}.safetensors"
     fake_classes.add(kept)
     press(panel, "Use this model", qtbot)
     assert models_of(trainable).classify.path == kept
@@ -343,9 +342,9 @@ def test_a_person_is_typed_and_who_does_what_is_said(trainable, tmp_path, qtbot)
 
 
 @pytest.mark.slow
-def test_stopped_by_a_click(trainable, qtbot):
+def test_stopped_by_a_click(trainable, qtbot, monkeypatch):
     training, panel = models_of(trainable).class_training, trainable.findChild(ClassPanel)
-    training._command = (*training._command, "--step-s", "0.5")
+    monkeypatch.setenv(fake_class_command.STEP_S, "0.5")
     press(panel, "Start training", qtbot)
     qtbot.waitUntil(lambda: training.run.history.steps_done >= 1, timeout=20_000)
     assert trainable.side.button("Train").toolTip().startswith("Train · ")

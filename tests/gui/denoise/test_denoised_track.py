@@ -87,7 +87,7 @@ def test_a_click_chooses_a_model_and_the_track_appears(window, qtbot):
     tops = [tracks.synthetic.y(), tracks.denoised.y(), tracks.real.y()]
     assert tops == sorted(tops)
     assert shown_button(window).text() == "kitchen"
-    assert "simulated data only" in tracks.denoised._status()
+    assert "simulated data only" in tracks.denoised.status()
     choose(window, qtbot, shown_button(window), "hall")
     assert is_of(c, 3.0)
     qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
@@ -142,7 +142,7 @@ def test_the_difference_has_a_sign_and_says_what_it_is(denoised, qtbot):
     assert view.isVisible()
     qtbot.wait(100)  # until the tracks have found their heights
     assert view.title() == "Denoised − radar (simulated)"
-    assert "as strong altogether" in view._status()
+    assert "as strong altogether" in view.status()
     levels, palette = c.display.levels, c.display.palette
     # The ball is seen by the denoiser where the radar, pure noise, sees little: and the
     # other way round at velocities that the ball does not have.
@@ -234,7 +234,7 @@ def test_the_model_before_stands_below_this_one(denoised, qtbot):
         rtol=1e-5,
         atol=1e-9,
     )
-    assert "kitchen" in tracks.before._status()
+    assert "kitchen" in tracks.before.status()
     qtbot.keyClick(denoised, Qt.Key.Key_B)
     assert not tracks.before.isVisible()
 

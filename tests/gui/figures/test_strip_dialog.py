@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from answering import once_asked
+from finding import named
 from PIL import Image
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QPushButton
@@ -80,7 +81,7 @@ def test_exported_by_hand(window, qtbot, tmp_path, monkeypatch):
     def choose(dialog: StripDialog) -> None:
         model = dialog._model
         model.choose(way="list")
-        field = dialog._typed
+        field = named(dialog, "Frames such as")
         field.clear()
         qtbot.keyClicks(field, "4,8")
         overlay = next(b for b in dialog.findChildren(QCheckBox) if b.text() == "mesh over video")

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from answering import answer, once_asked
 from fake_denoisers import FakeDenoisers
+from finding import button_of, words_in
 from PySide6.QtCore import QCoreApplication, QEvent, QPoint, Qt
 from PySide6.QtWidgets import (
     QCheckBox,
@@ -93,7 +94,7 @@ def test_from_the_offer_to_the_recording(made, qtbot, video) -> None:
     asked: list[FitRequest] = []
 
     def fill(dialog: NewFromVideoDialog) -> None:
-        qtbot.waitUntil(lambda: dialog.picker._setup.picture is not None, timeout=10_000)
+        qtbot.waitUntil(lambda: dialog.picker.setup.picture is not None, timeout=10_000)
         picker = dialog.picker
         box = picker.box
 
@@ -107,7 +108,7 @@ def test_from_the_offer_to_the_recording(made, qtbot, video) -> None:
         known = dialog.findChild(QCheckBox)
         qtbot.mouseClick(known, Qt.MouseButton.LeftButton, pos=QPoint(8, known.height() // 2))
         fit = next(b for b in dialog.findChildren(QPushButton) if b.text() == "Fit")
-        asked.append(dialog.picker._setup.request())
+        asked.append(dialog.picker.setup.request())
         qtbot.mouseClick(fit, Qt.MouseButton.LeftButton)
 
     once_asked(NewFromVideoDialog, fill)
@@ -159,9 +160,9 @@ def test_landmarks_are_drawn_and_the_clock_goes_along_until_it_is_moved(made, qt
     click(window, qtbot, "Cancel")
     assert c.fit.state == "cancelling"
     qtbot.waitUntil(lambda: c.fit.state == "stopped", timeout=10_000)
-    qtbot.waitUntil(lambda: not bar._buttons["follow"].isVisible())
+    qtbot.waitUntil(lambda: not button_of(bar, "Follow").isVisible())
     QCoreApplication.processEvents()
-    discard = bar._buttons["discard"].geometry()
+    discard = button_of(bar, "Discard…").geometry()
     assert not any(discard.intersects(one) for one in before), "it came to where one was"
     # What is lost is said, and nothing is deleted unless that is wanted.
     asked: list[str] = []
@@ -186,12 +187,11 @@ def test_a_failure_is_shown_and_put_away(made, qtbot, video) -> None:
     models_of(window).fit.start(FitRequest(video, video.with_name("walk.sd2")))
     qtbot.waitUntil(lambda: models_of(window).fit.state == "failed", timeout=20_000)
     bar = window.findChild(FitBar)
-    assert bar._reason.text() == "There is nobody in walk.mp4. Film a person."
-    assert bar._reason.isVisible()
+    assert words_in(bar, "warning") == ["There is nobody in walk.mp4. Film a person."]
     asked: list[Path | None] = []
 
     def look(dialog: NewFromVideoDialog) -> None:
-        asked.append(dialog.picker._setup.video)
+        asked.append(dialog.picker.setup.video)
         dialog.reject()
 
     once_asked(NewFromVideoDialog, look)

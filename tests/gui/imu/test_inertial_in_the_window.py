@@ -94,7 +94,7 @@ def test_a_key_and_a_click_place_a_sensor_and_undo_takes_it_away(window, track, 
     vertex = front_vertex(window)
     place = vertex_px(window, vertex)
     QTest.mouseMove(window.features.scene.view.childAt(place), place)
-    assert overlay._reading == f"inertial sensor at vertex {vertex}"
+    assert overlay.reading == f"inertial sensor at vertex {vertex}"
     click_scene(window, place)
     assert models.document.recording.imu_places == (str(vertex),)
     assert not models.placing.active

@@ -7,12 +7,14 @@ from pathlib import Path
 import pytest
 from answering import once_asked
 from dropping import drop, hover
+from finding import named
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QComboBox, QFileDialog, QPushButton
 from window_models import models_of
 
 from sd2app.labels.export_dialog import LabelExportDialog
 from sd2app.labels.import_dialog import LabelImportDialog, import_labels
+from sd2app.widgets.inputs import Choice
 from sd2core.labels.formats import FORMATS, read_labels, write_labels
 from sd2core.labels.spans import Labels, LabelTrack, Span
 
@@ -105,7 +107,7 @@ def test_export_to_every_format_and_back(window, qtbot, monkeypatch, tmp_path) -
         choose(monkeypatch, "getSaveFileName", path)
 
         def work(dialog: LabelExportDialog, title: str = one.title) -> None:
-            dialog._format.setCurrentText(title)
+            named(dialog, "The program that is to read", Choice).setCurrentText(title)
             qtbot.waitUntil(button(dialog, "Export…").isEnabled, timeout=10_000)
             qtbot.mouseClick(button(dialog, "Export…"), LEFT)
 

@@ -12,9 +12,12 @@ import h5py
 import numpy as np
 import pytest
 from answering import answer, once_asked
+from finding import button_of, named
+from left_behind import end_process
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QAction
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QToolButton
+from PySide6.QtWidgets import QToolButton, QTreeWidget
 from window_models import models_of
 
 from sd2app.labels.recovery import LabelNotice, RecoverLabelsDialog
@@ -90,6 +93,11 @@ def left_behind():
     return offers_in(recovery_folder()).offers
 
 
+def listed(dialog: RecoverLabelsDialog) -> QTreeWidget:
+    """The labels that are offered."""
+    return named(dialog, "Labels that can be recovered", QTreeWidget)
+
+
 class TestAfterACrash:
     def test_it_is_said_what_is_offered_and_one_click_restores_it(self, on, qtbot, crashed) -> None:
         window = on(crashed)
@@ -153,10 +161,10 @@ class TestAfterACrash:
         assert bar(window).text.endswith("before labels were saved: ball.sd2.")
 
         def choose(dialog: RecoverLabelsDialog) -> None:
-            row = dialog._list.topLevelItem(0)
+            row = listed(dialog).topLevelItem(0)
             assert [row.text(column) for column in (0, 2)] == ["ball.sd2", "3 spans"]
             assert row.text(1).startswith("1 edit until ")
-            qtbot.keyClick(dialog._list, Qt.Key.Key_Return)
+            qtbot.keyClick(listed(dialog), Qt.Key.Key_Return)
 
         once_asked(RecoverLabelsDialog, choose)
         with qtbot.waitSignal(models_of(window).document.opened, timeout=20_000):
@@ -171,18 +179,20 @@ class TestAfterACrash:
         out = tmp_path / "rescued.json"
 
         def rescue(dialog: RecoverLabelsDialog) -> None:
-            assert not dialog._open.isEnabled()
-            assert "is not there any more" in dialog._open.toolTip()
+            recording = button_of(dialog, "Open recording")
+            assert not recording.isEnabled()
+            assert "is not there any more" in recording.toolTip()
             monkeypatch.setattr(
                 "PySide6.QtWidgets.QFileDialog.getSaveFileName",
                 lambda *_: (str(out), ""),
             )
-            qtbot.mouseClick(dialog._write, Qt.MouseButton.LeftButton)
-            qtbot.mouseClick(dialog._discard, Qt.MouseButton.LeftButton)
-            assert dialog._list.topLevelItem(0).text(3) == "discarded"
+            qtbot.mouseClick(button_of(dialog, "Write to file…"), Qt.MouseButton.LeftButton)
+            discard = button_of(dialog, "Discard")
+            qtbot.mouseClick(discard, Qt.MouseButton.LeftButton)
+            assert listed(dialog).topLevelItem(0).text(3) == "discarded"
             answer(qtbot, "Discard")
-            qtbot.mouseClick(dialog._discard, Qt.MouseButton.LeftButton)
-            assert dialog._list.topLevelItemCount() == 0
+            qtbot.mouseClick(discard, Qt.MouseButton.LeftButton)
+            assert listed(dialog).topLevelItemCount() == 0
             dialog.reject()
 
         once_asked(RecoverLabelsDialog, rescue)
@@ -262,7 +272,10 @@ class TestReadOnly:
             assert not window.action(name).isEnabled()
             assert window.action(name).toolTip() == refusal
         assert window.action("next_span").isEnabled()
-        labels = window.features.labels._keys._actions
+        names = [one.name for one in models_of(window).labels.labels.label_set.labels]
+        actions = window.findChildren(QAction)
+        labels = [one for one in actions if one.text().replace("&", "") in names]
+        assert len(labels) == len(names)
         assert all(not one.isEnabled() and one.toolTip() == refusal for one in labels)
         elsewhere.release()
         window.action("edit_labels_here").trigger()
@@ -354,10 +367,7 @@ class TestOtherEditsAfterACrash:
 
     def crash(self, window) -> None:
         """What the end of a process does to the open recording."""
-        session = models_of(window).label_session
-        session._journal._close_stream()
-        session._place.release()
-        session._journal = session._place = None
+        end_process(models_of(window).label_session, recovery_folder())
 
     def edited(self, on, qtbot, path):
         """The window after a sensor moved and aimed, a plan and an offset, none of them saved."""

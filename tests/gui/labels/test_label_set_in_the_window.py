@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from finding import named
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
@@ -145,9 +146,10 @@ def test_order_and_name_of_the_set(window, page) -> None:
     QTest.mouseClick(button(page, "Down"), LEFT)
     assert names(window)[:3] == ["right-to-left", "up-to-down", "left-to-right"]
     assert page.table.currentIndex().row() == 2
-    page._name.setFocus()
+    name = named(page, "Name of the label set")
+    name.setFocus()
     press(Qt.Key.Key_A, CONTROL)
-    QTest.keyClicks(page._name, " Mine ")
+    QTest.keyClicks(name, " Mine ")
     press(Qt.Key.Key_Return)
     assert models_of(window).labels.labels.label_set.name == "Mine"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from finding import splitter_around
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
@@ -243,7 +244,8 @@ def test_the_panel_is_as_wide_as_its_table_needs_and_others_are_as_before(labell
     assert labelled.side.width() == narrow
     labelled.side.bring_up("Labels")
     assert labelled.side.width() >= wide  # as far as the scene gives way
-    labelled._across.splitterMoved.emit(0, 0)  # a hand has chosen what is there
+    across = splitter_around(labelled.side, Qt.Orientation.Horizontal)
+    across.splitterMoved.emit(0, 0)  # a hand has chosen what is there
     chosen = labelled.side.width()
     labelled.side.bring_up("Sensor")
     labelled.side.bring_up("Labels")

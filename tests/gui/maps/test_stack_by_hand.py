@@ -10,7 +10,7 @@ from answering import menu_at, pick
 from full_disk import full_disk
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QCursor, QGuiApplication, QImage, QWheelEvent
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QScrollBar
 from window_models import models_of
 
 from sd2app.maps.arrangement import HEADER_PX, MIN_PX
@@ -118,28 +118,29 @@ def test_the_border_is_dragged(stack, qtbot):
     assert stack.arrangement.row("synthetic").wanted_px is None
 
 
-def test_what_does_not_fit_is_scrolled_by_bar_and_by_wheel(stack, qtbot):
+def test_what_does_not_fit_is_scrolled_by_bar_and_by_wheel(window, stack, qtbot):
     view, below = stack.synthetic, stack.real
     turn_wheel(view, TITLE, -1)
     assert not stack.verticalScrollBar().value(), "all is in view"
     stack.arrangement.set_height("synthetic", stack.viewport().height())
-    bar = stack._bar
+    (bar,) = stack.findChildren(QScrollBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
+    span = models_of(window).span
     assert bar.isVisible()
-    span_s = (stack._session.span.start_s, stack._session.span.end_s)
+    span_s = (span.start_s, span.end_s)
     turn_wheel(view, TITLE, -1)
     by_wheel = bar.value()
     assert by_wheel > 0
     turn_wheel(view, TITLE, 1)
     assert bar.value() == 0
-    assert (stack._session.span.start_s, stack._session.span.end_s) == span_s
+    assert (span.start_s, span.end_s) == span_s
     drag(qtbot, bar, QPoint(4, 20), QPoint(4, bar.height() - 4))
     assert bar.value() == bar.maximum() == stack.verticalScrollBar().value()
     bottom = below.mapTo(stack.viewport(), QPoint(0, below.height())).y()
     assert bottom <= stack.viewport().height()
     # Over the map itself it zooms, as ever.
     turn_wheel(below, QPoint(300, HEADER_PX + 20), 1)
-    assert stack._session.span.duration_s < span_s[1] - span_s[0]
-    stack._session.span.fit()
+    assert span.duration_s < span_s[1] - span_s[0]
+    span.fit()
 
 
 def test_a_title_is_dragged_to_another_place(window, stack, qtbot):

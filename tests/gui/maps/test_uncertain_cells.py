@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QToolButton
+from PySide6.QtWidgets import QCheckBox, QToolButton
 from window_models import models_of
 
 from sd2app.maps.heatmap import HeatmapView
@@ -60,7 +60,7 @@ def test_a_key_takes_the_colour_from_what_is_not_known(fitted, qtbot, tmp_path):
     wait(fitted, qtbot)
     assert c.synthetic.uncertainty is not None
     assert colour_of(view) < 10
-    assert "grey: ±50 % or worse" in view._status()
+    assert "grey: ±50 % or worse" in view.status()
     place = QPoint(round(view.scale.x_of(0.5)), round(view.y_of(1.2)))
     qtbot.mouseMove(view, place)
     reading = c.pointer.reading
@@ -125,6 +125,11 @@ def test_closing_while_it_is_found_is_safe(fitted, qtbot):
     fitted.close()
 
 
+def counting(panel) -> QCheckBox:
+    """The box that spreads vertices over bins."""
+    return next(one for one in panel.findChildren(QCheckBox) if one.text() == "expected map")
+
+
 def test_counting_is_chosen_by_hand_and_the_title_states_one_accuracy(fitted, qtbot, tmp_path):
     c, (panel,) = models_of(fitted), fitted.findChildren(SensorPanel)
     fitted.bring_up("Sensor", "Sensor")
@@ -136,7 +141,7 @@ def test_counting_is_chosen_by_hand_and_the_title_states_one_accuracy(fitted, qt
     c.synthesis.export(tmp_path / "map.npz")
     assert str(DopplerMap.load(tmp_path / "map.npz").accuracy) == accuracy
 
-    box = panel._expected
+    box = counting(panel)
     qtbot.mouseClick(box, Qt.MouseButton.LeftButton, pos=QPoint(8, box.height() // 2))
     assert c.document.count == "plain"
     wait(fitted, qtbot)
@@ -152,4 +157,4 @@ def test_counting_is_chosen_by_hand_and_the_title_states_one_accuracy(fitted, qt
 
 def test_a_mesh_that_says_nothing_offers_no_counting(window):
     (panel,) = window.findChildren(SensorPanel)
-    assert not panel._readouts.isRowVisible(panel._expected)
+    assert counting(panel).isHidden()

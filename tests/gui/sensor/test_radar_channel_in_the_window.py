@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from finding import named
 from window_models import models_of
 
 from sd2app.sensor.panel import SensorPanel
+from sd2app.widgets.inputs import Choice
 from tests.core.io.radar.dca1000_files import TiRecording, write_ti
 
 
@@ -24,11 +26,15 @@ def shown(window, path, qtbot):
     return c
 
 
+def channel(panel, which):
+    return named(panel, f"{which} whose signal is shown", Choice)
+
+
 def offered(panel):
     return [
         [choice.itemText(place) for place in range(choice.count())]
-        for choice in (panel._receiver, panel._transmitter)
-        if panel._capture_form.isRowVisible(choice)
+        for choice in (channel(panel, "Receiver"), channel(panel, "Transmitter"))
+        if not choice.isHidden()
     ]
 
 
@@ -43,10 +49,10 @@ def test_only_what_there_is_several_of_is_offered(empty_window, panel, qtbot, tm
 def test_a_receiver_is_chosen_by_hand(empty_window, panel, qtbot, tmp_path):
     c = shown(empty_window, write_ti(tmp_path, TiRecording()), qtbot)
     every = c.real.map.values.copy()
-    panel._receiver.setCurrentIndex(2)
+    channel(panel, "Receiver").setCurrentIndex(2)
     assert c.document.recording.radar_receiver == 2
     qtbot.waitUntil(lambda: not np.array_equal(c.real.map.values, every), timeout=30_000)
     assert c.real.title == "Real, receiver 2"
     c.document.undo_stack.undo()
-    assert panel._receiver.currentText() == "all (mean power)"
+    assert channel(panel, "Receiver").currentText() == "all (mean power)"
     qtbot.waitUntil(lambda: np.array_equal(c.real.map.values, every), timeout=30_000)

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QToolTip
 from window_models import models_of
 
 from sd2app.sensor.panel import SensorPanel
-from sd2app.sensor.placements_page import PlacementsPage
+from sd2app.sensor.placement_fields import PlacementFields
 from sd2app.widgets.inputs import NumberBox, TypedLine
 
 
@@ -119,7 +119,7 @@ def test_ranges_of_placements_have_units_too(active) -> None:
     window.bring_up("Sensor", "Placements")
     fields = window.findChild(SensorPanel).window().findChildren(TypedLine)
     page = next(one for one in fields if one.accessibleName() == "Ranges, m")
-    kinds = window.findChild(PlacementsPage)._fields
+    kinds = window.findChild(PlacementFields)
     kinds.set_kind("grid")
     QApplication.processEvents()
     type_into(page, "150cm, 2, 3000 mm", key=None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from answering import menu_at, pick
+from finding import button_of
 from PySide6.QtWidgets import QFileDialog
 from window_models import models_of
 
@@ -37,7 +38,7 @@ def test_placements_are_named_as_the_recording(labelled, proposed):
     c = models_of(labelled)
     c.edits.plan_placements(PlacementGrid((1.0,)))
     labelled.action("placements").trigger()
-    labelled.findChild(PlacementsPage)._export_plan()
+    button_of(labelled.findChild(PlacementsPage), "Export…").click()
     assert proposed == ["ball-placements.json"]
     c.document.undo_stack.undo()
 

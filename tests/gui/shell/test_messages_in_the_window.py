@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 from answering import once_asked
+from finding import panel_of
 from grey_video import write_video
-from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtCore import QPoint, QRect, Qt, QTimer
 from PySide6.QtGui import QCursor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialogButtonBox, QToolButton, QWidget
@@ -16,22 +17,31 @@ from window_models import models_of
 from sd2app.fit.bar import FitOffer
 from sd2app.labels.recovery import LabelNotice
 from sd2app.shell.messages.views import MessageNotice, MessagesDialog
-from sd2app.widgets.notices import Notice
+from sd2app.widgets.notices import Notice, NoticeStack
 
+PANELS = ("video", "scene", "tracks", "spectrum", "side")
 LEFT = Qt.MouseButton.LeftButton
 
 
 def places(window) -> dict[str, QRect]:
     """Place on the screen of every part and of every button that is not a notice's."""
-    parts = [*window._panels.items(), *((f"line {n}", w) for n, w in enumerate(_buttons(window)))]
-    return {name: QRect(part.mapToGlobal(QPoint(0, 0)), part.size()) for name, part in parts}
+    buttons = {f"line {n}": one for n, one in enumerate(_buttons(window))}
+    parts = {**panels_of(window), **buttons}
+    return {
+        name: QRect(part.mapToGlobal(QPoint(0, 0)), part.size()) for name, part in parts.items()
+    }
+
+
+def panels_of(window) -> dict[str, QWidget]:
+    """Parts of the window by their names."""
+    return {name: panel_of(window, name) for name in PANELS}
 
 
 def _buttons(window) -> list[QWidget]:
     return [
         button
         for button in window.findChildren(QToolButton)
-        if button.isVisible() and not window._notices.isAncestorOf(button)
+        if button.isVisible() and not window.findChild(NoticeStack).isAncestorOf(button)
     ]
 
 
@@ -64,13 +74,13 @@ def test_nothing_moves_when_something_is_said(window, pointer_elsewhere) -> None
     models_of(window).label_session.changed.emit()
     other = shown(window, LabelNotice)
     assert places(window) == before
-    inside = window._panels["scene"].mapTo(window, QPoint(0, 0)).x()
+    inside = panel_of(window, "scene").mapTo(window, QPoint(0, 0)).x()
     assert notice.mapTo(window, QPoint(0, 0)).x() >= inside
     assert not notice.geometry().intersects(other.geometry())
     for one in (notice, other):
         QTest.mouseClick(cross_of(one), LEFT)
     QApplication.processEvents()
-    assert not window._notices.isVisible()
+    assert not window.findChild(NoticeStack).isVisible()
     assert places(window) == before
 
 
@@ -84,13 +94,13 @@ def test_several_failures_are_one_notice_with_a_list(window, pointer_elsewhere) 
     assert said[-2:] == ["• File 7 is missing.", "3 more: View → Messages"]
     window.note("Something was done.")
     assert notice.text.splitlines() == said
-    assert window._notices.rect().contains(notice.geometry())
+    assert window.findChild(NoticeStack).rect().contains(notice.geometry())
     QTest.mouseClick(cross_of(notice), LEFT)
     assert window.messages.text == ""
 
 
 def test_what_is_under_the_pointer_stays_there(window) -> None:
-    c, scene = models_of(window), window._panels["scene"]
+    c, scene = models_of(window), panel_of(window, "scene")
     aim = QPoint(scene.width() - 60, scene.height() - 40)
     QCursor.setPos(scene.mapToGlobal(aim))
     under = window.childAt(scene.mapTo(window, aim))
@@ -103,12 +113,13 @@ def test_what_is_under_the_pointer_stays_there(window) -> None:
 def test_a_remark_goes_by_itself_and_a_failure_stays(window, pointer_elsewhere) -> None:
     window.note("Something was done.")
     notice = shown(window, MessageNotice)
-    assert notice._timer.isActive()
-    notice._timer.timeout.emit()
+    timer = notice.findChild(QTimer)
+    assert timer.isActive()
+    timer.timeout.emit()
     assert window.messages.text == ""
     assert not notice.isVisible()
     window.warn("This cannot be read.")
-    assert not notice._timer.isActive()
+    assert not timer.isActive()
     # Once it was closed the same is said again.
     QTest.mouseClick(cross_of(shown(window, MessageNotice)), LEFT)
     window.warn("This cannot be read.")
@@ -138,14 +149,14 @@ def test_everything_that_was_said_is_listed(window, qtbot, pointer_elsewhere) ->
 
 def test_the_offer_of_a_fit_lies_over_the_content(empty_window, qtbot, tmp_path: Path) -> None:
     window = empty_window
-    before = {name: part.geometry() for name, part in window._panels.items()}
+    before = {name: part.geometry() for name, part in panels_of(window).items()}
     video = tmp_path / "walk.mp4"
     write_video(video)
     with qtbot.waitSignal(models_of(window).document.opened, timeout=20_000):
         window.open_paths([video])
     offer = shown(window, FitOffer)
     assert offer.text.startswith("walk.mp4 has no mesh")
-    assert {name: part.geometry() for name, part in window._panels.items()} == before
+    assert {name: part.geometry() for name, part in panels_of(window).items()} == before
     assert "walk.mp4 has no mesh" in window.messages.history[-1].text
     QTest.mouseClick(cross_of(offer), LEFT)
     assert not offer.isVisible()

@@ -58,7 +58,7 @@ def test_the_map_is_empty_there_and_says_so_under_the_pointer(window, qtbot):
     qtbot.mouseMove(view, QPoint(round(view.scale.x_of(10 / 30)), middle.y()))
     assert c.pointer.reading.note == ""
     assert real.isVisible()
-    assert "no person in 0.50 s" in view._status()
+    assert "no person in 0.50 s" in view.status()
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from answering import once_asked
 from dropping import drop, hover
-from PySide6.QtCore import QDir, Qt, QTimer
+from PySide6.QtCore import QDir, QSettings, Qt, QTimer
 from PySide6.QtGui import QDragLeaveEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QListView, QMenu
@@ -142,12 +142,13 @@ def test_whatever_is_opened_or_saved_is_recent(empty_window, qtbot, recording_co
     assert c.document.paths == (video, mesh)
 
 
-def test_recent_files_are_kept_between_sessions():
-    settings = Settings.forgetful()
+def test_recent_files_are_kept_between_sessions(tmp_path):
+    store = QSettings(str(tmp_path / "settings.ini"), QSettings.Format.IniFormat)
+    settings = Settings(store)
     for number in range(12):
         settings.add_recent(Path(f"/{number}.mp4"), Path(f"/{number}.npz"))
     settings.add_recent(Path("/5.mp4"), Path("/5.npz"))
-    again = Settings(settings._store).recent
+    again = Settings(store).recent
     assert len(again) == 10
     assert again[:2] == [(Path("/5.mp4"), Path("/5.npz")), (Path("/11.mp4"), Path("/11.npz"))]
 

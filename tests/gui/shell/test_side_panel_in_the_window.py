@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from finding import named, panel_of, splitter_around
 from kept_window import close_window
 from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QSplitterHandle, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QSplitterHandle, QWidget
 
 from sd2app.maps.arrangement import HEADER_PX
 from sd2app.settings import Settings
@@ -74,7 +75,7 @@ def test_it_stands_beside_scene_and_maps_and_shows_every_icon(windows, size) -> 
         assert side.contains(icon), name
         assert icon.width() >= 32
     for other in ("tracks", "scene"):
-        assert place_of(window._panels[other]).right() < side.left()
+        assert place_of(panel_of(window, other)).right() < side.left()
 
 
 def test_icons_have_names_tips_and_a_ring_for_what_is_under_way(windows) -> None:
@@ -100,7 +101,7 @@ def test_arrows_go_from_panel_to_panel(windows) -> None:
     for name in (*NAMES[1:], NAMES[-1]):
         QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Down)
         assert side.shown == name
-        assert side._title.text() == name
+        assert named(side, "Open panel", QLabel).text() == name
         assert QApplication.focusWidget() is side.button(name)
     QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Up)
     assert side.shown == NAMES[-2]
@@ -108,7 +109,7 @@ def test_arrows_go_from_panel_to_panel(windows) -> None:
 
 def test_its_own_icon_or_a_key_folds_it_and_another_opens_it(windows) -> None:
     window = windows()
-    side, scene = window.side, window._panels["scene"]
+    side, scene = window.side, panel_of(window, "scene")
     wide_px, scene_px = side.width(), scene.width()
     QTest.mouseClick(side.button("Sensor"), LEFT)
     assert side.folded
@@ -127,7 +128,7 @@ def test_its_own_icon_or_a_key_folds_it_and_another_opens_it(windows) -> None:
 def test_the_next_window_has_the_width_that_was_chosen(windows) -> None:
     window = windows()
     before_px = window.side.width()
-    drag(window._across.handle(1), -90)
+    drag(splitter_around(window.side, Qt.Orientation.Horizontal).handle(1), -90)
     chosen_px = window.side.width()
     assert chosen_px == pytest.approx(before_px + 90, abs=2)
     again = windows()
@@ -156,7 +157,7 @@ def test_the_next_window_has_the_heights_that_were_chosen(windows, qtbot, small_
 
     window = opened()
     before_px = window.maps.height()
-    drag(window._rows.handle(1), 0, -60)
+    drag(splitter_around(window.maps, Qt.Orientation.Vertical).handle(1), 0, -60)
     chosen_px = window.maps.height()
     assert chosen_px == pytest.approx(before_px + 60, abs=2)
     view = window.maps.synthetic

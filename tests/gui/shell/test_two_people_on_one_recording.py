@@ -12,6 +12,7 @@ from dataclasses import replace
 import pytest
 from answering import answer
 from kept_window import close_window, new_window
+from left_behind import end_process
 from PySide6.QtCore import Qt
 from window_models import models_of
 
@@ -310,10 +311,7 @@ class TestTheFolderIsGone:
         save(window, qtbot, "Cancel")
         assert models_of(window).document.modified
         assert not recording_copy.exists()
-        session = models_of(window).label_session
-        session._journal._close_stream()  # as at the end of a process
-        session._place.release()
-        session._journal = session._place = None
+        end_process(models_of(window).label_session, recovery_folder())
         (offer,) = offers_in(recovery_folder()).offers
         assert spans_of(offer.labels) == [THERE, MINE, BACK]
 

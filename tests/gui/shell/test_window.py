@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from finding import named
 from PySide6.QtCore import QPoint, QPointF, Qt, QTimer
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QApplication, QMessageBox
@@ -199,7 +200,7 @@ def test_typing_a_range_moves_the_sensor_along_its_direction(window, qtbot):
 
     c = models_of(window)
     panel = window.findChild(SensorPanel)
-    box = panel._spherical[0]
+    box = named(panel, "Range: ")
     box.setFocus()
     box.lineEdit().selectAll()
     qtbot.keyClicks(box, "6")
@@ -215,9 +216,11 @@ def test_typing_a_range_moves_the_sensor_along_its_direction(window, qtbot):
 
 def number_boxes(window):
     from sd2app.sensor.panel import SensorPanel
+    from sd2app.widgets.inputs import NumberBox
 
     panel = window.findChild(SensorPanel)
-    return panel._xyz, panel._spherical
+    axes = [named(panel, f"Sensor position, {axis}", NumberBox) for axis in "xyz"]
+    return axes, [named(panel, name, NumberBox) for name in ("Range: ", "Azimuth: ", "Elevation: ")]
 
 
 def type_into(box, text, qtbot):
@@ -279,13 +282,14 @@ def test_levels_push_each_other_along(window, qtbot):
     from sd2app.maps.level_bar import LevelBar
 
     bar, levels = window.findChild(LevelBar), lambda: models_of(window).display.levels
-    type_into(bar._low, "15", qtbot)
-    qtbot.keyClick(bar._low, Qt.Key.Key_Return)
+    low, high = (named(bar, f"Level shown as the {end}") for end in ("first", "last"))
+    type_into(low, "15", qtbot)
+    qtbot.keyClick(low, Qt.Key.Key_Return)
     assert (levels().low_db, levels().high_db) == (15, 16)
-    type_into(bar._high, "-40", qtbot)
-    qtbot.keyClick(bar._high, Qt.Key.Key_Return)
+    type_into(high, "-40", qtbot)
+    qtbot.keyClick(high, Qt.Key.Key_Return)
     assert (levels().low_db, levels().high_db) == (-41, -40)
-    assert (bar._low.value(), bar._high.value()) == (-41, -40)
+    assert (low.value(), high.value()) == (-41, -40)
 
 
 def test_clutter_removal_can_be_undone(window, qtbot):

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
-import fake_class_command
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QFileDialog, QLabel, QToolButton
@@ -23,9 +21,8 @@ from sd2core.study.report import write_report
 def page(window, tmp_path, qtbot):
     """The page of studies with data, and a command that learns nothing."""
     feature = window.features.study
-    feature.runs._command = (sys.executable, "-u", fake_class_command.__file__)
     feature.runs.select(None)
-    feature._shell.action("study").trigger()
+    window.action("study").trigger()
     setup = models_of(window).class_training.setup
     setup.add(write_pairs(tmp_path / "campaign.zarr"))
     qtbot.waitUntil(lambda: not setup.problem, timeout=10_000)

@@ -196,7 +196,7 @@ def test_with_suggestions_alone_accepting_makes_a_track_and_marking_says_what_to
 def buttons_of(window) -> dict[str, QRect]:
     """Places of the buttons on the selected suggestion, by their signs."""
     view = hands.timeline(window)
-    placed = view._buttons.placed(view.scale, view.plot_rect(), view.rows)
+    placed = view.buttons.placed(view.scale, view.plot_rect(), view.rows)
     return {one.sign: place.toAlignedRect() for place, one in placed}
 
 

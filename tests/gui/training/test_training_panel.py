@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 from answering import answer
+from finding import button_of
 from PySide6.QtCore import QCoreApplication, QEvent, QObject, QRect, Qt, QTimer, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
@@ -35,7 +36,6 @@ from sd2app.training.dialogs import may_leave
 from sd2app.training.model import TrainingModel
 from sd2app.training.panel import TrainingPanel, TrainingRunView
 from sd2app.training.result import ModelAdoption
-from sd2app.training.setup_view import TrainingSetupView
 from sd2app.widgets.chart import ChartView
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.theme import apply_theme
@@ -256,7 +256,7 @@ def test_it_learns_from_joints_or_goes_on_from_a_model(made, qtbot, pairs, tmp_p
 
 def test_the_open_recording_is_made_into_pairs(made, qtbot, small_recording) -> None:
     window = made()
-    menu = window.panel.findChild(TrainingSetupView)._menu
+    menu = button(window, "Add pairs").menu()
 
     def this() -> QAction:
         menu.aboutToShow.emit()
@@ -309,6 +309,13 @@ def test_a_run_that_lies_elsewhere_is_opened(made, qtbot, pairs, tmp_path, monke
     assert window.training.run is None
 
 
+def make_of_recordings(window) -> None:
+    """Choose that in the menu of data."""
+    menu = button(window, "Add pairs").menu()
+    menu.aboutToShow.emit()
+    next(one for one in menu.actions() if one.text() == "Make of recordings…").trigger()
+
+
 def test_recordings_are_made_into_pairs(made, qtbot, tmp_path, small_recording, monkeypatch):
     """Of the panel; that the command makes pairs is tested where it is."""
     window = made()
@@ -339,7 +346,7 @@ def test_recordings_are_made_into_pairs(made, qtbot, tmp_path, small_recording, 
     qtbot.waitUntil(lambda: said == ["There is no room."], timeout=10_000)
     qtbot.waitUntil(lambda: "Making" not in texts(window))
     maker._command = (sys.executable, "-c", "import time; time.sleep(3600)")
-    window.panel.findChild(TrainingSetupView)._ask_recordings()
+    make_of_recordings(window)
     click(window, qtbot, "Cancel")
     assert "Cancelling… ball.zarr" in texts(window)
     qtbot.waitUntil(lambda: maker.out is None, timeout=10_000)
@@ -347,7 +354,7 @@ def test_recordings_are_made_into_pairs(made, qtbot, tmp_path, small_recording, 
     maker.made.emit(write_pairs(tmp_path / "made.zarr"))
     qtbot.waitUntil(lambda: "made.zarr" in texts(window))
     monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *a: str(tmp_path))
-    window.panel.findChild(TrainingSetupView)._ask_recordings()
+    make_of_recordings(window)
     assert "no recording with a mesh and a radar capture" in window.said[-1]
 
 
@@ -381,19 +388,22 @@ def test_what_deletes_never_comes_to_where_another_button_was(made, qtbot, pairs
     harmless, deleting = [], []
 
     def look() -> None:
-        for name, one in view._buttons.items():
+        for one in view.findChildren(QToolButton):
             if one.isVisible():
-                (deleting if name == "delete" else harmless).append(QRect(one.geometry()))
+                deletes = one.text() == "Delete…"
+                (deleting if deletes else harmless).append(QRect(one.geometry()))
 
     begun(window, qtbot, pairs, "running", epochs=200)
     qtbot.waitUntil(lambda: window.training.run.history.best is not None, timeout=15_000)
     for text, phase, then in (
-        (None, "running", "pause"), ("Pause", "paused", "go_on"), ("Stop", "stopped", "use")
+        (None, "running", "Pause"),
+        ("Pause", "paused", "Continue"),
+        ("Stop", "stopped", "Use this model"),
     ):  # fmt: skip
         if text:
             click(window, qtbot, text)
         qtbot.waitUntil(lambda phase=phase: window.training.run.phase == phase, timeout=15_000)
-        qtbot.waitUntil(view._buttons[then].isVisible, timeout=5_000)
+        qtbot.waitUntil(button_of(view, then).isVisible, timeout=5_000)
         for widget in (window.panel, view):
             widget.layout().activate()
         look()
