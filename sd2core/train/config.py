@@ -10,7 +10,11 @@ from sd2core.files.paths import located_path
 from sd2core.files.texts import read_text
 from sd2core.files.toml import toml_lines
 from sd2core.options.toml_files import parsed
-from sd2core.options.training import TrainConfig
+from sd2core.options.training import DataConfig as DataConfig
+from sd2core.options.training import MachineConfig as MachineConfig
+from sd2core.options.training import ModelConfig as ModelConfig
+from sd2core.options.training import TrainConfig as TrainConfig
+from sd2core.options.training import TrainingConfig as TrainingConfig
 
 
 def read_config(path: Path) -> TrainConfig:
