@@ -18,9 +18,11 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import remove
 from sd2core.files.texts import read_json
-from sd2core.pairs.segments import OVERLAP
+from sd2core.pairs.segments import OVERLAP, segment_starts
 from sd2core.pairs.store import PairSet, PairWriter, Take
 from sd2core.study.plan import Denoiser
+
+_BATCH = 16
 
 
 def learn_denoiser(
@@ -67,9 +69,10 @@ def learn_denoiser(
         writer.append(replace(take, name=f"{take.name}-{number}"))
     words = [sys.executable, "-m", "sd2core.cli", "train", str(place / "pairs.zarr")]
     words += ["--out", str(place / "run"), "--model", chosen.model, "--inputs", chosen.inputs]
-    words += ["--minutes", f"{chosen.minutes:g}", "--segment-frames", str(chosen.segment_frames)]
-    words += ["--overlap-frames", str(min(OVERLAP, chosen.segment_frames // 4))]
-    words += ["--velocity-weight", f"{chosen.velocity_weight:g}", "--batch-size", "16"]
+    words += _length(long, chosen)
+    words += ["--segment-frames", str(chosen.segment_frames)]
+    words += ["--overlap-frames", str(_overlap(chosen))]
+    words += ["--velocity-weight", f"{chosen.velocity_weight:g}", "--batch-size", str(_BATCH)]
     words += ["--test-subjects", "none", "--threads", "1", "--seed", str(seed)]
     for name, value in chosen.options.items():
         words += ["--set", f"{name}={json.dumps(value)}"]
@@ -80,6 +83,19 @@ def learn_denoiser(
     if done.returncode < 0 or done.returncode == 130:
         raise KeyboardInterrupt
     atomic_write_text(place / "done", json.dumps({"reason": reason}))
+
+
+def _overlap(chosen: Denoiser) -> int:
+    return min(OVERLAP, chosen.segment_frames // 4)
+
+
+def _length(takes: Sequence[Take], chosen: Denoiser) -> list[str]:
+    """Options of ``sd2 train`` for how long it takes."""
+    if chosen.minutes is not None:
+        return ["--minutes", f"{chosen.minutes:g}"]
+    cut = chosen.segment_frames, _overlap(chosen)
+    segments = sum(len(segment_starts(len(one.times_s), *cut)) for one in takes)
+    return ["--epochs", str(max(1, round(chosen.steps * _BATCH / max(1, segments))))]
 
 
 def denoiser_in(place: Path) -> tuple[Any, str]:

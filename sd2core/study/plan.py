@@ -77,7 +77,10 @@ class Denoiser(Section):
     model: Text = "s4"
     inputs: Inputs = "kinematics"
     options: dict[str, Any] = Field(default_factory=dict)
-    minutes: Annotated[FiniteFloat, Field(gt=0, le=600)] = 0.5
+    steps: Annotated[int, Field(ge=1, le=1_000_000)] = 1_000
+    """About so many batches are learnt from, whatever the amount of data."""
+    minutes: Annotated[FiniteFloat, Field(gt=0, le=600)] | None = None
+    """In place of ``steps``: what comes of it depends on the machine, and on what else it does."""
     segment_frames: Annotated[int, Field(ge=8, le=10_000)] = 24
     velocity_weight: Annotated[FiniteFloat, Field(ge=0)] = 1.0
 

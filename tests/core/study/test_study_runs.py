@@ -17,6 +17,7 @@ from sd2core.study.plan import Learner, read_study
 from sd2core.study.report import findings_of, untried, write_report
 from sd2core.study.run import run_study
 from sd2core.study.trial import REAL
+from sd2core.train.config import read_config
 
 
 @pytest.fixture
@@ -182,7 +183,7 @@ def test_denoisers_learn_within_their_fold(plan: Path, capsys: pytest.CaptureFix
     text = plan.read_text().replace('["synthetic", "radar"]', '["denoised", "denoised+texture"]')
     text = text.replace("[0.2, 1.0]", "[1.0]")
     plan.write_text(
-        text + "[denoiser]\nmodel = 's4d'\nminutes = 0.05\n"
+        text + "[denoiser]\nmodel = 's4d'\nsteps = 20\n"
         "options = {channels = 8, depth = 1, live = false}\n"
     )
     assert run(build_parser()[0], ["study", str(plan), "--workers", "2"]) == 0
@@ -195,6 +196,10 @@ def test_denoisers_learn_within_their_fold(plan: Path, capsys: pytest.CaptureFix
     for folder in folders:
         made = json.loads((folder / "run" / "run.json").read_text(encoding="utf-8"))
         assert made
+        # As many steps on any machine, however busy it is.
+        training = read_config(folder / "run" / "config.toml").training
+        assert training.minutes is None
+        assert training.epochs > 1
         subjects = {json.loads(line)["subject"] for line in
                     (folder / "pairs.zarr" / "takes.jsonl").read_text().splitlines()}  # fmt: skip
         assert len(subjects) == 1
