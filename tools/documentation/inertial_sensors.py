@@ -29,7 +29,7 @@ from scipy.spatial.transform import Rotation
 import sd2core as sd2
 from sd2core.files.hdf5_files import open_hdf5_file
 from sd2core.imu.mounting import mounted
-from sd2core.imu.signals import GRAVITY_MPS2, InertialSignals, RigidPath, felt, low_pass
+from sd2core.imu.signals import GRAVITY_MPS2, InertialSignals, RigidPath, imu_signals, low_pass
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 from tools.documentation.pages import table
@@ -119,7 +119,7 @@ def beside(
 def board_beside(path: Path, cutoff_hz: float = CUTOFF_HZ) -> Beside:
     """The virtual sensor in the middle of the board beside the real one, where it is moved."""
     mesh, real, moved = board(path)
-    virtual = felt(mounted(mesh, 0).path(mesh), mesh.times_s, cutoff_hz)
+    virtual = imu_signals(mounted(mesh, 0).path(mesh), mesh.times_s, cutoff_hz)
     return beside(virtual, real, moved & virtual.known, cutoff_hz)
 
 
@@ -158,7 +158,7 @@ def foot(folder: Path, side: str) -> tuple[MeshSequence, InertialSignals]:
 def foot_beside(folder: Path, side: str, vertex: int = INSTEP) -> tuple[float, float, float]:
     """Correlations of |a| and of |ω| of a virtual and a real sensor, and the time between them."""
     mesh, real = foot(folder, side)
-    virtual = felt(mounted(mesh, vertex).path(mesh), mesh.times_s, CUTOFF_HZ)
+    virtual = imu_signals(mounted(mesh, vertex).path(mesh), mesh.times_s, CUTOFF_HZ)
     magnitudes = [np.linalg.norm(one, axis=1) for one in _both(virtual)]
     smooth = [low_pass(one, real.rate_hz, CUTOFF_HZ) for one in _both(real)]
     inner = slice(50, -50)  # what the shift leaves of both recordings
@@ -200,8 +200,10 @@ def fit_rows(true: MeshSequence, fitted: MeshSequence) -> list[list[str]]:
     times_s = true.times_s[true.times_s <= fitted.times_s[-1]]
     for place in PLACES:
         paths = [mounted(mesh, place).path(mesh) for mesh in (true, fitted)]
-        own = [felt(path, times_s, CUTOFF_HZ) for path in paths]
-        world = [felt(_unturned(path), times_s, CUTOFF_HZ).acceleration_mps2 for path in paths]
+        own = [imu_signals(path, times_s, CUTOFF_HZ) for path in paths]
+        world = [
+            imu_signals(_unturned(path), times_s, CUTOFF_HZ).acceleration_mps2 for path in paths
+        ]
         known = own[0].known & own[1].known
         moved = (world[0] - [0.0, -GRAVITY_MPS2, 0.0])[known]
         off = (world[1] - world[0])[known]

@@ -37,7 +37,7 @@ SEVERAL_MEANINGS = {
     "--count": {"N", None},  # of pictures; how vertices are counted
     "--from": {"PATH", "FILE|NAME"},  # where a folder was; a model to go on from
     "--imu": {"FILE", "LIST"},  # a real sensor's samples; places of virtual ones
-    "--model": {"FILE", "FILE|NAME", "NAME", None},  # one that was trained; kind of one to train
+    "--model": {"FILE", "FILE|NAME", "NAME"},  # one that was trained; kind of one to train
     "--placements": {"FILE", "FILE|planned", None},  # a plan; which of those in pairs are used
     "--radar": {"CAPTURE", "NAME|CONFIG.json"},  # a real one; one to simulate
     "--rate": {"FPS", "HZ"},  # of maps; of an inertial sensor

@@ -74,7 +74,7 @@ def test_the_bar_does_the_same(moving, qtbot) -> None:
     for text in ("Reject", "Accept"):
         qtbot.mouseClick(buttons[text], Qt.MouseButton.LeftButton)
     assert decided(moving) == [("left-to-right", "person")]
-    assert not buttons["Accept"].isEnabled()
+    qtbot.waitUntil(lambda: not buttons["Accept"].isEnabled())
     assert bar.findChildren(QToolButton)[-1].accessibleName() == "Close the suggestions"
     qtbot.mouseClick(buttons["✕"], Qt.MouseButton.LeftButton)
     assert not bar.isVisible()

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sd2core.imu.mounting import mounted
-from sd2core.imu.signals import InertialSignals, felt
+from sd2core.imu.signals import InertialSignals, imu_signals
 from tools.documentation.inertial_sensors import (
     beside,
     board,
@@ -44,9 +44,9 @@ def test_the_comparison_finds_a_known_rotation_shift_and_offset(recording: Path)
     mesh, _, _ = board(recording)
     mesh = mesh.between(20_000, 24_000)
     path = mounted(mesh, 0).path(mesh)
-    virtual = felt(path, mesh.times_s, 6.0)
+    virtual = imu_signals(path, mesh.times_s, 6.0)
     turn = Rotation.from_rotvec([0.4, -1.0, 0.2])
-    later = felt(path, mesh.times_s[100:-100] - 0.02, 60.0)
+    later = imu_signals(path, mesh.times_s[100:-100] - 0.02, 60.0)
     real = InertialSignals(
         later.times_s + 0.02,
         turn.apply(later.acceleration_mps2) + np.array([0.1, 0.2, -0.3]),
