@@ -10,6 +10,7 @@ from dataclasses import MISSING, dataclass
 from typing import Any, NamedTuple, NoReturn, TypeVar
 
 from sd2core.errors import Sd2Error
+from sd2core.files.tables import capitalised
 from sd2core.options.records import Group, Option, OptionRecord, typed_options
 from sd2core.options.shared import ReplacesMaps
 
@@ -77,11 +78,12 @@ def _names(option: Option) -> tuple[str, ...]:
 
 def _keywords(option: Option) -> dict[str, Any]:
     """How argparse wants to know an option; in a section what is not typed is None."""
-    from sd2core.radar_profiles import RADARS
+    place, required, words = option.place, option.default is MISSING, option.words
+    if "{radars}" in words:
+        from sd2core.radar_profiles import RADARS
 
-    place, required = option.place, option.default is MISSING
-    words = option.words.replace("{radars}", ", ".join(RADARS)).replace("%", "%%")
-    about: dict[str, Any] = {"help": words}
+        words = words.replace("{radars}", ", ".join(RADARS))
+    about: dict[str, Any] = {"help": words.replace("%", "%%")}
     if not place.argument:
         about["dest"] = option.dest
     default = None if option.section or required else option.default
@@ -201,7 +203,7 @@ def add_command(
         summary, _, own = text.partition("\n\n")
         summary = f"{summary[0].lower()}{summary[1:].removesuffix('.')}"
         description = "\n\n".join(filter(None, (description, own)))
-    text = f"{summary[0].upper()}{summary[1:]}."
+    text = f"{capitalised(summary)}."
     parser: CommandParser = commands.add_parser(
         name,
         help=summary,

@@ -12,7 +12,7 @@ from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import progress_bar
 from sd2core.cli.radar_description import DESCRIPTION, Description, describe
 from sd2core.options.kinds import SpanM
-from sd2core.options.records import ARGUMENT, OptionError, Place, changed, given_flags
+from sd2core.options.records import ARGUMENT, OptionError, Place, changed_flags, given_flags
 from sd2core.options.shared import Axis, Channel, Json, ReplacesMaps
 from sd2core.radar_config import Clutter
 
@@ -67,7 +67,7 @@ class Radar(ReplacesMaps, Axis, Channel, Json, Description):
     def refuse(self, names: Sequence[str], why: str, where: str) -> None:
         """Refuse those of the named options that are not as by default."""
         comma = "," if why.startswith("and ") else ""
-        for name in given_flags(self, [name for name in changed(self) if name in names]):
+        for name in changed_flags(self, names):
             raise OptionError(f"{name} is given{comma} {why}", f"{name} {where}")
 
 

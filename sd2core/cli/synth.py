@@ -11,7 +11,7 @@ from sd2core.cli.ladder import chosen
 from sd2core.cli.output import progress_bar
 from sd2core.cli.simulate import simulate_with_bar
 from sd2core.errors import Sd2Error
-from sd2core.options.records import OptionError, changed, flag, options_of
+from sd2core.options.records import OptionError, changed_flags, options_of
 from sd2core.options.shared import Json, MapOutput, MeshAndSensor, Method, RadarChoice
 from sd2core.options.synthesis import Synthesis, Wish
 
@@ -48,10 +48,10 @@ class Synth(MeshAndSensor, MapOutput, Method, RadarChoice, Wish, Synthesis, Json
             if self.radar != "paper":
                 raise OptionError("--radar is given", "it together with --method fmcw only")
             return
-        unfit = [name for name in changed(self) if name in _HISTOGRAM_ONLY]
+        unfit = changed_flags(self, _HISTOGRAM_ONLY)
         if unfit:
             raise OptionError(
-                f"{flag(unfit[0])} is given with --method fmcw",
+                f"{unfit[0]} is given with --method fmcw",
                 "options of the histogram with the histogram only",
             )
         if self.visibility not in (None, "facing", "exact"):

@@ -29,6 +29,11 @@ def markdown_table(rows: Sequence[Sequence[str]], names: int = 1) -> list[str]:
     return [f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:])]
 
 
+def capitalised(text: str) -> str:
+    """Begin a text with a capital, and leave the rest as it is."""
+    return f"{text[:1].upper()}{text[1:]}"
+
+
 def counted(number: int, what: str, several: str = "") -> str:
     """``1 map``, ``2,000 maps``; ``several`` is a plural without a plain ``s``."""
     return f"{number:,} {what if number == 1 else several or what + 's'}"

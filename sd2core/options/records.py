@@ -29,6 +29,7 @@ from typing import (
 )
 
 from sd2core.errors import Sd2Error
+from sd2core.files.tables import capitalised
 from sd2core.options.bounds import Bounds
 from sd2core.options.kinds import Typed, number_reader
 
@@ -115,7 +116,7 @@ class Option:
     default: Any  # MISSING where it must be given
     words: str  # of the help, with the default
     called: str | None  # a value, as in "--bins N"
-    bounds: Bounds | None
+    bounds: Bounds  # without ends where none are stated
     typed: Typed | None
     choices: tuple[Any, ...]
     place: Place
@@ -135,13 +136,13 @@ class Option:
         if self.typed is not None:
             return self.typed.read
         if self.kind in (int, float) and not self.choices:
-            return number_reader(self.bounds or Bounds(whole=self.kind is int))
+            return number_reader(self.bounds)
         return self.kind if self.kind in (int, str, Path) else None
 
     @property
     def sentence(self) -> str:
         """The words, beginning with a capital."""
-        return f"{self.words[:1].upper()}{self.words[1:]}"
+        return capitalised(self.words)
 
     @property
     def dest(self) -> str:
@@ -223,12 +224,13 @@ def given_of(record: OptionRecord) -> dict[str, Any]:
     return {name: getattr(record, name) for name in changed(record)}
 
 
-def changed_flags(record: OptionRecord) -> list[str]:
-    """Options that are not as by default, as they are typed."""
+def changed_flags(record: OptionRecord, names: Collection[str] = ()) -> list[str]:
+    """Options that are not as by default, as they are typed; some by their names, or all."""
     flags = []
     for option in typed_options(type(record)):
         value = option.of(record)
-        if value is not None and (option.section or value != option.default):
+        is_changed = value is not None and (option.section or value != option.default)
+        if is_changed and (not names or option.name in names):
             flags.append(option.flags[0])
     return flags
 
@@ -259,7 +261,7 @@ def _check_value(option: Option, value: Any) -> None:
         fits = value in option.choices
         words = f"one of {', '.join(map(str, option.choices))}"
     elif option.kind in (int, float):
-        bounds = option.bounds or Bounds(whole=option.kind is int)
+        bounds = option.bounds
         number = isinstance(value, int | float) and not isinstance(value, bool)
         fits, words = number and math.isfinite(value) and value in bounds, bounds.words
     else:
@@ -313,7 +315,7 @@ def _options(kind: type, section: str = "") -> Iterator[Option]:
             default,
             words,
             called,
-            _note(notes, Bounds),
+            _note(notes, Bounds) or Bounds(whole=plain is int),
             _note(notes, Typed),
             choices,
             place,

@@ -17,6 +17,7 @@ from sd2app.widgets.layouts import STRETCH, column_of, grid_of, pane, row_of
 from sd2app.widgets.panel import Fold, outlined, rule, say, sentence, show_words, title
 from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import milliseconds, number
+from sd2core.files.tables import capitalised
 from sd2core.numerics.map_accuracy import percent
 
 if TYPE_CHECKING:
@@ -180,7 +181,7 @@ class ReasonList(QWidget):
             role = "plain" if reason.modelled else "muted"
             mark = QLabel("✓" if reason.modelled else "–", self)
             mark.setObjectName(role)
-            words = reason.text[:1].upper() + reason.text[1:]
+            words = capitalised(reason.text)
             # A number and its unit stay on one line.
             text = sentence(words.replace(" %", "\N{NO-BREAK SPACE}%"), role)
             text.setAccessibleName(

@@ -15,6 +15,7 @@ from sd2app.feature import Shell
 from sd2app.widgets.inputs import CheckBox, Choice, TypedLine
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, pane, row_of
 from sd2app.widgets.panel import Fold, outlined, sentence, show_words, side_by_side, title
+from sd2core.files.tables import capitalised
 from sd2core.options.records import Option
 
 
@@ -72,7 +73,7 @@ class CommandForm(QWidget):
     def _build(self) -> None:
         options = self._forms.options
         summary = self._forms.chosen.summary
-        self._about.setText(f"{summary[0].upper()}{summary[1:]}.")
+        self._about.setText(f"{capitalised(summary)}.")
         self._refreshers = []
         needed = [one for one in options if one.place.argument or one.default is MISSING]
         outputs = [one for one in options if one.name == "out" and one not in needed]
@@ -83,7 +84,7 @@ class CommandForm(QWidget):
             rows = self._rows([one for one in rest if one.group == group])
             heading = "More options" if group is None else group.title
             about = (group.text if group is not None else None) or "What is empty is as by default"
-            parts += [Fold(f"{heading[0].upper()}{heading[1:]}", about, rows, self), rows]
+            parts += [Fold(capitalised(heading), about, rows, self), rows]
         inside = QWidget()
         inside.setLayout(column_of(*parts, STRETCH, spacing_px=8, margins_px=8))
         self._area.setWidget(inside)

@@ -21,6 +21,7 @@ from sd2core.cli import build_parser
 from sd2core.cli.command_parser import Command, commands_of
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_data
+from sd2core.files.tables import capitalised
 from sd2core.options.records import Option, OptionRecord, typed_options, words_of
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder, last_output
 
@@ -177,8 +178,7 @@ class CommandForms(Runs[AnyCommandRun]):
 
 def name_of(option: Option) -> str:
     """Name of an option in a form."""
-    name = option.name.replace("_", " ")
-    return f"{name[0].upper()}{name[1:]}"
+    return capitalised(option.name.replace("_", " "))
 
 
 def _read(option: Option, text: str) -> Any:

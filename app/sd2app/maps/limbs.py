@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QMenu, QWidget
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
+from sd2core.files.tables import capitalised
 from sd2core.mesh.vertex_parts import PARTS
 
 
@@ -64,7 +65,7 @@ class LimbMenu(QMenu):
         group = QActionGroup(self)
         for part in ("", *PARTS):
             words = part_words(part)
-            action = self.addAction(words[:1].upper() + words[1:] if part else "Whole body")
+            action = self.addAction(capitalised(words) if part else "Whole body")
             action.setData(part)
             action.setCheckable(True)
             group.addAction(action)

@@ -14,6 +14,7 @@ from sd2app.session.content import UNTITLED, reference_of
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
+from sd2core.files.tables import capitalised
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.recording import MeshReading, Recording, is_recording, open_recording
 
@@ -162,7 +163,7 @@ def joint_words(name: str) -> str:
     """``hand.R`` as ``Right hand``."""
     part, _, side = name.partition(".")
     words = {"L": f"left {part}", "R": f"right {part}"}.get(side, part)
-    return words[0].upper() + words[1:]
+    return capitalised(words)
 
 
 def name_of(path: Path) -> str:

@@ -19,7 +19,6 @@ from PySide6.QtWidgets import (
 
 from sd2core.errors import Sd2Error
 from sd2core.files.quantities import parse_quantity
-from sd2core.options.bounds import Bounds
 from sd2core.options.records import OptionRecord, option_named
 
 _ENDING_KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Return, Qt.Key.Key_Enter)
@@ -178,7 +177,7 @@ def option_box(
 ) -> NumberBox:
     """Make the box of an option: its record says the bounds, and what the option is."""
     option = option_named(record, name)
-    bounds = option.bounds or Bounds()
+    bounds = option.bounds
     low, high = (min(max(end, -_FAR), _FAR) for end in (bounds.low, bounds.high))
     # What must be above a number begins with the least that the box can show.
     low += bounds.above * 10.0**-decimals

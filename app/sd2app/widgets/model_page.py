@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from sd2core.files.tables import capitalised
 from sd2core.sensor import VelocityAxis
 
 _UNITS = {"mps": "m/s", "db": "dB", "s": "s", "hz": "Hz"}
@@ -50,7 +51,7 @@ def about_sections(
 
 def _heading(name: str) -> str:
     text = name.replace("_", " ").strip()
-    return text[:1].upper() + text[1:]
+    return capitalised(text)
 
 
 def _lines(value: Any, prefix: str = "") -> Iterator[tuple[str, str]]:

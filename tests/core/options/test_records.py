@@ -22,7 +22,6 @@ from sd2core.cli.command_parser import (
 from sd2core.cli.running import attach_negative_values
 from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.errors import Sd2Error
-from sd2core.options.bounds import Bounds
 from sd2core.options.kinds import Count, Names, Share
 from sd2core.options.records import (
     ARGUMENTS,
@@ -66,7 +65,7 @@ def values_of(option: Option) -> st.SearchStrategy[Any] | None:
             return None
         one = found
     elif option.kind in (int, float):
-        bounds = option.bounds or Bounds()
+        bounds = option.bounds
         low, high = max(bounds.low, -1e6), min(bounds.high, 1e6)
         if option.kind is int:
             one = st.integers(int(low) + bounds.above, int(high))
