@@ -15,6 +15,7 @@ from sd2app.plain_imports import plain_imports
 from sd2app.system_libraries import explain_missing, missing_libraries
 from sd2core.cli import build_parser, run
 from sd2core.cli.command_parser import add_command
+from sd2core.cli.parser import COMMANDS
 from sd2core.cli.preparing import JOBS, Doctor, do_job
 from sd2core.errors import Sd2Error
 from sd2core.options.records import ARGUMENTS, Place
@@ -76,7 +77,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def full_parser(typed: Sequence[str] = ()) -> argparse.ArgumentParser:
     """The library's commands, or the one that is typed, and those that open the window."""
     parser, commands = build_parser(_EXAMPLES, typed)
-    _add_window_commands(commands)
+    if not typed or typed[0] not in COMMANDS:
+        _add_window_commands(commands)
     return parser
 
 

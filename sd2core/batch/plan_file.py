@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from sd2core.batch.plan import STEPS, BatchPlan
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import is_absolute, located_path, stored_path
 from sd2core.files.texts import read_text
-from sd2core.files.toml import toml_lines
+from sd2core.files.toml import section_lines, toml_lines
 from sd2core.options.toml_files import parsed
 from sd2core.radar_profiles import RADAR_PLUG_INS, RADARS
 
@@ -50,7 +49,7 @@ def plan_text(plan: BatchPlan, folder: Path) -> str:
     for section in ("recordings", "placements", *STEPS[1:]):
         # A section that is there is done, even with nothing in it.
         if getattr(plan, section) is not None:
-            lines += _section_lines(section, content.get(section, {}), folder)
+            lines += section_lines(section, content.get(section, {}), folder)
     return "\n".join(lines) + "\n"
 
 
@@ -58,15 +57,6 @@ def write_plan(path: Path, plan: BatchPlan) -> None:
     """Write a plan in one step, with paths relative to the file's folder."""
     path = Path(path)
     atomic_write_text(path, plan_text(plan, path.absolute().parent))
-
-
-def _section_lines(name: str, table: Mapping[str, Any], folder: Path) -> list[str]:
-    tables = {key: value for key, value in table.items() if isinstance(value, Mapping)}
-    plain = {key: value for key, value in table.items() if key not in tables}
-    lines = ["", f"[{name}]", *toml_lines(plain, folder)]
-    for key, content in tables.items():
-        lines += ["", f"[{name}.{key}]", *toml_lines(content, folder)]
-    return lines
 
 
 def _with_paths(plan: BatchPlan, changed: Any) -> BatchPlan:

@@ -31,6 +31,16 @@ def toml_lines(table: Mapping[str, Any], folder: Path) -> list[str]:
     ]
 
 
+def section_lines(name: str, table: Mapping[str, Any], folder: Path) -> list[str]:
+    """Lines of a section, tables in it as sections of their own."""
+    tables = {key: value for key, value in table.items() if isinstance(value, Mapping)}
+    plain = {key: value for key, value in table.items() if key not in tables}
+    lines = ["", f"[{name}]", *toml_lines(plain, folder)]
+    for key, content in tables.items():
+        lines += ["", f"[{name}.{key}]", *toml_lines(content, folder)]
+    return lines
+
+
 def _text(value: str) -> str:
     """Write a basic string of TOML: JSON's, but for one character."""
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

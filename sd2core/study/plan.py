@@ -23,7 +23,7 @@ from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.denoise.card import Inputs
 from sd2core.files.paths import located_path
 from sd2core.files.texts import read_text
-from sd2core.files.toml import toml_lines
+from sd2core.files.toml import section_lines, toml_lines
 from sd2core.options.kinds import Share, Text
 from sd2core.options.toml_files import parsed
 from sd2core.pairs.segments import OVERLAP
@@ -153,7 +153,7 @@ def study_text(plan: StudyPlan, folder: Path) -> str:
     learners = told.pop("classifiers", [])
     lines = toml_lines({"format": plan.format, "version": plan.version, **told}, folder)
     for name, content in sections.items():
-        lines += ["", f"[{name}]", *toml_lines(content, folder)]
+        lines += section_lines(name, content, folder)
     for one in learners:
         lines += ["", "[[classifiers]]", *toml_lines(one or {"model": "ridge"}, folder)]
     return "\n".join(lines) + "\n"

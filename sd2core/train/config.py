@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 
 from sd2core.files.paths import located_path
 from sd2core.files.texts import read_text
-from sd2core.files.toml import toml_lines
+from sd2core.files.toml import section_lines
 from sd2core.options.toml_files import parsed
 from sd2core.options.training import DataConfig as DataConfig
 from sd2core.options.training import MachineConfig as MachineConfig
@@ -45,12 +44,7 @@ def config_text(config: TrainConfig, folder: Path) -> str:
     """Settings as TOML, with paths relative to a folder; :func:`read_config` reads them back."""
     lines = ["# Settings of `sd2 train`; docs/formats.md says what they mean."]
     for section in fields(config):
-        lines += ["", f"[{section.name}]"]
         record = getattr(config, section.name)
         values = {one.name: getattr(record, one.name) for one in fields(record)}
-        tables = {name: value for name, value in values.items() if isinstance(value, Mapping)}
-        plain = {name: value for name, value in values.items() if name not in tables}
-        lines += toml_lines(plain, folder)
-        for name, content in tables.items():
-            lines += ["", f"[{section.name}.{name}]", *toml_lines(content, folder)]
+        lines += section_lines(section.name, values, folder)
     return "\n".join(lines) + "\n"

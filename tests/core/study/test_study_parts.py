@@ -227,6 +227,14 @@ def test_paths_of_a_plan_are_beside_it(tmp_path: Path) -> None:
     assert read_study(tmp_path / "again.toml") == plan
 
 
+def test_a_plan_is_written_with_the_options_of_its_denoiser(tmp_path: Path) -> None:
+    options = "[denoiser.options]\nchannels = 8\nlive = false\n"
+    (tmp_path / "s.toml").write_text(f"{PLAN}[denoiser]\nsteps = 20\n{options}")
+    plan = read_study(tmp_path / "s.toml")
+    (tmp_path / "again.toml").write_text(study_text(plan, tmp_path))
+    assert read_study(tmp_path / "again.toml") == plan
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
