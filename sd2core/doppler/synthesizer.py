@@ -16,13 +16,14 @@ from sd2core.doppler.histogram import Counts
 from sd2core.doppler.kinematics import kinematics
 from sd2core.doppler.masks import Quality, Visibility
 from sd2core.doppler.options import PRESETS, SynthesisOptions
-from sd2core.doppler.prepared import Block, ByteBudget, PreparedMesh
+from sd2core.doppler.prepared import Block, PreparedMesh
 from sd2core.doppler.smoothing import frames_within_reach, smooth
 from sd2core.errors import Sd2Error, wanted
 from sd2core.maps import CellUncertainty, DopplerMap, LimbMaps
 from sd2core.mesh.presence import gaps_in_words, runs
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import VertexParts
+from sd2core.numerics.byte_budget import ByteBudget
 from sd2core.numerics.compiled import compile_in_background, kernels_ready
 from sd2core.numerics.parallel import Ticket, run_jobs, run_light_jobs
 from sd2core.numerics.precision import SHARE_OF_A_BIN, stored_velocity_error_mps

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -18,6 +18,7 @@ from sd2core.classify.card import ClassifierCard
 from sd2core.denoise.resample_to_model import check_bins, is_regular, stretches
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
+from sd2core.numerics.byte_budget import ByteBudget
 from sd2core.timebase import Timebase
 
 _LATE_S = 0.2
@@ -71,9 +72,14 @@ class ClassTrack(BackgroundModel):
 
     changed = Signal()  # probabilities of frames
 
-    def __init__(self, counts: Callable[[MapModel], bool], parent: QObject | None = None) -> None:
+    def __init__(
+        self,
+        counts: Callable[[MapModel], bool],
+        results: ByteBudget,
+        parent: QObject | None = None,
+    ) -> None:
         super().__init__(parent)
-        self._counts = counts
+        self._counts, self._results = counts, results
         self.source: MapModel | None = None  # the map that is looked at
         self._classifier: RemoteClassifier | None = None
         self.card: ClassifierCard | None = None  # of the classifier at work
@@ -196,7 +202,7 @@ class ClassTrack(BackgroundModel):
             self._fail(error)
             return
         self._take(source.map, source.known)
-        if self._again:
+        if self._restore() or self._again:
             return
         if np.count_nonzero(self._known & ~self.done) <= AT_ONCE:
             self._calm.stop()
@@ -241,6 +247,23 @@ class ClassTrack(BackgroundModel):
         self.shares[nobody] = self.card.no_person()
         self.done[nobody] = True
         self.changed.emit()
+
+    @property
+    def _key(self) -> Hashable:
+        """Key of all that the answers depend on; None until the map is final."""
+        source = self.source.key if self.source is not None else None
+        return source and (source, self._classifier)
+
+    def _restore(self) -> bool:
+        """Show what the classifier answered before of the same map."""
+        kept = None if self._key is None else self._results.get(self._key)
+        if kept is None or self._again or self.done.all():
+            return False
+        self._calm.stop()
+        self._runner.cancel()
+        self.shares[:], self.done[:], self._going = kept, True, None
+        self.changed.emit()
+        return True
 
     def _lengthen(self, before: DopplerMap, timebase: Timebase) -> DopplerMap:
         """Make room for frames that were added to the map."""
@@ -304,6 +327,8 @@ class ClassTrack(BackgroundModel):
         again, self._again = self._again, False
         if again:
             self._go_on()
+        elif self._key is not None and self.done.all():
+            self._results.put(self._key, self.shares.copy(), self.shares.nbytes)
         self.changed.emit()
 
     def _fail(self, error: Exception) -> None:

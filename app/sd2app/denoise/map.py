@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from copy import deepcopy
 from dataclasses import replace
 from typing import NamedTuple
@@ -19,7 +19,8 @@ from sd2app.maps.partial_map import View
 from sd2app.maps.quality import Companion
 from sd2app.session.content import reference_of
 from sd2app.session.maps import MapModel
-from sd2app.session.tasks import Job, TaskList
+from sd2app.session.session import Session
+from sd2app.session.tasks import Job
 from sd2core.denoise.known import KnownMovements
 from sd2core.denoise.resample_to_model import input_of, is_regular
 from sd2core.denoise.texture import Texture
@@ -88,15 +89,14 @@ class DenoisedMap(BackgroundModel):
     def __init__(
         self,
         track: MapModel,
-        synthetic: MapModel,
+        session: Session,
         view: Callable[[], View],
-        jobs: TaskList,
         parent: QObject,
     ) -> None:
         super().__init__(parent)
-        self.track, self._synthetic = track, synthetic
+        self.track, self._synthetic = track, session.maps.synthetic
         self._view = view
-        self._jobs = jobs
+        self._jobs, self._results = session.jobs, session.results
         self._job: Job | None = None
         self.denoiser: RemoteDenoiser | None = None  # the model in use
         self.words = ""
@@ -178,7 +178,7 @@ class DenoisedMap(BackgroundModel):
         self._restart()
         if denoiser is None:
             self.track.set_map(None)
-        else:
+        elif not self._restore():
             self._go_on()
 
     def clear(self) -> None:
@@ -194,7 +194,7 @@ class DenoisedMap(BackgroundModel):
             self.track.set_status(self.words)
         self._follow(sensor)
         self._wanted[touched(piece, self._wanted.size)] = True
-        if not self._again.isActive():
+        if not self._restore() and not self._again.isActive():
             self._go_on()
 
     def finish(self) -> None:
@@ -269,6 +269,38 @@ class DenoisedMap(BackgroundModel):
         self._stop()
         super().close()
 
+    # --- what was made before -------------------------------------------------------------
+
+    @property
+    def _key(self) -> Hashable:
+        """Key of all that the denoised map depends on; None until the synthetic map is final."""
+        source = self._synthetic.key
+        return source and (source, self.denoiser, self._texture is not None)
+
+    @property
+    def _final(self) -> bool:
+        """True once no frame is a preview."""
+        frames = self._wanted.size
+        in_order = self._order is not None and self._order.next >= frames
+        return bool(self._shown.all()) and (
+            in_order or (frames <= AT_ONCE and not self._wanted.any())
+        )
+
+    def _restore(self) -> bool:
+        """Show the map if it was made before of the same synthetic map, by the same model."""
+        if self._key is None or self.denoiser is None or self._held or not self._wanted.any():
+            return False
+        if (kept := self._results.get(self._key)) is None:
+            return False
+        self._stop()
+        self._made = replace(kept, values=kept.values.copy())
+        self._strongest = max(self._strongest, float(kept.values.max(initial=0.0)))
+        self._shown[:], self._wanted[:] = True, False
+        self._order = _Order(self._wanted.size)
+        self._publish()
+        self._end()
+        return True
+
     # --- denoising ------------------------------------------------------------------------
 
     def _follow(self, sensor: object) -> None:
@@ -335,6 +367,9 @@ class DenoisedMap(BackgroundModel):
     def _end(self) -> None:
         """Everything is denoised: say which frames the model passes through."""
         self._report(0)
+        if self._made is not None and self.track.key is not None:
+            kept = replace(self._made, values=self._made.values.copy())
+            self._results.put(self.track.key, kept, kept.values.nbytes)
         source, movements = self._synthetic.map, self._movements
         if source is not None and movements is not None:
             passed = int(movements.strange(source.values.T, source.axis).sum())
@@ -395,7 +430,8 @@ class DenoisedMap(BackgroundModel):
             self._needs_reference = not whole
             strongest = reference_of(self._made.values) if whole else self._strongest
             self.track.set_reference(strongest)
-        self.track.set_map(self._made, None if whole else self._shown.copy())
+        key = self._key if self._final else None
+        self.track.set_map(self._made, None if whole else self._shown.copy(), key)
 
     def _report(self, left: int) -> None:
         """Report a long clip as a task that can be cancelled."""

@@ -51,7 +51,7 @@ class DenoiseModel(ReportingModel):
         self._session, self._synthesis, self._library = session, synthesis, library
         self._document, self._synthetic = session.document, session.maps.synthetic
         self.map, self.before_map = (
-            DenoisedMap(track, self._synthetic, synthesis.frames_in_view, session.jobs, self)
+            DenoisedMap(track, session, synthesis.frames_in_view, self)
             for track in (session.maps.denoised, session.maps.before)
         )
         self.path: Path | None = None  # of the model that is in use or being loaded
@@ -319,7 +319,7 @@ class DenoiseModel(ReportingModel):
         return lambda start, stretch: [part and part(start, stretch) for part in parts]
 
     def _take(self, part: Part) -> None:
-        piece = (part.start, part.start + part.stretch.values.shape[1])
+        piece = (part.start, part.stop)
         for number, one in enumerate((self.map, self.before_map)):
             if self._synthesis.moving:
                 made = part.more[number] if part.more is not None else None

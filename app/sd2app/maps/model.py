@@ -35,6 +35,7 @@ from sd2core.doppler.options import PRESETS
 from sd2core.doppler.synthesizer import FrameScattering, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
+from sd2core.mesh.presence import runs
 from sd2core.sensor import Vector, VirtualSensor
 
 if TYPE_CHECKING:
@@ -190,6 +191,7 @@ class SynthesisModel(QObject):
         if synthesizers is None or synthesizers.options.count == count:
             return
         self._stop()
+        self._keep()
         mesh, options = synthesizers.mesh, replace(synthesizers.options, count=count)
         self._synthesizers = SynthesizerCache(mesh, options)
         self._synthesizers.limbs = synthesizers.limbs
@@ -219,6 +221,7 @@ class SynthesisModel(QObject):
         if bool(self._wanting_limbs) != before and self._synthesizers is not None:
             self._synthesizers.limbs = not before
             if not before:
+                self._keep()
                 self._partial.quality[:] = 0
                 self._settle()
 
@@ -324,14 +327,19 @@ class SynthesisModel(QObject):
         self._sweeping = False
         sensor = self._sensor
         self._accuracy.measured.rest_at(sensor)
+        was_complete = self.complete
+        self._set_moving(False)
+        final = self._final_quality()
+        if final is not None:
+            self._restore(final)
         quality = self._partial.quality_for(sensor)
         if quality.min() >= FINAL:
-            self._set_moving(False)
+            self._runner.cancel()
+            if not was_complete:
+                self.completed.emit()
             self._go_on()
             return
         view, rough, vertices = self.frames_in_view(), self._preview_quality(), self._vertices
-        self._set_moving(False)
-        final = self._final_quality()
         # Much of a long clip can wait until it is known how it is to be done.
         long = not is_swept_whole(vertices, len(quality))
         only_view = final is None and not self._compiler.busy and long
@@ -373,6 +381,7 @@ class SynthesisModel(QObject):
             self._say_quality()
             return
         self._plan = plan
+        self._keep()
         self._partial.mark_stale()
         if not self.moving:
             self._settle()
@@ -403,8 +412,30 @@ class SynthesisModel(QObject):
             self.completed.emit()
         self._go_on()
 
+    def _keep(self) -> None:
+        """Keep the final frames of what is being left, for when one comes back to it."""
+        if (left := self._partial.kept()) is not None:
+            self._session.results.put(*left, left[1].size_bytes)
+
+    def _restore(self, final: QualityLevel) -> None:
+        """Show final frames that were made before, with the same sensor, plan and options."""
+        kept = self._session.results.get(final.key_of(self._sensor))
+        if kept is None:
+            return
+        lacking = self._partial.quality_for(self._sensor) < FINAL
+        for start, stop in runs(kept.known & lacking):
+            limbs = None if kept.limbs is None else kept.limbs.between(start, stop)
+            self._take(
+                Part(
+                    self._sensor, start, kept.values[:, start:stop], limbs, FINAL, final.words,
+                    kept.unit, final.key_of(self._sensor),
+                )
+            )  # fmt: skip
+
     def _take(self, part: Part) -> None:
         first = self._track.map is None
+        if part.sensor != self._partial.sensor:
+            self._keep()
         self._partial.take(part)
         self._say_quality()
         self.painted.emit(part)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
+from copy import deepcopy
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,7 @@ from numpy.typing import NDArray
 from sd2app.session.content import reference_of
 from sd2app.session.maps import MapModel
 from sd2core.doppler.options import SynthesisOptions
-from sd2core.doppler.synthesizer import Stretch
-from sd2core.maps import DopplerMap
+from sd2core.maps import DopplerMap, LimbMaps
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 
@@ -22,6 +22,21 @@ ROUGH, PREVIEW, FINAL = 1, 2, 3
 final for another plan), what the plan in use gives. 0 is not computed."""
 
 View = tuple[int, int]
+
+
+class Kept(NamedTuple):
+    """Final frames of a map that was left."""
+
+    known: NDArray[np.bool_]  # (T,)
+    values: NDArray[np.float32]  # (bins, T)
+    limbs: LimbMaps | None
+    unit: str
+
+    @property
+    def size_bytes(self) -> int:
+        """Memory that it takes, about."""
+        split = 0 if self.limbs is None else self.limbs.values.nbytes
+        return self.values.nbytes + split
 
 
 class PartialMap:
@@ -36,6 +51,7 @@ class PartialMap:
         self._map: DopplerMap | None = None  # with the values so far
         self.quality = np.zeros(0, np.uint8)  # (T,), see FINAL
         self.sensor: VirtualSensor | None = None  # placement that all of it is for
+        self._key: Hashable = None  # of the final frames
         self._words: dict[int, str] = {}
         self._needs_reference = True
 
@@ -72,6 +88,14 @@ class PartialMap:
         """True if the map is split by the parts of the body."""
         return self._map is not None and self._map.limbs is not None
 
+    def kept(self) -> tuple[Hashable, Kept] | None:
+        """Key and copy of the final frames; None without any."""
+        known = self.quality >= FINAL
+        if self._map is None or not known.any():
+            return None
+        limbs = deepcopy(self._map.limbs)  # filled in place, as the values are
+        return self._key, Kept(known, self._map.values.copy(), limbs, self._map.unit)
+
     def mark_stale(self) -> None:
         """Lower final frames to previews; they stay on screen until they are replaced."""
         np.minimum(self.quality, PREVIEW, out=self.quality)
@@ -90,22 +114,25 @@ class PartialMap:
         if part.sensor != self.sensor:
             self.sensor = part.sensor
             self.quality[:] = 0
-        values, limbs, made = self._map.values, self._map.limbs, part.stretch
-        inside = slice(part.start, part.start + made.values.shape[1])
-        values[:, inside] = made.values
-        if made.limbs is None:
+        values, limbs = self._map.values, self._map.limbs
+        inside = slice(part.start, part.stop)
+        values[:, inside] = part.values
+        if part.limbs is None:
             limbs = None
         else:
-            limbs = made.limbs.empty(self.frames) if limbs is None else limbs
-            limbs.put(part.start, made.limbs)
+            limbs = part.limbs.empty(self.frames) if limbs is None else limbs
+            limbs.put(part.start, part.limbs)
         self.quality[inside] = part.quality
+        if part.quality >= FINAL:
+            self._key = part.key
         self._words[part.quality] = part.words
         if self._needs_reference and self.full:
             self._needs_reference = False
             self._track.set_reference(reference_of(values))
         # Others tell by the object that it is another map, though its values are in the same place.
         self._map = replace(self._map, unit=part.unit, limbs=limbs)
-        self._track.set_map(self._map, None if self.full else self.quality > 0)
+        covered = None if self.full else self.quality > 0
+        self._track.set_map(self._map, covered, self._key if self.final else None)
 
     def say_quality(self, view: View, final_words: str, compiling: bool) -> None:
         """Write the lowest quality in view on the track."""
@@ -144,13 +171,20 @@ def pieces(
 class Part:
     """Computed frames on their way to the window.
 
-    ``more`` is what a companion made of it.
+    ``key`` is of all that final ones depend on; ``more`` is what a companion made of it.
     """
 
     sensor: VirtualSensor
     start: int
-    stretch: Stretch
+    values: NDArray[np.float32]  # (bins, n)
+    limbs: LimbMaps | None
     quality: int
     words: str
     unit: str
+    key: Hashable = None
     more: Any = None
+
+    @property
+    def stop(self) -> int:
+        """Number of the frame after the last."""
+        return self.start + self.values.shape[1]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -60,6 +61,16 @@ class SynthesizerCache:
         self._made: OrderedDict[AccuracyPlan, Synthesizer] = OrderedDict()
         self._lock = threading.Lock()
 
+    def key(self, plan: AccuracyPlan | None, sensor: VirtualSensor) -> Hashable:
+        """Key of all that a final map depends on."""
+        return self._scene, plan and _key(plan), self.limbs, sensor
+
+    @functools.cached_property
+    def _scene(self) -> str:
+        from sd2core.accuracy.cache import scene_fingerprint
+
+        return scene_fingerprint(self.mesh, VirtualSensor(), self.options, "histogram")
+
     def of(self, plan: AccuracyPlan | None) -> Synthesizer:
         """The synthesizer of a plan; the first time it takes as long as decimating."""
         if plan is None:
@@ -111,6 +122,8 @@ class QualityLevel:
     visibility: Visibility | None = None  # None: that of the synthesizer's options
     parts_of: Callable[[Synthesizer], VertexParts | None] = lambda _: None
     """Parts of the body by which the map is split, too."""
+    key_of: Callable[[VirtualSensor], Hashable] = lambda _: None
+    """Key of frames of the final quality."""
 
 
 def budget_ms(frames: int) -> float:
@@ -153,7 +166,13 @@ def final_quality(
 ) -> QualityLevel:
     """Quality of the plan in use; exact without a plan."""
     words = final_words(synthesizers, in_use)
-    return QualityLevel(lambda: synthesizers.of(plan), FINAL, words, parts_of=synthesizers.parts_of)
+    return QualityLevel(
+        lambda: synthesizers.of(plan),
+        FINAL,
+        words,
+        parts_of=synthesizers.parts_of,
+        key_of=functools.partial(synthesizers.key, plan),
+    )
 
 
 def final_words(synthesizers: SynthesizerCache, in_use: InUse | None) -> str:
@@ -182,7 +201,10 @@ def compute_part(
         # No mask is kept.
         quality, words = ROUGH, _ROUGH_WORDS
     more = companion(start, stretch) if companion is not None else None
-    return Part(sensor, start, stretch, quality, words, synthesizer.unit, more)
+    return Part(
+        sensor, start, stretch.values, stretch.limbs, quality, words, synthesizer.unit,
+        level.key_of(sensor), more,
+    )  # fmt: skip
 
 
 def is_swept_whole(vertices: int, frames: int) -> bool:

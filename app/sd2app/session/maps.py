@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,6 +68,7 @@ class MapModel(QObject):
         self.revision = 0
         self.map: DopplerMap | None = None  # on its own clock, without the offset
         self.covered: NDArray[np.bool_] | None = None  # (frames,): is computed; None: all are
+        self.key: Hashable = None  # of all that the map was made from; None until it is final
         self.uncertainty: CellUncertainty | None = None  # None: unknown or switched off
         self.offset_s = 0.0  # start of the map's clock on the recording's clock
         self.reference = 1.0  # value shown as 0 dB
@@ -121,12 +122,16 @@ class MapModel(QObject):
         return float(self.levels_db(np.array(self._strongest, np.float32)))
 
     def set_map(
-        self, doppler_map: DopplerMap | None, covered: NDArray[np.bool_] | None = None
+        self,
+        doppler_map: DopplerMap | None,
+        covered: NDArray[np.bool_] | None = None,
+        key: Hashable = None,
     ) -> None:
         """Show another map, or none."""
         self.revision += 1
         self.map = doppler_map
         self.covered = covered
+        self.key = key
         self.uncertainty = None
         present = None if doppler_map is None else doppler_map.present
         self._gaps = () if present is None else runs(~present)

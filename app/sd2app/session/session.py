@@ -18,6 +18,10 @@ from sd2app.session.time_window import GROWING_S, TimeWindow
 from sd2app.session.undo import Edits
 from sd2app.session.video import VideoModel
 from sd2app.settings import Settings
+from sd2core.numerics.byte_budget import ByteBudget
+
+_RESULTS_BYTES = 256 << 20
+"""For maps and classes of places that were left: some hundred minutes of maps."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +61,7 @@ class Session:
     maps: Maps
     placing: PlacingModel
     edits: Edits
+    results: ByteBudget  # of places and models that were left, by :attr:`MapModel.key`
 
     def has_content(self) -> bool:
         """True while something is open."""
@@ -134,6 +139,7 @@ def build_session(parent: QObject, settings: Settings) -> Session:
         ),
         placing=PlacingModel(parent),
         edits=Edits(document, sensor),
+        results=ByteBudget(_RESULTS_BYTES),
     )
     document.grown.connect(session.extend)
     return session

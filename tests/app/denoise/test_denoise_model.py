@@ -301,6 +301,32 @@ def test_while_dragging_both_maps_are_of_one_place(context, models, qtbot, ball)
     assert is_of(context, 2.0)
 
 
+def test_what_a_model_made_of_a_place_comes_back_with_the_place_and_with_the_model(
+    context, models, qtbot, ball
+):
+    open_it(context, qtbot, ball)
+    first, second = list(models.cards)[:2]
+    context.denoise.use(first)
+    rest(context, qtbot)
+    before = context.denoised.map.values.copy()
+    context.edits.place_sensor(VirtualSensor(position_m=(0.4, 0.0, 0.0)))
+    rest(context, qtbot)
+    assert is_of(context, 2.0)
+    models.asked.clear()
+    context.document.undo_stack.undo()
+    rest(context, qtbot)
+    np.testing.assert_array_equal(context.denoised.map.values, before)
+    assert models.asked == []
+    context.denoise.use(second)
+    rest(context, qtbot)
+    assert not np.array_equal(context.denoised.map.values, before)
+    models.asked.clear()
+    context.denoise.use(first)
+    rest(context, qtbot)
+    np.testing.assert_array_equal(context.denoised.map.values, before)
+    assert models.asked == []
+
+
 def test_a_model_too_slow_for_a_hand_waits_for_it(context, models, qtbot, ball, monkeypatch):
     monkeypatch.setattr(denoised_map, "_TOO_SLOW_S", -1.0)
     open_it(context, qtbot, ball)

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,7 +7,6 @@ from hypothesis import strategies as st
 from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, Part, PartialMap, pieces
 from sd2app.session.maps import MapModel
 from sd2core.doppler.options import SynthesisOptions
-from sd2core.doppler.synthesizer import Stretch
 from sd2core.maps import LimbMaps
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import JOINTS, QUANTITIES
@@ -17,10 +14,8 @@ from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
 
-def stretch_of(frames, value):
-    ones = np.ones(frames, np.float32)
-    values = np.full((2, frames), value)
-    return Stretch(values.astype(np.float32), values, ones, 0 * ones, "exact")
+def values_of(frames, value):
+    return np.full((2, frames), value, np.float32)
 
 
 def partial_map(frames):
@@ -32,8 +27,9 @@ def partial_map(frames):
     return partial, track
 
 
-def paint(partial, sensor, start, stretch, quality):
-    partial.take(Part(sensor, start, stretch, quality, f"rank {quality}", "count"))
+def paint(partial, sensor, start, values, quality, limbs=None):
+    key = "key" if quality == FINAL else None
+    partial.take(Part(sensor, start, values, limbs, quality, f"rank {quality}", "count", key))
 
 
 @given(
@@ -58,9 +54,9 @@ def test_pieces_cover_what_is_below_once_and_nothing_else(ranks, below, size, da
 def test_a_new_placement_forgets_the_old_one():
     partial, track = partial_map(10)
     here, there = VirtualSensor(), VirtualSensor(position_m=(1, 0, 0))
-    paint(partial, here, 0, stretch_of(10, 1.0), FINAL)
+    paint(partial, here, 0, values_of(10, 1.0), FINAL)
     assert partial.final
-    paint(partial, there, 4, stretch_of(3, 2.0), ROUGH)
+    paint(partial, there, 4, values_of(3, 2.0), ROUGH)
     assert not partial.full
     assert track.covered.tolist() == [False] * 4 + [True] * 3 + [False] * 3
     assert partial.quality.tolist() == [0] * 4 + [ROUGH] * 3 + [0] * 3
@@ -71,16 +67,31 @@ def test_a_new_placement_forgets_the_old_one():
 def test_ranks_rise_to_final():
     partial, _ = partial_map(4)
     assert not partial.full
-    paint(partial, VirtualSensor(), 0, stretch_of(4, 1.0), ROUGH)
+    paint(partial, VirtualSensor(), 0, values_of(4, 1.0), ROUGH)
     assert partial.full
     assert not partial.final
-    paint(partial, VirtualSensor(), 0, stretch_of(4, 1.0), FINAL)
+    paint(partial, VirtualSensor(), 0, values_of(4, 1.0), FINAL)
     assert partial.quality.min() == FINAL
+
+
+def test_what_is_left_is_kept_as_far_as_it_is_final():
+    (partial, track), here = partial_map(4), VirtualSensor()
+    assert partial.kept() is None
+    paint(partial, here, 0, values_of(4, 1.0), ROUGH)
+    assert partial.kept() is None
+    paint(partial, here, 1, values_of(2, 2.0), FINAL)
+    assert track.key is None
+    key, kept = partial.kept()
+    paint(partial, VirtualSensor(position_m=(1, 0, 0)), 0, values_of(4, 3.0), ROUGH)
+    assert (key, kept.known.tolist()) == ("key", [False, True, True, False])
+    assert kept.values[0, 1:3].tolist() == [2.0, 2.0]
+    paint(partial, here, 0, values_of(4, 2.0), FINAL)
+    assert track.key == "key"
 
 
 def test_another_plan_leaves_the_values_until_they_are_replaced():
     (partial, track), here = partial_map(4), VirtualSensor()
-    paint(partial, here, 0, stretch_of(3, 1.0), FINAL)
+    paint(partial, here, 0, values_of(3, 1.0), FINAL)
     partial.mark_stale()
     assert partial.quality.tolist() == [PREVIEW] * 3 + [0]
     assert track.map.values[0].tolist() == [1.0] * 3 + [0.0]
@@ -98,8 +109,7 @@ def test_parts_are_painted_whole_also_where_they_become_zero(strokes):
         limbs[rng.random((3, 2)) < 0.6] = 0  # most parts stand still
         moves = rng.normal(size=(*kinematics.shape[:2], stop - start)).astype(np.float32)
         split = LimbMaps(("a", "b", "c"), limbs, moves)
-        painted = replace(stretch_of(stop - start, 1.0), limbs=split)
-        paint(partial, VirtualSensor(), start, painted, FINAL)
+        paint(partial, VirtualSensor(), start, values_of(stop - start, 1.0), FINAL, split)
         wanted[..., start:stop], kinematics[..., start:stop] = limbs, moves
         np.testing.assert_array_equal(track.map.limbs.values, wanted)
         np.testing.assert_array_equal(track.map.limbs.kinematics, kinematics)

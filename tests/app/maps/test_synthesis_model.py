@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from types import SimpleNamespace
 
 import numpy as np
@@ -65,7 +66,7 @@ def test_rough_comes_before_exact(context, qtbot, ball):
 
     def note(part) -> None:
         ranks.append(ranks[-1].copy())
-        ranks[-1][part.start : part.start + part.stretch.values.shape[1]] = part.quality
+        ranks[-1][part.start : part.stop] = part.quality
 
     context.synthesis.painted.connect(note)
     open_ball(context, qtbot, ball)
@@ -273,6 +274,47 @@ def test_a_new_place_first_gets_the_plan_in_use_and_then_a_choice_of_its_own(
     np.testing.assert_allclose(
         context.synthetic.map.values, of_plan(ball, FACING, there), atol=1e-7
     )
+
+
+def test_a_place_that_was_left_comes_back_without_being_computed(context, qtbot, ball, monkeypatch):
+    open_ball(context, qtbot, ball)
+    wait_until_done(context, qtbot)
+    before = context.synthetic.map.values.copy()
+    context.edits.place_sensor(VirtualSensor(position_m=(0.4, 0.0, 0.0)))
+    wait_until_done(context, qtbot)
+    assert not np.array_equal(context.synthetic.map.values, before)
+    made, completed = [], []
+    monkeypatch.setattr(Synthesizer, "stretch", lambda *_, **__: made.append(1))
+    context.synthesis.completed.connect(lambda: completed.append(1))
+    context.document.undo_stack.undo()
+    assert context.synthesis.complete
+    assert (made, completed) == ([], [1])
+    np.testing.assert_array_equal(context.synthetic.map.values, before)
+
+
+def test_work_for_a_place_that_is_left_again_does_not_come_after_what_was_kept(
+    context, qtbot, ball, monkeypatch
+):
+    open_ball(context, qtbot, ball)
+    wait_until_done(context, qtbot)
+    before, gate, stretch = (
+        context.synthetic.map.values.copy(),
+        threading.Event(),
+        Synthesizer.stretch,
+    )
+
+    def slow(*arguments, **more):
+        gate.wait(10)
+        return stretch(*arguments, **more)
+
+    monkeypatch.setattr(Synthesizer, "stretch", slow)
+    context.edits.place_sensor(VirtualSensor(position_m=(0.4, 0.0, 0.0)))
+    qtbot.waitUntil(lambda: context.synthesis.busy, timeout=5_000)
+    context.document.undo_stack.undo()
+    gate.set()
+    wait_until_done(context, qtbot)
+    assert context.synthesis.shows_sensor
+    np.testing.assert_array_equal(context.synthetic.map.values, before)
 
 
 def test_a_hand_gets_the_plan_for_dragging(context, fake, qtbot, ball):

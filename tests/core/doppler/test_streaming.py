@@ -16,10 +16,10 @@ from doppler_scenes import CAMERA, cached_mask, options, sensor_at, wobbling
 
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.doppler.masks import VisibilityMasks
-from sd2core.doppler.prepared import ByteBudget
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics import parallel
+from sd2core.numerics.byte_budget import ByteBudget
 from sd2core.numerics.parallel import run_jobs, run_light_jobs
 from sd2core.progress import Cancelled, silent
 
