@@ -139,9 +139,6 @@ class Feature:
         """Functions that fill the places of the menus that follow a model, by their names."""
         return {}
 
-    def refresh_menus(self) -> None:
-        """Update what :meth:`menus` filled in."""
-
     def panels(self) -> Mapping[str, QWidget]:
         """Views by the name of their place in the window."""
         return {}

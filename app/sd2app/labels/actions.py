@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence
 from PySide6.QtWidgets import QInputDialog, QMenu, QWidget
@@ -13,7 +13,6 @@ from sd2app.feature import Action
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.loop import SpanLoop
 from sd2app.labels.marking import LONGEST_MS, OFFERED_MS, LabelMarking, Reaction
-from sd2app.labels.model import LabelsModel
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.key_text import canonical, native
 from sd2core.labels.label_set import Label, LabelSet
@@ -22,37 +21,43 @@ from sd2core.labels.label_set import Label, LabelSet
 def editing(edits: LabelEdits, *rows: Action) -> tuple[Action, ...]:
     """Actions that change labels: disabled, with the reason, while edits are refused."""
 
-    def enabled(row: Action) -> Callable[[], bool]:
-        return lambda: row.enabled() and not edits.refusal
+    # The same question of several actions stays one, which is asked once.
+    @cache
+    def enabled(question: Callable[[], bool]) -> Callable[[], bool]:
+        return lambda: question() and not edits.refusal
 
-    def why_not(row: Action) -> Callable[[], str]:
-        return lambda: edits.refusal or (row.why_not() if row.why_not is not None else "")
+    @cache
+    def why_not(question: Callable[[], str] | None) -> Callable[[], str]:
+        return lambda: edits.refusal or (question() if question is not None else "")
 
-    return tuple(replace(row, enabled=enabled(row), why_not=why_not(row)) for row in rows)
+    return tuple(
+        replace(row, enabled=enabled(row.enabled), why_not=why_not(row.why_not)) for row in rows
+    )
 
 
 class LabelActions:
     """Action per label: its key marks, or relabels selected spans while paused without marks."""
 
     def __init__(
-        self, labels: LabelsModel, use: Callable[[str], None], menu: QMenu, window: QWidget
+        self, edits: LabelEdits, use: Callable[[str], None], menu: QMenu, window: QWidget
     ) -> None:
-        self._labels, self._use, self._menu, self._window = labels, use, menu, window
+        self._edits, self._use, self._menu, self._window = edits, use, menu, window
         self._first = menu.addSeparator()
         self._actions: list[QAction] = []
         self._shown: LabelSet | None = None
-        labels.changed.connect(self._follow)
+        edits.labels.changed.connect(self._follow)
         self._follow()
 
-    def refresh(self, refusal: str) -> None:
-        """Disable the actions where ``refusal`` says why labels cannot be edited."""
+    def refresh(self) -> None:
+        """Disable the actions while edits are refused."""
+        refusal = self._edits.refusal
         labels = self._shown.labels if self._shown is not None else ()
         for action, label in zip(self._actions, labels, strict=True):
             action.setEnabled(not refusal)
             action.setToolTip(refusal or _tip(label))
 
     def _follow(self) -> None:
-        offered = self._labels.labels.label_set
+        offered = self._edits.labels.labels.label_set
         if offered == self._shown:
             return
         self._shown = offered
@@ -61,6 +66,7 @@ class LabelActions:
             action.deleteLater()
         self._actions = [self._made(label) for label in offered.labels]
         self._menu.insertActions(self._first, self._actions)
+        self.refresh()
 
     def _made(self, label: Label) -> QAction:
         action = QAction(swatch_icon(label.colour), label.name, self._window)

@@ -60,7 +60,6 @@ class LabelsFeature(Feature):
         self.cut_out.asked.connect(
             lambda *others: ask_about_others(shell.dialog_parent, self.cut_out, *others)
         )
-        self._keys: LabelActions | None = None
         self.edits.done_at.connect(session.span.reveal_any)
         self.edits.failed.connect(shell.warn)
         self.edits.restoring.connect(session.edits.restore)
@@ -316,7 +315,9 @@ class LabelsFeature(Feature):
         }
 
     def _fill_keys(self, menu: QMenu) -> None:
-        self._keys = LabelActions(self.model, self._use_label, menu, self._shell.dialog_parent)
+        keys = LabelActions(self.edits, self._use_label, menu, self._shell.dialog_parent)
+        for signal in (self._session.document.opened, self.autosave.changed):
+            signal.connect(keys.refresh)
 
     def _use_label(self, label: str) -> None:
         chosen = self.model.selected
@@ -326,11 +327,6 @@ class LabelsFeature(Feature):
             self._accept(label)
         else:
             self.edits.relabel(label)
-
-    def refresh_menus(self) -> None:
-        """Disable the keys of labels while edits are refused."""
-        if self._keys is not None:
-            self._keys.refresh(self.edits.refusal)
 
     # --- views ----------------------------------------------------------------------------
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -232,10 +232,9 @@ def _paint_spans(
                     target = QRectF(box.left(), edge, box.width(), 1.5)
                     painter.drawImage(target, marked, QRectF(0, line, marked.width(), 1))
             line += 1
-    for number in columns.wide.tolist():
+    for number, left, right in _ends_px(columns, scale, arrays):
         span = arrays.spans[number]
         row = rows[arrays.tracks[number]]
-        left, right = scale.x_of(span.start_s), scale.x_of(span.end_s)
         paint_span(
             painter,
             lane_box(row, int(arrays.lanes[number]), left, right),
@@ -245,6 +244,15 @@ def _paint_spans(
             selected=model.is_selected(span.id),
             suggestion=span.origin == "suggestion",
         )
+
+
+def _ends_px(
+    columns: SpanColumns, scale: TimeScale, arrays: SpanArrays
+) -> Iterator[tuple[int, float, float]]:
+    """Number, left and right of every wide span in view."""
+    wide = columns.wide
+    lefts, rights = scale.xs_of(arrays.starts_s[wide]), scale.xs_of(arrays.ends_s[wide])
+    return zip(wide.tolist(), lefts.tolist(), rights.tolist(), strict=True)
 
 
 def _text(span: Span) -> str:
@@ -264,12 +272,13 @@ def map_overlay(model: LabelsModel) -> Overlay:
         with clipped(painter, plot):
             painter.drawImage(plot, _coloured(columns, arrays.colours, tints))
             edges: dict[tuple[int, bool], list[QLineF]] = {}
-            for number in _columns_in(painter, plot, scale, model).wide.tolist():
+            wide = _columns_in(painter, plot, scale, model)
+            for number, left, right in _ends_px(wide, scale, arrays):
                 span, tone = arrays.spans[number], int(arrays.tones[number])
-                left, right = scale.x_of(span.start_s), scale.x_of(span.end_s)
                 if right - left >= _EDGES_FROM_PX:
                     lines = edges.setdefault((tone, span.origin == "suggestion"), [])
-                    lines += [QLineF(x, plot.top(), x, plot.bottom()) for x in (left, right)]
+                    lines.append(QLineF(left, plot.top(), left, plot.bottom()))
+                    lines.append(QLineF(right, plot.top(), right, plot.bottom()))
             for (tone, suggested), lines in edges.items():
                 style = Qt.PenStyle.DashLine if suggested else Qt.PenStyle.SolidLine
                 painter.setPen(QPen(QColor(arrays.colours[tone]), 1.0, style))

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QPainter, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
@@ -33,6 +35,14 @@ from sd2core.maps import DopplerMap
 
 BinMarks = tuple[QColor, QColor, Sequence[tuple[Sequence[int], Qt.BrushStyle]]]
 """Colour of zero, colour of hatching, and bins without information with their hatching."""
+
+
+Velocity = TypeVar("Velocity", float, NDArray[np.float64])
+
+
+def y_of(plot: QRectF, velocity_mps: Velocity, v_max_mps: float) -> Velocity:
+    """Pixels of velocities on the axis of a map, upwards."""
+    return plot.top() + plot.height() * (v_max_mps - velocity_mps) / (2.0 * v_max_mps)
 
 
 def velocity_labels(
@@ -137,8 +147,7 @@ class HeatmapView(TrackMouse, MapWidget):
 
     def y_of(self, velocity_mps: float) -> float:
         """Pixel of a velocity."""
-        plot, v_max = self.plot_rect(), self._map.axis.v_max_mps
-        return plot.top() + plot.height() * (v_max - velocity_mps) / (2.0 * v_max)
+        return y_of(self.plot_rect(), velocity_mps, self._map.axis.v_max_mps)
 
     def velocity_of(self, y_px: float) -> float:
         """Velocity of a pixel."""
@@ -237,7 +246,7 @@ class HeatmapView(TrackMouse, MapWidget):
         return " · ".join(filter(None, parts))
 
     def _paint_marked_bins(self, painter: QPainter, plot: QRectF) -> None:
-        edges = self._map.axis.edges_mps
+        edges_px = y_of(plot, self._map.axis.edges_mps, self._map.axis.v_max_mps).tolist()
         stretches = [
             (self.scale.x_of(start_s), self.scale.x_of(end_s))
             for start_s, end_s in self.track.covered_s
@@ -247,7 +256,7 @@ class HeatmapView(TrackMouse, MapWidget):
             painter.setPen(Qt.PenStyle.NoPen)
             for bins, pattern in marked:
                 for index in bins:
-                    top, bottom = self.y_of(edges[index + 1]), self.y_of(edges[index])
+                    top, bottom = edges_px[index + 1], edges_px[index]
                     for left, right in stretches:
                         band = QRectF(left, top, right - left, bottom - top)
                         painter.fillRect(band, nothing)
@@ -260,7 +269,7 @@ class HeatmapView(TrackMouse, MapWidget):
         painter.setPen(QPen(QColor(colours.muted), 1))
         labels = velocity_labels(v_max, plot.height(), painter.fontMetrics().height())
         for velocity, _ in labels:
-            y = self.y_of(velocity)
+            y = y_of(plot, velocity, v_max)
             painter.drawLine(QPointF(plot.left() - 4, y), QPointF(plot.left(), y))
         paint_velocity_labels(painter, plot, labels)
 

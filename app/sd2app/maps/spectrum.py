@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QFontMetrics, QPainter, QPen, QPolygonF
 
-from sd2app.maps.heatmap import paint_velocity_labels, velocity_labels
+from sd2app.maps.heatmap import paint_velocity_labels, velocity_labels, y_of
 from sd2app.maps.limbs import title_of
 from sd2app.maps.stack import MapStack
 from sd2app.session.maps import MapModel
@@ -99,7 +98,7 @@ class SpectrumView(Canvas):
                 if curve.frame is not None and not curve.nobody:
                     self._paint_curve(painter, plot, curve, curve.frame, v_max)
             if self._pointer.velocity_mps is not None:
-                y = _y_of(plot, self._pointer.velocity_mps, v_max)
+                y = y_of(plot, self._pointer.velocity_mps, v_max)
                 painter.setPen(QPen(QColor(colours.muted), 1, Qt.PenStyle.DotLine))
                 painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
         self._paint_legend(painter, curves, plot)
@@ -108,7 +107,7 @@ class SpectrumView(Canvas):
         colours, levels = self._display.palette, self._display.levels
         edges, v_max = doppler_map.axis.edges_mps, doppler_map.axis.v_max_mps
         for index in doppler_map.null_bins:
-            top, bottom = _y_of(plot, edges[index + 1], v_max), _y_of(plot, edges[index], v_max)
+            top, bottom = y_of(plot, edges[index + 1], v_max), y_of(plot, edges[index], v_max)
             painter.fillRect(
                 QRectF(plot.left(), top, plot.width(), bottom - top),
                 QBrush(QColor(colours.border), Qt.BrushStyle.BDiagPattern),
@@ -127,7 +126,7 @@ class SpectrumView(Canvas):
             plot,
             colours,
             [(x, "" if self._is_tight(plot) else text.replace("-", "−")) for x, text in across],
-            [(_y_of(plot, velocity, v_max), "") for velocity, _ in upwards],
+            [(y_of(plot, velocity, v_max), "") for velocity, _ in upwards],
             "" if self._is_tight(plot) else f"level ({unit} of the reference)",
         )
         paint_velocity_labels(painter, plot, upwards)
@@ -144,14 +143,10 @@ class SpectrumView(Canvas):
         self, painter: QPainter, plot: QRectF, curve: _Curve, frame: int, v_max: float
     ) -> None:
         def line(values: np.ndarray, order: int = 1) -> list[QPointF]:
-            shades = curve.track.shade(values, self._display.levels)
-            cells: Iterable[tuple[float, float]] = zip(
-                shades[::order], curve.map.axis.centres_mps[::order], strict=True
-            )
-            return [
-                QPointF(plot.left() + plot.width() * float(shade), _y_of(plot, velocity, v_max))
-                for shade, velocity in cells
-            ]
+            shades = curve.track.shade(values, self._display.levels)[::order]
+            xs = plot.left() + plot.width() * shades.astype(float)
+            ys = y_of(plot, curve.map.axis.centres_mps[::order], v_max)
+            return list(map(QPointF, xs.tolist(), ys.tolist()))
 
         known = curve.track.uncertainty
         if known is not None and not curve.track.part:
@@ -210,7 +205,3 @@ def _fill(
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QBrush(light, style))
     painter.drawPolygon(QPolygonF(points))
-
-
-def _y_of(plot: QRectF, velocity_mps: float, v_max_mps: float) -> float:
-    return plot.top() + plot.height() * (v_max_mps - velocity_mps) / (2.0 * v_max_mps)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -95,7 +96,7 @@ class DocumentModel(QObject):
 
     def file_name(self, ending: str) -> str:
         """Proposed name of a file about the recording: its title and an ending."""
-        return "".join("-" if one in "/\\:" else one for one in self.title) + ending
+        return re.sub(r"[/\\:]", "-", self.title) + ending
 
     @property
     def paths(self) -> tuple[Path, ...]:

@@ -191,11 +191,15 @@ class Menus:
 
     def refresh(self) -> None:
         """Follow the models."""
-        for row in self._rows.values():
+        rows = self._rows.values()
+        # Many actions ask the same.
+        enabled = {question: question() for question in {row.enabled for row in rows}}
+        reasons = {question: question() for question in {row.why_not for row in rows} if question}
+        for row in rows:
             action = self._actions[row.id]
-            action.setEnabled(row.enabled())
+            action.setEnabled(enabled[row.enabled])
             if row.why_not is not None:
-                action.setToolTip(row.why_not() or self._tip(row))
+                action.setToolTip(reasons[row.why_not] or self._tips[row.id])
             if row.checked is not None:
                 action.setChecked(row.checked())
         stack = self._session.document.undo_stack
@@ -227,8 +231,9 @@ class Menus:
             action.setShortcuts([])
         for name, action in self._actions.items():
             action.setShortcuts([QKeySequence(key) for key in self._keys.keys_of(name)])
-        for row in self._rows.values():
-            self._actions[row.id].setToolTip(self._tip(row))
+        self._tips = {row.id: self._tip(row) for row in self._rows.values()}
+        for name, tip in self._tips.items():
+            self._actions[name].setToolTip(tip)
 
     def _tip(self, row: Action) -> str:
         keys = ", ".join(map(native, self._keys.keys_of(row.id)))

@@ -219,23 +219,24 @@ class MainWindow(QMainWindow):
         self._refresh()
 
     def _follow_actions(self) -> None:
-        """Enable and check the actions as the models stand now."""
+        """Enable and check the actions, and name the window, as the models stand now."""
         if self._behind:
             self._behind = False
             self._menus.refresh()
-            for feature in self.features:
-                feature.refresh_menus()
+            self._name_window()
 
-    def _refresh(self) -> None:
-        # An edit changes several models; a hundred actions follow them once, before they are used.
-        self._behind = True
-        self._soon.start()
+    def _name_window(self) -> None:
         document = self.session.document
         mark = " *" if document.modified else ""
         kind = " (simulated)" if document.simulated else ""
         name = f"{document.title}{mark}{kind} – " if document.title else ""
         self.setWindowFilePath(document.file_name(""))  # names what is saved of it
         self.setWindowTitle(f"{name}SD² Studio")
+
+    def _refresh(self) -> None:
+        # An edit changes several models; a hundred actions follow them once, before they are used.
+        self._behind = True
+        self._soon.start()
 
     def _restyle(self) -> None:
         application = QApplication.instance()

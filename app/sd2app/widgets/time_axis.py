@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 
@@ -28,7 +31,7 @@ class TimeScale:
     end_s: float
     width_px: float
 
-    @property
+    @cached_property
     def plot_width_px(self) -> float:
         """Width of what is drawn to scale."""
         return max(self.width_px - GUTTER_PX - MARGIN_PX, 1.0)
@@ -37,6 +40,11 @@ class TimeScale:
         """Pixel of a time, at most a million from 0: Qt paints what is farther wrongly."""
         share = (time_s - self.start_s) / (self.end_s - self.start_s)
         return min(max(GUTTER_PX + share * self.plot_width_px, -_FARTHEST_PX), _FARTHEST_PX)
+
+    def xs_of(self, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Pixels of many times, as :meth:`x_of` gives them."""
+        shares = (times_s - self.start_s) / (self.end_s - self.start_s)
+        return np.clip(GUTTER_PX + shares * self.plot_width_px, -_FARTHEST_PX, _FARTHEST_PX)
 
     def time_of(self, x_px: float) -> float:
         """Time of a pixel, extrapolated outside."""

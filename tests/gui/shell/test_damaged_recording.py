@@ -16,7 +16,7 @@ from tests.damaged_files import change, cut, lose
 @pytest.mark.parametrize("damage", [cut, change, lose])
 def test_the_rest_of_a_damaged_mesh_is_shown(empty_window, qtbot, tmp_path, damage):
     recording = shutil.copytree(resource_path("swipes.sd2"), tmp_path / "swipes.sd2")
-    damage(recording / "mesh.zarr" / "vertices" / "c" / "1" / "0" / "0")
+    damage(recording / "fit.zarr" / "vertices" / "c" / "1" / "0" / "0")
     c = models_of(empty_window)
     with qtbot.waitSignal(c.document.opened, timeout=20_000):
         empty_window.open_paths([recording])
@@ -29,4 +29,4 @@ def test_the_rest_of_a_damaged_mesh_is_shown(empty_window, qtbot, tmp_path, dama
     c.playback.seek_frame(200)
     qtbot.waitUntil(lambda: empty_window.settled, timeout=20_000)
     notice = empty_window.findChild(MessageNotice)
-    assert "mesh.zarr is damaged: frames 150 to 299 of vertices" in notice.text
+    assert "fit.zarr is damaged: frames 150 to 299 of vertices" in notice.text
