@@ -9,6 +9,7 @@ import shutil
 import sys
 import threading
 import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -118,13 +119,13 @@ def _listen(options: Listen) -> None:
     except BaseException:
         source.close()
         raise
-    status = _Status(listening, source, as_json=options.json, columns=options.columns)
+    status = Status(listening, source, as_json=options.json, columns=options.columns)
     status.begin(recording.folder, recording.is_continued)
     # To be told to end is to be told to stop: what waits to be stored is stored.
     with stop_signals() as told:
         listening.start()
         try:
-            _follow(listening, status, options.seconds, told)
+            follow(listening, status, options.seconds, told)
         finally:
             listening.stop()
     status.end(recording.folder)
@@ -132,23 +133,33 @@ def _listen(options: Listen) -> None:
 
 def _source(options: Listen) -> Source:
     """Source that the options name; Sd2Error where it is not to be had."""
-    from sd2core.live.sources import DATA_PORT, LOOPBACK, Dca1000Source, ReplaySource
-    from sd2core.recording.recording import is_recording, open_recording
-
     if options.replay is not None:
-        if is_recording(options.replay):
-            return ReplaySource(open_recording(options.replay).load_capture())
-        return ReplaySource(options.replay)
+        return replayed(options.replay)
     assert options.dca1000 is not None
     assert options.setup is not None
-    address, _, port = options.dca1000.partition(":")
+    return dca1000(options.dca1000, options.setup)
+
+
+def replayed(path: Path) -> Source:
+    """Capture, or the one of a recording, at its own rate."""
+    from sd2core.live.sources import ReplaySource
+    from sd2core.recording.recording import is_recording, open_recording
+
+    return ReplaySource(open_recording(path).load_capture() if is_recording(path) else path)
+
+
+def dca1000(place: str, setup: Path) -> Source:
+    """DCA1000 that sends to ``ADDRESS[:PORT]``."""
+    from sd2core.live.sources import DATA_PORT, LOOPBACK, Dca1000Source
+
+    address, _, port = place.partition(":")
     if port and not (port.isascii() and port.isdigit()):
         raise Sd2Error(f"The port is {port!r}", "a number, as in 192.168.33.30:4098")
-    return Dca1000Source(options.setup, address or LOOPBACK, int(port) if port else DATA_PORT)
+    return Dca1000Source(setup, address or LOOPBACK, int(port) if port else DATA_PORT)
 
 
-def _follow(
-    listening: Listening, status: _Status, seconds: float | None, told: threading.Event
+def follow(
+    listening: Listening, status: Status, seconds: float | None, told: threading.Event
 ) -> None:
     """Show columns until the source ends, the time is over, q is pressed, or it is told to end."""
     from sd2core.cli.keys import pressed_keys
@@ -161,7 +172,7 @@ def _follow(
             status.show(listening.next_column(_WAIT_S))
 
 
-class _Status:
+class Status:
     """What is printed while listening."""
 
     def __init__(
@@ -175,13 +186,15 @@ class _Status:
         self._loudest = 0.0
         self._shown_s = time.monotonic()
         self._said: set[str] = set()
+        self.more: Callable[[], Mapping[str, Any]] = dict  # what else is told with every line
 
-    def begin(self, folder: Path, continued: bool) -> None:
-        """Say what is listened to."""
+    def begin(self, folder: Path, continued: bool, about: str = "") -> None:
+        """Say what is listened to, or ``about`` what is recorded."""
+        about = about or self._source.about
         if self._as_json:
             print_event(
                 "listening",
-                source=self._source.about,
+                source=about,
                 out=str(folder),
                 continued=continued,
                 bins=self._listening.axis.bins,
@@ -190,7 +203,7 @@ class _Status:
         else:
             goes_on = " (continued)" if continued else ""
             stop = "Ctrl-C or q stops." if self._is_line else "Ctrl-C stops."
-            print(f"{self._source.about}\n  into {folder}{goes_on}. {stop}", flush=True)
+            print(f"{about}\n  into {folder}{goes_on}. {stop}", flush=True)
         self._warn_of_doubts()
 
     def show(self, column: Column | None) -> None:
@@ -214,7 +227,7 @@ class _Status:
         self._shown_s = time.monotonic()
         self._warn_of_doubts()
         if self._as_json:
-            print_event("frames", **self._newest())
+            print_event("frames", **self._newest(), **self.more())
         elif self._is_line:
             width = shutil.get_terminal_size().columns - 1
             print(f"\r{self._line()[:width]:<{width}}", end="", flush=True)
@@ -230,7 +243,7 @@ class _Status:
             most_s = latencies_s[math.ceil(0.95 * len(latencies_s)) - 1]
         if self._is_line:
             print()
-        for doubt in self._source.doubts(at_end=True):
+        for doubt in self._listening.doubts(at_end=True):
             self._warn(doubt)
         if self._as_json:
             print_event(
@@ -245,7 +258,7 @@ class _Status:
             print("No frame came, and nothing was written.")
             return
         facts = {
-            "recorded": counted(counts.recorded, "frame"),
+            "recorded": counts.frames,
             "missing": counts.missing or "nothing",
             "not shown": counted(counts.not_shown, "frame") if counts.not_shown else "",
         }
@@ -255,7 +268,7 @@ class _Status:
 
     def _line(self) -> str:
         counts, column = self._listening.counts, self._column
-        parts = [counted(counts.recorded, "frame"), counts.missing or "0 dropped"]
+        parts = [counts.frames, counts.missing or "0 dropped"]
         if counts.not_shown:
             parts.append(f"{counts.not_shown:,} not shown")
         if column is not None and self._first_s is not None:
@@ -286,7 +299,7 @@ class _Status:
         return told
 
     def _warn_of_doubts(self) -> None:
-        for doubt in self._source.doubts(at_end=False):
+        for doubt in self._listening.doubts(at_end=False):
             self._warn_once(doubt)
 
     def _warn_once(self, sentence: str) -> None:

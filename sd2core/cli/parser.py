@@ -28,6 +28,7 @@ examples:
   sd2 synth walk.npz --out map.npz --sensor 0,0,1
   sd2 radar capture/ --out real.npz
   sd2 listen --dca1000 --setup profile.cfg --out walk.sd2    a radar, while it runs
+  sd2 record --camera 0 --radar 192.168.33.30 --setup profile.cfg --out take.sd2
   sd2 imu walk.zarr --at left-wrist --out wrist.csv    what an inertial sensor would feel
   sd2 denoise map.npz --out denoised.npz      what a radar would show
   sd2 labels suggest walk.sd2                 where something moves
@@ -54,6 +55,7 @@ COMMANDS = {
     "synth": "compute the Doppler that a radar would have measured of a moving mesh",
     "radar": "turn a raw radar capture into a Doppler map, or say what limits it has",
     "listen": "record a radar while it runs, and follow its Doppler map",
+    "record": "record a camera and a radar together, on one clock",
     "imu": "what an inertial sensor on the body would measure (simulated)",
     "denoise": "turn a synthetic Doppler map into what a radar would show",
     "classify": "train, evaluate and apply gesture classifiers",

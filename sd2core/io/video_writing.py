@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,34 +49,98 @@ def write_video(
     Sd2Error
         If this build of PyAV has no H.264 encoder.
     """
-    import av
-
-    try:
-        av.Codec("libx264", "w")
-    except ValueError as error:
-        raise Sd2Error(
-            "This build of PyAV cannot encode H.264 (libx264)",
-            "the wheels of PyAV from the package index",
-            "Install it again with: pip install --force-reinstall av",
-        ) from error
     ticks = frames_per_s if times_s is None else _TICKS_PER_S
-    with av.open(str(path), "w", options={"movflags": "+faststart"}) as container:
-        stream = container.add_stream("libx264", rate=frames_per_s)
-        stream.width, stream.height = size
-        stream.pix_fmt = "yuv420p"
+    encoder = VideoEncoder(path, frames_per_s, size, crf=crf, preset=preset, ticks_per_s=ticks)
+    with encoder:
+        for number, picture in enumerate(frames):
+            time_s = number / frames_per_s if times_s is None else float(times_s[number])
+            encoder.add(picture, time_s)
+
+
+class VideoEncoder:
+    """H.264 in MP4, picture by picture.
+
+    Parameters
+    ----------
+    file : Path or file open for writing
+        A file that grows is cut into pieces of half a second, each of which is whole.
+    frames_per_s : float
+        Half of this many are between key frames.
+    size : (int, int)
+        Width and height in pixels, both even.
+    crf : int
+        As of :func:`write_video`.
+    preset : str
+        As of :func:`write_video`.
+    ticks_per_s : int
+        Times are rounded to these.
+    grows : bool
+        True for a file that can be read up to the last second however writing ends.
+
+    Raises
+    ------
+    Sd2Error
+        If this build of PyAV has no H.264 encoder.
+    """
+
+    def __init__(
+        self,
+        file: Path | Any,
+        frames_per_s: float,
+        size: tuple[int, int],
+        *,
+        crf: int = 21,
+        preset: str = "slow",
+        ticks_per_s: int = _TICKS_PER_S,
+        grows: bool = False,
+    ) -> None:
+        import av
+
+        try:
+            av.Codec("libx264", "w")
+        except ValueError as error:
+            raise Sd2Error(
+                "This build of PyAV cannot encode H.264 (libx264)",
+                "the wheels of PyAV from the package index",
+                "Install it again with: pip install --force-reinstall av",
+            ) from error
+        flags = "frag_keyframe+empty_moov+default_base_moof" if grows else "+faststart"
+        options = {"movflags": flags} | ({"flush_packets": "1"} if grows else {})
+        self._container = av.open(
+            str(file) if isinstance(file, Path) else file, "w", format="mp4", options=options
+        )
+        rate = Fraction(frames_per_s).limit_denominator(1001)
+        self._stream = self._container.add_stream("libx264", rate=rate)
+        self._stream.width, self._stream.height = size
+        self._stream.pix_fmt = "yuv420p"
         # A key frame every half second: scrubbing decodes few frames.
-        stream.options = {
+        self._stream.options = {
             "preset": preset,
             "crf": str(crf),
-            "g": str(max(frames_per_s // 2, 1)),
+            "g": str(max(int(frames_per_s) // 2, 1)),
             "threads": "1",
-        }
-        stream.codec_context.time_base = Fraction(1, ticks)
-        for number, picture in enumerate(frames):
-            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
-            # Without this, players guess the matrix from the picture's size.
-            frame = frame.reformat(format="yuv420p", dst_colorspace="ITU601")
-            frame.pts = number if times_s is None else round(float(times_s[number]) * ticks)
-            frame.time_base = Fraction(1, ticks)
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))
+        } | ({"tune": "zerolatency"} if grows else {})
+        self._ticks_per_s = ticks_per_s
+        self._stream.codec_context.time_base = Fraction(1, ticks_per_s)
+
+    def __enter__(self) -> VideoEncoder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def add(self, picture: NDArray[np.uint8], time_s: float) -> None:
+        """Encode an sRGB picture, (height, width, 3), that is shown from a time on."""
+        import av
+
+        frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
+        # Without this, players guess the matrix from the picture's size.
+        frame = frame.reformat(format="yuv420p", dst_colorspace="ITU601")
+        frame.pts = round(time_s * self._ticks_per_s)
+        frame.time_base = Fraction(1, self._ticks_per_s)
+        self._container.mux(self._stream.encode(frame))
+
+    def close(self) -> None:
+        """Write what is left, and the end of the file."""
+        self._container.mux(self._stream.encode(None))
+        self._container.close()

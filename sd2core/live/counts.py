@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Self
 
+from sd2core.files.tables import counted
+
 
 @dataclass
 class Counts:
@@ -26,6 +28,16 @@ class Counts:
     def whole(self) -> bool:
         """True if nothing is missing in the recording."""
         return not (self.dropped or self.lost or self.damaged)
+
+    @property
+    def frames(self) -> str:
+        """Number of frames recorded, of all that were sent: ``47 of 50 frames``."""
+        sent = self.recorded + self.dropped + self.lost
+        return (
+            counted(sent, "frame")
+            if sent == self.recorded
+            else (f"{self.recorded:,} of {counted(sent, 'frame')}")
+        )
 
     @property
     def missing(self) -> str:

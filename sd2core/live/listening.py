@@ -140,6 +140,16 @@ class Listening:
         """Times from a frame's last packet to its column, of the last 10,000 columns."""
         return list(self._latencies_s)
 
+    def doubts(self, *, at_end: bool) -> list[str]:
+        """What looks wrong with source and recording, in sentences."""
+        doubts = self._source.doubts(at_end=at_end)
+        if self._recording.times_put_back:
+            doubts.append(
+                f"{self._recording.folder} was deleted while it was recorded: all that was received"
+                " was written there again."
+            )
+        return doubts
+
     def start(self) -> None:
         """Begin to listen."""
         self._last_received_s = time.monotonic()
@@ -223,6 +233,7 @@ class Listening:
             words,
             head,
             time_s=frame.time_s,
+            received_s=frame.received_s,
             dropped=dropped,
             lost=frame.lost,
             missing_bytes=frame.missing_bytes,

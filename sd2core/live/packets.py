@@ -146,14 +146,14 @@ class FrameAssembler:
     def _continues(self, given: _Packet) -> bool:
         """True if a packet fits the stream of the newest one, near it."""
         step, place = self._from_newest(given)
-        if step > 0:
-            follows = place == self._end if step == 1 else place >= self._end
-            return follows and step <= _FAR_PACKETS
-        return (
-            step > -_FAR_PACKETS
-            and place <= self._count
-            and not (given.is_first and step < -self._window)
-        )
+        if not self._agree(step, place):
+            return False
+        return abs(step) <= _FAR_PACKETS and not (given.is_first and step < -self._window)
+
+    def _agree(self, step: int, place: int) -> bool:
+        """True if so many packets can hold the bytes that were sent between."""
+        between, sent = (step - 1, place - self._end) if step > 0 else (-step, self._count - place)
+        return between <= sent <= between * PAYLOAD_BYTES
 
     def _take_elsewhere(self, given: _Packet, received_s: float) -> list[RawFrame]:
         """Take a packet of a card that began again, or of a stream that went on unheard.
@@ -170,7 +170,7 @@ class FrameAssembler:
             together = [before, given]
         ready = []
         step, place = self._from_newest(together[0])
-        if given.is_first or step <= 0 or place < self._end:
+        if given.is_first or step <= 0 or not self._agree(step, place):
             ready = self.finish()
             self.counts.restarts += 1
             self._begin(together[0])

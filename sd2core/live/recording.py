@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.appended import AppendedFile
 from sd2core.files.atomic import atomic_write_text, full_disk_named
 from sd2core.files.lock import FileLock
 from sd2core.files.recording_json import FILE_NAME
@@ -24,11 +25,15 @@ from sd2core.io.radar.growing import (
     read_entries,
     read_head,
 )
+from sd2core.live.clocks import ARRIVALS_NAME, CLOCKS_NAME
 from sd2core.recording.recording import Recording, folder_named, open_recording
 
 RADAR_FOLDER = "radar"
 _LOCK_NAME = "listening.lock"
 _MAX_COUNT = 2**32 - 1
+
+
+_LOOK_S = 1.0
 
 
 class GrowingRecording:
@@ -42,6 +47,9 @@ class GrowingRecording:
     ----------
     folder : path
         ``NAME.sd2``; the suffix is appended where it is not there.
+    keep_arrivals : bool
+        True to keep when each frame arrived, by which clocks are compared
+        (:mod:`sd2core.live.clocks`); then it cannot be continued.
 
     Raises
     ------
@@ -49,12 +57,15 @@ class GrowingRecording:
         When something else is there, or another process listens into it.
     """
 
-    def __init__(self, folder: Path | str) -> None:
+    def __init__(self, folder: Path | str, *, keep_arrivals: bool = False) -> None:
         self.folder = folder_named(folder)
         self.radar = self.folder / RADAR_FOLDER
         self.frames = 0
         self._head: GrowingHead | None = None
-        self._streams: tuple[IO[bytes], IO[bytes]] | None = None
+        self._streams: tuple[AppendedFile, ...] | None = None
+        self._keeps_arrivals = keep_arrivals
+        self._looked_s = 0.0  # when it was last seen to be there, by the monotonic clock
+        self.times_put_back = 0  # after it had been deleted
         self._session = 0
         self._begin_s: float | None = None  # of this session; None before its first frame
         self._last_s = -np.inf
@@ -63,6 +74,12 @@ class GrowingRecording:
         self._check_is_ours()
         self._lock: FileLock | None = None
         if is_growing(self.radar):
+            if keep_arrivals or (self.folder / CLOCKS_NAME).exists():
+                raise Sd2Error(
+                    f"{self.folder} exists",
+                    "a new folder: what was recorded with a camera is not continued",
+                    "Give another folder as --out",
+                )
             self._continue()
 
     @property
@@ -111,6 +128,7 @@ class GrowingRecording:
         head: GrowingHead,
         *,
         time_s: float,
+        received_s: float = 0.0,
         dropped: int = 0,
         lost: int = 0,
         missing_bytes: int = 0,
@@ -125,6 +143,8 @@ class GrowingRecording:
             What the frame is of; ``start_unix_s`` is the wall-clock time of this session's time 0.
         time_s : float
             Since the first frame of this session.
+        received_s : float
+            When it arrived, by the monotonic clock.
         dropped, lost, missing_bytes : int
             See :data:`~sd2core.io.radar.growing.ENTRY`.
         """
@@ -138,16 +158,36 @@ class GrowingRecording:
         counts = (min(one, _MAX_COUNT) for one in (dropped, lost, missing_bytes, self._session))
         entry = np.array([(at_s, *counts)], ENTRY)
         with full_disk_named(self.radar / SAMPLES_NAME):
-            _write(self._streams[0], np.ascontiguousarray(words).view(np.uint8).data.cast("B"))
-            _write(self._streams[1], entry.tobytes())
+            self._streams[0].write(np.ascontiguousarray(words).view(np.uint8).data.cast("B"))
+            self._streams[1].write(entry.tobytes())
+            for arrivals in self._streams[2:]:
+                arrivals.write(np.float64(received_s).tobytes())
         self.frames += 1
         self._last_s = at_s
         if self.frames == 1:
             self._make_recording()
+        if time.monotonic() > self._looked_s + _LOOK_S:
+            self._look()
+
+    def _look(self) -> None:
+        """Put the recording back if somebody has deleted it."""
+        assert self._streams is not None
+        assert self._head is not None
+        self._looked_s = time.monotonic()
+        if (self.folder / FILE_NAME).is_file() and all(one.is_there for one in self._streams):
+            return
+        with full_disk_named(self.radar / SAMPLES_NAME):
+            for one in self._streams:
+                one.put_back()
+            self._write_head(self._head)
+        if not (self.folder / FILE_NAME).is_file():
+            self._make_recording()
+        self.times_put_back += 1
 
     def close(self, dropped: int = 0) -> None:
         """End this session; ``dropped`` frames came after its last one."""
         if self._streams is not None:
+            self._look()
             for stream in self._streams:
                 stream.close()
             self._streams = None
@@ -198,8 +238,8 @@ class GrowingRecording:
             self._take_lock()
         if self._head is None or not self.frames:
             self._write_head(head)
-        samples = (self.radar / SAMPLES_NAME).open("ab", buffering=0)
-        self._streams = (samples, (self.radar / INDEX_NAME).open("ab", buffering=0))
+        names = [SAMPLES_NAME, INDEX_NAME, *([ARRIVALS_NAME] if self._keeps_arrivals else [])]
+        self._streams = tuple(AppendedFile(self.radar / name) for name in names)
 
     def _write_head(self, head: GrowingHead) -> None:
         atomic_write_text(self.radar / HEAD_NAME, head.model_dump_json(indent=2) + "\n")
@@ -223,10 +263,3 @@ class GrowingRecording:
 def wall_clock_s(monotonic_s: float) -> float:
     """Wall-clock time (unix) of a time of the monotonic clock."""
     return time.time() - (time.monotonic() - monotonic_s)
-
-
-def _write(stream: IO[bytes], content: bytes | memoryview) -> None:
-    """Write all of it: the system may take less at a time."""
-    left = memoryview(content)
-    while len(left):
-        left = left[stream.write(left) :]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 import socket
 import threading
@@ -31,8 +32,12 @@ _SOCKET_BYTES = 8 << 20
 """Asked of the system for packets that wait; it may give less."""
 _PAUSE_S = 0.2
 """After so long without a packet, none is on its way any more."""
+_FALLEN_SILENT_S = 1.0
+"""After so long, another sender may follow: a card that was started again."""
 _JUDGED_S = 3.0
 _RATE_TOLERANCE = 0.2
+_AHEAD_S = 2.0
+"""A frame is not received so long before it is taken: its number is wrong."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +60,10 @@ class Source(Protocol):
     @property
     def about(self) -> str:
         """Radar and place that frames come from, in words."""
+
+    @property
+    def delay_s(self) -> float:
+        """Time from the middle of a burst of chirps to when its frame has arrived."""
 
     def head(self, start_unix_s: float) -> GrowingHead:
         """Description of the frames; ``start_unix_s`` is the wall-clock time of the first one."""
@@ -83,6 +92,8 @@ class ReplaySource:
     capture : path or RadarCapture
         Anything that :func:`~sd2core.io.radar.load_capture` opens, or what it opened.
     """
+
+    delay_s = 0.0
 
     def __init__(self, capture: RadarCapture | Path | str) -> None:
         if not isinstance(capture, RadarCapture):
@@ -157,7 +168,8 @@ class Dca1000Source:
         self._setup = read_setup(setup)
         self._decoder = FrameDecoder(self._setup, str(setup))
         self.assembler = FrameAssembler(self._decoder.frame_bytes)
-        self.foreign_packets = 0  # from another address than the first packet
+        self.foreign_packets = 0  # from another address or port than the first packet
+        self.jumps = 0  # of frame numbers, into the future
         self._stored_as = self.head(0.0)
         self._anchor: RawFrame | None = None  # first frame since the card began, or began again
         self._anchor_s = self._last_s = 0.0
@@ -167,6 +179,8 @@ class Dca1000Source:
         self._is_judged = False
         self._socket = _listening_socket(address, port)
         self.address, self.port = self._socket.getsockname()[:2]
+        radar = self._setup.config
+        self.delay_s = 0.5 * radar.chirps_per_frame * radar.chirp_repetition_s
         # What the system keeps of packets that wait, with its own overhead.
         self.waiting_bytes = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
 
@@ -195,21 +209,21 @@ class Dca1000Source:
         """Receive packets until ``stop`` is set."""
         # Longer than any packet, so that a longer one is noticed.
         buffer = memoryview(bytearray(HEADER_BYTES + PAYLOAD_BYTES + 1))
-        sender: str | None = None
+        sender, heard_s = None, -math.inf
         self._socket.settimeout(_PAUSE_S)
         while not stop.is_set():
             try:
-                size, (address, _) = self._socket.recvfrom_into(buffer)
+                size, address = self._socket.recvfrom_into(buffer)
             except TimeoutError:
                 for raw in self.assembler.finish():
                     take(self._frame(raw))
                 continue
-            if address != sender:
-                if sender is not None:
-                    self.foreign_packets += 1
-                    continue
-                sender = address
-            for raw in self.assembler.take(buffer[:size], time.monotonic()):
+            received_s = time.monotonic()
+            if address != sender and received_s < heard_s + _FALLEN_SILENT_S:
+                self.foreign_packets += 1
+                continue
+            sender, heard_s = address, received_s
+            for raw in self.assembler.take(buffer[:size], received_s):
                 take(self._frame(raw))
         for raw in self.assembler.finish():
             take(self._frame(raw))
@@ -228,6 +242,11 @@ class Dca1000Source:
             )
         if self.foreign_packets:
             doubts.append(f"Packets left out of another sender: {self.foreign_packets:,}.")
+        if self.jumps:
+            doubts.append(
+                f"Frame numbers jumped into the future: {self.jumps:,} times. Frames stand where"
+                " they were received."
+            )
         if at_end and counts.lost:
             doubts.append(f"Packets lost: {counts.lost:,}.")
         if self.waiting_bytes < _SOCKET_BYTES and (counts.lost or not at_end):
@@ -267,9 +286,17 @@ class Dca1000Source:
         elif raw.stream != self._anchor.stream:
             self._anchor_s = max(raw.received_s - self._first_s, self._last_s + period_s)
             self._anchor = raw
+        before_s, lost = self._last_s, raw.lost
         self._last_s = self._anchor_s + (raw.number - self._anchor.number) * period_s
+        arrived_s = raw.received_s - self._first_s
+        if self._last_s > arrived_s + _AHEAD_S:
+            # Numbers that jumped: what they skip was never sent.
+            self.jumps += 1
+            self._anchor, self._anchor_s = raw, max(arrived_s, before_s + period_s)
+            self._last_s = self._anchor_s
+            lost = max(round((self._last_s - before_s) / period_s) - 1, 0)
         self._judge_rate(raw)
-        return Frame(raw.data, self._last_s, raw.received_s, raw.missing_bytes, raw.lost)
+        return Frame(raw.data, self._last_s, raw.received_s, raw.missing_bytes, lost)
 
     def _judge_rate(self, raw: RawFrame) -> None:
         """Compare how fast frames come with the configuration, once."""

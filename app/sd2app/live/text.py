@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from sd2app.live.model import LiveModel
-from sd2app.widgets.text import counted
 from sd2core.live.counts import Counts
 
 
@@ -39,7 +38,7 @@ def frames_text(counts: Counts) -> str:
         (counts.not_shown, "stored and not shown yet"),
     ]
     told = [f"{number:,} {what}" for number, what in lacks if number]
-    return f"{counted(counts.recorded, 'frame')}, {', '.join(told) or 'none missing'}"
+    return f"{counts.frames}, {', '.join(told) or 'none missing'}"
 
 
 def level_text(level_db: float | None) -> str:

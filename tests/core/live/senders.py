@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import socket
 import time
 from collections.abc import Callable, Iterable
@@ -20,13 +21,21 @@ def packets_of(
     return found
 
 
-def send(packets: Iterable[bytes], port: int, has_received: Callable[[], int]) -> None:
+def send(
+    packets: Iterable[bytes],
+    port: int,
+    has_received: Callable[[], int],
+    sender: socket.socket | None = None,
+) -> None:
     """Send packets to the loopback address, no faster than they are received.
 
-    ``has_received`` is the number of packets that arrived, of any kind, since before the call.
+    ``has_received`` is the number of packets that arrived, of any kind, since before the call;
+    ``sender`` is a socket to send them from, by default one of its own.
     """
     before = has_received()
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+    with contextlib.ExitStack() as stack:
+        if sender is None:
+            sender = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
         for number, one in enumerate(packets):
             sender.sendto(one, ("127.0.0.1", port))
             until_s = time.monotonic() + 5.0

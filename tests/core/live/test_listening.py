@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import shutil
 import socket
 import threading
 import time
@@ -305,12 +307,13 @@ def test_another_radar_is_not_appended(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_card_that_begins_again_goes_on_in_time(tmp_path: Path) -> None:
-    with _card(tmp_path) as (source, _, content):
+    card = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    with card, _card(tmp_path) as (source, _, content):
         recording = GrowingRecording(tmp_path / "walk.sd2")
         listening = Listening(source, recording)
         listening.start()
         for pause_s in (0.5, 0.0):
-            send(packets_of(content), source.port, lambda: _received(source))
+            send(packets_of(content), source.port, lambda: _received(source), card)
             time.sleep(pause_s)
         until_s = time.monotonic() + 5.0
         while listening.counts.recorded < 2 * TI.frames and time.monotonic() < until_s:
@@ -324,33 +327,56 @@ def test_a_card_that_begins_again_goes_on_in_time(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.delete(steps_s, TI.frames - 1), TI.frame_s, atol=1e-9)
 
 
-def test_another_sender_is_left_out(tmp_path: Path) -> None:
-    with _card(tmp_path) as (source, _, content):
+@pytest.mark.parametrize("address", ["127.0.0.2", "127.0.0.1"])
+def test_another_sender_is_left_out(tmp_path: Path, address: str) -> None:
+    """One at another address, or another program at the same."""
+    with _card(tmp_path) as (source, _, content), contextlib.ExitStack() as stack:
         packets = packets_of(content)
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
-            try:
-                other.bind(("127.0.0.2", 0))
-            except OSError:
-                pytest.skip("This system has one loopback address only")
-            listening = Listening(source, GrowingRecording(tmp_path / "walk.sd2"))
-            listening.start()
-            send(packets[:40], source.port, lambda: _received(source))
-            other.sendto(packets[100], ("127.0.0.1", source.port))
-            send(packets[40:], source.port, lambda: _received(source))
-            until_s = time.monotonic() + 5.0
-            while listening.counts.recorded < TI.frames and time.monotonic() < until_s:
-                listening.next_column(0.1)
-            listening.stop()
+        card, other = (
+            stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(2)
+        )
+        try:
+            other.bind((address, 0))
+        except OSError:
+            pytest.skip("This system has one loopback address only")
+        listening = Listening(source, GrowingRecording(tmp_path / "walk.sd2"))
+        listening.start()
+        send(packets[:40], source.port, lambda: _received(source), card)
+        other.sendto(packets[100], ("127.0.0.1", source.port))
+        send(packets[40:], source.port, lambda: _received(source), card)
+        until_s = time.monotonic() + 5.0
+        while listening.counts.recorded < TI.frames and time.monotonic() < until_s:
+            listening.next_column(0.1)
+        listening.stop()
         assert listening.counts.whole
         assert listening.counts.recorded == TI.frames
         assert "Packets left out of another sender: 1." in source.doubts(at_end=True)
+
+
+def test_a_recording_that_is_deleted_is_put_back_and_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sd2core.live.recording._LOOK_S", 0.0)
+    recording = GrowingRecording(tmp_path / "walk.sd2")
+    listening = Listening(ReplaySource(fast_swipes()), recording)
+    listening.start()
+    while listening.counts.recorded < 20:
+        listening.next_column(0.1)
+    recording.folder.rename(tmp_path / "gone")  # in one step, while it is written to
+    shutil.rmtree(tmp_path / "gone")
+    while not listening.is_over:
+        listening.next_column(0.1)
+    listening.stop()
+    assert any("was deleted while it was recorded" in one for one in listening.doubts(at_end=True))
+    assert_same_samples(open_recording(recording.folder).load_capture(), fast_swipes())
 
 
 def test_another_configuration_than_the_radars_is_noticed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sources_module, "_JUDGED_S", 0.2)
-    with _card(tmp_path) as (source, _, content):
+    card = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    with card, _card(tmp_path) as (source, _, content):
         listening = Listening(source, GrowingRecording(tmp_path / "walk.sd2"))
         listening.start()
         size = len(content) // TI.frames
@@ -358,7 +384,7 @@ def test_another_configuration_than_the_radars_is_noticed(
             part = content[frame * size : (frame + 1) * size]
             sent = packets_of(content[: frame * size] + part)[frame * size // 1456 :]
             sent = [one for one in sent if len(one) == 1466 or frame == TI.frames - 1]
-            send(sent, source.port, lambda: _received(source))
+            send(sent, source.port, lambda: _received(source), card)
             time.sleep(3 * TI.frame_s)
         listening.stop()
         (doubt,) = (one for one in source.doubts(at_end=True) if "MB/s" in one)

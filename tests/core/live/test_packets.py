@@ -105,6 +105,25 @@ def test_counters_wrap_around(stream: dict[str, int], packets_left: int, bytes_l
     ]
 
 
+@given(streams, st.integers(1, 4000), st.integers(0, 2**40))
+def test_a_packet_whose_numbers_contradict_each_other_is_refused(
+    stream: dict[str, int], ahead: int, sent: int
+) -> None:
+    rng = random.Random(stream["seed"])
+    size = stream["frame_bytes"]
+    content = _content(size, stream["frames"], rng)
+    packets = packets_of(content, stream["size"])
+    half = len(packets) // 2
+    end = half * stream["size"]
+    assume(half and not ahead - 1 <= sent - end <= (ahead - 1) * 1456)
+    wrong = packets_of(b"\xff" * 8, 8, half + ahead, sent)
+    assume(wrong[0] not in packets)
+    assembler = FrameAssembler(size, WINDOW)
+    found = _taken(assembler, packets[:half] + wrong + packets[half:])
+    assert b"".join(one.data for one in found) == content
+    assert (assembler.counts.lost, assembler.counts.restarts) == (0, 0)
+
+
 @given(streams, st.integers(1, 12))
 def test_a_card_that_begins_again_is_a_new_stream(stream: dict[str, int], again: int) -> None:
     rng = random.Random(stream["seed"])

@@ -1,0 +1,237 @@
+"""``sd2 record``: a camera and a radar together, into one recording on one clock."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sd2core.cli.command_parser import add_command
+from sd2core.cli.output import counted, print_event, print_facts
+from sd2core.errors import Sd2Error
+from sd2core.options.kinds import Positive
+from sd2core.options.records import OptionError
+from sd2core.options.shared import Json
+from sd2core.runs.control import stop_signals
+
+if TYPE_CHECKING:
+    from sd2core.live.clocks import ClockLine
+    from sd2core.live.filming import Film
+    from sd2core.live.listening import Listening
+    from sd2core.live.recording import GrowingRecording
+    from sd2core.live.sources import Source
+
+_SIZE = re.compile(r"(\d{2,5})x(\d{2,5})")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record(Json):
+    """Options of ``sd2 record``.
+
+    Parameters
+    ----------
+    camera : SOURCE
+        a camera's number (0 is the first), the URL of a stream, a video file, which is played at
+        its rate, or `test`
+    radar : SOURCE
+        `test` (`test:20`: with 20 frames/s); a capture or recording, replayed at its own rate; or
+        with --setup the address of this computer that a DCA1000 sends to, ADDRESS[:PORT]
+    setup : FILE
+        the .cfg or .json that the radar runs with
+    out : NAME.sd2
+        the recording to write
+    size : WIDTHxHEIGHT
+        of the camera's pictures, where it can (default: as it comes)
+    rate : HZ
+        frames per second of the camera, where it can
+    exposure : VALUE
+        fixed exposure in the driver's own unit, where it can (default: the camera chooses)
+    camera_delay_ms : MS
+        from an exposure to the arrival of its picture, as measured (default: what is known of the
+        source: 0 for a camera)
+    radar_delay_ms : MS
+        from the middle of a frame's chirps to its arrival (default: half of them)
+    seconds : S
+        stop after so long (default: never)
+    previews
+        with --json, small pictures of the camera, and every column of the Doppler map
+    """
+
+    camera: str
+    radar: str
+    setup: Path | None = None
+    out: Path
+    size: str | None = None
+    rate: Positive | None = None
+    exposure: float | None = None
+    camera_delay_ms: float | None = None
+    radar_delay_ms: float | None = None
+    seconds: Positive | None = None
+    previews: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.previews and not self.json:
+            raise OptionError(
+                "--previews is given without --json", "both, for a program that reads them"
+            )
+        if self.size is not None and _SIZE.fullmatch(self.size) is None:
+            raise OptionError(f"--size is {self.size!r}", "WIDTHxHEIGHT, as in 1280x720")
+
+
+def add_commands(commands: argparse._SubParsersAction) -> None:
+    """Add ``record``."""
+    add_command(commands, "record", options=Record, handler=_record)
+
+
+def _record(options: Record) -> None:
+    """Record a camera and a radar together, on one clock.
+
+    Each frame of both has the time at which it arrived at this computer, less the delay
+    of its source; how fast the radar's clock runs is found from all arrivals. The
+    recording can be opened at any moment, aligned; `sd2 align` checks it by what both
+    saw. The video is encoded in a process of its own. Ctrl-C or q stops. Without
+    hardware: `test`.
+
+      sd2 record --camera test --radar test --out try.sd2 --seconds 10
+      sd2 record --camera 0 --size 1280x720 --rate 30 --radar 192.168.33.30
+                 --setup profile.cfg --out take.sd2
+      sd2 record --camera walk.mp4 --radar walk.sd2 --out again.sd2
+    """
+    from sd2core.cli.listen import Status, follow
+    from sd2core.live.filming import VIDEO_NAME, CameraChoice, Film
+    from sd2core.live.listening import Listening
+    from sd2core.live.recording import GrowingRecording
+
+    size = _SIZE.fullmatch(options.size) if options.size else None
+    choice = CameraChoice(
+        options.camera,
+        (int(size[1]), int(size[2])) if size else None,
+        options.rate,
+        options.exposure,
+    )
+    with contextlib.ExitStack() as stack:
+        source = _source(options)
+        stack.callback(source.close)
+        recording = GrowingRecording(options.out, keep_arrivals=True)
+        if recording.folder.exists():
+            raise Sd2Error(f"{recording.folder} exists", "a new folder", "Give another as --out")
+        stack.callback(recording.close)
+        listening = Listening(source, recording)
+        recording.folder.mkdir()
+        stack.callback(_remove_empty, recording.folder)
+        film = Film(choice, recording.folder / VIDEO_NAME, previews=options.previews)
+        stack.callback(film.stop)
+        take = _Take(options, source, recording, listening, film)
+        status = Status(listening, source, as_json=options.json, columns=options.previews)
+        status.more = take.progress
+        status.begin(recording.folder, False, f"{film.about}\n{source.about}")
+        # To be told to end is to be told to stop: what waits to be stored is stored.
+        with stop_signals() as told:
+            listening.start()
+            try:
+                follow(listening, status, options.seconds, told)
+            finally:
+                film.stop()
+                listening.stop()
+        status.end(recording.folder)
+        take.end()
+
+
+def _source(options: Record) -> Source:
+    from sd2core.cli.listen import dca1000, replayed
+    from sd2core.live.rehearsal import TEST, TEST_RATE_HZ, TestSource
+
+    if options.setup is not None:
+        return dca1000(options.radar, options.setup)
+    name, _, rate = options.radar.partition(":")
+    if name == TEST and (not rate or rate.isdecimal()):
+        return TestSource(float(rate or TEST_RATE_HZ))
+    return replayed(Path(options.radar))
+
+
+def _remove_empty(folder: Path) -> None:
+    """Remove the folder of a recording that did not begin."""
+    with contextlib.suppress(OSError):
+        folder.rmdir()
+
+
+class _Take:
+    """Video and radar of a recording, linked as soon as both are there."""
+
+    def __init__(
+        self,
+        options: Record,
+        source: Source,
+        recording: GrowingRecording,
+        listening: Listening,
+        film: Film,
+    ) -> None:
+        self._json = options.json
+        self._recording, self._listening, self._film = recording, listening, film
+        self._delays_s = tuple(
+            known_s if given_ms is None else 1e-3 * given_ms
+            for given_ms, known_s in (
+                (options.camera_delay_ms, film.delay_s),
+                (options.radar_delay_ms, source.delay_s),
+            )
+        )
+        self._linked = False
+
+    def progress(self) -> dict[str, Any]:
+        """What the camera has given; the first time there is something of both, they are linked."""
+        self._film.check()
+        filmed = self._film.filmed
+        if not self._linked and filmed.first_s is not None and self._recording.frames:
+            self._link()
+            self._linked = True
+        told: dict[str, Any] = {"pictures": filmed.recorded, "pictures_dropped": filmed.dropped}
+        if (preview := self._film.next_preview()) is not None:
+            told["preview"] = preview
+        return told
+
+    def end(self) -> None:
+        """Correct the clocks by all that arrived, and say what they are."""
+        from sd2core.live.clocks import correct_drift
+
+        filmed = self._film.filmed
+        if not (filmed.recorded and self._listening.counts.recorded):
+            return
+        line = self._link()
+        correct_drift(self._recording.radar, line)
+        if self._json:
+            print_event(
+                "clocks",
+                pictures=filmed.recorded,
+                pictures_dropped=filmed.dropped,
+                drift_ppm=line.drift_ppm,
+                jitter_s=line.jitter_s,
+            )
+            return
+        dropped = f", {filmed.dropped:,} dropped" if filmed.dropped else ""
+        print_facts(
+            "clocks",
+            {
+                "pictures": f"{counted(filmed.recorded, 'frame')}{dropped}",
+                "radar": f"runs {line.drift_ppm:+.1f} millionths slow, arrivals ± "
+                f"{1e3 * line.jitter_s:.1f} ms",
+                "delays": "camera {:g} ms, radar {:.1f} ms".format(
+                    *(1e3 * delay_s for delay_s in self._delays_s)
+                ),
+            },
+        )
+
+    def _link(self) -> ClockLine:
+        from sd2core.live.clocks import Clocks, link_clocks
+        from sd2core.live.filming import VIDEO_NAME
+        from sd2core.recording.recording import open_recording
+
+        first_s = self._film.filmed.first_s
+        assert first_s is not None
+        recording = open_recording(self._recording.folder)
+        recording.video = self._recording.folder / VIDEO_NAME
+        recording.simulated = recording.simulated or self._film.simulated
+        return link_clocks(recording, Clocks(first_s, *self._delays_s))

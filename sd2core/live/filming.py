@@ -1,0 +1,275 @@
+"""A camera's pictures into a video, in a process of its own.
+
+``python -m sd2core.live.filming`` reads its settings as one line of JSON, and films until its
+input ends. It says on its output, line by line, what it has: the times are those of the monotonic
+clock, which all processes of a computer share.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import queue
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.files.appended import AppendedFile
+from sd2core.io.video_writing import VideoEncoder
+from sd2core.live.cameras import Camera, open_camera
+
+VIDEO_NAME = "video.mp4"
+
+_CRF, _PRESET = 19, "superfast"
+_WAITING = 60
+"""Pictures that may wait for the encoder: two seconds."""
+_TELL_S = 0.1
+_LOOK_S = 1.0
+_PREVIEW_PX = 320
+_PREVIEW_QUALITY = 70
+_END_S = 20.0
+"""By then all that waited is encoded, or never will be."""
+
+
+@dataclass(frozen=True)
+class CameraChoice:
+    """Camera to film with, see :func:`~sd2core.live.cameras.open_camera`."""
+
+    name: str
+    size_px: tuple[int, int] | None = None
+    rate_hz: float | None = None
+    exposure: float | None = None
+
+    def open(self) -> Camera:
+        """Open it."""
+        size_px = None if self.size_px is None else (self.size_px[0], self.size_px[1])
+        return open_camera(self.name, size_px, self.rate_hz, self.exposure)
+
+
+@dataclass
+class Filmed:
+    """What a camera has given so far."""
+
+    recorded: int = 0
+    dropped: int = 0  # the encoder was too slow
+    first_s: float | None = None  # arrival of the first picture
+    last_s: float = 0.0
+    put_back: int = 0  # times that the video was deleted, and written again
+
+
+class Film:
+    """A camera that is filmed in a process of its own.
+
+    Parameters
+    ----------
+    choice : CameraChoice
+    video : path
+        File to write, in a folder that exists.
+    previews : bool
+        True if small pictures are wanted, too.
+
+    Raises
+    ------
+    Sd2Error
+        If the camera cannot be opened.
+    """
+
+    def __init__(self, choice: CameraChoice, video: Path, *, previews: bool = False) -> None:
+        self.filmed = Filmed()
+        self._preview: str | None = None
+        self.about = ""
+        self.delay_s = 0.0
+        self.simulated = False
+        self._error: Sd2Error | None = None
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "sd2core.live.filming"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+            start_new_session=True,  # Ctrl-C is for the one that films, who ends it
+        )
+        settings = {"camera": asdict(choice), "video": str(video), "previews": previews}
+        self._send(json.dumps(settings))
+        self._hear()
+        if self._error is not None:
+            self._process.wait()
+            raise self._error
+        self._reader = threading.Thread(target=self._hear_all, name="sd2-film", daemon=True)
+        self._reader.start()
+
+    @property
+    def is_over(self) -> bool:
+        """True once the camera gives no more, or filming has failed."""
+        return not self._reader.is_alive()
+
+    def next_preview(self) -> str | None:
+        """Newest small picture that was not asked for before, as JPEG in base64."""
+        preview, self._preview = self._preview, None
+        return preview
+
+    def check(self) -> None:
+        """Raise what has stopped filming."""
+        if self._error is not None:
+            raise self._error
+
+    def stop(self) -> None:
+        """Stop, and wait until all pictures are in the video."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._reader.join(_END_S)
+        try:
+            self._process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+        assert self._process.stdout is not None
+        self._process.stdout.close()
+        self.check()
+
+    def _send(self, line: str) -> None:
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(line + "\n")
+            self._process.stdin.flush()
+        except OSError:
+            self._error = self._error or Sd2Error("The process that films has ended")
+
+    def _hear(self) -> bool:
+        """Take one line; False at the end."""
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line:
+            if self._process.wait() and self._error is None:
+                self._error = Sd2Error("The process that films was stopped from outside")
+            return False
+        told = json.loads(line)
+        match told.pop("event"):
+            case "camera":
+                self.about, self.delay_s = told["about"], told["delay_s"]
+                self.simulated = told["simulated"]
+            case "filmed":
+                picture = told.pop("picture", None)
+                self.filmed = Filmed(**told)
+                self._preview = picture or self._preview
+            case "failed":
+                self._error = Sd2Error(**told)
+        return True
+
+    def _hear_all(self) -> None:
+        while self._hear():
+            pass
+
+
+def main() -> int:
+    """Film as the first line of the input says, until the input ends."""
+    settings = json.loads(sys.stdin.readline())
+    try:
+        camera = CameraChoice(**settings["camera"]).open()
+    except (Sd2Error, OSError) as error:
+        return _failed(error)
+    _tell("camera", about=camera.about, delay_s=camera.delay_s, simulated=camera.simulated)
+    try:
+        _Filming(camera, Path(settings["video"]), previews=settings["previews"]).run()
+    except (Sd2Error, OSError) as error:
+        return _failed(error)
+    return 0
+
+
+def _failed(error: Sd2Error | OSError) -> int:
+    told = vars(error) if isinstance(error, Sd2Error) else {"found": str(error)}
+    _tell("failed", **told)
+    return 1
+
+
+class _Filming:
+    """Pictures on their way from the camera, in a thread of its own, to the encoder."""
+
+    def __init__(self, camera: Camera, video: Path, *, previews: bool) -> None:
+        self._camera, self._previews = camera, previews
+        self._file = AppendedFile(video)
+        self._encoder = VideoEncoder(
+            self._file, camera.rate_hz, camera.size_px, crf=_CRF, preset=_PRESET, grows=True
+        )
+        self._pictures: queue.Queue[tuple[NDArray[np.uint8], float] | None]
+        self._pictures = queue.Queue(_WAITING)
+        self._stop = threading.Event()
+        self._filmed = Filmed()
+        self._told_s = self._looked_s = 0.0
+
+    def run(self) -> None:
+        """Film until the input ends or the camera does."""
+        for target in (self._wait_for_end, self._take_pictures):
+            threading.Thread(target=target, daemon=True).start()
+        while (taken := self._pictures.get()) is not None:
+            self._encode(*taken)
+        self._encoder.close()
+        self._look()
+        self._file.close()
+        self._camera.close()
+        self._tell_progress(None)
+
+    def _wait_for_end(self) -> None:
+        sys.stdin.read()
+        self._stop.set()
+
+    def _take_pictures(self) -> None:
+        while not self._stop.is_set() and (taken := self._camera.read()) is not None:
+            try:
+                self._pictures.put_nowait(taken)
+            except queue.Full:
+                self._filmed.dropped += 1
+        self._pictures.put(None)
+
+    def _encode(self, picture: NDArray[np.uint8], taken_s: float) -> None:
+        filmed = self._filmed
+        if filmed.first_s is None:
+            filmed.first_s = taken_s
+        self._encoder.add(picture, taken_s - filmed.first_s)
+        filmed.recorded += 1
+        filmed.last_s = taken_s
+        now_s = time.monotonic()
+        if now_s > self._looked_s + _LOOK_S:
+            self._looked_s = now_s
+            self._look()
+        if now_s > self._told_s + _TELL_S:
+            self._told_s = now_s
+            self._tell_progress(picture if self._previews else None)
+
+    def _look(self) -> None:
+        """Put the video back if somebody has deleted it."""
+        if not self._file.is_there:
+            self._file.put_back()
+            self._filmed.put_back += 1
+
+    def _tell_progress(self, picture: NDArray[np.uint8] | None) -> None:
+        told: dict[str, Any] = asdict(self._filmed)
+        if picture is not None:
+            told["picture"] = base64.b64encode(_small(picture)).decode("ascii")
+        _tell("filmed", **told)
+
+
+def _small(picture: NDArray[np.uint8]) -> bytes:
+    """Preview of a picture, as JPEG."""
+    import cv2
+
+    height, width = picture.shape[:2]
+    size = (_PREVIEW_PX, max(round(_PREVIEW_PX * height / width), 1))
+    small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+    made = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _PREVIEW_QUALITY])
+    return bytes(made[1].data)
+
+
+def _tell(event: str, **about: Any) -> None:
+    print(json.dumps({"event": event, **about}), flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
