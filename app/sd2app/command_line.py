@@ -6,11 +6,12 @@ import argparse
 import os
 import signal
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from sd2app.displays import has_display, silent_displays
 from sd2app.plain_imports import plain_imports
 from sd2app.system_libraries import explain_missing, missing_libraries
 from sd2core.cli import build_parser, run
@@ -25,6 +26,7 @@ _EXAMPLES = """\
   sd2 demo                                    look at the bundled sample recording
   sd2 open walk.sd2                           look at a recording, a video or a mesh
 """
+_WITHOUT_DISPLAY = "Draw the same window into a picture with --screenshot FILE.png"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,7 +154,14 @@ def _show(paths: Sequence[Path], screenshot: Path | None) -> int:
     elif not has_display(sys.platform, os.environ):
         raise Sd2Error(
             "There is no display to open a window on",
-            remedy="Draw the same window into a picture with --screenshot FILE.png",
+            remedy=_WITHOUT_DISPLAY,
+        )
+    elif silent := silent_displays(sys.platform, os.environ):
+        raise Sd2Error(
+            f"The display cannot be reached: {', '.join(silent)}",
+            "a display that answers",
+            "Begin the session again that it belonged to (such as ssh -X), or unset the variable."
+            f" {_WITHOUT_DISPLAY}",
         )
     if missing := missing_libraries():
         raise explain_missing(missing)
@@ -165,14 +174,6 @@ def _show(paths: Sequence[Path], screenshot: Path | None) -> int:
         return run_window(paths, screenshot=screenshot, parser=full_parser)
     finally:
         signal.signal(signal.SIGINT, previous)
-
-
-def has_display(platform: str, environment: Mapping[str, str]) -> bool:
-    """True if Qt finds a screen, or its platform is set explicitly."""
-    if not platform.startswith("linux"):
-        return True
-    names = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
-    return any(environment.get(name) for name in names)
 
 
 if __name__ == "__main__":

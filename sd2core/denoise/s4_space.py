@@ -98,7 +98,16 @@ class StateSpace(Keeping):
             self.outputs = nn.Parameter(torch.randn(channels, pairs, 2) * math.sqrt(0.5))
 
     def dt(self) -> Tensor:
-        """Step size Δ per channel, (H,) float64, within `STEP_RANGE`."""
+        """Step size Δ per channel, (H,) float64, within `STEP_RANGE`.
+
+        Kernel and recurrence begin with it: Sd2Error where the parameters are of half precision.
+        """
+        if self.log_dt.dtype not in (torch.float32, torch.float64):
+            raise Sd2Error(
+                f"The parameters of a state space are {self.log_dt.dtype}",
+                "float32 or float64: half precision is too coarse for its poles",
+                "Keep the network in float32 and run it under torch.autocast",
+            )
         low, high = (math.log(step) for step in STEP_RANGE)
         return self.log_dt.double().clamp(low, high).exp()
 
@@ -114,12 +123,13 @@ class StateSpace(Keeping):
 
     def forward(self, length: int) -> Tensor:
         """Work out the kernel anew: `kernel` without what is kept."""
+        dt = self.dt()
         if self.kernel_name == "legs":
-            kernel = legs_kernel(self.outputs, self.dt(), length, self.matrix())
+            kernel = legs_kernel(self.outputs, dt, length, self.matrix())
         else:
             outputs = torch.view_as_complex(self.outputs)
             ones = torch.ones_like(outputs)
-            kernel = diagonal_kernel(self.poles(), ones, outputs, self.dt(), length)
+            kernel = diagonal_kernel(self.poles(), ones, outputs, dt, length)
         return torch.cat((kernel[:, :1] + self.skip[:, None], kernel[:, 1:]), 1)
 
     # What follows from the parameters alone is kept while nothing is being learned.

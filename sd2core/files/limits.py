@@ -1,8 +1,9 @@
-"""Limits on what is opened and read: regular files, and sizes judged before they are believed."""
+"""Limits on what is opened and read: files of data, and sizes judged before they are believed."""
 
 from __future__ import annotations
 
 import os
+import re
 import stat
 from pathlib import Path
 from typing import BinaryIO
@@ -13,6 +14,9 @@ VARIABLE = "SD2_READ_LIMIT_GB"
 """Environment variable that raises the limit for commands and the window."""
 DEFAULT_LIMIT_BYTES = 256 * 10**6
 _FEW_CHUNKS = 10_000
+_LOOKED_AT_BYTES = 512
+_LFS_POINTER = b"version https://git-lfs.github.com/spec/"
+_HTML = re.compile(rb"(\xef\xbb\xbf)?\s*(<!--.*?-->\s*)*<(!doctype\s+html|html)\b", re.I | re.S)
 MULTIPLE = 50
 """Size that numbers may have, as a multiple of the file that holds them, above the limit."""
 
@@ -70,19 +74,47 @@ def check_chunk_count(place: str | Path, declared: int, stored: int) -> None:
 
 
 def check_regular(path: Path) -> None:
-    """Raise Sd2Error if a path is a pipe, a device or a socket, which may never end.
+    """Raise Sd2Error if a path is no file of data: the door that all readers go through.
 
-    A path at which there is nothing is not refused here, but by whoever opens it.
+    That is a pipe, a device or a socket, which may never end; and what stands under the name of
+    a file that was not fetched: a pointer of Git LFS, or a page of a web site. A path at which
+    there is nothing is not refused here, but by whoever opens it.
     """
     try:
         mode = path.stat().st_mode
     except (OSError, ValueError):
         return
-    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+    if stat.S_ISREG(mode):
+        check_fetched(path)
+    elif not stat.S_ISDIR(mode):
         raise Sd2Error(
             f"{path} is {_KINDS.get(stat.S_IFMT(mode), 'a special file')}",
             "a regular file or a folder",
             "Copy what it gives into a file, and name that",
+        )
+
+
+def check_fetched(path: Path | None) -> None:
+    """Raise Sd2Error if a file is a pointer of Git LFS, or a web page."""
+    if path is None:
+        return
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(_LOOKED_AT_BYTES)
+    except OSError:  # said by whoever opens it
+        return
+    if start.startswith(_LFS_POINTER):
+        raise Sd2Error(
+            f"{path} is a pointer of Git LFS: the repository was cloned without its large files",
+            "the file that it stands for",
+            "Run `git lfs install` and `git lfs pull` in the repository, or download the file from"
+            " its page",
+        )
+    if _HTML.match(start):
+        raise Sd2Error(
+            f"{path} is a web page (HTML), saved under the name of a file",
+            "the file itself",
+            "Download it again: by its raw link, after signing in if the site asks for it",
         )
 
 

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import (
     check_chunk_count,
+    check_fetched,
     check_regular,
     check_regular_within,
     check_size,
@@ -258,6 +259,7 @@ def open_group(path: Path, mode: Literal["r", "r+"] = "r") -> Any:
             for name in _DESCRIPTIONS:
                 for description in (*path.glob(name), *path.glob(f"*/{name}")):
                     check_size(description, _PARSED * description.stat().st_size)
+                    check_fetched(next(filter(_is_chunk, description.parent.rglob("*")), None))
         group = zarr.open_group(ZipStore(path, mode="r") if packed else str(path), mode=mode)
         _check_declared(group, path, files)
     except Sd2Error:
@@ -265,6 +267,10 @@ def open_group(path: Path, mode: Literal["r", "r+"] = "r") -> Any:
     except Exception as error:  # damaged descriptions fail in many ways
         raise _no_group(path, error) from error
     return group
+
+
+def _is_chunk(path: Path) -> bool:
+    return path.is_file() and path.name not in _DESCRIPTIONS
 
 
 def _check_declared(group: Any, path: Path, files: int) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 import zipfile
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -40,6 +42,10 @@ SMALL_NAMES = (
     *("vertex_counts", "present", "limbs"),
 )
 
+_PARAMETER = re.compile(
+    r"^(smplx?|smpl_.*|poses?|betas|thetas|(root|global)_orient|body_pose|transl?|pose_body)$"
+)
+"""Names of arrays that describe a body of the SMPL family, among others."""
 _CHUNK_BYTES = 2 * 2**20
 _WHOLE_CHECK_BYTES = 128 * 2**20
 """Size of the vertices on disk up to which all are checked when a mesh is opened."""
@@ -73,15 +79,36 @@ def read_npz(path: Path) -> RawMesh:
     return named_arrays(arrays, names, str(path))
 
 
+def no_vertices(source: str, names: Sequence[str]) -> Sd2Error:
+    """Error for a file that holds no vertices, by the names of what it holds."""
+    shown = ", ".join(names[:12]) or "nothing"
+    if any(_PARAMETER.search(name) for name in names):
+        return Sd2Error(
+            f"{source} holds body parameters and no vertices ({shown}), as AMASS, AIST++, GVHMR,"
+            " 4D-Humans (PHALP) and other SMPL tools write them",
+            "vertices, or the model of the body that makes them of the parameters",
+            "Give the model file with sd2 import --body-model, or let that tool export one OBJ per"
+            " frame and open the folder",
+        )
+    if list(names) == ["results"]:
+        return Sd2Error(
+            f"{source} holds 'results', Python objects as ROMP and BEV save them",
+            "plain arrays",
+            "Write its vertices anew: r = numpy.load(FILE, allow_pickle=True)['results'][()];"
+            " numpy.savez('mesh.npz', vertices=r['verts'] + r['cam_trans'][:, None], fps=30)",
+        )
+    return Sd2Error(
+        f"{source} holds {shown}",
+        "'vertices' (or 'verts') of shape (frames, vertices, 3), in a pickle perhaps per person",
+        "Save them as numpy.savez('mesh.npz', vertices=verts, faces=faces, times_s=times)",
+    )
+
+
 def named_arrays(arrays: dict[str, Any], names: list[str], source: str) -> RawMesh:
     """Pick vertices, faces, times and rate out of arrays by their names."""
     vertices = _first(arrays, VERTEX_NAMES)
     if vertices is None:
-        raise Sd2Error(
-            f"{source} holds {', '.join(sorted(names)) or 'nothing'}",
-            "an array 'vertices' (or 'verts') of shape (frames, vertices, 3)",
-            "Rename the array where the file is written",
-        )
+        raise no_vertices(source, sorted(names))
     times = _first(arrays, TIME_NAMES)
     rate = _first(arrays, RATE_NAMES)
     held = [name for name in UNCERTAINTY_NAMES if name in arrays]

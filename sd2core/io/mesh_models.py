@@ -16,11 +16,17 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_size
-from sd2core.io.mesh_arrays import FACE_NAMES, RATE_NAMES, TIME_NAMES, VERTEX_NAMES, RawMesh
+from sd2core.io.mesh_arrays import (
+    FACE_NAMES,
+    RATE_NAMES,
+    TIME_NAMES,
+    VERTEX_NAMES,
+    RawMesh,
+    no_vertices,
+)
 from sd2core.io.pickles import read_pickle
 
 _AT_ROOT_M = 0.6
-_PARAMETERS = ("smpl", "body_pose", "pose", "betas", "global_orient")
 
 
 def read_model_output(
@@ -58,7 +64,8 @@ def read_model_output(
             and _vertices_of(value) is not None
         }
         if not people:
-            raise _no_vertices(path, content)
+            first = next((one for one in content.values() if isinstance(one, dict)), content)
+            raise no_vertices(str(path), [str(one) for one in first if isinstance(one, str | int)])
         entry = _choose(path, people, person, notes)
     raw = RawMesh(vertices=_stacked(_vertices_of(entry), path), notes=notes)
     raw.faces = _array(entry, content, FACE_NAMES)
@@ -272,25 +279,4 @@ def _place_in_front(
         f"The body is placed by the file's weak-perspective camera, focal length {focal:.0f} "
         f"px{assumed}, at {np.median(shift_m[:, 2]):.2f} m. Its depth follows the size of the box "
         "and jitters: smooth the trajectory before reading velocities along the line of sight."
-    )
-
-
-def _no_vertices(path: Path, content: dict[Any, Any]) -> Sd2Error:
-    first = next((v for v in content.values() if isinstance(v, dict)), content)
-    keys = (
-        ", ".join(str(key) for key in list(first)[:12] if isinstance(key, str | int)) or "nothing"
-    )
-    if any(name in first for name in _PARAMETERS):
-        return Sd2Error(
-            f"{path} holds body parameters and no vertices ({keys}), as 4D-Humans (PHALP) and "
-            "SMPL tools write them",
-            "vertices: making them needs the licensed SMPL model",
-            "Let that tool export one OBJ per frame and open the folder, or save its vertices as "
-            "numpy.savez('mesh.npz', vertices=verts, faces=faces, times_s=times)",
-        )
-    return Sd2Error(
-        f"{path} holds {keys}",
-        "'verts' or 'vertices' of shape (frames, vertices, 3), for one person or one entry per "
-        "person",
-        "Save them as numpy.savez('mesh.npz', vertices=verts, faces=faces, times_s=times)",
     )

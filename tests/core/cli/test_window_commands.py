@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import socket
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -10,7 +11,7 @@ from types import ModuleType
 import pytest
 from cli_outcome import Sd2
 
-from sd2app.command_line import has_display
+from sd2app.displays import has_display, silent_displays
 from sd2core.files.resources import is_bundled, resource_path
 from sd2core.recording.recording import open_recording
 
@@ -51,6 +52,49 @@ def no_display(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_display(platform: str, environment: dict[str, str], expected: bool) -> None:
     assert has_display(platform, environment) is expected
+
+
+@pytest.mark.parametrize(
+    ("environment", "silent"),
+    [
+        ({"DISPLAY": ":1977"}, ("DISPLAY=:1977",)),
+        ({"WAYLAND_DISPLAY": "gone"}, ("WAYLAND_DISPLAY=gone",)),
+        (
+            {"WAYLAND_DISPLAY": "gone", "DISPLAY": ":1977"},
+            ("WAYLAND_DISPLAY=gone", "DISPLAY=:1977"),
+        ),
+        ({"QT_QPA_PLATFORM": "xcb"}, ("DISPLAY=",)),
+        ({"QT_QPA_PLATFORM": "xcb;offscreen", "DISPLAY": ":1977"}, ()),
+        ({"QT_QPA_PLATFORM": "offscreen", "DISPLAY": ":1977"}, ()),
+        ({}, ()),
+    ],
+)
+def test_displays_that_do_not_answer(
+    environment: dict[str, str], silent: tuple[str, ...], tmp_path: Path
+) -> None:
+    environment["XDG_RUNTIME_DIR"] = str(tmp_path)
+    assert silent_displays("linux", environment) == silent
+    assert silent_displays("darwin", environment) == ()
+
+
+def test_one_display_that_answers_is_enough(tmp_path: Path) -> None:
+    environment = {"DISPLAY": ":1977", "WAYLAND_DISPLAY": "way", "XDG_RUNTIME_DIR": str(tmp_path)}
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(tmp_path / "way"))
+        server.listen()
+        assert silent_displays("linux", environment) == ()
+
+
+@pytest.mark.usefixtures("no_display")
+def test_a_display_that_is_gone_is_named(
+    sd2: Sd2, window: list, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DISPLAY", ":1977")
+    outcome = sd2("demo")
+    assert outcome.code == 1
+    assert "DISPLAY=:1977" in outcome.err
+    assert "--screenshot FILE.png" in outcome.err
+    assert not window
 
 
 @pytest.mark.usefixtures("no_display")

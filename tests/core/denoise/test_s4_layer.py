@@ -335,3 +335,21 @@ class TestKept:
             assert len(pickle.dumps(layer)) == unused
             copied = copy.deepcopy(layer)
             assert torch.equal(copied(x), true)
+
+
+@pytest.mark.parametrize("precision", [torch.float16, torch.bfloat16])
+@pytest.mark.parametrize("kernel", ["legs", "diagonal"])
+def test_half_precision_is_refused_and_autocast_is_the_way(
+    kernel: Kernel, precision: torch.dtype
+) -> None:
+    layer, signal = S4Layer(2, state_size=8, kernel=kernel).eval(), torch.randn(1, 40, 2)
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        assert layer(signal).isfinite().all()
+    layer.to(precision)
+    for run in (
+        lambda: layer(signal.to(precision)),
+        lambda: layer.initial_state(1),
+        lambda: layer.chunk(signal.to(precision), torch.zeros(2, 1, 8, dtype=torch.float64)),
+    ):
+        with pytest.raises(Sd2Error, match=r"float32 or float64.*autocast"):
+            run()

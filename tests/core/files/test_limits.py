@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from sd2core.errors import Sd2Error
@@ -16,7 +17,13 @@ from sd2core.files.limits import (
     check_size,
     read_limit_bytes,
 )
+from sd2core.files.texts import read_text
 from sd2core.io.kinds import kind_of
+from sd2core.io.mesh import load_mesh, save_mesh
+from sd2core.io.radar import load_capture
+from sd2core.maps import DopplerMap
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.timebase import Timebase
 
 
 @pytest.fixture
@@ -69,3 +76,58 @@ def test_a_limit_that_is_no_size_is_refused(text: str, monkeypatch: pytest.Monke
     monkeypatch.setenv(VARIABLE, text)
     with pytest.raises(Sd2Error, match=f"{VARIABLE} is '{text}'"):
         read_limit_bytes()
+
+
+POINTER = (
+    "version https://git-lfs.github.com/spec/v1\n"
+    "oid sha256:4d7a214614ab2935c943f9e0ff69d22eadbb8f32b1258daaa5e2ca24d17e2393\nsize 12345678\n"
+)
+PAGE = "\n<!-- served -->\n<!DOCTYPE html>\n<html><head><title>Sign in</title></head></html>"
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["a.npz", "a.npy", "a.pkl", "a.mp4", "a.h5", "a.csv", "a.obj", "a.ply", "a.glb", "a.bin",
+     "a.zarr.zip", "a.safetensors", "a.sto", "a.sigmf-meta", "recording.json", "a.unheard"],
+)  # fmt: skip
+@pytest.mark.parametrize(("content", "told"), [(POINTER, "git lfs pull"), (PAGE, "web page")])
+def test_what_was_not_fetched_is_named_whatever_it_is_called(
+    tmp_path: Path, name: str, content: str, told: str
+) -> None:
+    (tmp_path / name).write_text(content)
+    with pytest.raises(Sd2Error, match=told):
+        kind_of(tmp_path / name)
+
+
+@pytest.mark.parametrize("content", [POINTER, PAGE])
+def test_readers_of_their_own_name_what_was_not_fetched(tmp_path: Path, content: str) -> None:
+    def at(name: str) -> Path:
+        (tmp_path / name).write_text(content)
+        return tmp_path / name
+
+    (tmp_path / "adc_data.bin").write_bytes(bytes(64))
+    for read, path in (
+        (load_mesh, at("a.obj")),
+        (load_mesh, at("a.npz")),
+        (load_capture, at("adc_data.cfg").with_suffix(".bin")),
+        (lambda path: read_text(path, "labels"), at("labels.eaf")),
+        (DopplerMap.load, at("map.npz")),
+    ):
+        with pytest.raises(Sd2Error, match=r"Git LFS|web page"):
+            read(path)
+
+
+def test_a_store_whose_chunks_were_not_fetched_is_told(tmp_path: Path) -> None:
+    store = tmp_path / "a.zarr"
+    points, corners = np.zeros((4, 8, 3), np.float32), np.array([[0, 1, 2]])
+    save_mesh(MeshSequence(points, corners, Timebase([0.0, 0.1, 0.2, 0.3])), store)
+    for chunk in (store / "vertices").rglob("*"):
+        if chunk.is_file() and chunk.suffix != ".json":
+            chunk.write_text(POINTER)
+    with pytest.raises(Sd2Error, match="git lfs pull"):
+        load_mesh(store)
+
+
+def test_a_text_about_web_pages_is_no_web_page(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("tag,meaning\n<html>,a page\n")
+    check_regular(tmp_path / "a.csv")

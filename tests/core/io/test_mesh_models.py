@@ -204,7 +204,7 @@ def test_body_parameters_without_vertices_are_explained(tmp_path: Path) -> None:
 
 def test_a_pickle_without_vertices_says_what_it_holds(tmp_path: Path) -> None:
     (tmp_path / "a.pkl").write_bytes(pickle.dumps({"images": 1, "names": 2}))
-    with pytest.raises(Sd2Error, match=r"a\.pkl holds images, names.*'verts' or 'vertices'"):
+    with pytest.raises(Sd2Error, match=r"a\.pkl holds images, names.*'vertices' \(or 'verts'\)"):
         load_mesh(tmp_path / "a.pkl")
     (tmp_path / "a.pkl").write_bytes(pickle.dumps("hello"))
     with pytest.raises(Sd2Error, match=r"a\.pkl: the vertices are a str"):
@@ -266,3 +266,27 @@ def test_frame_ids_that_are_no_numbers_are_named(tmp_path: Path, ids: Any) -> No
     path.write_bytes(pickle.dumps({"verts": np.ones((4, 5, 3)), "frame_ids": ids}))
     with pytest.raises(Sd2Error, match=r"w\.pkl: frame_ids are no numbers of frames"):
         read_model_output(path)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("poses", "betas", "trans", "mocap_framerate"),
+        ("smpl_poses", "smpl_trans", "smpl_scaling"),
+        ("root_orient", "pose_body", "trans"),
+    ],
+)
+def test_parameters_in_an_npz_are_named_with_the_way_to_vertices(
+    tmp_path: Path, names: tuple[str, ...]
+) -> None:
+    np.savez(tmp_path / "a.npz", **{name: np.zeros((3, 3)) for name in names})
+    with pytest.raises(Sd2Error, match=rf"body parameters.*{names[0]}.*--body-model") as caught:
+        load_mesh(tmp_path / "a.npz")
+    assert "Rename" not in str(caught.value)
+
+
+def test_results_of_romp_are_named(tmp_path: Path) -> None:
+    people = {"verts": np.zeros((2, 5, 3)), "cam_trans": np.zeros((2, 3))}
+    np.savez(tmp_path / "video_results.npz", results=np.array(people, dtype=object))
+    with pytest.raises(Sd2Error, match=r"ROMP.*\['results'\].*numpy\.savez"):
+        load_mesh(tmp_path / "video_results.npz")
