@@ -64,8 +64,11 @@ def read_content(path: Path, expected: str) -> bytes:
         raise Sd2Error(f"{path} cannot be read: {reason}", expected) from error
 
 
-def read_text(path: Path, expected: str) -> str:
+def read_text(path: Path, expected: str, *, errors: str = "strict") -> str:
     """Read a text in UTF-8, or in UTF-16 with a byte order mark; line ends stay as they are.
+
+    With ``errors="replace"`` what is in another encoding becomes signs of replacement: for files
+    whose comments alone hold more than ASCII.
 
     Raises Sd2Error as :func:`read_content`, and when the file is no such text or empty.
     """
@@ -76,7 +79,7 @@ def read_text(path: Path, expected: str) -> str:
             content, encoding = content[len(mark) :], name
     remedy = "Save it as UTF-8"
     try:
-        text = content.decode(encoding)
+        text = content.decode(encoding, errors)
     except UnicodeDecodeError as error:
         raise Sd2Error(
             f"{path} is not {encoding.upper()}: byte {error.start} is {content[error.start]:#04x}",

@@ -111,6 +111,20 @@ class _Chirp(_Part):
     txEnable: Mask
 
 
+class _Code(_Part):
+    """Phases that transmitters have in some chirps, whatever their names."""
+
+    model_config = ConfigDict(extra="allow")
+
+    chirpStartIdx: int
+    chirpEndIdx: int
+
+    def phases(self) -> tuple[str, ...]:
+        """Phases by name; those that are not 0."""
+        told = (self.model_extra or {}).items()
+        return tuple(f"{name} {value}" for name, value in told if _number(value) != 0)
+
+
 class _Frame(_Part):
     chirpStartIdx: int
     chirpEndIdx: int
@@ -126,6 +140,8 @@ class _Device(_Part):
     profiles: list[_Profile] = _at("rfConfig", "rlProfiles", min_length=1)
     chirps: list[_Chirp] = _at("rfConfig", "rlChirps", min_length=1)
     frame: _Frame = _at("rfConfig", "rlFrameCfg_t")
+    signs: list[dict[str, _Code]] = _at("rfConfig", "rlBpmChirps", default_factory=list)
+    shifts: list[dict[str, _Code]] = _at("rfConfig", "rlRfPhaseShiftCfgs", default_factory=list)
     swapped: int = _at("rawDataCaptureConfig", "rlDevDataFmtCfg_t", "iqSwapSel", default=0)
     interleaved: int = _at("rawDataCaptureConfig", "rlDevDataFmtCfg_t", "chInterleave")
     laneEn: Mask = _at("rawDataCaptureConfig", "rlDevLaneEnable_t", "laneEn")
@@ -135,34 +151,50 @@ class _Device(_Part):
 
 
 def _of_cfg(path: Path) -> TiSetup:
-    text = read_text(path, _CFG)
+    text = read_text(path, _CFG, errors="replace")  # comments are in any encoding
+    if text.lstrip().startswith("{"):
+        if "mmWaveDevices" in text:
+            return _of_json(path)
+        raise Sd2Error(
+            "It is JSON, as pymmw keeps it, which fills in masks only as it sends the commands",
+            f"{_CFG}: lines of commands, such as 'channelCfg 15 1 0'",
+            "Write the commands that were sent into a .cfg, one a line",
+        )
     commands: dict[str, list[list[str]]] = {}
     for line in text.splitlines():
-        words = line.split("%")[0].split()
+        words = re.split("%|#|//", line, maxsplit=1)[0].split()
         if words:
             commands.setdefault(words[0], []).append(words[1:])
     for name in ("advFrameCfg", "subFrameCfg"):
         if name in commands:
             raise Sd2Error(f"{name} makes frames of several kinds", "frameCfg")
+    # bpmCfg <subFrameIdx> <enabled> <chirp0Idx> <chirp1Idx>; the first SDK had no subframes.
+    if any(words[-3] != 0 for words in _all_numbers(commands, "bpmCfg", 3, needed=False)):
+        raise _coded("bpmCfg reverses a transmitter in some chirps of a loop (BPM)")
     channels = _numbers(commands, "channelCfg", 2)
     adc = _numbers(commands, "adcCfg", 2)
-    buffer = _numbers(commands, "adcbufCfg", 4)
+    swapped, interleaved = _buffer(_numbers(commands, "adcbufCfg", 4))
     frame = _numbers(commands, "frameCfg", 5)
     for words in commands.get("lvdsStreamCfg", ()):
-        if len(words) > 1 and words[1] != "0":
+        header, kind = [*words[1:3], "0", "0"][:2]
+        if header != "0" or kind == "4":  # CP_ADC_CQ
             raise Sd2Error(
-                "lvdsStreamCfg sends a header with every chirp",
-                "samples only, enableHeader 0",
-                "Record again without the header",
+                f"lvdsStreamCfg sends {'a header' if header != '0' else 'other data'} with every"
+                " chirp",
+                "samples only: enableHeader 0, dataFmt 1",
+                "Record again without",
             )
-    platform = re.search(r"xWR(\d\d)", text)
+    platform = re.search(r"[xIA]WR(\d\d)", text, re.IGNORECASE)
     notes = []
-    if platform is None:
+    if platform is not None:
+        lanes = 4 if platform[1] in ("12", "14", "22") else 2
+    else:
+        lanes = 4 if interleaved == 0 else 2
         notes.append(
-            "The .cfg does not say its platform; two lanes of LVDS are assumed, those of all"
-            " devices but xWR12xx and xWR14xx. A line '% Platform:xWR14xx' says otherwise."
+            f"The .cfg does not say its platform; {lanes} lanes of LVDS are assumed, as receivers"
+            f" {'are' if interleaved == 0 else 'are not'} interleaved. A line '% Platform:xWR14xx'"
+            " says otherwise."
         )
-    lanes = 4 if platform is not None and platform[1] in ("12", "14", "22") else 2
     profiles = [
         _Profile.model_construct(
             profileId=int(one[0]),
@@ -199,21 +231,40 @@ def _of_cfg(path: Path) -> TiSetup:
             numFrames=int(frame[3]),
             framePeriodicity_msec=frame[4],
         ),
-        swapped=int(buffer[2]),
-        interleaved=int(buffer[3]),
+        swapped=swapped,
+        interleaved=interleaved,
+        signs=[],
+        shifts=[],
     )
     return _setup(device, lanes, notes)
+
+
+def _buffer(numbers: list[float]) -> tuple[int, int]:
+    """SampleSwap and ChanInterleave of ``adcbufCfg``.
+
+    ``[<subFrameIdx>] <adcOutputFmt> <SampleSwap> <ChanInterleave> <ChirpThreshold>``: four values
+    on xWR14xx and in the first SDK, which knew no subframes, five since.
+    """
+    told = numbers if len(numbers) == 4 else numbers[1:]
+    if any(one not in (0, 1) for one in told[:3]):
+        raise Sd2Error(
+            f"adcbufCfg is {' '.join(f'{one:g}' for one in numbers)}",
+            "format, swap and interleave of 0 or 1, before them -1 where there are five values",
+        )
+    return int(told[1]), int(told[2])
 
 
 def _numbers(commands: dict[str, list[list[str]]], name: str, least: int) -> list[float]:
     return _all_numbers(commands, name, least)[-1]  # the last one holds
 
 
-def _all_numbers(commands: dict[str, list[list[str]]], name: str, least: int) -> list[list[float]]:
-    if name not in commands:
+def _all_numbers(
+    commands: dict[str, list[list[str]]], name: str, least: int, *, needed: bool = True
+) -> list[list[float]]:
+    if needed and name not in commands:
         raise Sd2Error(f"There is no {name}", f"{_CFG} as it was sent to the radar")
     found = []
-    for words in commands[name]:
+    for words in commands.get(name, ()):
         try:
             numbers = [float(word) for word in words]
         except ValueError:
@@ -282,6 +333,8 @@ def _setup(device: _Device, lanes: int, notes: list[str]) -> TiSetup:
             "one transmitter each, in turns, or the same ones for all",
             "Record with transmitters that take turns (TDM)",
         )
+    if same:
+        _refuse_codes(device, frame.chirpStartIdx, frame.chirpEndIdx)
     transmitters = 1 if same else len(turns)
     chirp_s = (
         profile.idleTimeConst_usec * 1e-6
@@ -340,3 +393,32 @@ def _turns(chirps: list[_Chirp], first: int, last: int) -> list[_Chirp]:
     if len({(one.profileId, one.idleTimeVar_usec) for one in found}) > 1:
         raise Sd2Error("Chirps of a loop differ in profile or idle time", "chirps of one kind")
     return found
+
+
+def _refuse_codes(device: _Device, first: int, last: int) -> None:
+    """Raise Sd2Error if phases of the transmitters differ between chirps of a loop."""
+    for name, entries in (("rlBpmChirps", device.signs), ("rlRfPhaseShiftCfgs", device.shifts)):
+        codes = [code for entry in entries for code in entry.values()]
+        told = set()
+        for number in range(first, last + 1):
+            fitting = [one for one in codes if one.chirpStartIdx <= number <= one.chirpEndIdx]
+            told.add(fitting[-1].phases() if fitting else ())
+        if len(told) > 1:
+            raise _coded(f"{name} gives transmitters other phases from chirp to chirp")
+
+
+def _coded(found: str) -> Sd2Error:
+    return Sd2Error(
+        found,
+        "transmitters in turns (TDM), or alike in all chirps: what is sent together in turning"
+        " phases would be taken for motion",
+        "Record with transmitters that take turns (TDM)",
+    )
+
+
+def _number(value: Any) -> float:
+    """Value of a number, or of a text such as "0x20"; 0 for anything else."""
+    try:
+        return float(int(value, 0)) if isinstance(value, str) else float(value)
+    except (TypeError, ValueError):
+        return 0.0

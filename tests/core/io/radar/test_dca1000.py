@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -189,6 +190,28 @@ def _json(edit: Callable[[dict], object]) -> Callable[[Path], object]:
     return change
 
 
+def _together(device: dict[str, Any]) -> None:
+    """Have two transmitters send together in two chirps of a loop."""
+    device["rfConfig"]["rlChirps"] = [
+        {
+            "rlChirpCfg_t": {
+                "chirpStartIdx": 0,
+                "chirpEndIdx": 1,
+                "profileId": 0,
+                "txEnable": "0x3",
+            }
+        }
+    ]
+    device["rfConfig"]["rlFrameCfg_t"] |= {"chirpEndIdx": 1, "numLoops": 8}
+
+
+def _coded(device: dict[str, Any], name: str, **phases: object) -> None:
+    """Give the second chirp of a loop phases of its own."""
+    inner = {"rlBpmChirps": "rlBpmChirpCfg_t", "rlRfPhaseShiftCfgs": "rlRfPhaseShiftCfg_t"}[name]
+    told = {"chirpStartIdx": 1, "chirpEndIdx": 1, **phases}
+    device["rfConfig"][name] = [{inner: told}]
+
+
 MISMATCHES: dict[str, tuple[Callable[[Path], object], str]] = {
     "no configuration": (
         lambda path: path.with_suffix(".cfg").unlink(),
@@ -230,6 +253,33 @@ MISMATCHES: dict[str, tuple[Callable[[Path], object], str]] = {
     "interleaved over two lanes": (
         _cfg(adcbufCfg="adcbufCfg -1 0 0 0 1"),
         r"walk\.cfg: Receivers are interleaved over 2 lanes",
+    ),
+    "sends samples with parameters of chirps": (
+        _cfg(lvdsStreamCfg="lvdsStreamCfg -1 0 4 0"),
+        r"walk\.cfg: lvdsStreamCfg sends other data",
+    ),
+    "a subframe before too few values": (
+        _cfg(adcbufCfg="adcbufCfg -1 0 1 1"),
+        r"walk\.cfg: adcbufCfg is -1 0 1 1\. Expected: .* 0 or 1",
+    ),
+    "transmitters that take turns in pairs": (
+        _cfg(bpmCfg="bpmCfg -1 1 0 1"),
+        r"walk\.cfg: bpmCfg reverses a transmitter .*TDM",
+    ),
+    "the same, of the first SDK": (_cfg(bpmCfg="bpmCfg 1 0 1"), r"walk\.cfg: bpmCfg reverses"),
+    "the same in mmWave Studio": (
+        _json(lambda d: _together(d) or _coded(d, "rlBpmChirps", constBpmVal="0x20")),
+        r"walk\.mmwave\.json: rlBpmChirps gives transmitters other phases",
+    ),
+    "phases shifted from chirp to chirp": (
+        _json(lambda d: _together(d) or _coded(d, "rlRfPhaseShiftCfgs", tx1PhaseShift=90.0)),
+        r"walk\.mmwave\.json: rlRfPhaseShiftCfgs gives transmitters other phases",
+    ),
+    "commands kept as JSON": (
+        lambda path: path.with_suffix(".cfg").write_text(
+            json.dumps({"channelCfg": {"rxMask": None}, "adcCfg": {"outputFormat": 1}})
+        ),
+        r"walk\.cfg: It is JSON, as pymmw keeps it.*lines of commands",
     ),
     "12 bits": (_cfg(adcCfg="adcCfg 0 1"), r"walk\.cfg: The number of bits of the converter is 0"),
     "pseudo real": (_cfg(adcCfg="adcCfg 2 3"), r"walk\.cfg: The output format .* is 3"),
@@ -315,3 +365,50 @@ def test_the_words_of_the_writer_are_those_of_the_data_sheet() -> None:
     assert words_of(replace(two, q_first=True), beat).tolist() == [5, 6, 1, 2, 7, 8, 3, 4]
     four = replace(two, receivers=4, samples=1, lanes=4)
     assert words_of(four, beat).tolist() == [1, 2, 3, 4, 5, 6, 7, 8]
+
+
+@pytest.mark.parametrize("q_first", [False, True])
+@pytest.mark.parametrize("lanes", [2, 4])
+def test_adcbuf_of_four_values_says_the_same_as_that_of_five(
+    tmp_path: Path, lanes: int, q_first: bool
+) -> None:
+    recording = replace(PLAIN, lanes=lanes, receivers=4, q_first=q_first)
+    path = write_ti(tmp_path, recording)
+    five = load_capture(path).read(0, 3)
+    four = f"adcbufCfg 0 {int(q_first)} {int(lanes == 2)} 1"
+    path.with_suffix(".cfg").write_text(cfg_of(recording, adcbufCfg=four))
+    assert (load_capture(path).read(0, 3) == five).all()
+    # Interleaving tells the number of lanes where no platform does.
+    path.with_suffix(".cfg").write_text(cfg_of(recording, adcbufCfg=four, comment=""))
+    capture = load_capture(path)
+    assert (capture.read(0, 3) == five).all()
+    assert f"{lanes} lanes of LVDS are assumed" in " ".join(capture.notes)
+
+
+def test_codes_that_are_off_or_the_same_in_all_chirps_are_read(tmp_path: Path) -> None:
+    path = write_ti(tmp_path, PLAIN)
+    plain = load_capture(path).read(0, 3)
+    path.with_suffix(".cfg").write_text(cfg_of(PLAIN, bpmCfg="bpmCfg -1 0 0 1"))
+    assert (load_capture(path).read(0, 3) == plain).all()
+    path.with_suffix(".cfg").unlink()
+    content = json_of(PLAIN)
+    _together(content["mmWaveDevices"][0])
+    _coded(content["mmWaveDevices"][0], "rlBpmChirps", constBpmVal="0x0")
+    path.with_suffix(".json").write_text(json.dumps(content))
+    assert (load_capture(path).read(0, 3) == plain).all()
+
+
+@pytest.mark.parametrize("encoding", ["gbk", "shift_jis", "utf-16"])
+def test_comments_of_a_cfg_may_be_in_any_encoding(tmp_path: Path, encoding: str) -> None:
+    path = write_ti(tmp_path, PLAIN)
+    plain = load_capture(path).read(0, 3)
+    lines = cfg_of(PLAIN, note="% 实验 一", other="// 帧").replace(" 1 0\n", " 1 0 % 表示\n")
+    path.with_suffix(".cfg").write_bytes(lines.encode(encoding, "replace"))
+    assert (load_capture(path).read(0, 3) == plain).all()
+
+
+def test_the_configuration_of_mmwave_studio_may_be_called_cfg(tmp_path: Path) -> None:
+    path = write_ti(tmp_path, PLAIN, studio=True)
+    plain = load_capture(path).read(0, 3)
+    (tmp_path / "walk.mmwave.json").rename(tmp_path / "walk.cfg")
+    assert (load_capture(path).read(0, 3) == plain).all()
