@@ -31,6 +31,7 @@ from sd2core.io.radar.infineon import (
     read_radar_config,
     write_capture,
 )
+from sd2core.io.radar.judging import judged
 from sd2core.io.radar.kkt import RecordedMap, load_kkt
 from sd2core.io.radar.sigmf import DATA, META
 from sd2core.io.readers import RADAR_FILES, FileReader, plug_in_for
@@ -88,7 +89,10 @@ def load_capture(path: Path | str) -> RadarCapture:
         raise Sd2Error(f"{path} does not exist", SUPPORTED, "Check the path")
     for reader in _READERS:
         if reader.fits(path):
-            return reader.read(path)
+            capture = reader.read(path)
+            # Of what is simulated and of what it recorded itself the program knows enough.
+            own = capture.simulated or reader.read is load_growing
+            return capture if own else judged(capture)
     plug_in, said = plug_in_for(path, RADAR_FILES)
     if plug_in is not None:
         read: RadarCapture = plug_in.use(lambda reader: reader.read(path), RadarCapture)

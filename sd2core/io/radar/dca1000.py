@@ -37,6 +37,8 @@ SUFFIX = ".bin"
 
 _EXPECTED = "samples of a DCA1000 (.bin) with the .cfg or .mmwave.json of the radar beside it"
 _PART = re.compile(r"(?P<base>.+)_Raw_(?P<number>\d{1,6})", re.IGNORECASE)
+_FIRMWARE = (b"MSTR", b"RPRC", b"\x7fELF")
+"""First bytes of TI's images for flash (of several cores, of one) and of programs."""
 _WORD = np.dtype("<i2")
 _JUDGED_WORDS = 1 << 18
 _MAX_FRAMES = 10**8
@@ -49,6 +51,7 @@ def load_dca1000(path: Path) -> RadarCapture:
     or if sizes contradict the configuration.
     """
     parts = parts_of(path)
+    _refuse_firmware(parts[0])
     setup_path = setup_of(parts[0])
     setup = read_setup(setup_path)
     config, notes = setup.config, list(setup.notes)
@@ -180,6 +183,16 @@ class _Words:
         if len(found) != stop - start:
             raise Sd2Error(f"{self._parts[0]} has become shorter", _EXPECTED, "Open it again")
         return found.astype(np.int16, copy=False)
+
+
+def _refuse_firmware(path: Path) -> None:
+    with path.open("rb") as stream:
+        if stream.read(4) in _FIRMWARE:
+            raise Sd2Error(
+                f"{path} is the firmware of a radar, which is flashed to it",
+                _EXPECTED,
+                "Take the file that was recorded, such as adc_data_Raw_0.bin",
+            )
 
 
 def _frame_words(setup: TiSetup) -> int:

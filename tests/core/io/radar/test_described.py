@@ -349,6 +349,7 @@ def test_gigabytes_open_at_once_and_are_read_by_frames(tmp_path: Path) -> None:
         header = {"descr": "<i2", "fortran_order": False, "shape": (frames, 64, 128)}
         np.lib.format.write_array_header_1_0(stream, header)
         start = stream.tell()
+        stream.write(b"\1")
     os.truncate(path, start + frames * 64 * 128 * 2)
     assert path.stat().st_size > 4e9
     told = FMCW | {"frame_repetition_s": 0.05}
