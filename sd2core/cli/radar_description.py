@@ -20,8 +20,9 @@ class Description(OptionRecord):
     Parameters
     ----------
     axes : LIST
-        names of the array's dimensions: frame, transmitter, receiver, chirp, sample, iq; or
-        stream (default: frame,chirp,sample, with receivers and transmitters after the frames)
+        names of the array's dimensions: frame, transmitter, receiver, chirp, sample, iq; without
+        frame the chirps have no gaps; or stream (default: frame,chirp,sample, with receivers and
+        transmitters after the frames; none for a .mat)
     carrier_hz : HZ
         centre frequency of the samples of a chirp
     bandwidth_hz : HZ
@@ -43,13 +44,13 @@ class Description(OptionRecord):
     samples_per_chirp : N
         of a stream: samples that make a chirp
     chirps_per_frame : N
-        of a stream: chirps that make a frame
+        of a stream, or of chirps without gaps: chirps that make a frame
     range_start_m : M
         distance of the first sample, if samples are distances
     range_step_m : M
         distance between samples, likewise
     dataset : NAME
-        dataset of an HDF5 file of several
+        array of an HDF5 or MATLAB file of several
     name : NAME
         name of the radar on screen
     """
@@ -88,11 +89,21 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
         plain_axes,
         write_description,
     )
+    from sd2core.io.radar.stored_arrays import array_names
 
     if not is_describable(path):
-        raise Sd2Error(f"{path} cannot be described", "a .npy, .h5 or .sigmf-meta of radar samples")
+        raise Sd2Error(
+            f"{path} cannot be described", "a .npy, .h5, .mat or .sigmf-meta of radar samples"
+        )
     told = _told_by_sigmf(path) | given(options, DESCRIPTION)
-    told.setdefault("axes", plain_axes(path, told.get("dataset")))
+    if len(names := array_names(path)) > 1:
+        _ask_for("dataset", told, f" ({', '.join(names[:9])})")
+    if "axes" not in told:
+        axes, shape = plain_axes(path, told.get("dataset"))
+        if axes is None:
+            _ask_for("axes", told, f" (the shape is {shape})")
+        else:
+            told["axes"] = axes
     _ask(told)
     with faults_in(f"The description of {path}", "all that its radar needs"):
         description = RadarDescription.model_validate(told)
@@ -121,8 +132,12 @@ def _ask(told: dict[str, Any]) -> None:
         needed.append("bandwidth_hz")
     if "stream" in told["axes"]:
         needed += ["sample_rate_hz", "samples_per_chirp", "chirps_per_frame"]
+    elif "frame" not in told["axes"]:
+        needed += ["chirp_repetition_s", "chirps_per_frame"]
     else:
         needed += ["chirp_repetition_s", "frame_repetition_s"]
+    if "range_start_m" in told or "range_step_m" in told:
+        needed += ["range_start_m", "range_step_m"]
     for name in needed:
         _ask_for(name, told)
     # Known only now: a continuous wave has no rate within a chirp.
@@ -130,16 +145,16 @@ def _ask(told: dict[str, Any]) -> None:
         _ask_for("sample_rate_hz", told)
 
 
-def _ask_for(name: str, told: dict[str, Any]) -> None:
+def _ask_for(name: str, told: dict[str, Any], about: str = "") -> None:
     if name in told:
         return
     entry = DESCRIPTION[name]
     assert entry.read is not None
     if not sys.stdin.isatty():
-        missing = f"{entry.flags[0]} is missing: {entry.words}"
+        missing = f"{entry.flags[0]} is missing: {entry.words}{about}"
         raise Sd2Error(missing, "it as an option, or a terminal to ask on")
     while name not in told:
-        print(f"{name} ({entry.words}): ", end="", file=sys.stderr, flush=True)
+        print(f"{name} ({entry.words}){about}: ", end="", file=sys.stderr, flush=True)
         answer = sys.stdin.readline()
         if not answer:
             raise Sd2Error(f"{name} was not answered", entry.words)

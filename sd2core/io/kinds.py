@@ -21,7 +21,9 @@ DATASET_FORMAT = "sd2-dataset"
 
 VIDEO_SUFFIXES = frozenset({".mp4", ".mkv", ".mov", ".avi", ".webm", ".m4v", ".mpg", ".ts", ".wmv"})
 RADAR_MAP_SUFFIXES = frozenset({".h5", ".hdf5"})
-RADAR_SUFFIXES = frozenset({".npy", ".bin", ".sigmf-meta", ".sigmf-data"}) | RADAR_MAP_SUFFIXES
+RADAR_SUFFIXES = (
+    frozenset({".npy", ".mat", ".bin", ".sigmf-meta", ".sigmf-data"}) | RADAR_MAP_SUFFIXES
+)
 MESH_SUFFIXES = frozenset({".obj", ".ply", ".glb"}) | PICKLE_SUFFIXES
 
 
@@ -59,7 +61,8 @@ def kind_of(path: Path) -> Kind:
         f"{path} is of no kind that is known",
         "a recording (.sd2), a video (.mp4, .mkv …), a mesh (.npz, .zarr, .obj, .ply, .glb, .pkl),"
         " a radar capture (a folder with radar.npy, the .h5 of a K60168A or an A121, the .bin of a"
-        " DCA1000, or samples with a description: .npy, .h5, .sigmf-meta) or samples of an inertial"
+        " DCA1000, or samples with a description: .npy, .h5, .mat,"
+        " .sigmf-meta) or samples of an inertial"
         " sensor (.csv, .sto)",
         said,
     )

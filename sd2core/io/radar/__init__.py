@@ -12,7 +12,7 @@ from sd2core.files.hdf5_files import open_hdf5_file
 from sd2core.files.paths import as_path
 from sd2core.io.kinds import RADAR_MAP_SUFFIXES
 from sd2core.io.radar import dca1000
-from sd2core.io.radar.acconeer import is_acconeer, load_acconeer
+from sd2core.io.radar.acconeer import a111_service, is_acconeer, load_acconeer, refuse_a111
 from sd2core.io.radar.capture import RadarCapture
 from sd2core.io.radar.described import (
     DATA_NAME,
@@ -34,6 +34,7 @@ from sd2core.io.radar.infineon import (
 from sd2core.io.radar.judging import judged
 from sd2core.io.radar.kkt import RecordedMap, load_kkt
 from sd2core.io.radar.sigmf import DATA, META
+from sd2core.io.radar.stored_arrays import array_names
 from sd2core.io.readers import RADAR_FILES, FileReader, plug_in_for
 from sd2core.radar_config import RadarConfig
 from sd2core.radar_profiles import PAPER, RADAR_PLUG_INS, RADARS, find_radar
@@ -140,22 +141,26 @@ def without_companions(paths: Sequence[Path]) -> list[Path]:
 def holds_map(path: Path | str) -> bool:
     """True if a radar recording holds maps: read it by `load_recorded_map`.
 
-    That is so of HDF5 files which are no capture; a file that is not there goes by its name.
+    That is so of HDF5 files of a K60168A, and of those that are damaged; a file that is not there
+    goes by its name.
     """
     path = Path(path).expanduser()
+    return not is_described(path) and _maker_of(path) in ("kaikutek", "unknown")
+
+
+def _maker_of(path: Path) -> str:
+    """Whose HDF5 file it is, "unknown" if that cannot be known, "" if it is another file."""
     if path.suffix.lower() not in RADAR_MAP_SUFFIXES:
-        return False
-    return not (is_described(path) or _is_acconeer(path))
-
-
-def _is_acconeer(path: Path) -> bool:
-    if path.suffix.lower() not in RADAR_MAP_SUFFIXES or not path.is_file():
-        return False
+        return ""
     try:
         with open_hdf5_file(path, SUPPORTED) as file:
-            return is_acconeer(file)
+            if is_acconeer(file):
+                return "acconeer"
+            if a111_service(file, path):
+                return "a111"
+            return "kaikutek" if "DS1" in file or "LABEL" in file else "other"
     except Exception:  # a damaged file fails in many ways, again where it is read
-        return False
+        return "unknown"
 
 
 def _refuse_map(path: Path) -> RadarCapture:
@@ -185,8 +190,10 @@ def _lacks_description(path: Path) -> bool:
 
 
 def _ask_description(path: Path) -> RadarCapture:
+    names = array_names(path)
+    held = f"; it holds {', '.join(names[:6])}" if names else ""
     raise Sd2Error(
-        f"{path} does not say what radar it is from",
+        f"{path} does not say what radar it is from{held}",
         f"its description, {description_of(path).name}, beside it",
         f"Write it with `sd2 radar describe {path.name}`",
     )
@@ -199,7 +206,8 @@ _READERS: tuple[FileReader[RadarCapture], ...] = (
         lambda path: load_described(path / DATA_NAME),
         looks=lambda path: is_described(path / DATA_NAME),
     ),
-    FileReader(load_acconeer, looks=_is_acconeer),
+    FileReader(load_acconeer, looks=lambda path: _maker_of(path) == "acconeer"),
+    FileReader(refuse_a111, looks=lambda path: _maker_of(path) == "a111"),
     FileReader(_refuse_map, looks=holds_map),
     FileReader(dca1000.load_dca1000, (dca1000.SUFFIX,)),
     FileReader(_load_infineon, looks=_holds_infineon),

@@ -9,7 +9,9 @@ An HDF5 file holds sessions, in them groups and entries, one entry per sensor::
     …/entry_0/result/frame                       int16 real and imag, (frames, sweeps, points)
     …/entry_0/result/tick                        time of every frame, in ticks of the server
 
-Every point is at a distance of its own: there is no range to be formed. Sweeps are slow time.
+Recordings of 2022 (version 5 of the tool) have one group ``session`` in place of
+``sessions/session_0``. Every point is at a distance of its own: there is no range to be formed.
+Sweeps are slow time; with one sweep per frame, the frames are.
 Layout, carrier and widths of the pulses are those of Acconeer's exploration tool
 (github.com/acconeer/acconeer-python-exploration, ``a121/algo/_utils.py``).
 """
@@ -38,6 +40,8 @@ CARRIER_HZ = 60.5e9
 PULSE_WIDTHS_M = {1: 0.04, 2: 0.07, 3: 0.14, 4: 0.19, 5: 0.32}
 """Width of a profile's envelope at half its height (``ENVELOPE_FWHM_M``)."""
 
+_JOINED = 32
+"""Frames of one sweep that are taken as one."""
 _EXPECTED = "a complete recording of the A121 by Acconeer's exploration tool (.h5)"
 _PARTS = np.dtype([("real", "<i2"), ("imag", "<i2")])
 _FULL = np.float32(32768.0)
@@ -86,7 +90,34 @@ class _Server(BaseModel):
 
 def is_acconeer(file: h5py.File) -> bool:
     """True if an open HDF5 file looks like a recording of the exploration tool."""
-    return "sessions" in file and "generation" in file
+    return "generation" in file and ("sessions" in file or "session" in file)
+
+
+def a111_service(file: h5py.File, path: Path) -> str:
+    """Service of an A111 that an open HDF5 file was recorded with; empty if it is none."""
+    if "sensor_config_dump" not in file or "data" not in file:
+        return ""
+    try:
+        return _text(file, path, "mode").strip().lower() or "unknown"
+    except Sd2Error:
+        return "unknown"
+
+
+def refuse_a111(path: Path) -> RadarCapture:
+    """Raise Sd2Error that names a recording of an A111, and says what can be done with it."""
+    with open_hdf5_file(path, _EXPECTED) as file:
+        service = a111_service(file, path)
+    way = (
+        f"Describe it: sd2 radar describe {path.name} --dataset data --axes chirp,receiver,sample"
+        if service == "iq"
+        else "Real values do not tell approaching from receding: record with its IQ service, or"
+        " with an A121"
+    )
+    raise Sd2Error(
+        f"{path} is a recording of Acconeer's A111, the older sensor, with its service {service}",
+        "a recording of the A121",
+        way,
+    )
 
 
 def load_acconeer(path: Path) -> RadarCapture:
@@ -104,7 +135,9 @@ def _read(file: h5py.File, path: Path) -> RadarCapture:
     generation = _text(file, path, "generation")
     if generation != "a121":
         raise Sd2Error(f"{path} is of the sensor generation {generation!r:.40}", "a121")
-    session, sessions = _first(file, path, "sessions", "session_")
+    session, sessions = "session", 1
+    if "sessions" in file:
+        session, sessions = _first(file, path, "sessions", "session_")
     group, groups = _first(file, path, session, "group_")
     entry, entries = _first(file, path, group, "entry_")
     planned = _parsed(_Session, file, path, f"{session}/session_config")
@@ -147,11 +180,24 @@ def _read(file: h5py.File, path: Path) -> RadarCapture:
         notes.append(
             f"All {len(sensor.subsweeps)} subsweeps are taken as they are, with their own gains."
         )
-    sweep_s = _sweep_s(sensor, found, path, notes)
+    joined = 1  # frames of the file that make one
+    if sensor.sweeps_per_frame == 1:
+        joined = min(_JOINED, len(frames))
+        sweep_s = 0.0
+    else:
+        sweep_s = _sweep_s(sensor, found, path, notes)
     timebase, frame_s = _clock(file, path, entry, sensor, sweep_s, shape[0], notes)
     saturated = _flags(file, path, f"{entry}/result/data_saturated", shape[0])
     if saturated:
         notes.append(f"The sensor was saturated in {saturated} of {shape[0]} frames.")
+    if sensor.sweeps_per_frame == 1:
+        notes.append(
+            f"Frames have one sweep: {joined} are taken as one, their sweeps {1e3 * frame_s:.3g} ms"
+            " apart."
+        )
+        sweep_s, frame_s = frame_s, joined * frame_s
+        shape = (len(frames) // joined, 1, joined, len(ranges_m))
+        timebase = Timebase(timebase.times_s[::joined][: shape[0]])
     width_m = max(one.pulse_m for one in sensor.subsweeps)
     half_hz = 0.25 * SPEED_OF_LIGHT_MPS / width_m
     with errors_in(path):
@@ -173,7 +219,8 @@ def _read(file: h5py.File, path: Path) -> RadarCapture:
 
     def read(some: slice) -> NDArray[Any]:
         with open_hdf5_file(path, _EXPECTED) as again, refusing_damage(path, _EXPECTED):
-            parts = again[place][some]
+            start, stop, _ = some.indices(shape[0])
+            parts = again[place][start * joined : stop * joined].reshape(-1, *shape[2:])
         signal = np.empty((len(parts), 1, *shape[2:]), np.complex64)
         signal.real[:, 0], signal.imag[:, 0] = parts["real"], parts["imag"]
         signal /= _FULL
@@ -228,8 +275,11 @@ def _clock(
                 f"No frame rate is set; by the ticks a frame comes every {1e3 * frame_s:.1f} ms."
             )
         return Timebase(times_s), frame_s
+    if frame_s == 0.0:
+        raise Sd2Error(f"{path} has one sweep per frame, and no rate of frames", "frame_rate")
     if frames > 1:
-        notes.append(f"The ticks do not increase: frames are placed every {1e3 * frame_s:g} ms.")
+        why = "do not increase" if server.ticks_per_second > 0 else "have no length"
+        notes.append(f"The ticks {why}: frames are placed every {1e3 * frame_s:g} ms.")
     return Timebase(np.arange(frames) * frame_s), frame_s
 
 

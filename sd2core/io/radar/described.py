@@ -8,6 +8,7 @@ recording (``.sigmf-data``). The description has the same name with the suffix `
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -27,7 +28,7 @@ from sd2core.files.toml import toml_lines
 from sd2core.io.radar.capture import LazySamples, RadarCapture
 from sd2core.io.radar.infineon import check_replaceable
 from sd2core.io.radar.sigmf import DATA, META
-from sd2core.io.radar.stored_arrays import SUFFIXES, StoredArray, open_stored
+from sd2core.io.radar.stored_arrays import MATLAB_SUFFIX, SUFFIXES, StoredArray, open_stored
 from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
 
@@ -38,8 +39,11 @@ Axis = Literal["frame", "transmitter", "receiver", "chirp", "sample", "iq", "str
 _META = "meta.json"
 _EXPECTED = "the description of radar samples (docs/radar-files.md)"
 _ORDER = ("frame", "transmitter", "receiver", "chirp", "sample", "iq")
+_GAPLESS = {"stream": ("chirp", "sample"), "chirp": ("chirp",), "frame": ()}
+"""Axes along which a recording is long, and those that it is cut into."""
 _PLAIN: dict[int, tuple[Axis, ...]] = {
     1: ("stream",),
+    2: ("chirp", "sample"),
     3: ("frame", "chirp", "sample"),
     4: ("frame", "receiver", "chirp", "sample"),
     5: ("frame", "transmitter", "receiver", "chirp", "sample"),
@@ -53,7 +57,8 @@ class RadarDescription(BaseModel):
     ``axes`` name the dimensions of the array: ``frame``, ``chirp`` and ``sample``, and where there
     are any ``transmitter``, ``receiver`` and ``iq`` (real and imaginary part); or ``stream``,
     samples without gaps, with ``receiver`` where there are several, of which ``samples_per_chirp``
-    make a chirp and ``chirps_per_frame`` of these a frame. ``chirp_repetition_s`` is the time
+    make a chirp and ``chirps_per_frame`` of these a frame. Without ``frame`` the chirps have no
+    gaps, and ``chirps_per_frame`` make a frame. ``chirp_repetition_s`` is the time
     between chirps of the same transmitter. ``sign`` is 1 where the phase grows with the distance,
     and -1 where it falls. A value of ``zero`` is no signal, and ``full_scale`` more fills the
     converter. With ``range_start_m`` and ``range_step_m`` samples are at distances already.
@@ -179,20 +184,22 @@ def write_described(
     return folder
 
 
-def plain_axes(path: Path, dataset: str | None) -> tuple[Axis, ...]:
-    """Axes of the array in a file where nobody names others, by its dimensions and type."""
+def plain_axes(path: Path, dataset: str | None) -> tuple[tuple[Axis, ...] | None, tuple[int, ...]]:
+    """Axes of the array in a file where nobody names others, and its shape.
+
+    They go by dimensions and type. None where several are as likely: those of MATLAB have no
+    usual order.
+    """
     stored = open_stored(path, dataset)
     last: tuple[Axis, ...] = ()
-    dimensions = len(stored.shape)
-    if path.suffix.lower() in (META, DATA) and dimensions == 2:
-        return ("stream", "receiver")
+    dimensions, suffix = len(stored.shape), path.suffix.lower()
+    if suffix in (META, DATA) and dimensions == 2:
+        return ("stream", "receiver"), stored.shape
     if dimensions > 3 and stored.shape[-1] == 2 and stored.dtype.kind != "c":
         last, dimensions = ("iq",), dimensions - 1
-    if dimensions not in _PLAIN:
-        raise Sd2Error(
-            f"{path} has shape {stored.shape}", "(frames, chirps, samples), or other axes by name"
-        )
-    return _PLAIN[dimensions] + last
+    if dimensions not in _PLAIN or suffix == MATLAB_SUFFIX:
+        return None, stored.shape
+    return _PLAIN[dimensions] + last, stored.shape
 
 
 def load_described(path: Path) -> RadarCapture:
@@ -210,24 +217,23 @@ def capture_of(path: Path, description: RadarDescription) -> RadarCapture:
         sizes = _sizes(stored, description)
         config, averaged = _config(stored, description, sizes)
     axes = description.axes
-    streamed = "stream" in axes
-    along = axes.index("stream" if streamed else "frame")
-    frame_samples = sizes["chirp"] * sizes["sample"]
+    along = axes.index(_longest(axes))
+    inner = _GAPLESS[axes[along]]  # axes that are made of it
+    each = math.prod(sizes[name] for name in inner)
     is_complex = config.sampling != "real"
     scale = np.float32(1.0 / (description.full_scale or 1.0))
     falling = (description.slope_hz_per_s or 0.0) < 0
     # Order of the axes of the file that are there, as ours.
-    present = ["frame", "chirp", "sample", *axes[1:]] if streamed else list(axes)
+    present = ["frame", *inner, *axes[:along], *axes[along + 1 :]]
     order = [present.index(name) for name in _ORDER if name in present]
 
     def read(some: slice) -> NDArray[Any]:
         start, stop, _ = some.indices(sizes["frame"])
-        each = frame_samples if streamed else 1
         place = [slice(None)] * len(stored.shape)
         place[along] = slice(start * each, stop * each)
-        raw = np.asarray(stored.read(tuple(place)))
-        if streamed:
-            raw = raw.reshape(-1, sizes["chirp"], sizes["sample"], *raw.shape[1:])
+        raw = np.moveaxis(np.asarray(stored.read(tuple(place))), along, 0)
+        if inner:
+            raw = raw.reshape(-1, *(sizes[name] for name in inner), *raw.shape[1:])
         signal = raw.transpose(order).reshape(
             stop - start, config.channels, sizes["chirp"], sizes["sample"], -1
         )
@@ -289,6 +295,11 @@ def _of_simulation(path: Path, description: RadarDescription) -> dict[str, Any]:
     return content
 
 
+def _longest(axes: Sequence[Axis]) -> Axis:
+    """Axis along which a recording is long: frames, or what has no gaps."""
+    return next((name for name in ("stream", "frame") if name in axes), "chirp")  # type: ignore[return-value]
+
+
 def _sizes(stored: StoredArray, description: RadarDescription) -> dict[str, int]:
     """Length of every axis, by name; 1 of those that are not there."""
     axes = description.axes
@@ -315,8 +326,15 @@ def _sizes(stored: StoredArray, description: RadarDescription) -> dict[str, int]
             "chirp": chirps,
             "sample": samples,
         }
-    elif not {"frame", "chirp", "sample"} <= set(axes):
-        raise Sd2Error(f"axes are {', '.join(axes)}", "at least frame, chirp and sample")
+    elif not {"chirp", "sample"} <= set(axes):
+        raise Sd2Error(f"axes are {', '.join(axes)}", "at least chirp and sample")
+    elif "frame" not in named:
+        if description.chirps_per_frame is None:
+            raise Sd2Error("Chirps without gaps have no frames of their own", "chirps_per_frame")
+        named |= {
+            "frame": named["chirp"] // description.chirps_per_frame,
+            "chirp": description.chirps_per_frame,
+        }
     if min(named.values()) < 1:
         raise Sd2Error(f"The array has shape {stored.shape}", "at least one whole frame")
     return {name: named.get(name, 1) for name in _ORDER}
@@ -337,6 +355,12 @@ def _config(
         )
     if (told.range_start_m is None) != (told.range_step_m is None):
         raise Sd2Error("One of range_start_m and range_step_m is missing", "both, or none")
+    if told.range_step_m is not None and not is_complex:
+        raise Sd2Error(
+            f"The samples are real ({stored.dtype}), at distances",
+            "complex samples (I and Q): real ones do not tell approaching from receding",
+            "Record I and Q, with the axis iq where they are apart",
+        )
     rate_hz, chirp_s, frame_s = (
         told.sample_rate_hz,
         told.chirp_repetition_s,
@@ -349,6 +373,10 @@ def _config(
                 "sample_rate_hz, and neither chirp_repetition_s nor frame_repetition_s",
             )
         chirp_s = samples / rate_hz
+        frame_s = chirp_s * sizes["chirp"]
+    elif "frame" not in told.axes and chirp_s is not None:
+        if frame_s is not None:
+            raise Sd2Error("Chirps without gaps follow one another", "no frame_repetition_s")
         frame_s = chirp_s * sizes["chirp"]
     if chirp_s is None or frame_s is None:
         raise Sd2Error("It states no times", "chirp_repetition_s and frame_repetition_s")

@@ -1,8 +1,10 @@
-"""Arrays of radar samples in NumPy, HDF5 and SigMF files, read in parts."""
+"""Arrays of radar samples in NumPy, HDF5, MATLAB and SigMF files, read in parts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,13 +13,21 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.hdf5_files import member_of, open_hdf5_file, refusing_damage
-from sd2core.files.limits import check_regular
+from sd2core.files.limits import check_regular, check_size
 from sd2core.files.numpy_files import open_npy_file
 from sd2core.io.radar.sigmf import DATA, META, read_sigmf_meta
 
 HDF5_SUFFIXES = (".h5", ".hdf5")
-SUFFIXES = (".npy", *HDF5_SUFFIXES, META, DATA)
+MATLAB_SUFFIX = ".mat"
+SUFFIXES = (".npy", *HDF5_SUFFIXES, MATLAB_SUFFIX, META, DATA)
 """Files that such arrays are in."""
+
+
+_HDF5 = "samples of a radar (.h5)"
+_MATLAB_NUMBERS = frozenset(
+    {"double", "single", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))}
+)
+"""Classes of MATLAB."""
 
 
 class StoredArray(NamedTuple):
@@ -36,9 +46,26 @@ def open_stored(path: Path, dataset: str | None) -> StoredArray:
         raise Sd2Error(f"There is no file {path}", "samples of a radar", "Check the path")
     if suffix in HDF5_SUFFIXES:
         return _hdf5(path, dataset)
+    if suffix == MATLAB_SUFFIX:
+        return _matlab(path, dataset)
     if dataset is not None:
-        raise Sd2Error(f"{path} is given with the dataset {dataset!r}", "datasets of HDF5 files")
+        raise Sd2Error(
+            f"{path} is given with the dataset {dataset!r}", "datasets of HDF5 and MATLAB files"
+        )
     return _sigmf(path) if suffix in (META, DATA) else _numpy(path)
+
+
+def array_names(path: Path) -> list[str]:
+    """Names of the arrays of numbers in an HDF5 or MATLAB file; none of another or damaged one."""
+    suffix = path.suffix.lower()
+    try:
+        if suffix == MATLAB_SUFFIX and not _is_hdf5(path):
+            return [name for name, shape, kind in _matlab_arrays(path) if kind in _MATLAB_NUMBERS]
+        if suffix == MATLAB_SUFFIX or suffix in HDF5_SUFFIXES:
+            return _hdf5_names(path)
+    except Sd2Error:
+        pass
+    return []
 
 
 def _numpy(path: Path) -> StoredArray:
@@ -46,37 +73,91 @@ def _numpy(path: Path) -> StoredArray:
     return StoredArray(array.shape, array.dtype, array.__getitem__)
 
 
-def _hdf5(path: Path, dataset: str | None) -> StoredArray:
+def _hdf5_names(path: Path) -> list[str]:
     import h5py
 
-    expected = "samples of a radar (.h5)"
-    with open_hdf5_file(path, expected) as file, refusing_damage(path, expected):
-        if dataset is None:
-            names = [name for name in file if isinstance(member_of(file, path, name), h5py.Dataset)]
-            if len(names) != 1:
-                raise Sd2Error(
-                    f"{path} holds {len(names)} datasets ({', '.join(names[:6]) or 'none'})",
-                    "the name of one, as dataset",
-                )
-            dataset = names[0]
-        found = member_of(file, path, dataset)
+    with open_hdf5_file(path, _HDF5) as file, refusing_damage(path, _HDF5):
+        found = {name: member_of(file, path, name) for name in file}
+        return [
+            name
+            for name, one in found.items()
+            if isinstance(one, h5py.Dataset) and one.shape and one.dtype.kind in "iufcV"
+        ]
+
+
+def _one_of(path: Path, names: list[str]) -> str:
+    if len(names) != 1:
+        raise Sd2Error(
+            f"{path} holds {len(names)} arrays of numbers ({', '.join(names[:6]) or 'none'})",
+            "the name of one: --dataset of `sd2 radar describe`, or dataset in the description",
+        )
+    return names[0]
+
+
+def _hdf5(path: Path, dataset: str | None, *, by_column: bool = False) -> StoredArray:
+    import h5py
+
+    name = _one_of(path, _hdf5_names(path)) if dataset is None else dataset
+    with open_hdf5_file(path, _HDF5) as file, refusing_damage(path, _HDF5):
+        found = member_of(file, path, name)
         if not isinstance(found, h5py.Dataset) or found.shape is None:
-            raise Sd2Error(f"{path} has no dataset {dataset!r}", "the name of one, as dataset")
+            raise Sd2Error(f"{path} has no dataset {name!r}", "the name of one, as dataset")
         shape, dtype = found.shape, found.dtype
     if dtype.fields is not None and set(dtype.fields) == {"real", "imag"}:
         if any(dtype[part].kind not in "iuf" for part in ("real", "imag")):
-            raise Sd2Error(f"{dataset} of {path} is of {dtype}", "numbers")
+            raise Sd2Error(f"{name} of {path} is of {dtype}", "numbers")
         dtype = np.dtype(np.complex64)
-    name = dataset
 
     def read(place: tuple[slice, ...]) -> NDArray[Any]:
-        with open_hdf5_file(path, expected) as file, refusing_damage(path, expected):
-            values = file[name][place]
-        if values.dtype.fields is None:
-            return np.asarray(values)
-        return values["real"] + np.complex64(1j) * values["imag"].astype(np.float32)
+        with open_hdf5_file(path, _HDF5) as file, refusing_damage(path, _HDF5):
+            values = file[name][place[::-1] if by_column else place]
+        if values.dtype.fields is not None:
+            values = values["real"] + np.complex64(1j) * values["imag"].astype(np.float32)
+        return np.asarray(values.T if by_column else values)
 
-    return StoredArray(shape, dtype, read)
+    return StoredArray(shape[::-1] if by_column else shape, dtype, read)
+
+
+def _is_hdf5(path: Path) -> bool:
+    """True for MATLAB's files from version 7.3 on."""
+    import h5py
+
+    return bool(h5py.is_hdf5(path))
+
+
+def _matlab(path: Path, dataset: str | None) -> StoredArray:
+    if _is_hdf5(path):
+        return _hdf5(path, dataset, by_column=True)
+    arrays = {name: shape for name, shape, kind in _matlab_arrays(path) if kind in _MATLAB_NUMBERS}
+    name = _one_of(path, list(arrays)) if dataset is None else dataset
+    if name not in arrays:
+        raise Sd2Error(f"{path} has no array {name!r}", f"one of {', '.join(arrays) or 'none'}")
+    from scipy.io import loadmat
+
+    declared_bytes = 16 * math.prod(arrays[name])
+    check_size(f"{name} of {path}", declared_bytes, path.stat().st_size)
+    with _matlab_damage(path):
+        values: NDArray[Any] = loadmat(path, variable_names=[name])[name]
+    return StoredArray(values.shape, values.dtype, values.__getitem__)
+
+
+def _matlab_arrays(path: Path) -> list[tuple[str, tuple[int, ...], str]]:
+    """Name, shape and class of the variables of a file up to version 7."""
+    from scipy.io import whosmat
+
+    check_regular(path)
+    with _matlab_damage(path):
+        return [(str(name), tuple(map(int, shape)), kind) for name, shape, kind in whosmat(path)]
+
+
+@contextmanager
+def _matlab_damage(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except Exception as error:  # a damaged file fails in many ways
+        raise Sd2Error(
+            f"{path} cannot be read as MATLAB's ({error})", "a whole .mat", "Copy it again"
+        ) from error
 
 
 def _sigmf(path: Path) -> StoredArray:

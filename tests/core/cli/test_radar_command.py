@@ -123,7 +123,7 @@ def test_what_is_missing_is_asked_for_on_a_terminal_only(
     sd2: Sd2, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "walk.npy"
-    np.save(path, np.zeros((4, 16, 20), np.complex64))
+    np.save(path, np.eye(16, 20, dtype=np.complex64)[None].repeat(4, 0))
     monkeypatch.setattr("sys.stdin", io.StringIO(""))
     outcome = sd2("radar", "describe", path)
     assert outcome.code == 1
@@ -167,7 +167,7 @@ def test_recordings_take_every_kind_and_copy_what_belongs_to_it(
         path = write_a121(tmp_path / "a.h5")
     else:
         path = tmp_path / "walk.npy"
-        np.save(path, np.zeros((4, 16, 20), np.float32))
+        np.save(path, np.eye(16, 20, dtype=np.float32)[None].repeat(4, 0))
         assert sd2("radar", "describe", path, *DESCRIBED).code == 0
     folder = tmp_path / "made.sd2"
     outcome = sd2("import", "--out", folder, "--radar", path, "--copy")

@@ -16,7 +16,7 @@ from sd2core.errors import Sd2Error
 from sd2core.fmcw import doppler_map, range_doppler
 from sd2core.io.kinds import kind_of
 from sd2core.io.radar import holds_map, load_capture
-from tests.core.io.radar.acconeer_files import FRAMES, POINTS, SWEEPS, write_a121
+from tests.core.io.radar.acconeer_files import FRAMES, PARTS, POINTS, SWEEPS, write_a121
 
 ENTRY = "sessions/session_0/group_0/entry_0"
 
@@ -166,3 +166,61 @@ def test_other_sweeps_than_configured_are_refused(tmp_path: Path) -> None:
     _sensor(path, sweeps_per_frame=8)
     with pytest.raises(Sd2Error, match=r"has shape \(6, 16, 5\).*8 sweeps, 5 points"):
         load_capture(path)
+
+
+def test_a_recording_of_2022_is_read_as_one_of_today(tmp_path: Path) -> None:
+    today = load_capture(write_a121(tmp_path / "a.h5"))
+    path = write_a121(tmp_path / "b.h5")
+    with h5py.File(path, "r+") as file:
+        file.move("sessions/session_0", "session")
+        del file["sessions"]
+    then = load_capture(path)
+    np.testing.assert_array_equal(then.read(0, FRAMES), today.read(0, FRAMES))
+    assert (then.config, then.notes) == (today.config, today.notes)
+
+
+def test_frames_of_one_sweep_are_joined(tmp_path: Path) -> None:
+    """A target that approaches at 0.2 m/s, one sweep every 5 ms, 70 of them."""
+    ticks, still_m = np.arange(70), 0.9
+    turns = 2.0 * (still_m - 0.2 * 0.005 * ticks) * 60.5e9 / 299_792_458.0
+    frame = np.zeros((70, 1, POINTS), PARTS)
+    wave = 3000.0 * np.exp(2j * np.pi * turns)
+    frame["real"][:, 0, 3], frame["imag"][:, 0, 3] = np.rint(wave.real), np.rint(wave.imag)
+    changes = {"frame": frame, "tick": 5 * ticks, "data_saturated": np.zeros(70, bool)}
+    changed = {f"{ENTRY}/result/{name}": value for name, value in changes.items()}
+    path = write_a121(tmp_path / "a.h5", **changed)
+    _sensor(path, sweeps_per_frame=1, sweep_rate=None, frame_rate=None)
+    capture = load_capture(path)
+    assert capture.samples.shape == (2, 1, 32, POINTS)
+    assert capture.config.chirp_repetition_s == pytest.approx(0.005)
+    np.testing.assert_allclose(capture.timebase.times_s, [0.0, 0.16])
+    assert any("32 are taken as one, their sweeps 5 ms" in note for note in capture.notes)
+    off = np.abs(doppler_map(capture).peak_velocity_mps() - 0.2)
+    assert off.max() < 0.51 * capture.config.velocity_resolution_mps
+
+
+@pytest.mark.parametrize(
+    ("service", "way"), [("sparse", "Real values"), ("iq", "--axes chirp,receiver,sample")]
+)
+def test_the_older_sensor_is_named_with_what_can_be_done(
+    tmp_path: Path, service: str, way: str
+) -> None:
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["data"] = np.ones((5, 1, 4))
+        file["mode"], file["sensor_config_dump"] = service, "{}"
+    assert not holds_map(path)
+    with pytest.raises(
+        Sd2Error, match=rf"a\.h5 is .* A111.*{service}.*{way}"
+    ):
+        load_capture(path)
+
+
+def test_an_hdf5_file_of_no_known_radar_is_called_so(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["iq"], file["t"] = np.ones((5, 4)), np.arange(5)
+    assert not holds_map(path)
+    with pytest.raises(Sd2Error, match=r"does not say what radar.*iq, t.*radar describe") as caught:
+        load_capture(path)
+    assert "DS1" not in str(caught.value)

@@ -15,6 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
+from scipy.io import savemat
 
 from sd2core.errors import Sd2Error
 from sd2core.fmcw import doppler_map, range_doppler
@@ -237,7 +238,7 @@ def test_a_sigmf_stream_is_the_doppler_of_its_carrier(tmp_path: Path, datatype: 
     }
     path = tmp_path / "a.sigmf-meta"
     path.write_text(json.dumps(meta))
-    assert plain_axes(path, None) == ("stream", "receiver")
+    assert plain_axes(path, None)[0] == ("stream", "receiver")
     description = RadarDescription(
         axes=("stream", "receiver"),
         carrier_hz=carrier_hz,
@@ -278,7 +279,7 @@ CUBE = np.zeros((2, 8, 8), np.float32)
 FAULTS: dict[str, tuple[np.ndarray, dict[str, Any], str]] = {
     "too few axes": (CUBE, {"axes": ("frame", "chirp")}, "axes are frame, chirp, for an array"),
     "an axis twice": (CUBE, {"axes": ("frame", "chirp", "chirp")}, "one different name"),
-    "no frames": (CUBE, {"axes": ("receiver", "chirp", "sample")}, "at least frame, chirp and"),
+    "no frames": (CUBE, {"axes": ("receiver", "chirp", "sample")}, "have no frames of their own"),
     "neither slope nor bandwidth": (CUBE, {"bandwidth_hz": None}, "bandwidth_hz is None"),
     "no rate": (CUBE, {"sample_rate_hz": None}, "It states no sample_rate_hz"),
     "no times": (CUBE, {"chirp_repetition_s": None}, "It states no times"),
@@ -286,7 +287,7 @@ FAULTS: dict[str, tuple[np.ndarray, dict[str, Any], str]] = {
     "distances of real samples": (
         CUBE,
         {"range_step_m": 0.1, "range_start_m": 0.0},
-        "8 real samples at 8 distances",
+        "real .float32., at distances",
     ),
     "a continuous wave of real samples": (CUBE, {"bandwidth_hz": 0.0}, "with 1 real samples"),
     "megahertz": (CUBE, {"carrier_hz": 24000.0}, "negative|radar's|radar sweeps"),
@@ -359,3 +360,60 @@ def test_gigabytes_open_at_once_and_are_read_by_frames(tmp_path: Path) -> None:
     assert capture.frame_count == frames
     assert not capture.read(frames - 3, frames).any()
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb < 300_000
+
+
+def _chirps(velocity_mps: float, chirps: int = 256) -> np.ndarray:
+    """Beat of a target at 1.5 m, complex64 (chirps, samples), without gaps."""
+    at_s = np.arange(chirps)[:, None] * CHIRP_S
+    delay_s = 2.0 * (1.5 - velocity_mps * at_s) / C_MPS
+    slope = BANDWIDTH_HZ * RATE_HZ / SAMPLES
+    turns = (CARRIER_HZ + slope * np.arange(SAMPLES) / RATE_HZ) * delay_s
+    return np.exp(2j * np.pi * turns).astype(np.complex64)
+
+
+GAPLESS = {name: value for name, value in FMCW.items() if name != "frame_repetition_s"}
+
+
+@pytest.mark.parametrize("by_samples", [False, True])
+def test_chirps_without_gaps_are_cut_into_frames(tmp_path: Path, by_samples: bool) -> None:
+    path, chirps = tmp_path / "a.npy", _chirps(1.0)
+    np.save(path, chirps.T if by_samples else chirps)
+    assert plain_axes(path, None)[0] == ("chirp", "sample")
+    axes = ("sample", "chirp") if by_samples else ("chirp", "sample")
+    write_description(RadarDescription(axes=axes, chirps_per_frame=48, **GAPLESS), path)
+    capture = load_capture(path)
+    assert capture.frame_count == 256 // 48
+    np.testing.assert_allclose(capture.timebase.times_s, np.arange(5) * 48 * CHIRP_S)
+    np.testing.assert_array_equal(capture.read(1, 3).reshape(-1, SAMPLES), chirps[48:144])
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_samples_of_matlab_are_those_in_the_order_of_matlab(tmp_path: Path, version: str) -> None:
+    path = tmp_path / "a.mat"
+    cube = _chirps(1.0).reshape(4, 64, SAMPLES).transpose(2, 1, 0)  # samples, chirps, frames
+    if version == "5":
+        savemat(path, {"adc": cube, "note": "a text", "about": {"fs": 2e6}})
+    else:
+        with h5py.File(path, "w", userblock_size=512) as file:
+            pairs = np.zeros(cube.T.shape, [("real", "<f4"), ("imag", "<f4")])
+            pairs["real"], pairs["imag"] = cube.T.real, cube.T.imag
+            file["adc"] = pairs
+    assert kind_of(path) == "radar"
+    with pytest.raises(Sd2Error, match=r"a\.mat does not say what radar.*it holds adc"):
+        load_capture(path)
+    assert plain_axes(path, None) == (None, (SAMPLES, 64, 4))
+    told = FMCW | {"frame_repetition_s": 0.1}
+    write_description(RadarDescription(axes=("sample", "chirp", "frame"), **told), path)
+    capture = load_capture(path)
+    np.testing.assert_allclose(capture.read(0, 4)[:, 0], cube.transpose(2, 1, 0), rtol=1e-6)
+    np.testing.assert_array_equal(capture.read(2, 3), capture.read(0, 4)[2:3])
+
+
+def test_a_damaged_file_of_matlab_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.mat"
+    savemat(path, {"adc": _chirps(1.0)})
+    path.write_bytes(path.read_bytes()[:300])
+    told = RadarDescription(axes=("chirp", "sample"), chirps_per_frame=8, **GAPLESS)
+    write_description(told, path)
+    with pytest.raises(Sd2Error, match=r"a\.mat"):
+        load_capture(path)
