@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import progress_bar
@@ -16,11 +16,10 @@ from sd2core.options.records import ARGUMENT, OptionError, Place, changed_flags,
 from sd2core.options.shared import Axis, Channel, Json, ReplacesMaps
 from sd2core.radar_config import Clutter
 
-if TYPE_CHECKING:
-    from sd2core.io.radar import RecordedMap
-
-_PROCESSING = ("bins", "v_max_mps", "clutter", "range")
+_AXIS = ("bins", "v_max_mps")
 _CHANNEL = ("receiver", "transmitter")
+_OF_SAMPLES = ("clutter", "range", *_CHANNEL)
+_PROCESSING = (*_AXIS, "clutter", "range")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +29,8 @@ class Radar(ReplacesMaps, Axis, Channel, Json, Description):
     Parameters
     ----------
     capture : CAPTURE
-        a capture's file or folder, the .h5 of a K60168A, a recording, or the word describe
+        a capture's file or folder, the .h5 of a K60168A, a table of points (.csv, .npy, .mat), a
+        recording, or the word describe
     file : FILE
         after describe: the samples
     out : FILE.npz
@@ -82,8 +82,8 @@ def _radar(options: Radar) -> None:
     Prints the resolution and limits of the radar by its configuration, what was
     assumed, and a note if the velocity axis extends beyond the limits. What files
     each radar needs is in docs/radar-files.md. `sd2 radar describe FILE` writes a
-    description of samples of one's own (.npy, .h5, .sigmf-meta), and asks for what
-    no option says.
+    description of samples of one's own (.npy, .h5, .mat, .sigmf-meta), or of a table
+    of points, and asks for what no option says.
 
       sd2 radar capture/                   (limits, and what was assumed)
       sd2 radar adc_data_Raw_0.bin --out real.npz --receiver 1
@@ -92,6 +92,7 @@ def _radar(options: Radar) -> None:
       sd2 radar capture/ --out real.npz --clutter mean --range 0.5,4
       sd2 radar walk.sd2 --out real.npz    (the capture of a recording)
       sd2 radar swing.h5 --out real.npz    (a file that holds the map already)
+      sd2 radar points.csv --out real.npz --v-max 4    (a point cloud)
     """
     if options.file is not None:
         describe(options.file, options, as_json=options.json)
@@ -128,18 +129,19 @@ def _write_map(options: Radar, out: Path) -> None:
     from sd2core.cli.info.description import describe_map, limit_facts, show
     from sd2core.cli.reading import chosen_axis
     from sd2core.fmcw import doppler_map, limits
-    from sd2core.io.radar import holds_map, load_capture, load_recorded_map
+    from sd2core.io.radar import holds_map, load_capture
     from sd2core.recording.recording import is_recording, open_recording
 
     channel, offset_s = (options.receiver, options.transmitter), 0.0
     if is_recording(options.capture):
         recording = open_recording(options.capture)
         if recording.holds_radar_map:
-            _write_recorded(recording.load_radar_map(), recording.radar_offset_s, options, out)
+            assert recording.radar is not None
+            _write_recorded(recording.radar, recording.radar_offset_s, options, out)
             return
         capture, offset_s = recording.load_capture(*channel), recording.radar_offset_s
     elif holds_map(options.capture):
-        _write_recorded(load_recorded_map(options.capture), 0.0, options, out)
+        _write_recorded(options.capture, 0.0, options, out)
         return
     else:
         capture = load_capture(options.capture).channel(*channel)
@@ -159,12 +161,19 @@ def _write_map(options: Radar, out: Path) -> None:
     show(description, as_json=options.json)
 
 
-def _write_recorded(recorded: RecordedMap, offset_s: float, options: Radar, out: Path) -> None:
-    """Write a map that the radar made itself: there are no samples to choose anything for."""
+def _write_recorded(path: Path, offset_s: float, options: Radar, out: Path) -> None:
+    """Write a map that the radar made itself, or that of its points, on the axis asked for."""
     from sd2core.cli.info.description import describe_map, show
+    from sd2core.cli.reading import chosen_axis
+    from sd2core.io.radar import load_recorded_map, looks_like_points
 
-    finished = f"and {recorded.source} holds a finished map"
-    options.refuse((*_PROCESSING, *_CHANNEL), finished, "for raw samples only")
+    if looks_like_points(path):
+        options.refuse(_OF_SAMPLES, f"and {path} holds points", "for raw samples only")
+        recorded = load_recorded_map(path, chosen_axis(options))
+    else:
+        finished = f"and {path} holds a finished map"
+        options.refuse((*_AXIS, *_OF_SAMPLES), finished, "for raw samples only")
+        recorded = load_recorded_map(path)
     doppler = recorded.doppler.shifted(offset_s)
     doppler.save(out)
     show(describe_map(out, doppler), as_json=options.json)

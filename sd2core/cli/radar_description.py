@@ -15,7 +15,7 @@ from sd2core.options.records import Group, OptionRecord, given, options_of
 
 @dataclass(frozen=True, kw_only=True)
 class Description(OptionRecord):
-    """Entries of a description of radar samples.
+    """Entries of a description of radar samples, or of a table of points.
 
     Parameters
     ----------
@@ -53,6 +53,10 @@ class Description(OptionRecord):
         array of an HDF5 or MATLAB file of several
     name : NAME
         name of the radar on screen
+    columns : LIST
+        of a table of points: names of its columns in order, of frame, time, x, y, z, range,
+        doppler, intensity, and - for others; with --frame-repetition-s and --sign (1: a positive
+        velocity recedes)
     """
 
     GROUP = Group("description", "after the word describe; all in SI units")
@@ -73,6 +77,7 @@ class Description(OptionRecord):
     range_step_m: Positive | None = None
     dataset: str | None = None
     name: str | None = None
+    columns: Words | None = None
 
 
 DESCRIPTION = {one.name: one for one in options_of(Description)}
@@ -89,13 +94,20 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
         plain_axes,
         write_description,
     )
+    from sd2core.io.radar.points import TEXT_SUFFIXES, looks_like_points
     from sd2core.io.radar.stored_arrays import array_names
+
+    told = given(options, DESCRIPTION)
+    of_points = looks_like_points(path) and not told.keys() & {"axes", "carrier_hz"}
+    if "columns" in told or of_points or path.suffix.lower() in TEXT_SUFFIXES:
+        _describe_points(path, told, as_json=as_json)
+        return
 
     if not is_describable(path):
         raise Sd2Error(
             f"{path} cannot be described", "a .npy, .h5, .mat or .sigmf-meta of radar samples"
         )
-    told = _told_by_sigmf(path) | given(options, DESCRIPTION)
+    told = _told_by_sigmf(path) | told
     if len(names := array_names(path)) > 1:
         _ask_for("dataset", told, f" ({', '.join(names[:9])})")
     if "axes" not in told:
@@ -112,6 +124,32 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
     shown = describe_capture(path, capture)
     shown.facts["description"] = str(written)
     shown.data["description"] = str(written)
+    show(shown, as_json=as_json)
+
+
+def _describe_points(path: Path, told: dict[str, Any], *, as_json: bool) -> None:
+    from sd2core.cli.info.description import describe_radar, show
+    from sd2core.io.radar.described import write_description
+    from sd2core.io.radar.points import column_names, described_points, read_points
+
+    foreign = told.keys() - {"columns", "dataset", "frame_repetition_s", "sign"}
+    if foreign:
+        raise Sd2Error(
+            f"{DESCRIPTION[min(foreign)].flags[0]} is given for a table of points",
+            "--columns, --dataset, --frame-repetition-s and --sign",
+        )
+    if "columns" not in told:
+        try:
+            told["columns"] = column_names(path, told.get("dataset"))
+        except Sd2Error as error:
+            if not sys.stdin.isatty():
+                raise
+            _ask_for("columns", told, f"; {error.found}")
+    description = described_points(path, told)
+    read_points(path, description)
+    written = write_description(description, path)
+    shown = describe_radar(path)
+    shown.facts["description"] = shown.data["description"] = str(written)
     show(shown, as_json=as_json)
 
 

@@ -54,6 +54,10 @@ def kind_of(path: Path) -> Kind:
         return "imu"
     if suffix == ".npz":
         return "map" if _is_doppler_map(path) else "mesh"
+    from sd2core.io.radar.points import looks_like_points
+
+    if looks_like_points(path):
+        return "radar"
     kind, said = _kind_by_plug_ins(path)
     if kind is not None:
         return kind
@@ -62,7 +66,7 @@ def kind_of(path: Path) -> Kind:
         "a recording (.sd2), a video (.mp4, .mkv …), a mesh (.npz, .zarr, .obj, .ply, .glb, .pkl),"
         " a radar capture (a folder with radar.npy, the .h5 of a K60168A or an A121, the .bin of a"
         " DCA1000, or samples with a description: .npy, .h5, .mat,"
-        " .sigmf-meta) or samples of an inertial"
+        " .sigmf-meta; or a table of points, .csv) or samples of an inertial"
         " sensor (.csv, .sto)",
         said,
     )

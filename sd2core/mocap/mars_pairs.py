@@ -28,6 +28,7 @@ from sd2core.io.radar.mars import (
     mars_parts,
     read_mars,
 )
+from sd2core.io.radar.point_maps import velocity_histogram
 from sd2core.maps import DopplerMap
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, SkeletonClip, puppet_of
@@ -83,20 +84,15 @@ def radar_doppler(
 ) -> NDArray[np.float32]:
     """Doppler of the radar's points per frame, (frames, bins).
 
-    A point says no more than that something moves within half a step of its velocity:
-    its intensity is spread evenly over that cell, and what is beyond the axis left out.
-    Frames without points are 0.
+    As :func:`~sd2core.io.radar.point_maps.velocity_histogram`; frames without points are 0.
     """
-    edges = axis.edges_mps
-    low = stretch.point_mps[:, None] - 0.5 * DOPPLER_STEP_MPS
-    inside = np.minimum(edges[1:], low + DOPPLER_STEP_MPS) - np.maximum(edges[:-1], low)
-    spread = np.maximum(inside, 0.0) / DOPPLER_STEP_MPS  # (P, bins)
     weight = stretch.point_intensity
     if target == "share":
         weight = weight / np.bincount(stretch.point_rows, weight)[stretch.point_rows]
-    values = np.zeros((stretch.frame_count, axis.bins))
-    np.add.at(values, stretch.frames[stretch.point_rows], weight[:, None] * spread)
-    return values.astype(np.float32)
+    columns = stretch.frames[stretch.point_rows]
+    return velocity_histogram(
+        columns, stretch.point_mps, weight, stretch.frame_count, axis, DOPPLER_STEP_MPS
+    ).T
 
 
 def skeleton_clip(stretch: MarsStretch) -> SkeletonClip:

@@ -177,7 +177,9 @@ def describe_recorded_map(path: Path, recorded: RecordedMap) -> Description:
         "notes": list(recorded.notes),
     }
     labelled = ", ".join(f"{span.start_s:.3f} to {span.end_s:.3f} s" for span in spans)
-    facts = inside.facts | {"gesture": recorded.gesture, "labelled": labelled or "nowhere"}
+    facts = inside.facts
+    if recorded.gesture:
+        facts = facts | {"gesture": recorded.gesture, "labelled": labelled or "nowhere"}
     return Description(f"Radar map {path}", data, facts, recorded.notes)
 
 

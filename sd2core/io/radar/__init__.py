@@ -33,11 +33,19 @@ from sd2core.io.radar.infineon import (
 )
 from sd2core.io.radar.judging import judged
 from sd2core.io.radar.kkt import RecordedMap, load_kkt
+from sd2core.io.radar.point_maps import load_points_map
+from sd2core.io.radar.points import (
+    TEXT_SUFFIXES,
+    column_names,
+    has_columns_told,
+    looks_like_points,
+)
 from sd2core.io.radar.sigmf import DATA, META
 from sd2core.io.radar.stored_arrays import array_names
 from sd2core.io.readers import RADAR_FILES, FileReader, plug_in_for
 from sd2core.radar_config import RadarConfig
 from sd2core.radar_profiles import PAPER, RADAR_PLUG_INS, RADARS, find_radar
+from sd2core.sensor import VelocityAxis
 
 __all__ = [
     "PAPER",
@@ -49,6 +57,7 @@ __all__ = [
     "holds_map",
     "load_capture",
     "load_recorded_map",
+    "looks_like_points",
     "named_radar",
     "read_radar_config",
     "without_companions",
@@ -108,7 +117,7 @@ def companions(path: Path) -> list[Path]:
     found: list[Path] = []
     if path.is_dir():
         return found
-    if is_described(path):
+    if is_described(path) or has_columns_told(path):
         found.append(description_of(path))
     if path.suffix.lower() in (META, DATA):
         found += [path.with_suffix(suffix) for suffix in (META, DATA)]
@@ -141,11 +150,13 @@ def without_companions(paths: Sequence[Path]) -> list[Path]:
 def holds_map(path: Path | str) -> bool:
     """True if a radar recording holds maps: read it by `load_recorded_map`.
 
-    That is so of HDF5 files of a K60168A, and of those that are damaged; a file that is not there
-    goes by its name.
+    That is so of tables of points, of HDF5 files of a K60168A, and of those that are damaged; a
+    file that is not there goes by its name.
     """
     path = Path(path).expanduser()
-    return not is_described(path) and _maker_of(path) in ("kaikutek", "unknown")
+    if is_described(path):
+        return False
+    return _maker_of(path) in ("kaikutek", "unknown") or looks_like_points(path)
 
 
 def _maker_of(path: Path) -> str:
@@ -199,6 +210,11 @@ def _ask_description(path: Path) -> RadarCapture:
     )
 
 
+def _ask_columns(path: Path) -> RadarCapture:
+    column_names(path)  # refuses it, but for a table of points, which is no capture
+    return _refuse_map(path)
+
+
 _READERS: tuple[FileReader[RadarCapture], ...] = (
     FileReader(load_growing, looks=is_growing),
     FileReader(load_described, looks=is_described),
@@ -213,16 +229,22 @@ _READERS: tuple[FileReader[RadarCapture], ...] = (
     FileReader(_load_infineon, looks=_holds_infineon),
     FileReader(dca1000.load_dca1000, looks=_holds_dca1000),
     FileReader(_ask_description, looks=_lacks_description),
+    FileReader(_ask_columns, TEXT_SUFFIXES),
 )
 """Readers of captures; the first that fits is taken, and those of plug-ins after all of them."""
 
 
-def load_recorded_map(path: Path | str) -> RecordedMap:
-    """Open a radar recording that holds a Doppler map and labels instead of samples.
+def load_recorded_map(path: Path | str, axis: VelocityAxis | None = None) -> RecordedMap:
+    """Open a radar recording that holds a Doppler map, or a table of points, instead of samples.
 
-    Raises Sd2Error if it is none that is known (:mod:`sd2core.io.radar.kkt`), or is damaged.
+    ``axis`` is that of the map of points, by default 32 bins over ±2 m/s; other maps have their
+    own. Raises Sd2Error if it is none that is known (:mod:`sd2core.io.radar.kkt`,
+    :mod:`sd2core.io.radar.points`), or is damaged.
     """
-    return load_kkt(Path(path).expanduser())
+    path = Path(path).expanduser()
+    if looks_like_points(path):
+        return load_points_map(path, axis)
+    return load_kkt(path)
 
 
 def named_radar(name: str) -> RadarConfig:

@@ -27,6 +27,7 @@ from sd2core.files.texts import errors_in, faults_in, read_json, read_toml
 from sd2core.files.toml import toml_lines
 from sd2core.io.radar.capture import LazySamples, RadarCapture
 from sd2core.io.radar.infineon import check_replaceable
+from sd2core.io.radar.points import PointsDescription, has_columns_told
 from sd2core.io.radar.sigmf import DATA, META
 from sd2core.io.radar.stored_arrays import MATLAB_SUFFIX, SUFFIXES, StoredArray, open_stored
 from sd2core.radar_config import RadarConfig
@@ -100,8 +101,8 @@ def is_describable(path: Path) -> bool:
 
 
 def is_described(path: Path) -> bool:
-    """True if a file is of a kind that can be described, and a description is beside it."""
-    return is_describable(path) and description_of(path).is_file()
+    """True if a file of samples can be described, and a description of samples is beside it."""
+    return is_describable(path) and description_of(path).is_file() and not has_columns_told(path)
 
 
 def read_description(path: Path) -> RadarDescription:
@@ -110,15 +111,16 @@ def read_description(path: Path) -> RadarDescription:
         return RadarDescription.model_validate(read_toml(path, _EXPECTED))
 
 
-def write_description(description: RadarDescription, data: Path) -> Path:
+def write_description(description: RadarDescription | PointsDescription, data: Path) -> Path:
     """Write the description of a file beside it; Sd2Error if something else is there."""
     path = description_of(data)
     if path.exists():
         try:
-            read_description(path)
+            if not has_columns_told(data):
+                read_description(path)
         except Sd2Error as error:
             raise Sd2Error(
-                f"{path} is there, and is no description of radar samples",
+                f"{path} is there, and is no description of radar data",
                 "a name that is free",
                 "Move it away",
             ) from error
@@ -297,7 +299,7 @@ def _of_simulation(path: Path, description: RadarDescription) -> dict[str, Any]:
 
 def _longest(axes: Sequence[Axis]) -> Axis:
     """Axis along which a recording is long: frames, or what has no gaps."""
-    return next((name for name in ("stream", "frame") if name in axes), "chirp")  # type: ignore[return-value]
+    return next((name for name in ("stream", "frame") if name in axes), "chirp")
 
 
 def _sizes(stored: StoredArray, description: RadarDescription) -> dict[str, int]:

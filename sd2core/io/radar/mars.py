@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular
 from sd2core.files.texts import lines_of
+from sd2core.io.radar.points import LONGEST_GAP_FRAMES
 
 JOINTS = (
     "SpineBase",
@@ -59,7 +60,6 @@ FRAMES_PER_S = 10.0
 DOPPLER_STEP_MPS = 0.356
 """Velocities of points are multiples of it: the radar's resolution."""
 
-_LONGEST_GAP_FRAMES = 10
 _FARTHEST_M = 100.0
 _FRAME, _DOPPLER, _INTENSITY = "Frame #", "Doppler", "Intensity"
 _KINECT, _RADAR = "kinect_data_{}.csv", "radar_data_{}.csv"
@@ -155,7 +155,7 @@ def read_mars(folder: Path | str, part: str) -> MarsPart:
         raise Sd2Error(
             f"{radar}: the intensity of point {bad + 1} is {points[bad, 2]:g}", "more than 0"
         )
-    cuts = np.flatnonzero(np.diff(numbers) > _LONGEST_GAP_FRAMES) + 1
+    cuts = np.flatnonzero(np.diff(numbers) > LONGEST_GAP_FRAMES) + 1
     edges = [0, *cuts.tolist(), len(numbers)]
     starts = np.append(first, len(points))
     stretches = []

@@ -9,13 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cli_outcome import Sd2
+from scipy.io import savemat
 
 from sd2core.io.radar import load_capture
 from sd2core.io.radar.described import read_description
 from sd2core.maps import DopplerMap
 from sd2core.recording.recording import Recording, open_recording
+from sd2core.sensor import VelocityAxis
 from tests.core.io.radar.acconeer_files import write_a121
 from tests.core.io.radar.dca1000_files import TiRecording, write_ti
+from tests.core.io.radar.point_files import walk, write_csv
 
 TI = TiRecording(transmitters=2, loops=32)
 DESCRIBED = (
@@ -217,3 +220,60 @@ def test_a_radar_that_is_none_is_named(sd2: Sd2, tmp_path: Path, plate: Path) ->
     outcome = sd2("simulate", "radar", plate, "--out", tmp_path / "made", "--radar", "sonar")
     assert outcome.code == 1
     assert "There is no radar 'sonar'" in outcome.err
+
+
+ADC = (
+    *("--dataset", "adc", "--axes", "sample,chirp", "--carrier-hz", 60e9, "--bandwidth-hz", 1e9),
+    *("--chirp-repetition-s", 1e-3),
+)
+
+
+def test_a_table_of_points_is_a_map_on_the_axis_asked_for(sd2: Sd2, tmp_path: Path) -> None:
+    path, out = write_csv(tmp_path / "points.csv", walk()), tmp_path / "map.npz"
+    assert sd2("radar", path, "--out", out, "--v-max", 4, "--bins", 16).code == 0
+    assert DopplerMap.load(out).axis == VelocityAxis(16, 4.0)
+    outcome = sd2("radar", path, "--out", out, "--overwrite", "--clutter", "mean")
+    assert outcome.code == 1
+    assert "--clutter is given" in outcome.err
+    folder = tmp_path / "a.sd2"
+    assert sd2("import", "--radar", path, "--out", folder, "--copy").code == 0
+    path.unlink()
+    assert "200 frames" in sd2("info", folder).out
+
+
+def test_what_a_table_of_points_lacks_is_described(sd2: Sd2, tmp_path: Path) -> None:
+    table = walk()
+    path = write_csv(tmp_path / "points.csv", table[:, :5], ("n", "a", "b", "c", "d"))
+    for command in (("radar",), ("radar", "describe")):
+        outcome = sd2(*command, path)
+        assert outcome.code == 1
+        assert "points.csv holds n, a, b, c, d" in outcome.err
+        assert "--columns" in outcome.err
+    columns = ("--columns", "frame,x,y,z,doppler")
+    outcome = sd2("radar", "describe", path, *columns, "--frame-repetition-s", 0.05)
+    assert outcome.code == 0, outcome.err
+    assert "20.00 frames/s" in outcome.out
+    assert "20.00 frames/s" in sd2("radar", path).out
+    outcome = sd2("radar", "describe", path, *columns, "--carrier-hz", 60e9)
+    assert outcome.code == 1
+    assert "--carrier-hz is given for a table of points" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("given", "asked"),
+    [
+        ((), "--dataset is missing"),
+        (("--dataset", "adc"), r"--axes is missing"),
+        (("--dataset", "adc", "--axes", "sample,chirp"), "--carrier-hz is missing"),
+        ((*ADC, "--range-start-m", 1), "--chirps-per-frame is missing"),
+        ((*ADC, "--range-start-m", 1, "--chirps-per-frame", 8), "--range-step-m is missing"),
+    ],
+)
+def test_every_fact_that_is_missing_is_asked_for_by_its_option(
+    sd2: Sd2, tmp_path: Path, given: tuple[object, ...], asked: str
+) -> None:
+    path = tmp_path / "walk.mat"
+    savemat(path, {"adc": np.ones((20, 64)) + 1j, "other": np.ones((3, 3))})
+    outcome = sd2("radar", "describe", path, *given)
+    assert outcome.code == 1
+    assert asked in outcome.err

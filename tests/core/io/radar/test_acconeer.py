@@ -210,9 +210,7 @@ def test_the_older_sensor_is_named_with_what_can_be_done(
         file["data"] = np.ones((5, 1, 4))
         file["mode"], file["sensor_config_dump"] = service, "{}"
     assert not holds_map(path)
-    with pytest.raises(
-        Sd2Error, match=rf"a\.h5 is .* A111.*{service}.*{way}"
-    ):
+    with pytest.raises(Sd2Error, match=rf"a\.h5 is .* A111.*{service}.*{way}"):
         load_capture(path)
 
 
