@@ -12,7 +12,7 @@ from sd2core.errors import Sd2Error
 from sd2core.io.kinds import MESH_SUFFIXES, RADAR_SUFFIXES, VIDEO_SUFFIXES, kind_of
 from sd2core.io.readers import MESH_FILES, RADAR_FILES, suffixes_of
 
-_OTHERS = {".npz", ".zip", ".csv", ".sto"}
+_OTHERS = {".npz", ".zip", ".csv", ".tsv", ".sto"}
 _SUFFIXES = VIDEO_SUFFIXES | MESH_SUFFIXES | RADAR_SUFFIXES | _OTHERS
 _CLOSED = ("recording.json", REQUEST_NAME, "zarr.json", "radar.npy")
 """Files of folders into which nobody has to look."""

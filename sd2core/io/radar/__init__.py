@@ -242,9 +242,10 @@ def load_recorded_map(path: Path | str, axis: VelocityAxis | None = None) -> Rec
     :mod:`sd2core.io.radar.points`), or is damaged.
     """
     path = Path(path).expanduser()
-    if looks_like_points(path):
-        return load_points_map(path, axis)
-    return load_kkt(path)
+    recorded = load_points_map(path, axis) if looks_like_points(path) else load_kkt(path)
+    if recorded.doppler.values.any():
+        return recorded
+    return replace(recorded, notes=(*recorded.notes, "The map holds nothing but zeros."))
 
 
 def named_radar(name: str) -> RadarConfig:

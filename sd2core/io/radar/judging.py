@@ -16,8 +16,8 @@ from sd2core.io.radar.capture import RadarCapture, Signal
 from sd2core.radar_config import RadarConfig
 
 _MOST_FRAMES, _MOST_SAMPLES = 32, 1 << 22
-_WHITE_LEVEL, _WHITE_CORRELATION = 0.45, 0.1
-"""Even noise over all of a converter's range has 0.58 of full scale, and 0."""
+_WHITE_LEVEL, _WHITE_CORRELATION = 0.3, 0.1
+"""Even noise over all of a converter's range has 0.58 of full scale, and 0; echoes are tones."""
 _FEWEST_GATES = 16
 _MIRRORED = 4.0
 """Ratio of powers: near echoes are the strongest, so that the far half has less."""
@@ -85,8 +85,10 @@ def _is_white(signal: Signal) -> bool:
     parts = np.ascontiguousarray(signal).view(np.float32).reshape(*signal.shape, -1)
     if parts.shape[3] < _FEWEST_GATES or float(parts.std()) < _WHITE_LEVEL:
         return False
-    product = float((parts[..., 1:, :] * parts[..., :-1, :]).mean())
-    return abs(product) < _WHITE_CORRELATION * float((parts * parts).mean())
+    power = float((parts * parts).mean())
+    # A tone that is not like its next sample is like one soon after.
+    alike = [abs(float((parts[..., n:, :] * parts[..., :-n, :]).mean())) for n in range(1, 5)]
+    return max(alike) < _WHITE_CORRELATION * power
 
 
 def _is_mirrored(signal: Signal, config: RadarConfig) -> bool:

@@ -180,3 +180,11 @@ def test_the_step_of_a_radar_is_found_in_rounded_velocities(step_mps: float) -> 
     velocities = np.round(step_mps * rng.integers(-6, 7, 5000), 3)
     assert doppler_step(velocities) == pytest.approx(step_mps, rel=0.01)
     assert doppler_step(rng.normal(size=5000)) == 0.0
+
+
+def test_a_map_of_nothing_is_told(tmp_path: Path) -> None:
+    table = walk()
+    table[:, 5] = 0.0
+    table[:, 4] = 9.0
+    notes = load_recorded_map(write_csv(tmp_path / "a.csv", table)).notes
+    assert "The map holds nothing but zeros." in notes
