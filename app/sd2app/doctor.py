@@ -11,6 +11,7 @@ import sys
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from sd2app.displays import silent_displays
 from sd2app.system_libraries import how_to_install, missing_libraries
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_cache, user_data
@@ -83,6 +84,9 @@ def _libraries() -> Finding:
 
 
 def _window() -> list[Finding]:
+    if silent := silent_displays(sys.platform, os.environ):
+        said = f"the display cannot be reached: {', '.join(silent)}"
+        return [Finding("Window", "problem", said, "Begin its session again, or unset it")]
     on_screen = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
     environment = dict(os.environ)
     if not on_screen and sys.platform.startswith("linux"):

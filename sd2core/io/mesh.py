@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error, wanted
+from sd2core.files.limits import check_regular
 from sd2core.files.paths import PICKLE_SUFFIXES, as_path, is_pattern
 from sd2core.files.texts import errors_in
 from sd2core.io.fitted import fitted_doubts
@@ -156,6 +157,7 @@ def save_mesh(mesh: MeshSequence, path: Path | str, progress: Progress = silent)
 def _read(path: Path, hints: MeshHints) -> RawMesh:
     if not (is_pattern(path) or path.exists()):
         raise Sd2Error(f"{path} does not exist", f"a mesh: {_KNOWN}", "Check the path")
+    check_regular(path)
     for reader in _READERS:
         if reader.fits(path):
             return reader.read(path, hints)

@@ -73,6 +73,12 @@ def test_a_window_that_cannot_be_drawn_is_not_begun(tmp_path: Path) -> None:
         command_line._show([], tmp_path / "window.png")
 
 
+def test_a_display_that_is_gone_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "silent_displays", lambda *_: ("DISPLAY=:1977",))
+    found = finding("Window")
+    assert (found.state, "DISPLAY=:1977" in found.found) == ("problem", True)
+
+
 def test_a_window_that_ends_its_process_is_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "PROBE", "raise SystemExit('could not load the platform plugin')")
     found = finding("Window")

@@ -81,8 +81,8 @@ def load_points_map(path: Path, axis: VelocityAxis | None = None) -> RecordedMap
     notes: list[str] = []
     if points.guessed:
         notes.append(
-            f"Columns have no names; by their numbers they are {', '.join(points.columns)}. If that"
-            f" is not so: sd2 radar describe {path.name} --columns …"
+            f"Columns have no names; by their numbers they are {', '.join(points.columns)}."
+            f" `sd2 radar describe {path.name} --columns LIST` says otherwise."
         )
     numbers, rows = np.unique(points.frame, return_inverse=True)
     stated_s = None if told is None else told.frame_repetition_s
@@ -138,8 +138,8 @@ def _clock(
     if frame_s is None:
         frame_s = USUAL_FRAME_S
         notes.append(
-            f"The table tells no times: a frame is taken every {1e3 * frame_s:g} ms. If that is not"
-            f" so: sd2 radar describe {path.name} --frame-repetition-s S"
+            f"The table tells no times: a frame is taken every {1e3 * frame_s:g} ms."
+            f" `sd2 radar describe {path.name} --frame-repetition-s S` says otherwise."
         )
     if moments_s is not None and (np.diff(moments_s) > 0).all():
         gaps_s = np.diff(moments_s)
@@ -198,7 +198,7 @@ def _sign(
         return sign
     notes.append(
         "A positive velocity is taken to recede, as TI's radars say it; walk towards the radar to"
-        f" check, or: sd2 radar describe {path.name} --sign -1"
+        f" check. `sd2 radar describe {path.name} --sign -1` says otherwise."
     )
     return 1
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from sd2core.errors import Sd2Error
-from sd2core.files.limits import check_size, open_regular
+from sd2core.files.limits import open_regular
 from sd2core.files.texts import faults_in, lines_of, read_toml
 from sd2core.io.imu_columns import titles_of
 from sd2core.io.radar.stored_arrays import MATLAB_SUFFIX, array_names, open_stored
@@ -47,7 +47,6 @@ _EXPECTED = "a table of points with the columns frame and doppler"
 _FEWEST, _MOST = 3, 12
 _LOOKED_AT = 20_000
 _FASTEST_MPS = 30.0
-_BYTES_PER_NUMBER = 8
 
 
 class PointsDescription(BaseModel):
@@ -143,7 +142,13 @@ def read_points(path: Path, description: PointsDescription | None = None) -> Rad
             f"{path} has {table.width} columns, its description {len(columns)}", "as many"
         )
     places = {name: place for place, name in enumerate(columns) if name in COLUMNS}
-    numbers = dict(zip(places, table.read(tuple(places.values())), strict=True))
+    try:
+        numbers = dict(zip(places, table.read(tuple(places.values())), strict=True))
+    except Sd2Error:
+        if not {"frame", "time"} <= places.keys():
+            raise
+        del places["time"]  # dates in words, perhaps
+        numbers = dict(zip(places, table.read(tuple(places.values())), strict=True))
     if table.frame is not None:
         numbers["frame"] = table.frame()
     finite = np.isfinite(numbers["doppler"])
@@ -308,7 +313,6 @@ class _Vectors(_Table):
 
 def _opened(path: Path, dataset: str | None) -> _Table:
     if path.suffix.lower() in TEXT_SUFFIXES:
-        check_size(path, _BYTES_PER_NUMBER * path.stat().st_size, path.stat().st_size)
         return _Text(path)
     if path.suffix.lower() == MATLAB_SUFFIX and dataset is None:
         names = array_names(path)

@@ -109,6 +109,8 @@ def test_readers_of_their_own_name_what_was_not_fetched(tmp_path: Path, content:
     for read, path in (
         (load_mesh, at("a.obj")),
         (load_mesh, at("a.npz")),
+        (load_mesh, at("a.pt")),
+        (load_capture, at("a.h5")),
         (load_capture, at("adc_data.cfg").with_suffix(".bin")),
         (lambda path: read_text(path, "labels"), at("labels.eaf")),
         (DopplerMap.load, at("map.npz")),

@@ -182,6 +182,14 @@ def test_the_step_of_a_radar_is_found_in_rounded_velocities(step_mps: float) -> 
     assert doppler_step(rng.normal(size=5000)) == 0.0
 
 
+def test_dates_in_words_are_left_out_where_frames_are_numbered(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "a.csv", walk())
+    first, *rows = path.read_text().splitlines()
+    dated = [f"2024-05-01 10:00:00.5,{row}" for row in rows]
+    path.write_text("\n".join([f"timestamp,{first}", *dated]))
+    assert is_the_walk(path)
+
+
 def test_a_map_of_nothing_is_told(tmp_path: Path) -> None:
     table = walk()
     table[:, 5] = 0.0
