@@ -464,9 +464,9 @@ def test_saving_keeps_sensor_and_offset(empty_window, recording_copy, qtbot):
         empty_window.open_paths([recording_copy])
     c.edits.place_sensor(VirtualSensor(position_m=(0.5, -0.25, 0.125)))
     c.edits.set_radar_offset(0.5)
-    assert "*" in empty_window.windowTitle()
+    qtbot.waitUntil(lambda: "*" in empty_window.windowTitle(), timeout=5_000)
     qtbot.keyClick(empty_window, Qt.Key.Key_S, Qt.KeyboardModifier.ControlModifier)
-    assert "*" not in empty_window.windowTitle()
+    qtbot.waitUntil(lambda: "*" not in empty_window.windowTitle(), timeout=5_000)
     with qtbot.waitSignal(c.document.opened, timeout=10_000):
         empty_window.open_paths([recording_copy])
     assert c.sensor.sensor.position_m == (0.5, -0.25, 0.125)
