@@ -45,7 +45,8 @@ class Listen(Json):
         listen to a DCA1000 on this address of this computer (default: 127.0.0.1, which only
         programs on this computer reach; port 4098)
     replay : CAPTURE
-        a capture, or the one of a recording, at its own rate
+        a capture, or the one of a recording, at its own rate; or `test`, a simulated radar
+        (`test:20`: with 20 frames/s)
     setup : FILE
         the .cfg or .json that the radar runs with (with --dca1000)
     out : NAME.sd2
@@ -141,10 +142,14 @@ def _source(options: Listen) -> Source:
 
 
 def replayed(path: Path) -> Source:
-    """Capture, or the one of a recording, at its own rate."""
+    """Capture, or the one of a recording, at its own rate; or the simulated radar ``test``."""
+    from sd2core.live.rehearsal import TEST, TEST_RATE_HZ, TestSource
     from sd2core.live.sources import ReplaySource
     from sd2core.recording.recording import is_recording, open_recording
 
+    name, _, rate = str(path).partition(":")
+    if name == TEST and (not rate or rate.isdecimal()):
+        return TestSource(float(rate or TEST_RATE_HZ))
     return ReplaySource(open_recording(path).load_capture() if is_recording(path) else path)
 
 

@@ -143,13 +143,9 @@ def _record(options: Record) -> None:
 
 def _source(options: Record) -> Source:
     from sd2core.cli.listen import dca1000, replayed
-    from sd2core.live.rehearsal import TEST, TEST_RATE_HZ, TestSource
 
     if options.setup is not None:
         return dca1000(options.radar, options.setup)
-    name, _, rate = options.radar.partition(":")
-    if name == TEST and (not rate or rate.isdecimal()):
-        return TestSource(float(rate or TEST_RATE_HZ))
     return replayed(Path(options.radar))
 
 
@@ -188,7 +184,9 @@ class _Take:
         if not self._linked and filmed.first_s is not None and self._recording.frames:
             self._link()
             self._linked = True
-        told: dict[str, Any] = {"pictures": filmed.recorded, "pictures_dropped": filmed.dropped}
+        told: dict[str, Any] = {
+            "pictures": filmed.recorded, "pictures_dropped": filmed.dropped, "linked": self._linked
+        }  # fmt: skip
         if (preview := self._film.next_preview()) is not None:
             told["preview"] = preview
         return told

@@ -29,8 +29,8 @@ from sd2core.live.cameras import Camera, open_camera
 VIDEO_NAME = "video.mp4"
 
 _CRF, _PRESET = 19, "superfast"
-_WAITING = 60
-"""Pictures that may wait for the encoder: two seconds."""
+_WAITING_BYTES = 256 << 20
+"""Pictures that may wait for the encoder: three seconds of 1280 × 720, twelve of 640 × 360."""
 _TELL_S = 0.1
 _LOOK_S = 1.0
 _PREVIEW_PX = 320
@@ -199,7 +199,8 @@ class _Filming:
             self._file, camera.rate_hz, camera.size_px, crf=_CRF, preset=_PRESET, grows=True
         )
         self._pictures: queue.Queue[tuple[NDArray[np.uint8], float] | None]
-        self._pictures = queue.Queue(_WAITING)
+        width, height = camera.size_px
+        self._pictures = queue.Queue(max(_WAITING_BYTES // (3 * width * height), 2))
         self._stop = threading.Event()
         self._filmed = Filmed()
         self._told_s = self._looked_s = 0.0

@@ -42,7 +42,9 @@ class LiveBar(StateBar):
         if live.state == "failed":
             say(self._frames, live.text, "warning")
         else:
-            say(self._frames, frames_text(live.counts), "" if live.counts.whole else "warning")
+            whole = live.counts.whole and not live.pictures_dropped
+            text = frames_text(live.counts, live.pictures, live.pictures_dropped)
+            say(self._frames, text, "" if whole else "warning")
         parts = (level_text(live.level_db), latency_text(live.latency_s))
         listening = live.state == "listening"
         self._numbers.setText(" · ".join(filter(None, parts)) if listening else "")

@@ -1,9 +1,11 @@
-"""Dialog Listen: a radar or a capture, and the recording that grows."""
+"""Dialog Record: a camera, a radar or a capture, and the recording that grows."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
+from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QDialog, QLabel, QLineEdit, QToolButton, QWidget
 
 from sd2app.live.setup import ListenSetup
@@ -17,7 +19,19 @@ from sd2core.io.readers import RADAR_FILES, suffixes_of
 
 _SETUPS = "Configuration of the radar (*.cfg *.json);;All files (*)"
 _CAPTURES = "Radar captures and recordings ({} radar.npy recording.json live.json);;All files (*)"
-_WAYS = {"dca1000": "a TI radar with a DCA1000", "replay": "a capture, replayed at its own rate"}
+_VIDEOS = "Videos (*.mp4 *.mov *.mkv *.avi *.webm);;All files (*)"
+_WAYS = {
+    "dca1000": "a TI radar with a DCA1000",
+    "replay": "a capture, replayed at its own rate",
+    "test": "a test radar (simulated)",
+}
+_CAMERAS = {
+    "": "none",
+    "0": "the first camera",
+    "1": "the second camera",
+    "test": "test pictures (simulated)",
+    "file": "a video, played at its rate…",
+}
 _NONE = "none chosen"
 
 
@@ -32,10 +46,11 @@ class ListenDialog(QDialog):
     def __init__(self, setup: ListenSetup, parent: QWidget) -> None:
         super().__init__(parent)
         self._setup = setup
-        self.setWindowTitle("Listen to a radar")
+        self.setWindowTitle("Record")
         self._way = Choice(
             "Where frames come from", self, _WAYS, lambda way: setup.choose("way", way)
         )
+        self._camera = Choice("Camera", self, dict(_CAMERAS), self._choose_camera)
         self._file = ElidedLabel(self)
         self._folder = ElidedLabel(self)
         self._address = QLineEdit(setup.address, self)
@@ -49,16 +64,18 @@ class ListenDialog(QDialog):
         self._hint.setWordWrap(False)  # in a form, what wraps gets too much room or too little
         self._message = sentence("")
         self._file_name, self._address_name = QLabel(self), QLabel("Address", self)
-        buttons, self._begin = accepting(self, "Listen")
+        buttons, self._begin = accepting(self, "Record")
+        self._file_button = self._button(self._ask_file)
         form = form_of(
-            ("From", self._way),
-            (self._file_name, row_of((self._file, 1), self._button(self._ask_file), spacing_px=8)),
+            ("Camera", self._camera),
+            ("Radar", self._way),
+            (self._file_name, row_of((self._file, 1), self._file_button, spacing_px=8)),
             (self._address_name, self._address),
             ("", self._hint),
             ("Into", row_of((self._folder, 1), self._button(self._ask_folder), spacing_px=8)),
             gaps_px=(16, 12),
         )
-        foot = with_help("Listen to a radar", buttons)
+        foot = with_help("Record", buttons)
         self.setLayout(column_of(form, STRETCH, self._message, foot, spacing_px=16, margins_px=16))
         setup.changed.connect(self._refresh)
         self._refresh()
@@ -71,6 +88,9 @@ class ListenDialog(QDialog):
         setup = self._setup
         is_radar = setup.way == "dca1000"
         self._way.show_value(setup.way)
+        self._show_camera()
+        for part in (self._file_name, self._file, self._file_button):
+            part.setVisible(setup.way != "test")
         self._file_name.setText("Configuration" if is_radar else "Capture")
         chosen = setup.setup if is_radar else setup.replay
         self._file.setText(str(chosen) if chosen is not None else _NONE)
@@ -82,7 +102,21 @@ class ListenDialog(QDialog):
             words = f"{setup.folder.name} exists: frames are added to it, if it is of this radar."
         say(self._message, words, role)
         self._begin.setEnabled(not setup.problem)
-        self._begin.setText("Continue" if setup.continues else "Listen")
+        self._begin.setText("Continue" if setup.continues else "Record")
+
+    def _show_camera(self) -> None:
+        """Show the camera, or the name of the video that was chosen."""
+        camera = self._setup.camera
+        if self._camera.findData(camera) < 0:
+            with QSignalBlocker(self._camera):
+                self._camera.addItem(Path(camera).name, camera)
+        self._camera.show_value(camera)
+
+    def _choose_camera(self, camera: str) -> None:
+        if camera == "file":
+            camera = str(ask_file(self, "Video to play", _VIDEOS, "") or self._setup.camera)
+        self._setup.choose("camera", camera)
+        self._show_camera()
 
     def _ask_file(self) -> None:
         setup = self._setup

@@ -33,10 +33,10 @@ class LiveFeature(Feature):
         model = self.model
         return (
             Action(
-                "listen", "File", "Listen to a radar…", (),
-                "Record a radar while it runs, with its Doppler map on screen",
+                "listen", "File", "Record…", (),
+                "Record a camera and a radar together, or a radar alone, with its Doppler map",
                 self._ask, lambda: not model.busy,
-                why_not=lambda: "A radar is listened to already" if model.busy else "",
+                why_not=lambda: "A recording is being made already" if model.busy else "",
             ),
         )  # fmt: skip
 
@@ -66,4 +66,4 @@ class LiveFeature(Feature):
         if not self.model.busy or request is None:
             return True
         words = f"Frames go into {request.folder.name}. What was received so far is kept."
-        return confirmed(self._shell.dialog_parent, "Stop listening?", words, Answer.Close)
+        return confirmed(self._shell.dialog_parent, "Stop recording?", words, Answer.Close)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import json
 import sys
@@ -11,7 +12,9 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, Signal
+from PySide6.QtGui import QImage
 
 from sd2app.background.latest import delayed
 from sd2app.live.growing_map import extended
@@ -52,6 +55,7 @@ class LiveModel(QObject):
         self.state: State = "idle"
         self.request: ListenRequest | None = None
         self.counts = Counts()
+        self.pictures = self.pictures_dropped = 0  # of the camera
         self.level_db: float | None = None  # of the newest column
         self.text = ""  # why it failed
         self._map: DopplerMap | None = None
@@ -59,6 +63,7 @@ class LiveModel(QObject):
         self.received_unix_s = 0.0  # of the newest column
         self._latencies_s: deque[float] = deque(maxlen=_LATENCIES)
         self._reference = 0.0  # that was set here: the strongest bin so far is 0 dB
+        self._is_linked = True  # false until the recording names its video
         self._is_shown = True  # false where the recording cannot be read
         self._process: QProcess | None = None
         self._said = ""  # on standard error
@@ -98,6 +103,7 @@ class LiveModel(QObject):
             return
         self.request, self.text, self._map = request, "", None
         self.counts, self.level_db = Counts(), None
+        self.pictures = self.pictures_dropped = 0
         self._latencies_s.clear()
         if not (request.folder / FILE_NAME).is_file():
             self._launch()
@@ -169,6 +175,7 @@ class LiveModel(QObject):
     def _launch(self) -> None:
         assert self.request is not None
         self._said, self._new, self._is_shown = "", [], True
+        self._is_linked = not self.request.camera
         process = QProcess(self)
         environment = QProcessEnvironment.systemEnvironment()
         for name, value in {**ONE_THREAD, "PYTHONIOENCODING": "utf-8"}.items():
@@ -217,6 +224,11 @@ class LiveModel(QObject):
                 self.counts = Counts.of(event)
             case "frames" | "end":
                 self.counts = Counts.of(event)
+                self.pictures = int(event.get("pictures", self.pictures))
+                self.pictures_dropped = int(event.get("pictures_dropped", self.pictures_dropped))
+                self._is_linked = bool(event.get("linked", True))
+                if (preview := event.get("preview")) is not None and self.on_screen:
+                    self._session.video.show_live(_pixels(base64.b64decode(preview)))
 
     def _end(self, code: int) -> None:
         self._read()
@@ -229,6 +241,7 @@ class LiveModel(QObject):
                 self._document.end_growth()
             except (Sd2Error, OSError) as error:
                 self.warned.emit(str(error))
+            self._show_video()
         if code == 0:
             self._set_state("stopped")
         else:
@@ -239,7 +252,7 @@ class LiveModel(QObject):
 
     def _show_new(self) -> None:
         """Add the columns that came to the map, and show it."""
-        if not self._new or not self._is_shown:
+        if not self._new or not self._is_shown or not self._is_linked:
             return
         if self._map is None:
             self._map = self._first_map()
@@ -265,6 +278,16 @@ class LiveModel(QObject):
         before, self._map = self._map, extended(self._map, self._new)
         self._new = []
         return self._map is not before
+
+    def _show_video(self) -> None:
+        """Open what was filmed with its video, unless there are edits that would be lost."""
+        assert self.request is not None
+        if not self.request.camera or not (self.request.folder / FILE_NAME).is_file():
+            return
+        if self._document.modified:
+            self.warned.emit("Save the recording and open it again: then its video is shown.")
+        else:
+            self._document.open([self.request.folder])
 
     def _first_map(self) -> DopplerMap | None:
         """Map of what is stored by now; None before there is something."""
@@ -310,6 +333,13 @@ class LiveModel(QObject):
             self.state = state
             self.state_changed.emit()
             self.changed.emit()
+
+
+def _pixels(jpeg: bytes) -> NDArray[np.uint8]:
+    """RGB picture (H, W, 3) of a JPEG."""
+    image = QImage.fromData(jpeg).convertToFormat(QImage.Format.Format_RGB888)
+    rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
+    return rows[:, : 3 * image.width()].reshape(image.height(), image.width(), 3).copy()
 
 
 def _tell_to_stop(process: QProcess) -> None:

@@ -11,26 +11,43 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.settings import Settings, StoredChoices
 from sd2core.cli.listen import Listen
+from sd2core.cli.record import Record
+from sd2core.live.rehearsal import TEST
+from sd2core.live.sources import LOOPBACK
 from sd2core.options.records import words_of
 from sd2core.recording.recording import FILE_NAME, SUFFIX, folder_named
 
-Way = Literal["dca1000", "replay"]
-_DEFAULTS = {"way": "dca1000", "setup": "", "address": "", "replay": "", "beside": ""}
+Way = Literal["dca1000", "replay", "test"]
+_WAYS = ("dca1000", "replay", "test")
+_DEFAULTS = {
+    "way": "dca1000", "setup": "", "address": "", "replay": "", "beside": "", "camera": ""
+}  # fmt: skip
 _ENDINGS = (".cfg", ".json")
 
 
 @dataclass(frozen=True)
 class ListenRequest:
-    """A radar that sends by a DCA1000, or a capture that is replayed; and where frames go."""
+    """Radar by a DCA1000, or capture that is replayed; a camera; and where frames go."""
 
     folder: Path  # the recording
     setup: Path | None = None  # configuration of the radar
     address: str = ""  # of this computer, with or without a port; empty: of this computer alone
     replay: Path | None = None
+    camera: str = ""  # as of `sd2 record`; empty: none
 
     def words(self) -> list[str]:
         """Words of the ``sd2`` command that does it."""
         replay = self.replay is not None
+        if self.camera:
+            take = Record(
+                camera=self.camera,
+                radar=str(self.replay) if replay else self.address or LOOPBACK,
+                setup=None if replay else self.setup,
+                out=self.folder,
+                json=True,
+                previews=True,
+            )
+            return words_of("record", take)
         command = Listen(
             dca1000=None if replay else self.address,
             replay=self.replay,
@@ -49,7 +66,7 @@ class ListenSetup(QObject):
 
     def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._choices = StoredChoices(settings, "listen", _DEFAULTS, {"way": ("dca1000", "replay")})
+        self._choices = StoredChoices(settings, "listen", _DEFAULTS, {"way": _WAYS})
         beside = Path(self._choices["beside"] or Path.home())
         self.folder = free_name(beside if beside.is_dir() else Path.home())
 
@@ -74,8 +91,13 @@ class ListenSetup(QObject):
         """Capture to be replayed."""
         return Path(self._choices["replay"]) if self._choices["replay"] else None
 
+    @property
+    def camera(self) -> str:
+        """Camera that is filmed with, as of ``sd2 record``; empty: none."""
+        return str(self._choices["camera"])
+
     def choose(self, name: str, value: object) -> None:
-        """Choose ``way``, ``address``, ``setup`` or ``replay``."""
+        """Choose ``way``, ``address``, ``setup``, ``replay`` or ``camera``."""
         if self._choices.set(name, str(value).strip()):
             self.changed.emit()
 
@@ -92,7 +114,11 @@ class ListenSetup(QObject):
 
     @property
     def problem(self) -> str:
-        """What is missing, or not there; empty where listening can begin."""
+        """What is missing, or not there; empty where recording can begin."""
+        if self.camera and self.folder.exists():
+            return f"{self.folder.name} exists: what is filmed is not continued. Choose another."
+        if self.way == "test":
+            return ""
         if self.way == "replay":
             if self.replay is None:
                 return "Choose the capture that is replayed."
@@ -107,9 +133,10 @@ class ListenSetup(QObject):
 
     def request(self) -> ListenRequest:
         """What was chosen."""
-        if self.way == "replay":
-            return ListenRequest(self.folder, replay=self.replay)
-        return ListenRequest(self.folder, setup=self.setup, address=self.address)
+        if self.way != "dca1000":
+            replay = Path(TEST) if self.way == "test" else self.replay
+            return ListenRequest(self.folder, replay=replay, camera=self.camera)
+        return ListenRequest(self.folder, self.setup, self.address, camera=self.camera)
 
 
 def free_name(beside: Path) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sd2app.live.model import LiveModel
+from sd2core.files.tables import counted
 from sd2core.live.counts import Counts
 
 
@@ -14,23 +15,26 @@ def title_text(live: LiveModel) -> str:
         case "opening":
             return f"Opening {name}…"
         case "starting":
-            return f"Beginning to listen, into {name}…"
+            return f"Beginning to record {name}…"
         case "listening" if not live.counts.recorded:
             return "Waiting for the first frame…"
         case "listening":
-            return f"Listening, into {name}"
+            return f"Recording {name}"
         case "stopping":
             return f"Storing what was received in {name}…"
         case "failed":
-            return "Listening has failed"
+            return "Recording has failed"
         case _:
-            return f"Listening into {name} was stopped"
+            return f"{name} is recorded"
 
 
-def frames_text(counts: Counts) -> str:
+def frames_text(counts: Counts, pictures: int = 0, pictures_dropped: int = 0) -> str:
     """Number of frames, and what they lack, in words."""
     if not counts.recorded:
         return ""
+    filmed = f"{counted(pictures, 'picture')}, " if pictures else ""
+    if pictures_dropped:
+        filmed = f"{pictures:,} of {counted(pictures + pictures_dropped, 'picture')}, "
     lacks = [
         (counts.dropped, "dropped (this computer was too slow)"),
         (counts.lost, "lost on the way"),
@@ -38,7 +42,7 @@ def frames_text(counts: Counts) -> str:
         (counts.not_shown, "stored and not shown yet"),
     ]
     told = [f"{number:,} {what}" for number, what in lacks if number]
-    return f"{counts.frames}, {', '.join(told) or 'none missing'}"
+    return f"{filmed}{counts.frames}, {', '.join(told) or 'none missing'}"
 
 
 def level_text(level_db: float | None) -> str:

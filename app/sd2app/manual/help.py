@@ -22,7 +22,7 @@ HELP = {
     "Label set": "how-to/use-your-own-label-set.md",
     "Agree": "tutorials/label-fast.md#3-compare-with-a-second-annotator",
     "New from video": "tutorials/video-to-data-set.md#2-fit-a-body",
-    "Listen to a radar": "how-to/record-a-live-radar.md",
+    "Record": "how-to/record-a-live-radar.md",
     "Align automatically": "how-to/align-video-and-radar.md",
     "Compare meshes": "how-to/compare-with-another-mesh.md",
     "Inertial sensor": "imu.md#in-the-window",

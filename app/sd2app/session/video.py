@@ -37,6 +37,12 @@ class VideoModel(ReportingModel):
         self.frame_changed.emit()
         self._follow()
 
+    def show_live(self, picture: NDArray[np.uint8]) -> None:
+        """Show a picture (H, W, 3) of a camera that is being filmed, while there is no video."""
+        if self.reader is None:
+            self.picture = picture
+            self.frame_changed.emit()
+
     def _follow(self) -> None:
         reader = self.reader
         if reader is None:

@@ -22,7 +22,7 @@ from sd2core.io.radar import write_capture
 from sd2core.live.counts import Counts
 from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import Recording, open_recording
-from sd2core.sensor import VelocityAxis
+from sd2core.sensor import VelocityAxis, VirtualSensor
 from tests.core.live.fast_captures import fast_swipes
 
 LIMIT_MS = 60_000
@@ -268,3 +268,45 @@ def test_a_set_up_says_what_is_missing_and_remembers(tmp_path, qtbot):
     again = ListenSetup(settings)
     assert (again.way, again.setup) == ("replay", tmp_path / "profile.cfg")
     assert again.folder == tmp_path / "live-2.sd2"
+
+
+def test_what_is_filmed_is_shown_as_it_comes_and_then_with_its_video(session, tmp_path, qtbot):
+    request = ListenRequest(tmp_path / "take.sd2", replay=Path("test"), camera="test")
+    model = heard(session, request, qtbot, 20)
+    qtbot.waitUntil(lambda: session.video.picture is not None, timeout=LIMIT_MS)
+    assert session.video.picture.shape == (180, 320, 3)
+    assert session.document.recording.video == tmp_path / "take.sd2" / "video.mp4"
+    stopped(model, qtbot)
+    assert model.pictures > 0
+    qtbot.waitUntil(lambda: session.document.video is not None, timeout=LIMIT_MS)
+    assert len(session.document.video) == model.pictures
+    assert session.document.simulated
+    assert f"{model.pictures} pictures, " in frames_text(
+        model.counts, model.pictures, model.pictures_dropped
+    )
+
+
+def test_edits_made_while_filming_are_not_lost(session, tmp_path, qtbot):
+    request = ListenRequest(tmp_path / "take.sd2", replay=Path("test"), camera="test")
+    model = heard(session, request, qtbot, 20)
+    warnings = []
+    model.warned.connect(warnings.append)
+    session.edits.place_sensor(VirtualSensor(position_m=(0.5, 0.0, 0.0)))
+    stopped(model, qtbot)
+    assert any("Save the recording and open it again" in one for one in warnings)
+    assert session.document.modified
+    assert session.sensor.sensor.position_m[0] == 0.5
+
+
+def test_a_camera_makes_it_another_command(tmp_path):
+    setup = ListenSetup(Settings.forgetful())
+    setup.choose("way", "test")
+    setup.choose_folder(tmp_path / "take")
+    assert setup.request().words()[0] == "listen"
+    setup.choose("camera", "0")
+    words = setup.request().words()
+    assert (words[0], words[words.index("--camera") + 1]) == ("record", "0")
+    assert words[words.index("--radar") + 1] == "test"
+    assert setup.problem == ""
+    (tmp_path / "take.sd2").mkdir()
+    assert "is not continued" in setup.problem
