@@ -60,8 +60,8 @@ def train(options: argparse.Namespace) -> int:
     if options.resume is None:
         folder.create(options.model)
         config = TrainConfig(
-            DataConfig(tuple(options.pairs)),
-            ModelConfig(options.model),
+            DataConfig(pairs=tuple(options.pairs)),
+            ModelConfig(name=options.model),
             TrainingConfig(epochs=options.epochs, batch_size=options.batch_size or 64),
         )
         folder.config.write_text(config_text(config, folder.path), encoding="utf-8")

@@ -7,7 +7,6 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -29,7 +28,6 @@ _EXAMPLES = """\
 _WITHOUT_DISPLAY = "Draw the same window into a picture with --screenshot FILE.png"
 
 
-@dataclass(frozen=True, kw_only=True)
 class Screenshot(Overwrite):
     """Picture of the window.
 
@@ -43,7 +41,6 @@ class Screenshot(Overwrite):
     screenshot: Annotated[Path | None, Place(one_of="instead", endings=(".png",))] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Open(Screenshot):
     """Options of ``sd2 open``.
 
@@ -57,7 +54,6 @@ class Open(Screenshot):
     paths: Annotated[tuple[Path, ...], ARGUMENTS] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
 class Demo(Screenshot):
     """Options of ``sd2 demo``.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
@@ -19,7 +18,6 @@ from sd2core.options.shared import Json
 _EXAMPLES = "  sd2 demo --out sample.sd2                   a copy of the bundled sample recording\n"
 
 
-@dataclass(frozen=True, kw_only=True)
 class Demo(OptionRecord):
     """Options of ``sd2 demo``.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from sd2core.recording.recording import Recording
 
 
-@dataclass(frozen=True, kw_only=True)
 class Align(Json):
     """Options of ``sd2 align``.
 

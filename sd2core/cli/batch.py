@@ -7,7 +7,6 @@ import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -37,7 +36,6 @@ _LISTED_FAILURES = 10
 _LISTED_UNUSABLE = 5
 
 
-@dataclass(frozen=True, kw_only=True)
 class Batch(JsonAndProgress):
     """Options of ``sd2 batch``.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
 _OWN_NAMES = {"mesh.zarr", "mesh.npz"}
 
 
-@dataclass(frozen=True, kw_only=True)
 class CompareMeshes(Sensor, MeshReading, Figure, Json):
     """Options of ``sd2 compare-meshes``.
 

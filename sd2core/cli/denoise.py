@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +13,6 @@ from sd2core.options.records import ARGUMENT
 from sd2core.options.shared import Denoising, Json, MapOutput
 
 
-@dataclass(frozen=True, kw_only=True)
 class Denoise(MapOutput, Denoising, Json):
     """Options of ``sd2 denoise``.
 

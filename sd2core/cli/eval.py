@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser
 
 
-@dataclass(frozen=True, kw_only=True)
 class Judging(Figure, Json):
     """Whom an evaluation judges, on which maps, and the picture of its result.
 
@@ -33,7 +31,6 @@ class Judging(Figure, Json):
     placements: Literal["all", "first"] = "first"
 
 
-@dataclass(frozen=True, kw_only=True)
 class Evaluate(Judging):
     """Options of ``sd2 eval``.
 

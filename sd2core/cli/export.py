@@ -6,7 +6,6 @@ import argparse
 import shlex
 import sys
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
 _LINE_EVERY_S = 0.1
 
 
-@dataclass(frozen=True, kw_only=True)
 class _Spans(SpanOptions):
     """What becomes a segment.
 
@@ -54,7 +52,6 @@ class _Spans(SpanOptions):
     segments: Literal["windows", "spans"] = "windows"
 
 
-@dataclass(frozen=True, kw_only=True)
 class _People(OptionRecord):
     """Who is in the inputs.
 
@@ -73,7 +70,6 @@ class _People(OptionRecord):
     labels: Annotated[tuple[Path, ...], Place(many="again")] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
 class _Maps(Denoising, Counting, Axis, Tolerance):
     """How maps of recordings are made.
 
@@ -97,7 +93,6 @@ class _Maps(Denoising, Counting, Axis, Tolerance):
     simulate: str | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Export(Exporting, _Spans, _People, _Maps, JsonAndProgress):
     """Options of ``sd2 export``.
 
@@ -173,7 +168,9 @@ def _export(options: Export) -> int:
 def _dataset_options(options: Export) -> DatasetOptions:
     from sd2core.datasets.options import dataset_options
 
-    spans = SpanOptions(options.margin_s, options.shortest_s, options.length)
+    spans = SpanOptions(
+        margin_s=options.margin_s, shortest_s=options.shortest_s, length=options.length
+    )
     provenance = {"command": shlex.join(["sd2", *sys.argv[1:]])}
     return dataset_options(options, spans if options.segments == "spans" else None, provenance)
 

@@ -6,7 +6,6 @@ import argparse
 import sys
 import time
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -59,7 +58,6 @@ def _rectangle(text: str) -> tuple[float, float, float, float]:
     return x, y, width, height
 
 
-@dataclass(frozen=True, kw_only=True)
 class Fit(Overwrite, Fitting, JsonAndProgress):
     """Options of ``sd2 fit``.
 

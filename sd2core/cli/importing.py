@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import shutil
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -36,7 +36,6 @@ _LEFT_OUT = {
 """What `sd2 set --without` names, and the fields that it empties."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class Content(MeshReading, Channel):
     """Files of a recording and what they do not say.
 
@@ -68,7 +67,6 @@ class Content(MeshReading, Channel):
     title: str | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Import(Content, Json):
     """Options of ``sd2 import``.
 
@@ -87,7 +85,6 @@ class Import(Content, Json):
     copy: bool = False
 
 
-@dataclass(frozen=True, kw_only=True)
 class SensorPlace(OptionRecord):
     """Where the radar is put.
 
@@ -111,7 +108,6 @@ class SensorPlace(OptionRecord):
     elevation_deg: float | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Set(Content, SensorPlace, Json):
     """Options of ``sd2 set``.
 
@@ -145,7 +141,6 @@ class Set(Content, SensorPlace, Json):
             )
 
 
-@dataclass(frozen=True, kw_only=True)
 class Relink(Json):
     """Options of ``sd2 relink``.
 

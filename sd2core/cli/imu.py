@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,7 +28,6 @@ _ERRORS = {
 """What the library calls the errors of a sensor."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class Errors(OptionRecord):
     """Errors of the sensor.
 
@@ -62,7 +60,6 @@ class Errors(OptionRecord):
     seed: int = 0
 
 
-@dataclass(frozen=True, kw_only=True)
 class Imu(MeshInput, Overwrite, Errors, Json):
     """Options of ``sd2 imu``.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sd2core.cli.command_parser import add_command
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 _TOLERANCE = 0.02
 
 
-@dataclass(frozen=True, kw_only=True)
 class UsualWish(Wish):
     """Error or time that is allowed, of what cannot do without.
 
@@ -33,7 +32,6 @@ class UsualWish(Wish):
     """
 
 
-@dataclass(frozen=True, kw_only=True)
 class Ladder(MeshAndSensor, UsualWish, Method, Counting, Figure, Json):
     """Options of ``sd2 ladder``.
 

@@ -10,7 +10,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -35,7 +34,6 @@ _BAR_DB = 5.0
 """Power of one step of a bar."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class Listen(Json):
     """Options of ``sd2 listen``.
 

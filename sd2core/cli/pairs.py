@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from sd2core.mocap.radar_place import RadarPlace
 
 
-@dataclass(frozen=True, kw_only=True)
 class MadePairs(Axis, Limbs, Json):
     """The store of pairs, and the axis of its maps.
 
@@ -35,7 +34,6 @@ class MadePairs(Axis, Limbs, Json):
     out: Path
 
 
-@dataclass(frozen=True, kw_only=True)
 class Subjects(OptionRecord):
     """Whom the recordings show.
 
@@ -48,7 +46,6 @@ class Subjects(OptionRecord):
     subjects: Words | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Mars(MadePairs):
     """Options of ``sd2 pairs mars``.
 
@@ -81,7 +78,6 @@ class Mars(MadePairs):
     target: Literal["share", "intensity"] | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Recordings(MadePairs, Counting, Subjects):
     """Options of ``sd2 pairs recordings``.
 
@@ -98,7 +94,6 @@ class Recordings(MadePairs, Counting, Subjects):
     null_bins: Bins | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Label(Json):
     """Options of ``sd2 pairs label``.
 
@@ -123,7 +118,6 @@ class Label(Json):
                 raise OptionError(f"--take is {said}", "SUBJECT/TAKE=FILE")
 
 
-@dataclass(frozen=True, kw_only=True)
 class Vary(MadePairs, Subjects, RadarChoice):
     """Options of ``sd2 pairs vary``.
 

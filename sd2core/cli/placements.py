@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -39,7 +38,6 @@ _LIMITS = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
 class Placing(MeshInput, UsualWish, Overwrite, Json):
     """Options of ``sd2 placements``.
 

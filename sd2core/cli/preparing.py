@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -35,7 +34,6 @@ runs, and edits that were not saved stay."""
 """What `sd2 doctor` does beside looking at the installation."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class Doctor(Json):
     """Options of ``sd2 doctor``.
 
@@ -94,7 +92,6 @@ def do_job(options: Doctor) -> bool:
     return True
 
 
-@dataclass(frozen=True, kw_only=True)
 class FetchModels(OptionRecord):
     """Options of ``sd2 fetch-models``.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -22,7 +21,6 @@ _OF_SAMPLES = ("clutter", "range", *_CHANNEL)
 _PROCESSING = (*_AXIS, "clutter", "range")
 
 
-@dataclass(frozen=True, kw_only=True)
 class Radar(ReplacesMaps, Axis, Channel, Json, Description):
     """Options of ``sd2 radar``.
 

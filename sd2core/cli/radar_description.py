@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,6 @@ from sd2core.options.kinds import Count, Positive, Words
 from sd2core.options.records import Group, OptionRecord, given, options_of
 
 
-@dataclass(frozen=True, kw_only=True)
 class Description(OptionRecord):
     """Entries of a description of radar samples, or of a table of points.
 

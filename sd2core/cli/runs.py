@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
@@ -21,7 +21,6 @@ Command = Literal["pause", "resume", "stop", "cancel"]
 WORDS: tuple[Command, ...] = get_args(Command)
 
 
-@dataclass(frozen=True, kw_only=True)
 class Runs(Json):
     """Options of ``sd2 runs``.
 

@@ -63,7 +63,6 @@ def _sizes(text: str) -> tuple[float, float]:
 Plane = Annotated[tuple[float, ...], Typed(_plane_at, joined)]
 
 
-@dataclass(frozen=True, kw_only=True)
 class SimulateRadar(MeshAndSensor, Overwrite, Simulating, Json):
     """Options of ``sd2 simulate radar``.
 
@@ -114,7 +113,6 @@ class SimulateRadar(MeshAndSensor, Overwrite, Simulating, Json):
     link_budget: Annotated[bool, Place(one_of="noise")] = False
 
 
-@dataclass(frozen=True, kw_only=True)
 class SimulateCampaign(Simulating, Limbs, Json):
     """Options of ``sd2 simulate campaign``.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
 _DEFAULT_COUNT = 8
 
 
-@dataclass(frozen=True, kw_only=True)
 class Strip(Sensor, MeshReading, Overwrite):
     """Options of ``sd2 strip``.
 

@@ -7,7 +7,6 @@ import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
     from sd2core.study.plan import StudyPlan
 
 
-@dataclass(frozen=True, kw_only=True)
 class Running(JsonAndProgress):
     """Where a study runs, and what it prints.
 
@@ -38,7 +36,6 @@ class Running(JsonAndProgress):
     scheduler: Annotated[str | None, Place(one_of="where")] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Study(Running):
     """Options of ``sd2 study``.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 from sd2core.cli.command_parser import add_command
@@ -27,7 +27,6 @@ _HISTOGRAM_ONLY = {one.name for one in options_of(Synthesis)} - {
 } | {"budget_ms", "uncertainty"}
 
 
-@dataclass(frozen=True, kw_only=True)
 class Synth(MeshAndSensor, MapOutput, Method, RadarChoice, Wish, Synthesis, Json):
     """Options of ``sd2 synth``.
 

@@ -7,7 +7,7 @@ import shlex
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 _BACKGROUND_NICE = 10
 
 
-@dataclass(frozen=True, kw_only=True)
 class _Learning(OptionRecord):
     """More options of the model.
 
@@ -56,7 +55,6 @@ class _Learning(OptionRecord):
     set: Annotated[tuple[Assignment, ...], Place(many="again")] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
 class _Background(OptionRecord):
     """Training beside other work.
 
@@ -71,7 +69,6 @@ class _Background(OptionRecord):
     background: bool = False
 
 
-@dataclass(frozen=True, kw_only=True)
 class Train(_Learning, _Background, Json):
     """Options of ``sd2 train``: its files, and what is given of each section of the settings.
 
@@ -172,7 +169,7 @@ def _config(options: Train) -> TrainConfig:
         if pairs:
             config = config.with_values({"data": {"pairs": pairs}})
     elif pairs:
-        config = TrainConfig(DataConfig(pairs))
+        config = TrainConfig(DataConfig(pairs=pairs))
     else:
         raise Sd2Error(
             "Nothing to learn from is given",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from typing import Annotated, Literal
 
 from sd2core.errors import Sd2Error
@@ -26,7 +26,6 @@ MAX_BINS = 254
 """Bin numbers are bytes, and two values say "beyond the axis" and "hidden"."""
 
 
-@dataclass(frozen=True)
 class SynthesisOptions(OptionRecord):
     """Options of the synthesis of a Doppler map from a mesh.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from sd2core.options.bounds import UP_TO_ONE
@@ -27,7 +26,6 @@ LabelRule = Literal["foreground", "majority"]
 SEGMENTS, PEOPLE, MAPS = Group("segments"), Group("people"), Group("maps")
 
 
-@dataclass(frozen=True)
 class SpanOptions(OptionRecord):
     """How labelled spans become segments, one of each.
 
@@ -50,7 +48,6 @@ class SpanOptions(OptionRecord):
     length: Annotated[Literal["padded", "resampled"], Place(("--span-length",))] = "padded"
 
 
-@dataclass(frozen=True, kw_only=True)
 class PeopleApart(KeptOut):
     """People that are not learnt from.
 
@@ -66,7 +63,6 @@ class PeopleApart(KeptOut):
     GROUP = PEOPLE
 
 
-@dataclass(frozen=True, kw_only=True)
 class NullBins(OptionRecord):
     """Bins that are empty in all maps.
 
@@ -81,7 +77,6 @@ class NullBins(OptionRecord):
     null_bins: Bins | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Exporting(Limbs, SegmentFrames, PeopleApart, NullBins):
     """What a data set holds: section ``[export]`` of a plan, and options of ``sd2 export``.
 

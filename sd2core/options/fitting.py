@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -22,7 +22,6 @@ FIT_CHOICES = (
 """Options that say how a body is fitted, and not to whom or where."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class Fitting(OptionRecord):
     """How a body is fitted: section ``[fit]`` of a plan, and options of ``sd2 fit``.
 

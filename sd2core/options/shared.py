@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,7 +11,6 @@ from sd2core.options.kinds import Count, ImageSize, Names, Natural, Positive, Te
 from sd2core.options.records import ARGUMENT, Group, OptionError, OptionRecord, Place
 
 
-@dataclass(frozen=True, kw_only=True)
 class Json(OptionRecord):
     """How a result is printed.
 
@@ -25,7 +23,6 @@ class Json(OptionRecord):
     json: bool = False
 
 
-@dataclass(frozen=True, kw_only=True)
 class JsonAndProgress(Json):
     """How a result, and the way to it, are printed.
 
@@ -39,7 +36,6 @@ class JsonAndProgress(Json):
     progress_json: Annotated[bool, Place(one_of="json")] = False
 
 
-@dataclass(frozen=True, kw_only=True)
 class Overwrite(OptionRecord):
     """What becomes of outputs that exist: without the option they are refused.
 
@@ -53,7 +49,6 @@ class Overwrite(OptionRecord):
     overwrite: Annotated[bool, Place(("--overwrite", "--replace"))] = False
 
 
-@dataclass(frozen=True, kw_only=True)
 class Sensor(OptionRecord):
     """Where the radar is.
 
@@ -66,7 +61,6 @@ class Sensor(OptionRecord):
     sensor: Vector | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class MeshReading(OptionRecord):
     """What a mesh file may not say about itself.
 
@@ -100,7 +94,6 @@ class MeshReading(OptionRecord):
     focal_px: Positive | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class MeshInput(MeshReading):
     """What is looked at.
 
@@ -113,17 +106,14 @@ class MeshInput(MeshReading):
     mesh: Annotated[Path, ARGUMENT]
 
 
-@dataclass(frozen=True, kw_only=True)
 class MeshAndSensor(Sensor, MeshInput):
     """What is looked at, and from where."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class ReplacesMaps(Overwrite):
     """What ``out`` may replace: nothing but a Doppler map."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class MapOutput(ReplacesMaps):
     """Doppler map to write.
 
@@ -136,7 +126,6 @@ class MapOutput(ReplacesMaps):
     out: Annotated[Path, Place(endings=(".npz",))]
 
 
-@dataclass(frozen=True, kw_only=True)
 class Figure(Overwrite):
     """Picture of a result.
 
@@ -149,7 +138,6 @@ class Figure(Overwrite):
     figure: Annotated[Path | None, Place(endings=FIGURES)] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Axis(OptionRecord):
     """The velocity axis.
 
@@ -165,7 +153,6 @@ class Axis(OptionRecord):
     v_max_mps: Annotated[Positive | None, Place(("--v-max",))] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Channel(OptionRecord):
     """Channel of a radar.
 
@@ -181,7 +168,6 @@ class Channel(OptionRecord):
     transmitter: Count | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Method(OptionRecord):
     """How Doppler is computed.
 
@@ -194,7 +180,6 @@ class Method(OptionRecord):
     method: Literal["histogram", "fmcw"] = "histogram"
 
 
-@dataclass(frozen=True, kw_only=True)
 class SegmentFrames(OptionRecord):
     """How recordings are cut into windows.
 
@@ -218,7 +203,6 @@ class SegmentFrames(OptionRecord):
             )
 
 
-@dataclass(frozen=True, kw_only=True)
 class Limbs(OptionRecord):
     """Maps of the parts of the body.
 
@@ -232,7 +216,6 @@ class Limbs(OptionRecord):
     limbs: bool = False
 
 
-@dataclass(frozen=True, kw_only=True)
 class Texture(OptionRecord):
     """How denoised maps are shown.
 
@@ -246,7 +229,6 @@ class Texture(OptionRecord):
     texture: Annotated[Natural | None, Place(bare=0)] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Denoising(Texture):
     """How maps are denoised: section ``[denoise]`` of a plan, and options of ``sd2 denoise``.
 
@@ -260,7 +242,6 @@ class Denoising(Texture):
     model: Text | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class RadarChoice(OptionRecord):
     """Radar to simulate.
 
@@ -274,7 +255,6 @@ class RadarChoice(OptionRecord):
     radar: Text = "paper"
 
 
-@dataclass(frozen=True, kw_only=True)
 class Simulating(RadarChoice):
     """A radar and its noise: section ``[simulate]`` of a plan, and options of a command.
 
@@ -287,7 +267,6 @@ class Simulating(RadarChoice):
     seed: Natural = 0
 
 
-@dataclass(frozen=True, kw_only=True)
 class KeptOut(OptionRecord):
     """People that are not learnt from.
 

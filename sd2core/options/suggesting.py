@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from sd2core.options.kinds import NotNegative
 from sd2core.options.records import OptionError, OptionRecord
 
 
-@dataclass(frozen=True, kw_only=True)
 class SuggestOptions(OptionRecord):
     """Thresholds and margins for suggesting spans.
 

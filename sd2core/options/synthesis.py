@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from sd2core.options import bounds
@@ -29,7 +28,6 @@ CHOSEN = (
 """Options that an accuracy plan chooses."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class Tolerance(OptionRecord):
     """Error that is allowed.
 
@@ -43,7 +41,6 @@ class Tolerance(OptionRecord):
     tolerance: Annotated[Share | None, Place(one_of="wish")] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Wish(Tolerance):
     """Error or time that is allowed.
 
@@ -56,7 +53,6 @@ class Wish(Tolerance):
     budget_ms: Annotated[Positive | None, Place(one_of="wish")] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Counting(OptionRecord):
     """How a vertex is counted.
 
@@ -70,7 +66,6 @@ class Counting(OptionRecord):
     count: HowCounted | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Synthesis(Counting, Axis, Tolerance, Limbs):
     """How vertices are counted: section ``[synthesise]`` of a plan, and options of ``sd2 synth``.
 

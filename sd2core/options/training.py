@@ -20,7 +20,6 @@ LEARNING = Group("network and training")
 MACHINE = Group("machine")
 
 
-@dataclass(frozen=True)
 class DataConfig(SegmentFrames):
     """Section ``[data]``: what is learnt from.
 
@@ -57,7 +56,6 @@ class DataConfig(SegmentFrames):
             raise OptionError("pairs is empty", "a list of at least one path")
 
 
-@dataclass(frozen=True)
 class ModelConfig(OptionRecord):
     """Section ``[model]``: model to train.
 
@@ -87,7 +85,6 @@ class ModelConfig(OptionRecord):
     frozen: bool = False
 
 
-@dataclass(frozen=True)
 class TrainingConfig(OptionRecord):
     """Section ``[training]``: settings of the optimisation.
 
@@ -149,7 +146,6 @@ class TrainingConfig(OptionRecord):
     checkpoint_s: Annotated[float, Bounds(0.0, 86_400.0), NOT_TYPED] = 30.0
 
 
-@dataclass(frozen=True)
 class MachineConfig(OptionRecord):
     """Section ``[machine]``: device, precision, threads, priority.
 

@@ -54,8 +54,8 @@ def test_the_loop_costs_little(
     """Between two steps: gathering a batch, chance, rate, control file, epochs."""
     pairs = write_pairs(tmp_path / "p.zarr", takes=40, frames=450, axis=VelocityAxis(BINS, 2.0))
     config = TrainConfig(
-        DataConfig((pairs,)),
-        ModelConfig("gru", TINY),
+        DataConfig(pairs=(pairs,)),
+        ModelConfig(name="gru", options=TINY),
         TrainingConfig(epochs=30, checkpoint_s=1e4),
         MachineConfig(device="cpu", threads=1),
     )

@@ -37,7 +37,7 @@ from tools.documentation.runs import sd2
 SPLITS = 3
 KERNEL = TrainOptions(model="kernel", delay_s=0.9)
 KERNEL_NAME = "kernel, columns, after 0.9 s"
-SPANS = SpanOptions(0.5, 0.2)
+SPANS = SpanOptions(margin_s=0.5, shortest_s=0.2)
 IOUS = (0.3, 0.4, 0.5, 0.6, 0.7)
 """Options are chosen by the mean F1 over these: with few files F1 at one of them has steps."""
 AT = IOUS.index(0.5)

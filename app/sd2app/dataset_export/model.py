@@ -315,7 +315,7 @@ class ExportModel(Runs[ExportRun]):
                 length=choice.length,
                 overlap=choice.overlap,
                 imu=choice.imu,
-                spans=SpanOptions(choice.margin_s) if choice.spans else None,
+                spans=SpanOptions(margin_s=choice.margin_s) if choice.spans else None,
             )
             if known is not None and known.sources == choice.sources:
                 counting = known.counting

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
     from sd2core.study.plan import Learner, StudyPlan
 
 
-@dataclass(frozen=True, kw_only=True)
 class Table(Sources, Network, Running):
     """Options of ``sd2 classify table``.
 

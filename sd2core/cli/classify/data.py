@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -33,7 +32,6 @@ _WITH_SUBJECTS = ("pairs", "dataset")
 _RADARS = ("simulated", "real")
 
 
-@dataclass(frozen=True, kw_only=True)
 class Sources(OptionRecord):
     """Labelled data.
 
@@ -49,7 +47,6 @@ class Sources(OptionRecord):
     denoiser: str | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class SourcesAndMaps(Sources):
     """Labelled data, and which of its maps.
 

@@ -8,7 +8,6 @@ import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
     from sd2core.classify.training import TrainOptions, Watch
 
 
-@dataclass(frozen=True, kw_only=True)
 class Network(OptionRecord):
     """What learns.
 
@@ -54,7 +52,6 @@ class Network(OptionRecord):
     delay_s: Annotated[float, DELAYS_S] = DELAY_S
 
 
-@dataclass(frozen=True, kw_only=True)
 class Train(SourcesAndMaps, Overwrite, Network, KeptOut, JsonAndProgress):
     """Options of ``sd2 classify train``.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
     from sd2core.classify.metrics import Score
 
 
-@dataclass(frozen=True, kw_only=True)
 class TrainedModel(OptionRecord):
     """The classifier that is used.
 
@@ -47,7 +45,6 @@ class TrainedModel(OptionRecord):
     model: Path
 
 
-@dataclass(frozen=True, kw_only=True)
 class Evaluate(SourcesAndMaps, TrainedModel, Judging):
     """Options of ``sd2 classify eval``.
 
@@ -61,7 +58,6 @@ class Evaluate(SourcesAndMaps, TrainedModel, Judging):
     """
 
 
-@dataclass(frozen=True, kw_only=True)
 class Apply(SearchedMap, TrainedModel, Json):
     """Options of ``sd2 classify apply``.
 

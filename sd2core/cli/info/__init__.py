@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -23,7 +22,6 @@ from sd2core.options.records import ARGUMENT
 from sd2core.options.shared import Json, MeshReading
 
 
-@dataclass(frozen=True, kw_only=True)
 class Info(MeshReading, Json):
     """Options of ``sd2 info``.
 

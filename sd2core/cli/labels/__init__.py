@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -30,12 +30,10 @@ if TYPE_CHECKING:
     from sd2core.timebase import Timebase
 
 
-@dataclass(frozen=True, kw_only=True)
 class Show(LabelFile, Json):
     """Options of ``sd2 labels show``."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class Convert(LabelFile, Overwrite, Json):
     """Options of ``sd2 labels convert``.
 
@@ -51,7 +49,6 @@ class Convert(LabelFile, Overwrite, Json):
     to: str | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Statistics(LabelFile, Json):
     """Options of ``sd2 labels statistics``.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
     from sd2core.labels.agreement import Agreement, Answer, Kappa
 
 
-@dataclass(frozen=True, kw_only=True)
 class Agree(FrameTimes, Json):
     """Options of ``sd2 labels agree``.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from sd2core.labels.spans import Labels
 
 
-@dataclass(frozen=True, kw_only=True)
 class Set(LabelFile, Overwrite, Json):
     """Options of ``sd2 labels set``.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
 _MAX_FRAMES = 100_000_000
 
 
-@dataclass(frozen=True, kw_only=True)
 class FrameTimes(OptionRecord):
     """Where the times of frames come from.
 
@@ -44,7 +42,6 @@ class FrameTimes(OptionRecord):
     fps: Annotated[Positive | None, Place(one_of="clock")] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class LabelFile(FrameTimes):
     """A file with labels, and how it is read; see :func:`read_named`.
 

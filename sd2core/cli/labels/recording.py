@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
 _PARTS = "video,mesh,maps"
 
 
-@dataclass(frozen=True, kw_only=True)
 class LabelledRecording(OptionRecord):
     """A recording, which of its maps, and labels in place of its own.
 
@@ -47,7 +45,6 @@ class LabelledRecording(OptionRecord):
     labels: Path | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class DrawnLabels(LabelledRecording, Overwrite):
     """Options of ``sd2 labels figure``.
 
@@ -66,7 +63,6 @@ class DrawnLabels(LabelledRecording, Overwrite):
     to_s: NotNegative | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Cut(LabelledRecording, Json):
     """Options of ``sd2 labels cut``.
 

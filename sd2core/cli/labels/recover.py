@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
     from sd2core.labels.recovery import Recoverable
 
 
-@dataclass(frozen=True, kw_only=True)
 class Recover(Overwrite, Json):
     """Options of ``sd2 labels recover``.
 

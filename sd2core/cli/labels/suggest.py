@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from sd2core.timebase import Timebase
 
 
-@dataclass(frozen=True, kw_only=True)
 class SearchedMap(Overwrite):
     """The map in which spans are looked for, and the file for them.
 
@@ -48,7 +47,6 @@ class SearchedMap(Overwrite):
     out: Path | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class Suggest(SearchedMap, SuggestOptions, Json):
     """Options of ``sd2 labels suggest``.
 

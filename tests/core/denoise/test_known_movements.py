@@ -138,8 +138,8 @@ def test_who_answers_as_the_radar_is_trusted_and_who_answers_noise_is_not(seed: 
 def test_a_run_learns_what_it_knows(tmp_path) -> None:  # type: ignore[no-untyped-def]
     pairs = write_pairs(tmp_path / "pairs.zarr")
     config = TrainConfig(
-        DataConfig((pairs,), segment_frames=24, overlap_frames=4),
-        ModelConfig("gru", {"channels": 4, "depth": 1}),
+        DataConfig(pairs=(pairs,), segment_frames=24, overlap_frames=4),
+        ModelConfig(name="gru", options={"channels": 4, "depth": 1}),
         TrainingConfig(epochs=1),
     )
     ending = begin(config, tmp_path / "run")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, dataclass
+from dataclasses import MISSING
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -121,7 +121,6 @@ def test_every_option_has_words(command: str) -> None:
         assert option.called or option.choices or option.kind is bool, option.name
 
 
-@dataclass(frozen=True, kw_only=True)
 class Basis(OptionRecord):
     """Options that others take.
 
@@ -139,7 +138,6 @@ class Basis(OptionRecord):
     share: Share = 0.5
 
 
-@dataclass(frozen=True, kw_only=True)
 class Example(Basis):
     """Options of an example.
 

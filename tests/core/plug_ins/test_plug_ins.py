@@ -112,7 +112,7 @@ class TestEach:
         pairs = write_pairs(tmp_path / "pairs.zarr", frames=60)
         config = TrainConfig(
             DataConfig(pairs=(pairs,), segment_frames=20, overlap_frames=4),
-            ModelConfig("blur", {"width": 2}),
+            ModelConfig(name="blur", options={"width": 2}),
             TrainingConfig(epochs=1, batch_size=8),
         )
         model = sd2.load_model(begin(config, tmp_path / "run").model or "")

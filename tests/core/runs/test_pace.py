@@ -67,10 +67,12 @@ def test_a_cache_that_cannot_be_written_is_no_matter(
 
 
 def test_what_the_time_of_a_training_step_depends_on_is_in_its_kind() -> None:
-    data = DataConfig((Path(),))
+    data = DataConfig(pairs=(Path(),))
     kinds = {
         TrainConfig(
-            data, ModelConfig(name, options, inputs), machine=MachineConfig(threads=threads)
+            data,
+            ModelConfig(name=name, options=options, inputs=inputs),
+            machine=MachineConfig(threads=threads),
         ).pace_kind
         for name, options in (("s4", {}), ("s4", {"channels": 64}), ("gru", {}))
         for inputs in ("map", "limbs")

@@ -36,9 +36,9 @@ def configs(draw: st.DrawFn) -> TrainConfig:
             range_factor=draw(st.floats(1.0, 4.0)),
         ),
         ModelConfig(
-            draw(NAMES),
-            draw(st.dictionaries(NAMES, st.booleans() | st.integers() | SHARES | NAMES)),
-            draw(st.sampled_from(["map", "limbs", "kinematics"])),
+            name=draw(NAMES),
+            options=draw(st.dictionaries(NAMES, st.booleans() | st.integers() | SHARES | NAMES)),
+            inputs=draw(st.sampled_from(["map", "limbs", "kinematics"])),
         ),
         TrainingConfig(
             minutes=draw(st.none() | st.floats(0.01, 1000.0)),
@@ -66,7 +66,7 @@ def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:
     # As the paper has it.
     assert (config.data.segment_frames, config.data.overlap_frames) == (72, 10)
     assert (config.training.batch_size, config.training.epochs) == (64, 500)
-    assert config.model == ModelConfig("s4")
+    assert config.model == ModelConfig(name="s4")
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_what_is_no_toml(tmp_path: Path) -> None:
 
 
 def test_replacing_checks_too() -> None:
-    config = TrainConfig(DataConfig((Path("a"),)))
+    config = TrainConfig(DataConfig(pairs=(Path("a"),)))
     assert config.with_values({"training": {"epochs": 3}}).training.epochs == 3
     with pytest.raises(Sd2Error, match="epochs is -1"):
         config.with_values({"training": {"epochs": -1}})

@@ -115,7 +115,9 @@ class TestSegments:
         path = write_pairs(tmp_path / "p.zarr", placements=3)
         counts = {}
         for placements in ("all", "first"):
-            config = DataConfig((path,), segment_frames=30, overlap_frames=0, placements=placements)
+            config = DataConfig(
+                pairs=(path,), segment_frames=30, overlap_frames=0, placements=placements
+            )
             data = prepare(read_pairs(path), config)
             counts[placements] = len(data.training), len(data.validation)
         # 2 takes of 150 frames; models are chosen by what the takes' own sensors saw.
@@ -123,17 +125,20 @@ class TestSegments:
 
     def test_one_subject_is_split_by_motions(self, tmp_path: Path) -> None:
         path = write_pairs(tmp_path / "p.zarr", ("s1",), takes=5, placements=2)
-        data = prepare(read_pairs(path), DataConfig((path,)))
+        data = prepare(read_pairs(path), DataConfig(pairs=(path,)))
         assert data.split.by_take
         assert {take.name for take in data.training_takes} == {"t0", "t1", "t2", "t3"}
         several = write_pairs(tmp_path / "several.zarr", ("s1", "s2"), takes=3)
-        data = prepare(read_pairs(several), DataConfig((several,), (), ()))
+        data = prepare(
+            read_pairs(several),
+            DataConfig(pairs=(several,), validation_subjects=(), test_subjects=()),
+        )
         assert [take.title for take in data.training_takes] == ["s1/t0", "s1/t1", "s2/t0", "s2/t1"]
 
     def test_a_lone_take_is_split_by_time(self, tmp_path: Path) -> None:
         lone = write_pairs(tmp_path / "lone.zarr", ("s1",), takes=1, frames=400)
         pairs = read_pairs(lone)
-        data = prepare(pairs, DataConfig((lone,)))
+        data = prepare(pairs, DataConfig(pairs=(lone,)))
         assert data.split.by_take
         (whole,), (learnt,) = pairs.takes, data.training_takes
         np.testing.assert_array_equal(learnt.radar, whole.radar[:320])
@@ -158,7 +163,7 @@ class TestSegments:
         one = write_pairs(tmp_path / "a.zarr")
         two = write_pairs(tmp_path / "b.zarr", takes=3)
         digests = {
-            prepare(read_pairs(path), DataConfig((path,))).digest for path in (one, two, one)
+            prepare(read_pairs(path), DataConfig(pairs=(path,))).digest for path in (one, two, one)
         }
         assert len(digests) == 2
 
@@ -167,7 +172,9 @@ class TestSegments:
         self, tmp_path: Path, segments: str
     ) -> None:
         pairs = read_pairs(write_pairs(tmp_path / "p.zarr", ("s1",), takes=3))
-        config = DataConfig((tmp_path,), segment_frames=40, overlap_frames=10, segments=segments)
+        config = DataConfig(
+            pairs=(tmp_path,), segment_frames=40, overlap_frames=10, segments=segments
+        )
         cut = windows_of(pairs.takes, config)
         assert np.array_equal(cut.inputs, np.concatenate([take.synthetic for take in pairs.takes]))
         assert np.array_equal(cut.targets, np.concatenate([take.radar for take in pairs.takes]))
@@ -188,7 +195,7 @@ class TestSegments:
     def test_takes_too_short_to_learn_from(self, tmp_path: Path) -> None:
         pairs = read_pairs(write_pairs(tmp_path / "p.zarr", ("s1",), frames=50))
         with pytest.raises(Sd2Error, match="72 frames long, and the longest of 2 takes has 50"):
-            windows_of(pairs.takes, DataConfig((tmp_path,)))
+            windows_of(pairs.takes, DataConfig(pairs=(tmp_path,)))
 
 
 def windows(segments: int) -> Windows:

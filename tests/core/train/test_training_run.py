@@ -52,8 +52,8 @@ def pairs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def settings(pairs: Path, model: str = "gru", **training: Any) -> TrainConfig:
     return TrainConfig(
-        DataConfig((pairs,), segment_frames=24, overlap_frames=4, range_factor=1.3),
-        ModelConfig(model, SMALL[model]),
+        DataConfig(pairs=(pairs,), segment_frames=24, overlap_frames=4, range_factor=1.3),
+        ModelConfig(name=model, options=SMALL[model]),
         TrainingConfig(**{"batch_size": 5, "epochs": 6, "seed": 3, **training}),
         MachineConfig(device="cpu", threads=1, deterministic=True),
     )

@@ -1,14 +1,11 @@
 """A command."""
 
-from dataclasses import dataclass
-
 from sd2core.cli.command_parser import AddedCommand
 from sd2core.options.records import OptionRecord
 
 SD2_PLUGIN_API = 1
 
 
-@dataclass(frozen=True, kw_only=True)
 class Greet(OptionRecord):
     """Options of the command.
 
