@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import signal
 import sys
@@ -108,6 +107,8 @@ def keep_little_free_memory() -> None:
     By default threads get up to eight heaps per core, which large arrays are taken from as well;
     what is free in them stays with the process (decision 63). Other C libraries are left alone.
     """
+    import ctypes
+
     with suppress(AttributeError, OSError, TypeError):
         mallopt = ctypes.CDLL(None).mallopt
         mallopt(_M_ARENA_MAX, _HEAPS)
@@ -117,6 +118,8 @@ def keep_little_free_memory() -> None:
 
 def return_free_memory() -> None:
     """Give freed memory in the GNU C library's heaps back to the system; some milliseconds."""
+    import ctypes
+
     with suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
 

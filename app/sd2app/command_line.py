@@ -8,7 +8,7 @@ import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING
 
 from sd2app.displays import has_display, silent_displays
 from sd2app.plain_imports import plain_imports
@@ -16,54 +16,17 @@ from sd2app.system_libraries import explain_missing, missing_libraries
 from sd2core.cli import build_parser, run
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.parser import COMMANDS
-from sd2core.cli.preparing import JOBS, Doctor, do_job
 from sd2core.errors import Sd2Error
-from sd2core.options.records import ARGUMENTS, Place
-from sd2core.options.shared import Overwrite
+
+if TYPE_CHECKING:
+    from sd2app.window_options import Demo, Open
+    from sd2core.cli.preparing import Doctor
 
 _EXAMPLES = """\
   sd2 demo                                    look at the bundled sample recording
   sd2 open walk.sd2                           look at a recording, a video or a mesh
 """
 _WITHOUT_DISPLAY = "Draw the same window into a picture with --screenshot FILE.png"
-
-
-class Screenshot(Overwrite):
-    """Picture of the window.
-
-    Parameters
-    ----------
-    screenshot : FILE.png
-        draw the window into a picture instead of on the screen
-    """
-
-    # Instead of the copy that `sd2 demo` can write.
-    screenshot: Annotated[Path | None, Place(one_of="instead", endings=(".png",))] = None
-
-
-class Open(Screenshot):
-    """Options of ``sd2 open``.
-
-    Parameters
-    ----------
-    paths : PATH
-        a recording; or a video, a mesh and a radar capture, each or together (default: an empty
-        window)
-    """
-
-    paths: Annotated[tuple[Path, ...], ARGUMENTS] = ()
-
-
-class Demo(Screenshot):
-    """Options of ``sd2 demo``.
-
-    Parameters
-    ----------
-    out : NAME.sd2
-        write a copy of the sample with its files, and open no window
-    """
-
-    out: Annotated[Path | None, Place(one_of="instead")] = None
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -75,12 +38,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def full_parser(typed: Sequence[str] = ()) -> argparse.ArgumentParser:
     """The library's commands, or the one that is typed, and those that open the window."""
     parser, commands = build_parser(_EXAMPLES, typed)
-    if not typed or typed[0] not in COMMANDS:
+    if typed[:1] in (["-h"], ["--help"]):
+        for name, handler in (("open", _open), ("demo", _demo), ("doctor", _doctor)):
+            add_command(commands, name, handler=handler)
+    elif not typed or typed[0] not in COMMANDS:
         _add_window_commands(commands)
     return parser
 
 
 def _add_window_commands(commands: argparse._SubParsersAction) -> None:
+    from sd2app.window_options import Demo, Open
+    from sd2core.cli.preparing import JOBS, Doctor
+
     add_command(commands, "open", options=Open, handler=_open)
     add_command(commands, "demo", options=Demo, handler=_demo)
     add_command(commands, "doctor", options=Doctor, handler=_doctor, description=JOBS)
@@ -99,6 +68,8 @@ def _doctor(options: Doctor) -> int:
       sd2 doctor --fetch-models --from mediapipe-0.10.21-….whl
       sd2 doctor --clean    (before pip uninstall sd2-studio)
     """
+    from sd2core.cli.preparing import do_job
+
     if do_job(options):
         return 0
     from sd2app.doctor import report

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -29,11 +28,15 @@ def progress_bar(what: str, unit: str = "frame") -> Iterator[Progress]:
 
 def print_json(content: Mapping[str, Any]) -> None:
     """Print one JSON object; NaN and infinities become null."""
+    import json
+
     print(json.dumps(finite(content), indent=2, ensure_ascii=False))
 
 
 def print_event(event: str, **content: Any) -> None:
     """Print one line of JSON at once, for a program that follows (docs/formats.md)."""
+    import json
+
     line = finite({"event": event, **content})
     print(json.dumps(line, ensure_ascii=False), flush=True)
 

@@ -8,7 +8,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import check_writable
 from sd2core.files.paths import make_folder
 
 OUTPUTS = ("out", "figure", "markdown", "probabilities", "landmarks", "export", "screenshot")
@@ -49,6 +48,8 @@ def output_folders(options: argparse.Namespace) -> Iterator[None]:
 
 def check_output(path: Path, *endings: str) -> None:
     """Refuse an output file that cannot be written, before the work is done."""
+    from sd2core.files.atomic import check_writable
+
     listed = ", ".join(endings)
     if path.suffix.lower() not in endings:
         raise Sd2Error(f"The output file is {path}", f"a name that ends in {listed}")

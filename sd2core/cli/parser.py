@@ -39,9 +39,9 @@ examples:
   sd2 batch plan.toml                         all of that for many recordings and places
   sd2 ladder walk.npz --quick                 what accuracy this scene requires
 
-`sd2 COMMAND --help` explains one command. With --json what went wrong is JSON as
-well, {{"error": {{"found": …, "expected": …, "remedy": …}}}}, and the exit code is
-1, or 2 for what was typed wrong.
+`sd2 COMMAND --help` explains one command; `sd2 doctor` lists those of plug-ins.
+With --json what went wrong is JSON as well, {{"error": {{"found": …, "expected": …,
+"remedy": …}}}}, and the exit code is 1, or 2 for what was typed wrong.
 """
 
 
@@ -98,7 +98,8 @@ def build_parser(
 
     Where the first of the ``typed`` words is a command, the others are left out, and where it asks
     for help, all are but named: they take longer to load than most commands work. Commands of
-    plug-ins are there where one is typed, or all are wanted.
+    plug-ins are there where an unknown one is typed, or all are wanted; to look for them in every
+    package takes as long as the rest of the help.
     """
     parser = CommandParser(
         prog="sd2",
@@ -112,7 +113,6 @@ def build_parser(
     if name in ("-h", "--help"):
         for command, summary in COMMANDS.items():
             commands.add_parser(command, help=summary, add_help=False)
-        _add_usable(commands)
         return parser, commands
     if name in WINDOW_COMMANDS:
         return parser, commands

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from sd2core.cli.command_parser import UsageError, record_of
 from sd2core.cli.output_folders import output_folders
 from sd2core.errors import Sd2Error
-from sd2core.processes import INTERRUPTED
 
 _STARTS_WITH_NEGATIVE_NUMBER = re.compile(r"-\.?\d")
 
@@ -30,6 +29,8 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
         _flush_output()
         return code or 0
     except KeyboardInterrupt:
+        from sd2core.processes import INTERRUPTED
+
         print("sd2: interrupted", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:

@@ -7,9 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.ladder import chosen
 from sd2core.cli.output import progress_bar
-from sd2core.cli.simulate import simulate_with_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.records import OptionError, changed_flags, options_of
 from sd2core.options.shared import Json, MapOutput, MeshAndSensor, Method, RadarChoice
@@ -121,6 +119,7 @@ def _as_chosen(
 ) -> DopplerMap:
     """Map by the plan that the scene requires; plan and reasons go into its provenance."""
     from sd2core.accuracy.trial import synthesizer_for
+    from sd2core.cli.ladder import chosen
 
     choice = chosen(mesh, sensor, base, options, dragging=False)
     if not choice.holds:
@@ -144,6 +143,7 @@ def _counted(options: Synth, synthesizer: Synthesizer, sensor: VirtualSensor) ->
 
 def _by_fmcw(options: Synth, mesh: MeshSequence, sensor: VirtualSensor) -> DopplerMap:
     from sd2core.cli.reading import chosen_axis
+    from sd2core.cli.simulate import simulate_with_bar
     from sd2core.fmcw import doppler_map
     from sd2core.io.radar import named_radar
 

@@ -33,7 +33,6 @@ from sd2core.options.training import (
     TrainConfig,
     TrainingConfig,
 )
-from sd2core.processes import INTERRUPTED
 
 if TYPE_CHECKING:
     from sd2core.train.start import Ending, Watch
@@ -227,6 +226,8 @@ def _bar(what: str) -> Iterator[Watch]:
 
 
 def _say_ending(options: Train, run: Path, ending: Ending) -> int:
+    from sd2core.processes import INTERRUPTED
+
     if options.json:
         print_json(
             {

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import io
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write
 from sd2core.version import __version__
 
 if TYPE_CHECKING:
@@ -53,7 +50,11 @@ def save_figure(
     Sd2Error
         For another ending, or a folder that does not exist.
     """
+    import io
+
     from matplotlib import rc_context
+
+    from sd2core.files.atomic import atomic_write
 
     check_figure(path)
     kind = path.suffix.lower()
@@ -69,6 +70,8 @@ def save_figure(
 
 
 def _metadata(kind: str, provenance: Mapping[str, Any]) -> dict[str, Any]:
+    import json
+
     program = f"SD² Studio {__version__}"
     about = {**provenance, "version": __version__}
     description = json.dumps(about, ensure_ascii=False)

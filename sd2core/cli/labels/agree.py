@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from statistics import median
 from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import add_command
@@ -90,6 +89,8 @@ def _print(found: Agreement) -> None:
         + ("" if spans.f1 is None else f"; F1 {spans.f1:.3f}")
     )
     if spans.matches:
+        from statistics import median
+
         start_s = median(abs(match.start_difference_s) for match in spans.matches)
         end_s = median(abs(match.end_difference_s) for match in spans.matches)
         print(f"Median difference: {start_s:.3f} s between starts, {end_s:.3f} s between ends")

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from sd2core.errors import Sd2Error
-from sd2core.files.digests import cached_digest
 from sd2core.options.kinds import Positive
 from sd2core.options.records import ARGUMENT, Group, OptionRecord, Place
 
@@ -204,6 +203,7 @@ def write(
         Digest of the file that they replace, where they were made of it: Sd2Error if it was saved
         meanwhile.
     """
+    from sd2core.files.digests import cached_digest
     from sd2core.labels import files
     from sd2core.labels.formats import write_labels
 
@@ -232,6 +232,7 @@ def check_label_output(path: Path) -> str:
     Return the digest of what is there, for :func:`write`; empty without a file.
     """
     from sd2core.cli.output_folders import check_output
+    from sd2core.files.digests import cached_digest
 
     check_output(path, path.suffix.lower())
     return cached_digest(path)
