@@ -7,12 +7,12 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject
 
+from sd2app.background.quoting import quoted
 from sd2app.background.runs import KnownRun, Runs, free_folder
 from sd2app.classify.run import MODEL_NAME, ClassRun
 from sd2app.classify.setup import ClassSetup
 from sd2app.settings import Settings
 from sd2app.training.command_runs import SENTENCES, known_commands
-from sd2app.training.model import quoted
 from sd2core.classify.files import user_classifiers_folder
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write

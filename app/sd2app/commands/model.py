@@ -12,11 +12,11 @@ from typing import Any, ClassVar
 
 from PySide6.QtCore import QObject
 
+from sd2app.background.quoting import quoted
 from sd2app.background.run_monitor import CommandRun, History
 from sd2app.background.runs import KnownRun, Messages, Runs, free_folder
 from sd2app.settings import Settings
 from sd2app.training.command_runs import known_commands
-from sd2app.training.model import quoted
 from sd2core.cli import build_parser
 from sd2core.cli.command_parser import Command, commands_of
 from sd2core.errors import Sd2Error

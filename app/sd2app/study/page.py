@@ -8,10 +8,10 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QApplication, QWidget
 
+from sd2app.background.quoting import quoted
 from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.feature import Shell
 from sd2app.study.runs import SWITCHES, TABLE_NAME, StudyRun, StudyRuns
-from sd2app.training.model import quoted
 from sd2app.widgets.inputs import CheckBox
 from sd2app.widgets.layouts import STRETCH, column_of
 from sd2app.widgets.panel import outlined, rule, sentence, show_words, side_by_side, title

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
-import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
 from PySide6.QtCore import QObject
 
+from sd2app.background.quoting import quoted
 from sd2app.background.runs import KnownRun, Messages, Runs, free_folder
 from sd2app.settings import Settings
 from sd2app.training.pair_maker import PairMaker
@@ -18,11 +16,10 @@ from sd2app.training.run import TrainingMonitor
 from sd2app.training.setup import TrainingSetupModel
 from sd2app.training.text import model_name
 from sd2app.widgets.text import clock_text
-from sd2core.cli.train import Train
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_data
 from sd2core.options.records import given_of, words_of
-from sd2core.options.training import TrainConfig
+from sd2core.options.training import Train, TrainConfig
 from sd2core.processes import ONE_THREAD
 from sd2core.runs.command_folder import COMMAND, launch
 from sd2core.runs.folder import LIVE
@@ -191,12 +188,6 @@ def train_arguments(config: TrainConfig, run: Path) -> list[str]:
         out=run,
     )
     return words_of("train", command)
-
-
-def quoted(arguments: list[str]) -> str:
-    """Command line for a terminal."""
-    words = ["sd2", *arguments]
-    return subprocess.list2cmdline(words) if sys.platform == "win32" else shlex.join(words)
 
 
 def _new_run(folder: Path, config: TrainConfig) -> Path:
