@@ -5,104 +5,20 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import picked, print_facts, print_json
 from sd2core.errors import Sd2Error
-from sd2core.options.kinds import Assignment
-from sd2core.options.records import (
-    ARGUMENTS,
-    OptionError,
-    OptionRecord,
-    Place,
-    Section,
-    changed_flags,
-)
-from sd2core.options.shared import Json
-from sd2core.options.training import (
-    LEARNING,
-    MACHINE,
-    DataConfig,
-    MachineConfig,
-    ModelConfig,
-    TrainConfig,
-    TrainingConfig,
-)
+from sd2core.options.training import DataConfig, Train, TrainConfig
 
 if TYPE_CHECKING:
     from sd2core.train.start import Ending, Watch
 
 _BACKGROUND_NICE = 10
-
-
-class _Learning(OptionRecord):
-    """More options of the model.
-
-    Parameters
-    ----------
-    set : NAME=VALUE
-        an option of the model, e.g. channels=64; may be given several times
-    """
-
-    GROUP = LEARNING
-
-    set: Annotated[tuple[Assignment, ...], Place(many="again")] = ()
-
-
-class _Background(OptionRecord):
-    """Training beside other work.
-
-    Parameters
-    ----------
-    background
-        one thread and nice 10, to work beside it
-    """
-
-    GROUP = MACHINE
-
-    background: bool = False
-
-
-class Train(_Learning, _Background, Json):
-    """Options of ``sd2 train``: its files, and what is given of each section of the settings.
-
-    Parameters
-    ----------
-    inputs : CONFIG.toml|DATA
-        a file with settings, or one or several stores of pairs, which are mixed
-    out : RUN
-        the folder of the run; new
-    resume : RUN
-        go on with a run that was stopped or killed
-    show_settings
-        print all settings as TOML and train nothing
-    """
-
-    inputs: Annotated[tuple[Path, ...], ARGUMENTS] = ()
-    out: Path | None = None
-    resume: Path | None = None
-    show_settings: bool = False
-    model: Annotated[Mapping[str, Any], Section(ModelConfig)] = field(default_factory=dict)
-    training: Annotated[Mapping[str, Any], Section(TrainingConfig)] = field(default_factory=dict)
-    data: Annotated[Mapping[str, Any], Section(DataConfig)] = field(default_factory=dict)
-    machine: Annotated[Mapping[str, Any], Section(MachineConfig)] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.resume is None:
-            return
-        if self.inputs:
-            raise OptionError(f"--resume is given with {self.inputs[0]}", "the run alone")
-        if others := [one for one in changed_flags(self) if one not in ("--resume", "--json")]:
-            raise OptionError(
-                f"--resume is given with {others[0]}",
-                "the run alone, which goes on with its own settings",
-            )
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:

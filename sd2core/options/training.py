@@ -9,9 +9,18 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from sd2core.options import bounds
 from sd2core.options.bounds import Bounds
-from sd2core.options.kinds import Names, Typed
-from sd2core.options.records import NOT_TYPED, Group, OptionError, OptionRecord, Place
-from sd2core.options.shared import SegmentFrames
+from sd2core.options.kinds import Assignment, Names, Typed
+from sd2core.options.records import (
+    ARGUMENTS,
+    NOT_TYPED,
+    Group,
+    OptionError,
+    OptionRecord,
+    Place,
+    Section,
+    changed_flags,
+)
+from sd2core.options.shared import Json, SegmentFrames
 
 if TYPE_CHECKING:
     from sd2core.runs.pace import Kind
@@ -217,3 +226,68 @@ class TrainConfig:
             if content
         }
         return replace(self, **changed)
+
+
+class _Learning(OptionRecord):
+    """More options of the model.
+
+    Parameters
+    ----------
+    set : NAME=VALUE
+        an option of the model, e.g. channels=64; may be given several times
+    """
+
+    GROUP = LEARNING
+
+    set: Annotated[tuple[Assignment, ...], Place(many="again")] = ()
+
+
+class _Background(OptionRecord):
+    """Training beside other work.
+
+    Parameters
+    ----------
+    background
+        one thread and nice 10, to work beside it
+    """
+
+    GROUP = MACHINE
+
+    background: bool = False
+
+
+class Train(_Learning, _Background, Json):
+    """Options of ``sd2 train``: its files, and what is given of each section of the settings.
+
+    Parameters
+    ----------
+    inputs : CONFIG.toml|DATA
+        a file with settings, or one or several stores of pairs, which are mixed
+    out : RUN
+        the folder of the run; new
+    resume : RUN
+        go on with a run that was stopped or killed
+    show_settings
+        print all settings as TOML and train nothing
+    """
+
+    inputs: Annotated[tuple[Path, ...], ARGUMENTS] = ()
+    out: Path | None = None
+    resume: Path | None = None
+    show_settings: bool = False
+    model: Annotated[Mapping[str, Any], Section(ModelConfig)] = field(default_factory=dict)
+    training: Annotated[Mapping[str, Any], Section(TrainingConfig)] = field(default_factory=dict)
+    data: Annotated[Mapping[str, Any], Section(DataConfig)] = field(default_factory=dict)
+    machine: Annotated[Mapping[str, Any], Section(MachineConfig)] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.resume is None:
+            return
+        if self.inputs:
+            raise OptionError(f"--resume is given with {self.inputs[0]}", "the run alone")
+        if others := [one for one in changed_flags(self) if one not in ("--resume", "--json")]:
+            raise OptionError(
+                f"--resume is given with {others[0]}",
+                "the run alone, which goes on with its own settings",
+            )

@@ -18,6 +18,8 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import remove
 from sd2core.files.texts import read_json
+from sd2core.options.records import words_of
+from sd2core.options.training import Train
 from sd2core.pairs.segments import OVERLAP, segment_starts
 from sd2core.pairs.store import PairSet, PairWriter, Take
 from sd2core.study.plan import Denoiser
@@ -67,17 +69,13 @@ def learn_denoiser(
     for number, take in enumerate(long):
         # Pieces of one take are kept apart by their names.
         writer.append(replace(take, name=f"{take.name}-{number}"))
-    words = [sys.executable, "-m", "sd2core.cli", "train", str(place / "pairs.zarr")]
-    words += ["--out", str(place / "run"), "--model", chosen.model, "--inputs", chosen.inputs]
-    words += _length(long, chosen)
-    words += ["--segment-frames", str(chosen.segment_frames)]
-    words += ["--overlap-frames", str(_overlap(chosen))]
-    words += ["--velocity-weight", f"{chosen.velocity_weight:g}", "--batch-size", str(_BATCH)]
-    words += ["--test-subjects", "none", "--threads", "1", "--seed", str(seed)]
-    for name, value in chosen.options.items():
-        words += ["--set", f"{name}={json.dumps(value)}"]
+    words = words_of("train", _command(place, chosen, long, seed))
     done = subprocess.run(
-        words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False
+        [sys.executable, "-m", "sd2core.cli", *words],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
     )
     reason = done.stderr.strip().splitlines()[-1] if done.returncode and done.stderr else ""
     if done.returncode < 0 or done.returncode == 130:
@@ -85,17 +83,28 @@ def learn_denoiser(
     atomic_write_text(place / "done", json.dumps({"reason": reason}))
 
 
-def _overlap(chosen: Denoiser) -> int:
-    return min(OVERLAP, chosen.segment_frames // 4)
-
-
-def _length(takes: Sequence[Take], chosen: Denoiser) -> list[str]:
-    """Options of ``sd2 train`` for how long it takes."""
+def _command(place: Path, chosen: Denoiser, takes: Sequence[Take], seed: int) -> Train:
+    """Options of ``sd2 train``."""
+    cut = chosen.segment_frames, min(OVERLAP, chosen.segment_frames // 4)
+    training: dict[str, float] = {
+        "velocity_weight": chosen.velocity_weight,
+        "batch_size": _BATCH,
+        "seed": seed,
+    }
     if chosen.minutes is not None:
-        return ["--minutes", f"{chosen.minutes:g}"]
-    cut = chosen.segment_frames, _overlap(chosen)
-    segments = sum(len(segment_starts(len(one.times_s), *cut)) for one in takes)
-    return ["--epochs", str(max(1, round(chosen.steps * _BATCH / max(1, segments))))]
+        training["minutes"] = chosen.minutes
+    else:
+        segments = sum(len(segment_starts(len(one.times_s), *cut)) for one in takes)
+        training["epochs"] = max(1, round(chosen.steps * _BATCH / max(1, segments)))
+    return Train(
+        inputs=(place / "pairs.zarr",),
+        out=place / "run",
+        model={"name": chosen.model, "inputs": chosen.inputs},
+        set=tuple(chosen.options.items()),
+        training=training,
+        data={"segment_frames": cut[0], "overlap_frames": cut[1], "test_subjects": ()},
+        machine={"threads": 1},
+    )
 
 
 def denoiser_in(place: Path) -> tuple[Any, str]:
