@@ -16,7 +16,9 @@ from sd2app.batch.setup import BatchSetupModel
 from sd2app.settings import Settings
 from sd2app.widgets.text import counted
 from sd2core.batch.folder import BatchFolder
+from sd2core.cli.batch import Batch
 from sd2core.errors import Sd2Error
+from sd2core.options.records import words_of
 from sd2core.progress import Progress
 from sd2core.runs.command_folder import COMMAND, launch
 
@@ -140,9 +142,12 @@ class BatchModel(Runs[BatchMonitor]):
         output = BatchFolder(out).output
         # What an earlier start said is not about this one.
         output.unlink(missing_ok=True)
-        words = ["batch", str(plan), "--workers", str(self.setup.workers)]
         self._forget_estimate()  # of what is about to be done
-        self.follow_new(out, launch([*self._command, *words], output))
+        self.follow_new(out, launch([*self._command, *self.words(plan)], output))
+
+    def words(self, plan: Path) -> list[str]:
+        """Words of ``sd2`` that work on a plan."""
+        return words_of("batch", Batch(plan=plan, workers=self.setup.workers))
 
     # --- following --------------------------------------------------------------------------
 

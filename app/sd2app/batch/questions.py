@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 
+from sd2app.background.quoting import quoted
 from sd2app.batch.model import BatchModel
 from sd2app.batch.results import Result
 from sd2app.denoise.model import DenoiseModel
@@ -155,15 +156,24 @@ class BatchQuestions(QObject):
         if folder := ask_new(self._over, "Folder of the results", start):
             self._batch.setup.set_out(folder)
 
-    def save_plan(self) -> None:
-        """Let the user choose a file for the plan."""
+    def save_plan(self) -> Path | None:
+        """Let the user choose a file for the plan; return it if it is written."""
         kinds = "Plan of a batch (*.toml)"
         out = self._batch.setup.out
         name = "plan.toml" if out is None else f"{out.name}.toml"
-        if path := ask_new(self._over, "Save plan", name, kinds, ".toml"):
-            from sd2core.batch.plan_file import write_plan
+        path = ask_new(self._over, "Save plan", name, kinds, ".toml")
+        return None if path is None else self._attempt(lambda: self._write_plan(path))
 
-            self._attempt(lambda: write_plan(path, self._batch.setup.plan()))
+    def _write_plan(self, path: Path) -> Path:
+        from sd2core.batch.plan_file import write_plan
+
+        write_plan(path, self._batch.setup.plan())
+        return path
+
+    def copy_command(self) -> None:
+        """Let the user save the plan, and copy the command that works on it."""
+        if path := self.save_plan():
+            QApplication.clipboard().setText(quoted(self._batch.words(path)))
 
     def start(self) -> None:
         """Start what is set up."""

@@ -113,9 +113,11 @@ class BatchSetupView(QWidget):
     def _buttons(self) -> QHBoxLayout:
         asks = self._asks
         self._save = outlined("Save plan…", "As a file for sd2 batch", asks.save_plan, self)
+        tip = "Save the plan, and copy the command for a terminal that works on it"
+        self._copy = outlined("Copy command…", tip, asks.copy_command, self)
         tip = "In background processes"
         self._start = outlined("Start", tip, asks.start, self, look="primary")
-        return row_of(STRETCH, self._save, self._start, spacing_px=6)
+        return row_of(STRETCH, self._save, self._copy, self._start, spacing_px=6)
 
     # --- showing --------------------------------------------------------------------------
 
@@ -156,6 +158,7 @@ class BatchSetupView(QWidget):
         self._problem.setVisible(bool(text))
         self._start.setEnabled(not why_not)
         self._save.setEnabled(not self._setup.problem)
+        self._copy.setEnabled(not self._setup.problem)
 
     def _follow_selection(self) -> None:
         self._remove.setEnabled(bool(self._list.selectedItems()))

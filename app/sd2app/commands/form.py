@@ -8,13 +8,21 @@ from dataclasses import MISSING
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtWidgets import QApplication, QFileDialog, QScrollArea, QWidget
+from PySide6.QtWidgets import QFileDialog, QScrollArea, QWidget
 
 from sd2app.commands.model import CommandForms, name_of
 from sd2app.feature import Shell
 from sd2app.widgets.inputs import CheckBox, Choice, TypedLine
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, pane, row_of
-from sd2app.widgets.panel import Fold, outlined, sentence, show_words, side_by_side, title
+from sd2app.widgets.panel import (
+    Fold,
+    copy_button,
+    outlined,
+    sentence,
+    show_words,
+    side_by_side,
+    title,
+)
 from sd2core.files.tables import capitalised
 from sd2core.options.records import Option
 
@@ -37,8 +45,7 @@ class CommandForm(QWidget):
         attempt = shell.attempt
         tip = "In the background; the window can be used meanwhile"
         self._start = outlined("Start", tip, partial(attempt, forms.start), self, look="primary")
-        tip = "The same as a command for a terminal"
-        self._copy = outlined("Copy command", tip, partial(attempt, self._copy_line), self)
+        self._copy = copy_button(lambda: forms.line, self, attempt=attempt)
         buttons = side_by_side(self._start, self._copy, spacing_px=6)
         head = row_of(title("Command"), (self._choice, 1), spacing_px=8)
         foot = self._problem, self._line, buttons
@@ -64,9 +71,6 @@ class CommandForm(QWidget):
 
     def _choose(self, name: str) -> None:
         self._forms.choose(name)
-
-    def _copy_line(self) -> None:
-        QApplication.clipboard().setText(self._forms.line)
 
     # --- building -----------------------------------------------------------------------------
 

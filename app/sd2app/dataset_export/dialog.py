@@ -22,7 +22,15 @@ from sd2app.manual.help import help_button
 from sd2app.widgets.dialogs import ask_folder, with_suffix
 from sd2app.widgets.inputs import CheckBox, Choice, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
-from sd2app.widgets.panel import ElidedLabel, outlined, rule, sentence, show_words, side_by_side
+from sd2app.widgets.panel import (
+    ElidedLabel,
+    copy_button,
+    outlined,
+    rule,
+    sentence,
+    show_words,
+    side_by_side,
+)
 from sd2app.widgets.text import counted
 from sd2core.cli.export import Export
 from sd2core.recording.recording import is_recording
@@ -124,12 +132,13 @@ class ExportDialog(QDialog):
         self._bar.setAccessibleName("How far the export is")
         tip = "Choose a name and write"
         self._export = outlined("Export…", tip, self._ask_out, self, look="primary")
+        self._copy = copy_button(lambda: self._model.line, self)
         self._stop = outlined(
             "Stop", "What is complete stays; the same export goes on there", self._model.stop, self
         )
         self._open = outlined("Open folder", "Show the data set's folder", self._show_folder, self)
         self._close = outlined("Close", "An export under way goes on", self.close, self)
-        buttons = (self._stop, self._export, self._close)
+        buttons = (self._stop, self._copy, self._export, self._close)
         guide = help_button("Export data set", self)
         self._foot = row_of(guide, self._open, STRETCH, *buttons, spacing_px=8)
 
@@ -205,6 +214,7 @@ class ExportDialog(QDialog):
         self._stop.setVisible(model.under_way)
         self._stop.setEnabled(run is None or run.phase != "stopping")
         self._export.setEnabled(model.ready)
+        self._copy.setEnabled(model.ready)
         result = model.result
         written = result is not None and not model.under_way
         self._open.setVisible(written)
@@ -254,11 +264,8 @@ class ExportDialog(QDialog):
             self._model.begin(path)
 
     def _ask_out(self) -> None:
-        choice = self._model.choice
-        if choice.place is None:
-            return
+        choice, start = self._model.choice, str(self._model.usual_out)
         # A folder is not asked for by its own name: one that is there can be gone on with.
-        start = str(choice.place.parent / f"{choice.place.stem}-set{choice.ending}")
         name, _ = QFileDialog.getSaveFileName(
             self, "Export data set", start, f"Data set (*{choice.ending})",
             options=QFileDialog.Option.DontConfirmOverwrite,

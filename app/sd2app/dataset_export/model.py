@@ -11,6 +11,7 @@ from pydantic import TypeAdapter
 from PySide6.QtCore import QObject
 
 from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.quoting import quoted
 from sd2app.background.runs import KnownRun, Messages, Runs, free_folder
 from sd2app.dataset_export.run import Exported, ExportRun
 from sd2app.session.tasks import Job, TaskList
@@ -171,13 +172,22 @@ class ExportModel(Runs[ExportRun]):
         else:
             self._count()
 
-    def start(self, out: Path) -> None:
-        """Have the data set written, in a process of its own; goes on with one begun there."""
-        choice, place = self.choice, self.choice.place
-        if not self.ready or place is None:
-            return
-        command = Export(
-            inputs=(place,),
+    @property
+    def usual_out(self) -> Path:
+        """Data set beside what it is of."""
+        place = self.choice.place or Path()
+        return place.parent / f"{place.stem}-set{self.choice.ending}"
+
+    @property
+    def line(self) -> str:
+        """Command for a terminal that writes the data set."""
+        return quoted(words_of("export", self.command(self.usual_out)))
+
+    def command(self, out: Path) -> Export:
+        """Options of ``sd2 export`` for what is chosen."""
+        choice = self.choice
+        return Export(
+            inputs=() if choice.place is None else (choice.place,),
             out=out,
             kinds=choice.kinds,
             segment_frames=choice.length,
@@ -187,12 +197,17 @@ class ExportModel(Runs[ExportRun]):
             placements="planned" if choice.planned else None,
             imu=choice.imu,
             subjects=choice.subjects or None,
-            progress_json=True,
         )
+
+    def start(self, out: Path) -> None:
+        """Have the data set written, in a process of its own; goes on with one begun there."""
+        if not self.ready:
+            return
+        command = replace(self.command(out), progress_json=True)
         about = {
             "what": "export",
             "out": str(out),
-            "choice": CHOICE.dump_python(choice, mode="json"),
+            "choice": CHOICE.dump_python(self.choice, mode="json"),
         }
         path = free_folder(self._folder, "export", [out])
         try:

@@ -14,7 +14,7 @@ from sd2app.widgets.dialogs import accepting, ask_file, ask_new
 from sd2app.widgets.inputs import CheckBox, Choice, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.mesh_painting import paint_picture
-from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence, side_by_side
+from sd2app.widgets.panel import ElidedLabel, copy_button, outlined, say, sentence, side_by_side
 from sd2app.widgets.time_axis import clock_text
 from sd2core.cli.fit import Fit
 
@@ -145,6 +145,8 @@ class NewFromVideoDialog(QDialog):
         self._build_picture(palette)
         self._build_form()
         self._buttons, self._begin = accepting(self, "Fit")
+        tip = "The same as a command for a terminal, which writes the mesh alone"
+        self._copy = copy_button(lambda: setup.line, self, tip)
         self._lay_out()
         setup.changed.connect(self._refresh)
         self._refresh()
@@ -214,6 +216,7 @@ class NewFromVideoDialog(QDialog):
         right = column_of(form, STRETCH, self._message)
         columns = row_of((left, 3), (right, 2), spacing_px=24)
         buttons = with_help("New from video", self._buttons)
+        buttons.insertWidget(1, self._copy)
         self.setLayout(column_of((columns, 1), buttons, spacing_px=16, margins_px=16))
 
     # --- following the model --------------------------------------------------------------
@@ -260,6 +263,7 @@ class NewFromVideoDialog(QDialog):
             text = "The mesh will be added to this recording."
         say(self._message, text, role)
         self._begin.setEnabled(setup.ready)
+        self._copy.setEnabled(setup.ready)
         self._begin.setText("Continue" if setup.continues else "Fit")
 
     # --- what is clicked ------------------------------------------------------------------

@@ -68,19 +68,22 @@ class FitRequest:
         return self.folder / RUN_NAME
 
     def arguments(self) -> list[str]:
-        """The same as a command line."""
+        """The same as a command line, whose progress can be followed."""
+        # A mesh of this name in the folder is of a fit before.
+        command = replace(self.command(self.mesh), overwrite=True, progress_json=True)
+        return words_of("fit", command)
+
+    def command(self, out: Path) -> Fit:
+        """Options of ``sd2 fit`` for the same mesh at any place."""
         person = self.person
-        command = Fit(
+        return Fit(
             video=self.video,
-            out=self.mesh,
-            overwrite=True,  # A mesh of this name in the folder is of a fit before.
+            out=out,
             stature_m=None if self.stature_m is None else round(self.stature_m, 3),
             focal_px=None if self.focal_px is None else round(self.focal_px, 2),
             person_box=None if person is None else person.box,
             person_frame=None if person is None else person.frame,
-            progress_json=True,
         )
-        return words_of("fit", command)
 
     def asks_the_same(self, other: FitRequest) -> bool:
         """True if the work of the other request can be continued for this one."""

@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import BackgroundModel, LatestRunner
+from sd2app.background.quoting import quoted
 from sd2app.fit.request import FitRequest, Person, read_request
 from sd2core.body.camera import DEFAULT_FIELD_OF_VIEW_DEG
 from sd2core.body.shape import DEFAULT_STATURE_M as DEFAULT_STATURE_M
 from sd2core.io.video import VideoReader, open_video
 from sd2core.options.bounds import FIELD_OF_VIEW_DEG, STATURE_M
+from sd2core.options.records import words_of
 from sd2core.recording.recording import FILE_NAME, SUFFIX, Recording
 
 CameraWay = Literal["file", "angle", "focal"]
@@ -167,6 +169,13 @@ class FitSetupModel(BackgroundModel):
             focal_px=None if choices.camera == "file" else self.focal_px,
             person=choices.person,
         )
+
+    @property
+    def line(self) -> str:
+        """Command for a terminal that makes the mesh beside the recording; when ready."""
+        request = self.request()
+        name = f"{request.folder.name.removesuffix(SUFFIX)}.zarr"
+        return quoted(words_of("fit", request.command(request.folder.with_name(name))))
 
     def close(self) -> None:
         """Stop reading, let go of the file."""

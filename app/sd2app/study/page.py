@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.background.quoting import quoted
 from sd2app.background.run_monitor import UNDER_WAY
@@ -14,7 +14,15 @@ from sd2app.feature import Shell
 from sd2app.study.runs import SWITCHES, TABLE_NAME, StudyRun, StudyRuns
 from sd2app.widgets.inputs import CheckBox
 from sd2app.widgets.layouts import STRETCH, column_of
-from sd2app.widgets.panel import outlined, rule, sentence, show_words, side_by_side, title
+from sd2app.widgets.panel import (
+    copy_button,
+    outlined,
+    rule,
+    sentence,
+    show_words,
+    side_by_side,
+    title,
+)
 from sd2app.widgets.run_panel import Button, RunView, RunWords
 from sd2app.widgets.run_text import PHASES
 from sd2app.widgets.text import counted
@@ -51,8 +59,9 @@ class StudySetupView(QWidget):
         self._start = outlined(
             "Start", "", partial(shell.attempt, runs.begin), self, look="primary"
         )
-        copy = partial(shell.attempt, self._copy_command)
-        self._copy = outlined("Copy command", "The same for a terminal", copy, self)
+        self._copy = copy_button(
+            lambda: quoted(runs.arguments(Path(TABLE_NAME))), self, attempt=shell.attempt
+        )
         tip = "Run a STUDY.toml, or go on with it: folds, shares, denoisers, speeds, more video"
         plan = outlined("Run a plan…", tip, open_plan, self)
         tip = "Show a study.json, or a matrix of sd2 classify eval"
@@ -66,9 +75,6 @@ class StudySetupView(QWidget):
         )  # fmt: skip
         runs.changed.connect(self._refresh)
         self._refresh()
-
-    def _copy_command(self) -> None:
-        QApplication.clipboard().setText(quoted(self._runs.arguments(Path(TABLE_NAME))))
 
     def _refresh(self) -> None:
         runs = self._runs

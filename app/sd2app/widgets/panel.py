@@ -8,6 +8,7 @@ from typing import Literal
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import (
+    QApplication,
     QFrame,
     QHBoxLayout,
     QLabel,
@@ -29,6 +30,30 @@ def title(text: str, name: str = "") -> QLabel:
     label.setAccessibleName(name)
     label.setWordWrap(bool(name))
     return label
+
+
+def copy_button(
+    line: Callable[[], str],
+    parent: QWidget,
+    tip: str = "The same as a command for a terminal",
+    attempt: Callable[[Callable[[], object]], object] = lambda work: work(),
+) -> QToolButton:
+    """A button *Copy command*, which puts a command line on the clipboard.
+
+    Parameters
+    ----------
+    line : callable
+        Says the command line.
+    parent : QWidget
+    tip : str
+    attempt : callable
+        Calls what may fail, and says why it did.
+    """
+
+    def copy() -> None:
+        QApplication.clipboard().setText(line())
+
+    return outlined("Copy command", tip, lambda: attempt(copy), parent)
 
 
 def sentence(text: str, role: str = "muted") -> QLabel:

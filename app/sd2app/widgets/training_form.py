@@ -7,13 +7,21 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QGridLayout, QLabel, QMenu, QSizePolicy, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QMenu, QSizePolicy, QWidget
 
 from sd2app.background.run_setup import RunSetup
 from sd2app.feature import Shell
 from sd2app.widgets.inputs import Choice, NumberBox, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
-from sd2app.widgets.panel import ElidedLabel, outlined, sentence, show_words, side_by_side, title
+from sd2app.widgets.panel import (
+    ElidedLabel,
+    copy_button,
+    outlined,
+    sentence,
+    show_words,
+    side_by_side,
+    title,
+)
 from sd2app.widgets.text import about
 from sd2core.options.records import OptionRecord, option_named
 
@@ -83,12 +91,7 @@ class TrainingForm(QWidget):
             self.column.addWidget(label)
         attempt, tip = self._shell.attempt, "Train in a background process"
         self._start = outlined("Start training", tip, partial(attempt, start), self, look="primary")
-        self._copy = outlined(
-            "Copy command",
-            "The same as a command for a terminal",
-            lambda: attempt(lambda: QApplication.clipboard().setText(command())),
-            self,
-        )
+        self._copy = copy_button(command, self, attempt=attempt)
         self.column.addLayout(side_by_side(self._start, self._copy, spacing_px=6))
 
     # --- showing --------------------------------------------------------------------------

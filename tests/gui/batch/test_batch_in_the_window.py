@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from copied import copied_record
 from finding import named
 from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtTest import QTest
@@ -34,6 +35,7 @@ from sd2app.shell.window import MainWindow
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.table import RecordTable
 from sd2core.batch.plan_file import read_plan
+from sd2core.cli.batch import Batch
 from sd2core.mesh.vertex_parts import KINEMATICS
 from sd2core.placements.placements import PlacementGrid, write_placements
 from sd2core.recording.recording import open_recording
@@ -136,6 +138,12 @@ def test_a_batch_is_set_up_started_and_its_results_opened(
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "made"), ""))
     click(dialog, "Choose…")
     ready(qtbot, batch)
+    with monkeypatch.context() as asked:
+        plan = tmp_path / "plan of mine.toml"
+        asked.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(plan), ""))
+        click(dialog, "Copy command…")
+    assert copied_record() == Batch(plan=plan, workers=batch.setup.workers)
+    assert read_plan(plan).recordings == batch.setup.plan().recordings
     click(dialog, "Start")
     until(qtbot, batch, "finished")
     plan = read_plan(tmp_path / "made" / "plan.toml")

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from copied import copied_record
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
@@ -81,6 +82,10 @@ def test_counts_follow_and_the_data_set_is_written(
     formats = next(one for one in dialog.findChildren(QComboBox) if "Format" in one.toolTip())
     qtbot.keyClick(formats, Qt.Key.Key_Down)
     assert model.choice.ending == ".h5"
+    qtbot.mouseClick(button(dialog, "Copy command"), LEFT)
+    assert copied_record() == model.command(model.usual_out)
+    assert copied_record().segment_frames == 20
+    assert copied_record().out.suffix == ".h5"
 
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, **__: (str(tmp_path / "s"), ""))
     qtbot.mouseClick(button(dialog, "Export…"), LEFT)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from answering import answer, once_asked
+from copied import copied_record
 from fake_denoisers import FakeDenoisers
 from finding import button_of, words_in
 from PySide6.QtCore import QCoreApplication, QEvent, QPoint, Qt
@@ -129,6 +130,28 @@ def test_from_the_offer_to_the_recording(made, qtbot, video) -> None:
     qtbot.waitUntil(lambda: window.messages.text == "This was no fit.")
     assert fit.state == "idle"
     assert not bar.isVisible()
+
+
+def test_a_fit_is_copied_for_a_terminal(made, qtbot, video) -> None:
+    window = made()
+    show(window, qtbot, video)
+    asked: list[FitRequest] = []
+
+    def copy(dialog: NewFromVideoDialog) -> None:
+        setup = dialog.setup
+        qtbot.waitUntil(lambda: setup.ready, timeout=10_000)
+        setup.change(stature_m=1.655, camera="angle", angle_deg=61.0)
+        setup.set_person(40, 20, 120, 100)
+        button = next(b for b in dialog.findChildren(QToolButton) if b.text() == "Copy command")
+        qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+        asked.append(setup.request())
+        dialog.reject()
+
+    once_asked(NewFromVideoDialog, copy)
+    click(window, qtbot, "Fit a body…")
+    mesh = video.with_name("walk.zarr")
+    assert copied_record() == asked[0].command(mesh)
+    assert (copied_record().stature_m, copied_record().person_box) == (1.655, (40, 20, 80, 80))
 
 
 @pytest.mark.slow
