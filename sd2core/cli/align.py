@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_facts, print_json
 from sd2core.errors import Sd2Error
-from sd2core.options.kinds import Positive
+from sd2core.options.bounds import RADAR_SEARCH_S
 from sd2core.options.records import ARGUMENTS
 from sd2core.options.shared import Json
 
@@ -32,7 +32,7 @@ class Align(Json):
     """
 
     recordings: Annotated[tuple[Path, ...], ARGUMENTS]
-    within: Positive | None = None
+    within: Annotated[float, RADAR_SEARCH_S] | None = None
     save: bool = False
 
 

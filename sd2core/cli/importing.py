@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
-from sd2core.options.kinds import Names, Positive, Vector
+from sd2core.options.bounds import AZIMUTH_DEG, ELEVATION_DEG, RANGE_M
+from sd2core.options.kinds import Names, Vector
 from sd2core.options.records import (
     ARGUMENT,
     Group,
@@ -93,19 +94,19 @@ class SensorPlace(OptionRecord):
     sensor : X,Y,Z
         in metres, as seen from the camera
     range_m : M
-        or its distance from the body, which keeps the angles that are not given
+        range: distance from the body's centre
     azimuth_deg : DEG
-        angle about the body, 0 towards the camera, positive to its right
+        azimuth: 0 is between body and camera, positive to the right
     elevation_deg : DEG
-        above the body's middle
+        elevation: positive is above the body's centre
     """
 
-    GROUP = Group("sensor", "where the radar is")
+    GROUP = Group("sensor", "where the radar is; about the body, what is not given stays")
 
     sensor: Vector | None = None
-    range_m: Positive | None = None
-    azimuth_deg: float | None = None
-    elevation_deg: float | None = None
+    range_m: Annotated[float, RANGE_M] | None = None
+    azimuth_deg: Annotated[float, AZIMUTH_DEG] | None = None
+    elevation_deg: Annotated[float, ELEVATION_DEG] | None = None
 
 
 class Set(Content, SensorPlace, Json):

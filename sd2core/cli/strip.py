@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import picked, progress_bar
 from sd2core.files.figure_files import SUFFIXES as FIGURES
+from sd2core.options.bounds import STRIP_FRAMES
 from sd2core.options.kinds import Count, Positive
 from sd2core.options.records import ARGUMENTS, Place
 from sd2core.options.shared import MeshReading, Overwrite, Sensor
@@ -33,7 +34,7 @@ class Strip(Sensor, MeshReading, Overwrite):
     frames : LIST
         frames such as 0,15,30, or ranges FROM:TO:STEP such as 0:90:15, TO not included
     count : N
-        that many frames, spread evenly (default: 8)
+        number of frames (default: 8, spread evenly)
     rows : LIST
         some of video, mesh and overlay (the mesh over the video), in this order (default:
         video,mesh, as far as they are there)
@@ -52,7 +53,7 @@ class Strip(Sensor, MeshReading, Overwrite):
     paths: Annotated[tuple[Path, ...], ARGUMENTS]
     out: Annotated[Path, Place(endings=FIGURES)]
     frames: Annotated[str | None, Place(one_of="frames")] = None
-    count: Annotated[Count | None, Place(one_of="frames")] = None
+    count: Annotated[Annotated[int, STRIP_FRAMES] | None, Place(one_of="frames")] = None
     rows: str | None = None
     dots: bool = False
     colour: Literal["velocity", "plain"] = "velocity"

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
+from sd2core.options.bounds import RADAR_SEARCH_S
 
 Floats = NDArray[np.float64]
 
-WITHIN_S, MIN_WITHIN_S = 5.0, 2.0
+WITHIN_S = 5.0
 """How far to look for an offset, either way: usually, and at least, as a peak stands out only
 among others."""
 MIN_CONFIDENCE = 0.9
@@ -116,9 +117,10 @@ def align(
     >>> align(seen, seen.shifted(-1.2)).checked().offset_s
     1.2
     """
-    if not (MIN_WITHIN_S <= within_s < math.inf and math.isfinite(around_s)):
+    if within_s not in RADAR_SEARCH_S or not math.isfinite(within_s + around_s):
         raise Sd2Error(
-            f"The search goes {within_s:g} s from {around_s:g} s", f"{MIN_WITHIN_S:g} s or more"
+            f"The search goes {within_s:g} s from {around_s:g} s",
+            f"{RADAR_SEARCH_S.low:g} s or more",
         )
     (ours, start_s), (theirs, their_start_s) = _series(synthetic), _series(radar)
     for name, values in (("map of the mesh", ours), ("radar's map", theirs)):

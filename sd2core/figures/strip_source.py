@@ -12,6 +12,7 @@ import numpy as np
 from sd2core.body.camera import PinholeCamera
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.options.bounds import STRIP_FRAMES
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 Row = Literal["video", "mesh", "overlay"]
 ROWS: tuple[Row, ...] = get_args(Row)
 Colour = Literal["plain", "velocity"]
-MAX_FRAMES = 100
 
 _RANGE = re.compile(r"(\d*):(\d*)(?::(\d+))?")
 _EXPECTED = "frame numbers such as 0,15,30 or a range such as 0:90:15 (from, to, step)"
@@ -95,8 +95,8 @@ class StripSource:
 
 def check_strip(source: StripSource, frames: Sequence[int], options: StripOptions) -> None:
     """Refuse what cannot be drawn."""
-    if not frames or len(frames) > MAX_FRAMES:
-        raise Sd2Error(f"A strip of {len(frames)} frames", f"1 to {MAX_FRAMES} frames")
+    if len(frames) not in STRIP_FRAMES:
+        raise Sd2Error(f"A strip of {len(frames)} frames", f"{STRIP_FRAMES.words} of them")
     for frame in frames:
         if not 0 <= frame < len(source.clock):
             raise Sd2Error(f"There is no frame {frame}", f"frames 0 to {len(source.clock) - 1}")

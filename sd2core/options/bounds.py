@@ -73,6 +73,16 @@ STATURE_M = Bounds(0.5, 2.6)
 FIELD_OF_VIEW_DEG = Bounds(1.0, 170.0)
 """Of a camera, across the longer side of the picture."""
 
+RANGE_M = Bounds(0.05, 1000.0)
+AZIMUTH_DEG = Bounds(-360.0, 360.0)
+ELEVATION_DEG = Bounds(-90.0, 90.0)
+"""Of a sensor, about the body."""
+
+RADAR_SEARCH_S = Bounds(2.0)
+"""How far to either side the offset of a radar's clock is searched."""
+
+STRIP_FRAMES = Bounds(1, 100, whole=True)
+
 RANGE_EXPONENT = Bounds(0.0, 8.0)
 REFERENCE_RANGE_M = Bounds(0.0, 1000.0, above=True)
 """Within these, the range law stays within single precision at any range."""

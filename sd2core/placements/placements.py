@@ -20,12 +20,12 @@ import numpy as np
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.texts import errors_in, read_json, read_toml
+from sd2core.options.bounds import AZIMUTH_DEG, ELEVATION_DEG, RANGE_M
 from sd2core.sensor import Vector, VirtualSensor, position_from_spherical
 
 FORMAT = "sd2-placements"
 VERSION = 1
 
-NEAREST_M, FARTHEST_M = 0.05, 1000.0
 MOST = 10_000
 """More than that around one body are hardly told apart, and take days."""
 
@@ -281,15 +281,16 @@ def _bounded(
     ranges_m: tuple[float, ...], azimuths_deg: tuple[float, ...], elevations_deg: tuple[float, ...]
 ) -> tuple[tuple[str, tuple[float, ...]], ...]:
     """Names and values, after a check of all bounds."""
-    for name, values, least, most, unit in (
-        ("range", ranges_m, NEAREST_M, FARTHEST_M, " m"),
-        ("azimuth", azimuths_deg, -360.0, 360.0, "°"),
-        ("elevation", elevations_deg, -90.0, 90.0, "°"),
+    for name, values, bounds, unit in (
+        ("range", ranges_m, RANGE_M, " m"),
+        ("azimuth", azimuths_deg, AZIMUTH_DEG, "°"),
+        ("elevation", elevations_deg, ELEVATION_DEG, "°"),
     ):
         for value in values:
-            if not least <= value <= most:
+            if value not in bounds:
                 raise Sd2Error(
-                    f"A placement has the {name} {value:g}{unit}", f"{least:g} to {most:g}{unit}"
+                    f"A placement has the {name} {value:g}{unit}",
+                    f"{bounds.low:g} to {bounds.high:g}{unit}",
                 )
     return (("ranges", ranges_m), ("azimuths", azimuths_deg), ("elevations", elevations_deg))
 

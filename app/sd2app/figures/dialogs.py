@@ -15,10 +15,11 @@ from sd2app.manual.help import with_help
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import ExportButtons, ask_figure
-from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
+from sd2app.widgets.inputs import CheckBox, Choice, NumberBox, option_box
 from sd2app.widgets.layouts import column_of, form_of, row_of
 from sd2app.widgets.mesh_painting import paint_picture
 from sd2app.widgets.panel import side_by_side
+from sd2core.cli.strip import Strip
 
 _WAYS = {"spread": "spread evenly", "around": "around the cursor", "list": "list or ranges"}
 _ROWS = {"video": "video", "mesh": "mesh", "overlay": "mesh over video"}
@@ -124,7 +125,7 @@ class StripDialog(FigureDialog):
     def _choices(self) -> QLayout:
         model = self._model
         self._way = Choice("Which frames", self, _WAYS, lambda way: model.choose(way=way))
-        self._count = NumberBox(1, 100, " frames", "How many frames", decimals=0, step=1)
+        self._count = option_box(Strip, "count", " frames")
         self._count.valueChanged.connect(lambda value: model.choose(count=int(value)))
         self._step = NumberBox(1, 1000, " apart", "How many frames apart", decimals=0, step=1)
         self._step.valueChanged.connect(lambda value: model.choose(step=int(value)))
@@ -132,9 +133,7 @@ class StripDialog(FigureDialog):
         self._typed.setToolTip("Frames such as 0,15,30, or ranges FROM:TO:STEP such as 0:90:15")
         self._typed.setAccessibleName(self._typed.toolTip())
         self._typed.textEdited.connect(lambda text: model.choose(text=text))
-        self._columns = NumberBox(
-            1, 50, " side by side", "More frames than that go below", decimals=0, step=1
-        )
+        self._columns = option_box(Strip, "columns", " side by side")
         self._columns.valueChanged.connect(lambda value: model.set_options(columns=int(value)))
         self._rows = {
             row: CheckBox(text, self, partial(model.set_row, row)) for row, text in _ROWS.items()
@@ -153,7 +152,7 @@ class StripDialog(FigureDialog):
             {"velocity": "radial velocity", "plain": "plain"},
             lambda colour: model.set_options(colour=colour),
         )
-        self._limit = NumberBox(0.1, 20.0, " m/s", "Where the colours end", decimals=1, step=0.5)
+        self._limit = option_box(Strip, "v_max_mps", " m/s", decimals=1, step=0.5)
         self._limit.valueChanged.connect(lambda value: model.set_options(v_max_mps=value))
         self._whole = CheckBox(
             "whole picture",

@@ -18,7 +18,6 @@ from sd2app.session.session import Session
 from sd2core.errors import Sd2Error
 from sd2core.figures.maps import Levels, MapRow, draw_maps, save_maps
 from sd2core.figures.strip_source import (
-    MAX_FRAMES,
     Row,
     StripOptions,
     StripSource,
@@ -28,6 +27,7 @@ from sd2core.figures.strip_source import (
 )
 from sd2core.files.figure_files import check_figure
 from sd2core.labels.spans import Labels
+from sd2core.options.bounds import STRIP_FRAMES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -262,7 +262,7 @@ class StripModel(DrawnFigure):
     def choose(self, **changes: object) -> None:
         """Choose other frames, no more than can be drawn."""
         choice = replace(self.choice, **changes)
-        count = min(max(choice.count, 1), MAX_FRAMES)
+        count = int(STRIP_FRAMES.nearest(choice.count))
         super().choose(**{**changes, "count": count, "step": max(choice.step, 1)})
 
     def set_options(self, **changes: object) -> None:

@@ -9,11 +9,11 @@ from sd2app.manual.help import with_help
 from sd2app.sensor.alignment import AlignmentModel, result_text
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.dialogs import accepting
-from sd2app.widgets.inputs import NumberBox
+from sd2app.widgets.inputs import option_box
 from sd2app.widgets.layouts import column_of, form_of
 from sd2app.widgets.panel import sentence, show_words, side_by_side
 from sd2app.widgets.plot import Themed
-from sd2core.doppler.alignment import MIN_WITHIN_S
+from sd2core.cli.align import Align
 
 _ABOUT = (
     "Mean velocity and motion of the synthetic map, compared with the radar's at each time offset."
@@ -29,10 +29,7 @@ class AlignmentDialog(QDialog):
         self.setWindowTitle("Align automatically")
         self._chart = ChartView(display, "Correlation over offsets", offset_chart(model))
         self._result, self._problem = sentence("", "plain"), sentence("", "warning")
-        self._within = NumberBox(
-            MIN_WITHIN_S, 600.0, " s", "How far from the present offset to search, either way",
-            decimals=1, step=1.0,
-        )  # fmt: skip
+        self._within = option_box(Align, "within", " s", decimals=1)
         self._within.show_value(model.within_s)
         self._within.valueChanged.connect(model.search)
         buttons, self._apply = accepting(self, "Apply")

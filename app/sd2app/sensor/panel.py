@@ -12,9 +12,10 @@ from PySide6.QtWidgets import QComboBox, QFormLayout, QGridLayout, QLabel, QWidg
 
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
-from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
+from sd2app.widgets.inputs import CheckBox, Choice, NumberBox, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, grid_of, pane, row_of
 from sd2app.widgets.panel import outlined, rule, sentence, show_words, title
+from sd2core.cli.importing import Content, SensorPlace
 from sd2core.radar_config import RadarConfig, range_in_words
 from sd2core.sensor import aimed_at, position_from_spherical, spherical_from_position
 
@@ -82,21 +83,14 @@ class SensorPanel(QWidget):
     def _placement_form(self) -> QGridLayout:
         grid = grid_of(gaps_px=(6, 3), wide=(1, 3))
         self._xyz = [
-            NumberBox(-100.0, 100.0, " m", f"Sensor position, {axis}: {meaning}")
+            NumberBox(-2000.0, 2000.0, " m", f"Sensor position, {axis}: {meaning}")
             for axis, meaning in (("x", "to the right"), ("y", "down"), ("z", "forward"))
         ]
         self._spherical = [
-            NumberBox(0.05, 100.0, " m", "Range: distance from the body's centre"),
-            NumberBox(
-                -180.0, 180.0, "°",
-                "Azimuth: 0° is between body and camera, positive to the right",
-                decimals=1, step=1.0,
-            ),
-            NumberBox(
-                -90.0, 90.0, "°", "Elevation: positive is above the body's centre",
-                decimals=1, step=1.0,
-            ),
-        ]  # fmt: skip
+            option_box(SensorPlace, "range_m", " m", decimals=2, step=0.1),
+            option_box(SensorPlace, "azimuth_deg", "°", decimals=1),
+            option_box(SensorPlace, "elevation_deg", "°", decimals=1),
+        ]
         for left, names, boxes, place in (
             (0, ("x", "y", "z"), self._xyz, self._place_by_xyz),
             (2, ("range", "azim.", "elev."), self._spherical, self._place_by_angles),
@@ -139,9 +133,7 @@ class SensorPanel(QWidget):
     def _capture_part(self, find: QWidget) -> QWidget:
         edits = self._session.edits
         self._capture_title, self._radar_name = title("Radar capture"), sentence("")
-        self._offset = NumberBox(
-            -1e5, 1e5, " s", "Time of the first radar frame here", decimals=3, step=0.01
-        )
+        self._offset = option_box(Content, "radar_offset_s", " s", decimals=3, step=0.01)
         self._offset.valueChanged.connect(edits.set_radar_offset)
         self._clutter = Choice(
             "How echoes that do not move are removed", self, _CLUTTER_TEXT, edits.set_clutter
