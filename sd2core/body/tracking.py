@@ -66,11 +66,11 @@ class Search:
             self._others[number] = self._follower.beside(pose)
             self._forget(number, self._follower.mistaken_s)
             if pose is not None:
-                # With the looks that were in doubt until now.
-                looks = [each for _, each in self._follower.hopes] or [pose]
-                rows = slice(number + 1 - len(looks), number + 1)
-                self._rois[rows] = [roi_numbers(each.next_roi) for each in looks]
-                self._confidence[rows] = [each.confidence for each in looks]
+                # With those that were in doubt until now.
+                detections = [each for _, each in self._follower.hopes] or [pose]
+                rows = slice(number + 1 - len(detections), number + 1)
+                self._rois[rows] = [roi_numbers(each.next_roi) for each in detections]
+                self._confidence[rows] = [each.confidence for each in detections]
                 self._unclear[rows] = self._follower.unclear
                 self._others[rows, 3] = False
             self._done += 1
@@ -85,7 +85,7 @@ class Search:
         )
 
     def _forget(self, number: int, since_s: float) -> None:
-        """Take back what the looks up to a number found after a time: that was somebody else.
+        """Take back what was detected after a time and up to a number: that was somebody else.
 
         The other half, and the start, stay as they are.
         """

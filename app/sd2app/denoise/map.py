@@ -16,7 +16,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.background.latest import BackgroundModel, LatestRunner, delayed
 from sd2app.background.model_worker.client import RemoteDenoiser, RemoteLive
 from sd2app.maps.partial_map import View
-from sd2app.maps.quality import Companion
+from sd2app.maps.quality import Postprocess
 from sd2app.session.content import reference_of
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
@@ -75,7 +75,7 @@ class DenoisedMap(BackgroundModel):
     """Denoises what changed of the synthetic map, what is in view first.
 
     While the sensor is dragged the model is asked in the same background task that
-    sweeps the map (:meth:`companion`), so that both are of the same place and are shown
+    sweeps the map (:meth:`postprocess`), so that both are of the same place and are shown
     together. At rest one piece after another is denoised behind the synthetic map. Pieces
     of a long clip are a preview, where a model remembers more than is around them: when
     the synthetic map stands, the clip is gone through in order (:meth:`finish`).
@@ -203,7 +203,7 @@ class DenoisedMap(BackgroundModel):
             self._order = _Order()
             self._go_on()
 
-    def companion(self) -> Companion | None:
+    def postprocess(self) -> Postprocess | None:
         """Function that denoises a preview in the same background task; None without a model."""
         denoiser, source = self.denoiser, self._synthetic.map
         if denoiser is None or source is None or self._held or not self.keeps_up:
@@ -224,7 +224,7 @@ class DenoisedMap(BackgroundModel):
         return denoised
 
     def take_sweep(self, sensor: object, start: int, swept: Swept | None) -> None:
-        """Show the preview that the companion has denoised during a drag."""
+        """Show the preview that was denoised during a drag."""
         self._runner.cancel()
         self._again.stop()
         self._follow(sensor)

@@ -16,7 +16,7 @@ from sd2app.denoise.map import TEXTURE_SEED, DenoisedMap
 from sd2app.denoise.text import origin_words, track_words
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.partial_map import Part
-from sd2app.maps.quality import Companion
+from sd2app.maps.quality import Postprocess
 from sd2app.session.denoiser_choice import NO_MODEL, UNSAID, DenoiserChoice
 from sd2app.session.session import Session
 from sd2core.denoise.files import default_name
@@ -70,7 +70,7 @@ class DenoiseModel(ReportingModel):
         self.before_map.failed.connect(lambda _: self.set_comparing(False))
         self._document.opened.connect(self._open)
         self._document.changed.connect(self._follow)
-        synthesis.accompany(self._companion)
+        synthesis.postprocess_with(self._postprocess)
         synthesis.painted.connect(self._take)
         synthesis.completed.connect(self._wake)
         synthesis.completed.connect(self._finish)
@@ -311,9 +311,9 @@ class DenoiseModel(ReportingModel):
 
     # --- following the synthetic map ------------------------------------------------------
 
-    def _companion(self) -> Companion | None:
-        """Companion of a sweep, which makes both maps in one task."""
-        parts = [one.companion() for one in (self.map, self.before_map)]
+    def _postprocess(self) -> Postprocess | None:
+        """Postprocessing of a sweep, which makes both maps in one task."""
+        parts = [one.postprocess() for one in (self.map, self.before_map)]
         if not any(parts):
             return None
         return lambda start, stretch: [part and part(start, stretch) for part in parts]

@@ -15,7 +15,7 @@ from sd2app.accuracy.model import AccuracyModel
 from sd2app.background.latest import Emit, delayed
 from sd2app.maps.partial_map import FINAL, Part, PartialMap, View
 from sd2app.maps.quality import (
-    Companion,
+    Postprocess,
     QualityLevel,
     SynthesizerCache,
     budget_ms,
@@ -68,7 +68,7 @@ class SynthesisModel(QObject):
         self.moving = False  # then the time budget decides, otherwise the tolerance
         self._track = session.maps.synthetic
         self._partial = PartialMap(self._track)
-        self._companion: Callable[[], Companion | None] = lambda: None
+        self._postprocess: Callable[[], Postprocess | None] = lambda: None
         self._wanting_limbs: set[str] = set()
         self._reader = FrameReader(session)
         self._synthesizers: SynthesizerCache | None = None
@@ -210,9 +210,9 @@ class SynthesisModel(QObject):
             return None
         return lambda: synthesizers.of(plan), self._sensor
 
-    def accompany(self, companion: Callable[[], Companion | None]) -> None:
-        """Ask ``companion`` before each sweep what is to be made of it, in step with it."""
-        self._companion = companion
+    def postprocess_with(self, postprocess: Callable[[], Postprocess | None]) -> None:
+        """Ask ``postprocess`` before each sweep what is to be made of it, in step with it."""
+        self._postprocess = postprocess
 
     def want_limbs(self, who: str, wanted: bool) -> None:
         """Split the map by the parts of the body while somebody wants it."""
@@ -301,9 +301,11 @@ class SynthesisModel(QObject):
         shows the one before meanwhile.
         """
         level, (start, stop) = self._preview_quality(), self._swept()
-        companion = self._companion()
+        postprocess = self._postprocess()
         self._next_sweep.append(
-            functools.partial(compute_part, level, self._sensor, start, stop, companion=companion)
+            functools.partial(
+                compute_part, level, self._sensor, start, stop, postprocess=postprocess
+            )
         )
         if not (self._sweeping and self._runner.busy):
             self._sweeping = True

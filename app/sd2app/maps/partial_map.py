@@ -171,7 +171,8 @@ def pieces(
 class Part:
     """Computed frames on their way to the window.
 
-    ``key`` is of all that final ones depend on; ``more`` is what a companion made of it.
+    ``key`` is of all that final ones depend on; ``more`` is what was made of it in
+    the same task.
     """
 
     sensor: VirtualSensor

@@ -41,7 +41,7 @@ _KEPT = 3
 
 _ROUGH_WORDS = "preview: vertices facing the sensor"
 _ALL_WORDS = "all vertices of the point cloud"
-Companion = Callable[[int, Stretch], Any]
+Postprocess = Callable[[int, Stretch], Any]
 """Makes something more of a stretch, given its first frame, in the same background task."""
 
 
@@ -188,7 +188,7 @@ def compute_part(
     start: int,
     stop: int,
     proceed: Callable[[], None] = lambda: None,
-    companion: Companion | None = None,
+    postprocess: Postprocess | None = None,
 ) -> Part:
     """Compute frames ``start`` to ``stop``; ``proceed`` is called in between and may raise."""
     synthesizer = level.synthesizer()
@@ -200,7 +200,7 @@ def compute_part(
     if level.visibility == "frozen" and stretch.quality == "facing":
         # No mask is kept.
         quality, words = ROUGH, _ROUGH_WORDS
-    more = companion(start, stretch) if companion is not None else None
+    more = postprocess(start, stretch) if postprocess is not None else None
     return Part(
         sensor, start, stretch.values, stretch.limbs, quality, words, synthesizer.unit,
         level.key_of(sensor), more,
