@@ -185,12 +185,12 @@ class PlanSearch:
 
     def reference_s(self) -> float:
         """Processor seconds of a frame of the reference."""
-        told = self.most_accurate.options(self._options)
+        exact = self.most_accurate.options(self._options)
         frames = [start for start, _ in self._runs()]
         spent_s = []
         for frame in (frames[0], *frames):  # the first call reads what is compiled
             begun_s = time.thread_time()
-            reference_stretch(self._mesh, self._places[0], told, frame, frame + 1)
+            reference_stretch(self._mesh, self._places[0], exact, frame, frame + 1)
             spent_s.append(time.thread_time() - begun_s)
         return float(np.mean(spent_s[1:]))
 

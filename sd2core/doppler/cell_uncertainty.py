@@ -74,7 +74,7 @@ def cell_uncertainty(
             f"{mesh.source or 'The mesh'} does not say how well its velocities are known",
             "a mesh that was fitted to a video with `sd2 fit`",
         )
-    found = CellUncertainty(
+    result = CellUncertainty(
         np.empty((axis.bins, stop - start), np.float32),
         np.empty((axis.bins, stop - start), np.float32),
     )
@@ -85,8 +85,8 @@ def cell_uncertainty(
             piece = _Piece(counts, sensor, low, high, visibility)
             expected, variance = piece.moments(lambda: ticket.advance(0))
             columns = slice(low - start, high - start)
-            found.expected[:, columns] = expected
-            found.sd[:, columns] = np.sqrt(np.maximum(variance, 0.0))
+            result.expected[:, columns] = expected
+            result.sd[:, columns] = np.sqrt(np.maximum(variance, 0.0))
             ticket.advance(high - low)
 
         return work
@@ -94,7 +94,7 @@ def cell_uncertainty(
     cuts = range(start, stop, _FRAMES)
     jobs = [job(low, min(low + _FRAMES, stop)) for low in cuts]
     run_jobs(jobs, stop - start, progress, threads)
-    return found
+    return result
 
 
 class _Piece:

@@ -83,7 +83,9 @@ class FrameCounts:
             if shares:
                 points, mask = prepared.points(block)[rows], scatterers.mask
                 normals = None if scatterers.normals is None else prepared.normals(block)[rows]
-                into.visible[:] = visible_counts(points, place, mask, normals, prepared.heads)
+                into.visible[:] = visible_counts(
+                    points, place, mask, normals, prepared.multiplicity
+                )
         if self.options.range_law == "frame":
             into.histogram[:] *= self.frame_law(block, rows, position_m)[:, None, None]
         return quality
@@ -200,6 +202,6 @@ class FrameCounts:
             mask=mask,
             areas=prepared.areas(block, moving)[rows] if weight == "area" else None,
             area_vectors=vectors(block, moving)[rows] if weight == "projected" else None,
-            vertex_counts=prepared.heads,
+            vertex_counts=prepared.multiplicity,
             parts=parts,
         )

@@ -16,8 +16,8 @@ from sd2core.doppler.kernels import (
     CLIP,
     DROP,
     FACING,
-    HEADS,
     MASK,
+    MULTIPLICITY,
     ONE,
     PROJECTED,
     WRAP,
@@ -52,12 +52,12 @@ class Scatterers:
             return which, PROJECTED
         if self.areas is not None:
             return which, AREA
-        return which, ONE if self.vertex_counts is None else HEADS
+        return which, ONE if self.vertex_counts is None else MULTIPLICITY
 
     def arguments(self) -> tuple[Any, ...]:
         """What kernels take: values as :class:`Paths` has places, empty where there are none."""
         normals, mask, parts = self.normals, self.mask, self.parts
-        areas, vectors, heads = (
+        areas, vectors, multiplicity = (
             _NO_AREAS if values is None else values.reshape(-1)
             for values in (self.areas, self.area_vectors, self.vertex_counts)
         )
@@ -66,7 +66,7 @@ class Scatterers:
             _NO_MASK if mask is None else mask,
             areas,
             vectors,
-            heads,
+            multiplicity,
             _NO_PARTS if parts is None else parts,
             *self.kinds,
         )
@@ -112,14 +112,14 @@ class Scatterers:
         elif self.areas is not None:
             weight = self.areas[row].astype(np.float64)
         else:
-            weight = self.heads(points.shape[1])
+            weight = self.multiplicity(points.shape[1])
         if counting.range_exponent:
             distance = np.linalg.norm(points - sensor[:, None], axis=0)
             law = counting.range_exponent, counting.reference_range_m
             weight = weight * range_weight(distance, *law)
         return weight
 
-    def heads(self, vertices: int) -> NDArray[np.float64]:
+    def multiplicity(self, vertices: int) -> NDArray[np.float64]:
         """Number of vertices that each of ``vertices`` stands for, float64 (V,)."""
         if self.vertex_counts is None:
             return np.ones(vertices)
@@ -364,20 +364,20 @@ def count_plain(
             return bins_plain(frames, t, sample, sensor, counting)
 
     _, parts, bins = into.histogram.shape
-    heads = scatterers.heads(frames.positions.shape[2])
+    multiplicity = scatterers.multiplicity(frames.positions.shape[2])
     # Bins of a part, and one for what is dropped.
     base = 0 if scatterers.parts is None else (bins + 1) * scatterers.parts.astype(np.intp)
     for t, knot in enumerate(frames.centre):
         points = frames.positions[knot]
         seen = scatterers.seen(t, points, sensor)
         weight = scatterers.weights(t, points, sensor, counting)
-        into.visible[t] = heads[seen].sum()
+        into.visible[t] = multiplicity[seen].sum()
         measured = max(1, int((frames.duration_s[t] > 0).sum()))
         for sample in np.flatnonzero(frames.duration_s[t] > 0).tolist():
             number, beyond = bins_of(t, sample)
             total = np.bincount((number + base)[seen], weight[seen], parts * (bins + 1))
             into.histogram[t] += total.reshape(parts, bins + 1)[:, :bins] / measured
-            into.beyond[t] += heads[beyond & seen].sum() / measured
+            into.beyond[t] += multiplicity[beyond & seen].sum() / measured
 
 
 def count(

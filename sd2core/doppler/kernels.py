@@ -26,7 +26,7 @@ _NEAREST = np.float32(NEAREST_RANGE_M)
 ALL, FACING, MASK = 0, 1, 2
 """Which vertices count: all, those facing the sensor, those marked in a mask."""
 
-ONE, HEADS, AREA, PROJECTED = 0, 1, 2, 3
+ONE, MULTIPLICITY, AREA, PROJECTED = 0, 1, 2, 3
 """What a vertex counts: 1, the vertices it stands for, its area, that towards the sensor."""
 
 DROP, WRAP, CLIP = 0, 1, 2
@@ -71,14 +71,14 @@ def ranges_at(here, knot, sensor, distance, ranges, held):  # type: ignore[no-un
     """
     row = knot % ranges.shape[0]
     # Cut like this the compiler knows that they lie side by side.
-    found = ranges[row][: here.shape[1]]
+    result = ranges[row][: here.shape[1]]
     if held[row] != knot:
         _relative_ranges(
             here[3 * knot], here[3 * knot + 1], here[3 * knot + 2],
-            sensor[0], sensor[1], sensor[2], distance, found,
+            sensor[0], sensor[1], sensor[2], distance, result,
         )  # fmt: skip
         held[row] = knot
-    return found
+    return result
 
 
 @compiled
@@ -222,28 +222,28 @@ def _projected(x, y, z, ax, ay, az, sx, sy, sz, weight):  # type: ignore[no-unty
 
 
 @compiled
-def _heads_beyond(f, seen, heads, bins):  # type: ignore[no-untyped-def]
+def _multiplicity_beyond(f, seen, multiplicity, bins):  # type: ignore[no-untyped-def]
     """Number of vertices that the visible ones beyond the axis stand for."""
     end, total = np.float32(bins), np.int32(0)
     for v in range(f.shape[0]):
         outside = (seen[v] != 0) & ((f[v] < np.float32(0)) | (f[v] > end))
-        total += np.int32(heads[v]) if outside else np.int32(0)
+        total += np.int32(multiplicity[v]) if outside else np.int32(0)
     return total
 
 
 @compiled
-def heads_seen(seen, heads):  # type: ignore[no-untyped-def]
+def multiplicity_seen(seen, multiplicity):  # type: ignore[no-untyped-def]
     """Number of vertices that the visible ones stand for."""
     total = np.int32(0)
     for v in range(seen.shape[0]):
-        total += np.int32(heads[v]) if seen[v] != 0 else np.int32(0)
+        total += np.int32(multiplicity[v]) if seen[v] != 0 else np.int32(0)
     return total
 
 
 @compiled
 def weigh_run(  # type: ignore[no-untyped-def]
-    p, q, own, middle, away, numbers, heads, normals, marks, areas, vectors, which, weighting,
-    sensor, distance, exponent, reference, seen, weight, spare,
+    p, q, own, middle, away, numbers, multiplicity, normals, marks, areas, vectors, which,
+    weighting, sensor, distance, exponent, reference, seen, weight, spare,
 ):  # fmt: skip
     """Return the visibility of a run of vertices of a frame and set their weights.
 
@@ -259,7 +259,7 @@ def weigh_run(  # type: ignore[no-untyped-def]
         Their ranges, less ``distance``.
     numbers : int32 (n,)
         Their numbers among all V.
-    heads : float32 (n,)
+    multiplicity : float32 (n,)
         Number of vertices that each stands for.
     normals, areas, vectors : flat
         Of all frames; see :class:`~sd2core.doppler.histogram.Scatterers`.
@@ -302,7 +302,7 @@ def weigh_run(  # type: ignore[no-untyped-def]
         ax, ay, az = vector[0][p:q], vector[1][p:q], vector[2][p:q]
         _projected(x, y, z, ax, ay, az, sx, sy, sz, spare)
     else:
-        spare[:] = heads[p:q]
+        spare[:] = multiplicity[p:q]
     if exponent != 0:
         for i in range(q - p):
             weight[i] *= spare[i]
@@ -380,7 +380,7 @@ def count_kernel(  # type: ignore[no-untyped-def]
     seen = np.ones(min(most, RUN), np.uint8)
     # Places without a sign are not looked at for being negative.
     row, place = np.empty(most, np.uint32), np.empty(min(most, RUN), np.uint32)
-    heads = np.ones(most, np.float32)
+    multiplicity = np.ones(most, np.float32)
     parts, width = histogram.shape[1], bins + 2
     sums, total = np.zeros(TABLES * parts * width), np.empty(parts * width)
     tables, slots = sums.reshape((TABLES, parts * width)), np.int32(parts * width)
@@ -404,7 +404,7 @@ def count_kernel(  # type: ignore[no-untyped-def]
                     row[i] += np.uint32(part[numbers[i]]) * np.uint32(width)
             if grouped:
                 for i in range(count):
-                    heads[i] = every[numbers[i]]
+                    multiplicity[i] = every[numbers[i]]
         own = group_frames * first[group] + (frame - group * group_frames) * count
         if which == MASK:
             marks = mask[t]
@@ -421,12 +421,12 @@ def count_kernel(  # type: ignore[no-untyped-def]
             n = q - p
             away = ranges_at(here, knot, sensor, distance, ranges, held)
             sight = weigh_run(
-                p, q, own, here[3 * knot : 3 * knot + 3], away, numbers, heads, normals, marks,
-                areas, vectors, which, weighting, sensor, distance, exponent, reference,
+                p, q, own, here[3 * knot : 3 * knot + 3], away, numbers, multiplicity, normals,
+                marks, areas, vectors, which, weighting, sensor, distance, exponent, reference,
                 seen[:n], weight[:n], spare[:n],
             )  # fmt: skip
             if grouped:
-                seen_count += heads_seen(sight, heads[p:q])
+                seen_count += multiplicity_seen(sight, multiplicity[p:q])
             else:
                 for i in range(n):
                     seen_count += np.int64(sight[i])
@@ -437,7 +437,7 @@ def count_kernel(  # type: ignore[no-untyped-def]
                 b = ranges_at(here, after[frame, sample], sensor, distance, ranges, held)
                 axis_positions(a[p:q], b[p:q], scale[t, sample], offset, f[:n])
                 if grouped:
-                    outside_count += _heads_beyond(f[:n], sight, heads[p:q], bins)
+                    outside_count += _multiplicity_beyond(f[:n], sight, multiplicity[p:q], bins)
                     _slots_of(f[:n], sight, bins, beyond, slot[:n])
                 else:
                     outside_count += _slots_of(f[:n], sight, bins, beyond, slot[:n])

@@ -46,8 +46,8 @@ class _Joints:
             if not self.known[number]:
                 first = number * _BLOCK_FRAMES
                 block = mesh.read(first, min(first + _BLOCK_FRAMES, mesh.frame_count))
-                found = [block[:, row].mean(axis=1, dtype=np.float64) for row in self.rows]
-                self.places_m[first : first + len(block)] = np.stack(found, axis=1)
+                places = [block[:, row].mean(axis=1, dtype=np.float64) for row in self.rows]
+                self.places_m[first : first + len(block)] = np.stack(places, axis=1)
                 self.known[number] = True
         return self.places_m[start:stop]
 
@@ -108,29 +108,29 @@ def kinematics(
             across_mps=known.across_mps[start:stop, limbs],
         )
         sigma = of_joints.towards(place, own)
-    told = (
+    features = (
         towards, speed, np.einsum("tjk,tk->tj", about, nearer),
         np.einsum("tjk,tk->tj", about, aside), -about[..., 1], sigma,
     )  # fmt: skip
-    values = np.stack(told, axis=2).transpose(1, 2, 0)
+    values = np.stack(features, axis=2).transpose(1, 2, 0)
     values[..., ~mesh.presence.measured[start:stop]] = 0.0
     return np.ascontiguousarray(values, np.float32)
 
 
-_FOUND: WeakKeyDictionary[MeshSequence, _Joints] = WeakKeyDictionary()
+_JOINTS_OF: WeakKeyDictionary[MeshSequence, _Joints] = WeakKeyDictionary()
 
 
 def _joints_of(mesh: MeshSequence, parts: VertexParts) -> _Joints:
     """Joints of a mesh, found once."""
-    found = _FOUND.get(mesh)
-    if found is None or found.parts is not parts:
+    joints = _JOINTS_OF.get(mesh)
+    if joints is None or joints.parts is not parts:
         first = mesh.frame(int(np.argmax(mesh.presence.there))).astype(np.float64)
         rows = joint_vertices(first, mesh.faces, parts)
         places_m = np.zeros((mesh.frame_count, len(rows), 3))
         blocks = -(-mesh.frame_count // _BLOCK_FRAMES)
-        found = _Joints(parts, rows, places_m, np.zeros(blocks, bool))
-        _FOUND[mesh] = found
-    return found
+        joints = _Joints(parts, rows, places_m, np.zeros(blocks, bool))
+        _JOINTS_OF[mesh] = joints
+    return joints
 
 
 def joint_vertices(
@@ -145,17 +145,17 @@ def joint_vertices(
     ends = np.zeros((0, 2), np.intp)
     if faces is not None:
         ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    found: dict[str, NDArray[np.intp]] = {"trunk": number["trunk"]}
+    rows: dict[str, NDArray[np.intp]] = {"trunk": number["trunk"]}
     for side in "LR":
         for joint, (inner, outer) in _MEETING.items():
             names = [inner if inner == "trunk" else f"{inner}.{side}", f"{outer}.{side}"]
-            found[f"{joint}.{side}"] = _border(points_m, ends, *(number[name] for name in names))
+            rows[f"{joint}.{side}"] = _border(points_m, ends, *(number[name] for name in names))
         for joint, (part, near) in _END_OF.items():
-            from_m = points_m[found[f"{near}.{side}"]].mean(axis=0)
-            found[f"{joint}.{side}"] = _farthest(points_m, number[f"{part}.{side}"], from_m)
-    hips = np.concatenate([found["hip.L"], found["hip.R"]])
-    found["head"] = _farthest(points_m, number["trunk"], points_m[hips].mean(axis=0))
-    return [found[joint] for joint in JOINTS]
+            from_m = points_m[rows[f"{near}.{side}"]].mean(axis=0)
+            rows[f"{joint}.{side}"] = _farthest(points_m, number[f"{part}.{side}"], from_m)
+    hips = np.concatenate([rows["hip.L"], rows["hip.R"]])
+    rows["head"] = _farthest(points_m, number["trunk"], points_m[hips].mean(axis=0))
+    return [rows[joint] for joint in JOINTS]
 
 
 def _border(

@@ -68,7 +68,7 @@ def fine_kernel(  # type: ignore[no-untyped-def]
         Number of visible vertices, and of those of them beyond the axis.
     """
     vertex, first, places, centre, before, after, _, _ = paths
-    normals, mask, areas, vectors, heads, _, which, weighting = scatterers
+    normals, mask, areas, vectors, multiplicity, _, which, weighting = scatterers
     bins, beyond, exponent, reference = law
     numbers, here = group_of(vertex, first, places, 0)
     marks = np.empty(0, np.uint8)
@@ -90,13 +90,13 @@ def fine_kernel(  # type: ignore[no-untyped-def]
             n = q - p
             away = ranges_at(here, knot, sensor, distance, ranges, held)
             sight = weigh_run(
-                p, q, most * t, here[3 * knot : 3 * knot + 3], away, numbers, heads, normals,
+                p, q, most * t, here[3 * knot : 3 * knot + 3], away, numbers, multiplicity, normals,
                 marks, areas, vectors, which, weighting, sensor, distance, exponent, reference,
                 seen[:n], weight[:n], spare[:n],
             )  # fmt: skip
             for i in range(n):
                 if sight[i] != 0:
-                    visible[t] += heads[p + i] if heads.shape[0] > 0 else 1.0
+                    visible[t] += multiplicity[p + i] if multiplicity.shape[0] > 0 else 1.0
             for sample in range(samples):
                 if scale[t, sample] <= 0:
                     continue
@@ -104,14 +104,14 @@ def fine_kernel(  # type: ignore[no-untyped-def]
                 b = ranges_at(here, after[t, sample], sensor, distance, ranges, held)
                 axis_positions(a[p:q], b[p:q], scale[t, sample], offset, f[:n])
                 outside[t] += share * _tally(
-                    f[:n], sight, weight[:n], share, limb[p:q], heads[p:q], bins, room, beyond,
-                    sigma[t], part, fine[t], histogram[t],
+                    f[:n], sight, weight[:n], share, limb[p:q], multiplicity[p:q], bins, room,
+                    beyond, sigma[t], part, fine[t], histogram[t],
                 )  # fmt: skip
 
 
 @compiled
 def _tally(  # type: ignore[no-untyped-def]
-    f, sight, weight, share, limb, heads, bins, room, beyond, sigma, part, fine, histogram
+    f, sight, weight, share, limb, multiplicity, bins, room, beyond, sigma, part, fine, histogram
 ):
     """Add a run of vertices; returns the number of visible ones beyond the axis."""
     parts = fine.shape[1]
@@ -125,7 +125,7 @@ def _tally(  # type: ignore[no-untyped-def]
         x, amount, number = f[v], weight[v] * share, limb[v]
         inside = (x >= np.float32(0)) & (x <= end)
         if not inside:
-            outside += heads[v] if heads.shape[0] > 0 else 1.0
+            outside += multiplicity[v] if multiplicity.shape[0] > 0 else 1.0
             if beyond == WRAP:
                 x = min(max(x - end * np.floor(x / end), np.float32(0)), end)
             else:

@@ -76,18 +76,18 @@ class MovingVertices(Paths):
         frames = np.arange(GROUP * (len(self.first) - 1)).reshape(-1, GROUP)
         # Of a last group with fewer frames the last stands for those that are missing.
         rows = np.minimum(frames, len(values) - 1)
-        found = np.empty(GROUP * columns.shape[1] * len(self.vertex), values.dtype)
-        gather_kernel(columns, rows, self.vertex, self.first, found)
-        return found
+        result = np.empty(GROUP * columns.shape[1] * len(self.vertex), values.dtype)
+        gather_kernel(columns, rows, self.vertex, self.first, result)
+        return result
 
     def normals(self, points: NDArray[np.float32], faces: NDArray[np.int32]) -> NDArray[np.int8]:
         """Normals of what moves, as :meth:`of` orders them.
 
         ``points`` (frames, 3, V) are those of all vertices.
         """
-        found = np.empty(GROUP * 3 * len(self.vertex), np.int8)
-        moving_normals_kernel(points, faces, self.vertex, self.first, found)
-        return found
+        result = np.empty(GROUP * 3 * len(self.vertex), np.int8)
+        moving_normals_kernel(points, faces, self.vertex, self.first, result)
+        return result
 
 
 def find_moving(
@@ -151,7 +151,7 @@ def visible_counts(
     sensor: NDArray[np.float64],
     mask: NDArray[np.uint8] | None,
     normals: NDArray[np.int8] | None,
-    heads: NDArray[np.float32] | None,
+    multiplicity: NDArray[np.float32] | None,
 ) -> NDArray[np.float64]:
     """Number of all visible vertices in each frame, (n,): marked, facing the sensor, or all.
 
@@ -165,15 +165,15 @@ def visible_counts(
         Where it is given, only marked vertices are visible.
     normals : int8 ndarray, (n, 3, V), or None
         Without a mask only vertices whose normal faces the sensor are visible; None: all are.
-    heads : float32 ndarray, (V,), or None
+    multiplicity : float32 ndarray, (V,), or None
         Number of vertices that each stands for; None: itself only.
     """
     vertices = points.shape[2]
-    stands_for = np.ones(vertices) if heads is None else heads.astype(np.float64)
+    stands_for = np.ones(vertices) if multiplicity is None else multiplicity.astype(np.float64)
     if mask is not None:
         return (mask > 0) @ stands_for
     visible = np.full(len(points), stands_for.sum())
     if normals is not None:
-        own = np.empty(0, np.float32) if heads is None else heads
+        own = np.empty(0, np.float32) if multiplicity is None else multiplicity
         facing_counts_kernel(points, normals, own, sensor.astype(points.dtype), visible)
     return visible

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sd2core.doppler.kernels import heads_seen
+from sd2core.doppler.kernels import multiplicity_seen
 from sd2core.numerics.compiled import compiled
 from sd2core.scattering.visibility import add_cross_product, facing_kernel, set_normal
 
@@ -41,7 +41,7 @@ def moving_kernel(positions, before, after, limit_m, marks):  # type: ignore[no-
 
 
 @compiled
-def gather_kernel(values, rows, vertex, first, found):  # type: ignore[no-untyped-def]
+def gather_kernel(values, rows, vertex, first, result):  # type: ignore[no-untyped-def]
     """Write the values of the vertices that move, at the rows of every group.
 
     Parameters
@@ -52,7 +52,7 @@ def gather_kernel(values, rows, vertex, first, found):  # type: ignore[no-untype
         Which of the N are wanted of a group.
     vertex, first
         Those of :class:`~sd2core.doppler.histogram.Paths`.
-    found : flat
+    result : flat
         Written: group after group, row after row, (columns, n).
     """
     at = 0
@@ -60,7 +60,7 @@ def gather_kernel(values, rows, vertex, first, found):  # type: ignore[no-untype
         for row in rows[group]:
             for column in range(values.shape[1]):
                 for p in range(first[group], first[group + 1]):
-                    found[at] = values[row, column, vertex[p]]
+                    result[at] = values[row, column, vertex[p]]
                     at += 1
 
 
@@ -111,14 +111,14 @@ def moving_normals_kernel(points, faces, vertex, first, normals):  # type: ignor
 
 
 @compiled
-def facing_counts_kernel(points, normals, heads, sensor, visible):  # type: ignore[no-untyped-def]
+def facing_counts_kernel(points, normals, multiplicity, sensor, visible):  # type: ignore[no-untyped-def]
     """Number of vertices that face the sensor in each frame, or of those that they stand for.
 
     Parameters
     ----------
     points, normals : (n, 3, V) and int8 (n, 3, V)
         All vertices.
-    heads : float32 (V,)
+    multiplicity : float32 (V,)
         Number of vertices that each stands for; empty: itself only.
     sensor : (3,)
         In the frame and the precision of the points.
@@ -133,8 +133,8 @@ def facing_counts_kernel(points, normals, heads, sensor, visible):  # type: igno
             sensor[0], sensor[1], sensor[2], seen,
         )  # fmt: skip
         total = np.int64(0)
-        if heads.shape[0] > 0:
-            total += heads_seen(seen, heads)
+        if multiplicity.shape[0] > 0:
+            total += multiplicity_seen(seen, multiplicity)
         else:
             for v in range(seen.shape[0]):
                 total += np.int64(seen[v])

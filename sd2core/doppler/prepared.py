@@ -68,7 +68,7 @@ class PreparedMesh:
         # array is another type to the compiler, and would be compiled for again.
         self.faces = None if self.mesh.faces is None else np.array(self.mesh.faces, np.int32)
         counts = self.mesh.vertex_counts
-        self.heads = None if counts is None else counts.astype(np.float32)
+        self.multiplicity = None if counts is None else counts.astype(np.float32)
         # Points are kept around the clip's own origin, in single precision where that
         # is enough (see _positions), so that large coordinates cost nothing. The origin
         # is a number that the mesh's own precision has. The compatible rule works on the
@@ -235,8 +235,8 @@ class PreparedMesh:
 
         def make() -> tuple[tuple[MovingVertices | None], int]:
             whole = block if len(block.frames.positions) else self._read(block.index)
-            found = find_moving(whole.frames, whole.reach_m, counting, still)
-            return (found,), 0 if found is None else found.nbytes
+            moving = find_moving(whole.frames, whole.reach_m, counting, still)
+            return (moving,), 0 if moving is None else moving.nbytes
 
         kept = self.budget.get_or_make(self._moving_key("moving", block.index), make)
         moving: MovingVertices | None = kept[0]
@@ -312,8 +312,10 @@ class PreparedMesh:
         return vectors
 
     def _middles(self, block: Block) -> NDArray[np.float64]:
-        heads = np.ones(self.mesh.vertex_count) if self.heads is None else self.heads
-        share = heads / heads.sum(dtype=np.float64)
+        multiplicity = (
+            np.ones(self.mesh.vertex_count) if self.multiplicity is None else self.multiplicity
+        )
+        share = multiplicity / multiplicity.sum(dtype=np.float64)
         return np.stack([points @ share for points in self.points(block)])
 
     def _limb_places(self, block: Block) -> NDArray[np.float64]:

@@ -104,8 +104,8 @@ def _sigma_bins(
     limb, limbs = known.vertex_limb, len(known.limbs)
     members = np.maximum(np.bincount(limb, minlength=limbs), 1)
     limbs_m = np.stack([np.bincount(limb, line, limbs) / members for line in points], axis=-1)
-    found = sigma_bins(known, sensor.position_m, limbs_m[None], frame, options.axis)
-    return SIGMA_FACTOR * found[0, limb]
+    sigma = sigma_bins(known, sensor.position_m, limbs_m[None], frame, options.axis)
+    return SIGMA_FACTOR * sigma[0, limb]
 
 
 def at_frames(
@@ -149,8 +149,8 @@ def at_frames(
         measured = moments_s > 0
         before, after = between.before[row, measured] - low, between.after[row, measured] - low
         duration_s = moments_s[measured][:, None]
-        found = radial_velocity(points[before], points[after], place, duration_s)
-        yield found, points[centre[row] - low]
+        velocity_mps = radial_velocity(points[before], points[after], place, duration_s)
+        yield velocity_mps, points[centre[row] - low]
 
 
 def _range_law(
@@ -189,10 +189,10 @@ def _weights(
 ) -> tuple[NDArray[np.float64], float]:
     """Weight of each vertex before the range law, and the total that the map is a share of."""
     if options.weight == "count" or mesh.faces is None:
-        heads = np.ones(points.shape[1])
+        multiplicity = np.ones(points.shape[1])
         if mesh.vertex_counts is not None:
-            heads *= mesh.vertex_counts
-        return heads, float(mesh.represented_count)
+            multiplicity *= mesh.vertex_counts
+        return multiplicity, float(mesh.represented_count)
     a, b, c = (points[:, mesh.faces[:, corner]] for corner in range(3))
     thirds = np.cross(b - a, c - a, axis=0) / 6.0
     corners = mesh.faces.ravel()

@@ -286,8 +286,8 @@ class Synthesizer:
         >>> from sd2core.body.parts import body_parts
         >>> from sd2core.files.resources import resource_path
         >>> mesh = sd2.load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(30, 36)
-        >>> found = sd2.Synthesizer(mesh).limb_maps(sd2.VirtualSensor(), body_parts(mesh))
-        >>> found.limbs.values.shape
+        >>> maps = sd2.Synthesizer(mesh).limb_maps(sd2.VirtualSensor(), body_parts(mesh))
+        >>> maps.limbs.values.shape
         (9, 32, 6)
         """
         if len(parts.numbers) != self.mesh.vertex_count:
