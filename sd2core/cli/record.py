@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
 _SIZE = re.compile(r"(\d{2,5})x(\d{2,5})")
 
 
-@dataclass(frozen=True, kw_only=True)
 class Record(Json):
     """Options of ``sd2 record``.
 
