@@ -190,6 +190,7 @@ class Status:
         self._shown_s = time.monotonic()
         self._said: set[str] = set()
         self.more: Callable[[], Mapping[str, Any]] = dict  # what else is told with every line
+        self.each_time: Callable[[], object] = dict  # called with every column, and between them
 
     def begin(self, folder: Path, continued: bool, about: str = "") -> None:
         """Say what is listened to, or ``about`` what is recorded."""
@@ -211,6 +212,7 @@ class Status:
 
     def show(self, column: Column | None) -> None:
         """Show the newest column, no oftener than is of use, and what looks wrong."""
+        self.each_time()
         if column is not None:
             self._column = column
             if self._first_s is None:

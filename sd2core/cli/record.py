@@ -125,7 +125,7 @@ def _record(options: Record) -> None:
         stack.callback(film.stop)
         take = _Take(options, source, recording, listening, film)
         status = Status(listening, source, as_json=options.json, columns=options.previews)
-        status.more = take.progress
+        status.more, status.each_time = take.progress, take.follow
         status.begin(recording.folder, False, f"{film.about}\n{source.about}")
         # To be told to end is to be told to stop: what waits to be stored is stored.
         with stop_signals() as told:
@@ -175,18 +175,22 @@ class _Take:
         )
         self._linked = False
 
-    def progress(self) -> dict[str, Any]:
-        """What the camera has given; the first time there is something of both, they are linked."""
+    def follow(self) -> None:
+        """Tell the newest picture; the first time there is something of both, link them."""
         self._film.check()
         filmed = self._film.filmed
         if not self._linked and filmed.first_s is not None and self._recording.frames:
             self._link()
             self._linked = True
+        if (preview := self._film.next_preview()) is not None:
+            print_event("preview", picture=preview, **self.progress())
+
+    def progress(self) -> dict[str, Any]:
+        """Numbers of pictures, and whether the recording names its video."""
+        filmed = self._film.filmed
         told: dict[str, Any] = {
             "pictures": filmed.recorded, "pictures_dropped": filmed.dropped, "linked": self._linked
         }  # fmt: skip
-        if (preview := self._film.next_preview()) is not None:
-            told["preview"] = preview
         return told
 
     def end(self) -> None:

@@ -224,11 +224,19 @@ class LiveModel(QObject):
                 self.counts = Counts.of(event)
             case "frames" | "end":
                 self.counts = Counts.of(event)
-                self.pictures = int(event.get("pictures", self.pictures))
-                self.pictures_dropped = int(event.get("pictures_dropped", self.pictures_dropped))
-                self._is_linked = bool(event.get("linked", True))
-                if (preview := event.get("preview")) is not None and self.on_screen:
-                    self._session.video.show_live(_pixels(base64.b64decode(preview)))
+                self._count_pictures(event)
+            case "clocks":
+                self._count_pictures(event)
+            case "preview":
+                self._count_pictures(event)
+                if self.on_screen:
+                    picture = base64.b64decode(event["picture"])
+                    self._session.video.show_live(_pixels(picture))
+
+    def _count_pictures(self, event: dict[str, Any]) -> None:
+        self.pictures = int(event.get("pictures", self.pictures))
+        self.pictures_dropped = int(event.get("pictures_dropped", self.pictures_dropped))
+        self._is_linked = bool(event.get("linked", True))
 
     def _end(self, code: int) -> None:
         self._read()
