@@ -50,7 +50,7 @@ class LiveBar(StateBar):
         self._numbers.setText(" · ".join(filter(None, parts)) if listening else "")
         shown = {
             "stop": live.busy,
-            "go_on": live.state in ("stopped", "failed"),
+            "go_on": live.can_go_on,
             "show": live.can_be_shown,
             "close": not live.busy,
         }

@@ -91,6 +91,12 @@ class LiveModel(QObject):
         return self._map is not None and not self.on_screen
 
     @property
+    def can_go_on(self) -> bool:
+        """True where it can be listened to again; what was filmed is not continued."""
+        ended = self.state in ("stopped", "failed")
+        return ended and self.request is not None and not self.request.camera
+
+    @property
     def latency_s(self) -> float | None:
         """Median time from a frame's reception to the screen, of the last hundred."""
         return float(np.median(self._latencies_s)) if self._latencies_s else None

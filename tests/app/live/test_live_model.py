@@ -278,6 +278,7 @@ def test_what_is_filmed_is_shown_as_it_comes_and_then_with_its_video(session, tm
     assert session.document.recording.video == tmp_path / "take.sd2" / "video.mp4"
     stopped(model, qtbot)
     assert model.pictures > 0
+    assert not model.can_go_on
     qtbot.waitUntil(lambda: session.document.video is not None, timeout=LIMIT_MS)
     assert len(session.document.video) == model.pictures
     assert session.document.simulated
