@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,7 +11,7 @@ from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_facts, print_json
 from sd2core.errors import Sd2Error
 from sd2core.options.bounds import RADAR_SEARCH_S
-from sd2core.options.records import ARGUMENTS
+from sd2core.options.records import ARGUMENTS, OptionError
 from sd2core.options.shared import Json
 
 if TYPE_CHECKING:
@@ -27,13 +28,25 @@ class Align(Json):
         with a mesh and a radar
     within : S
         search so far before and after the recording's offset, 2 s at least (default: 5)
+    by_arrival
+        by when frames of both arrived, as `sd2 record` has kept it: puts right an offset that was
+        changed, or delays that were wrong
+    camera_delay_ms : MS
+        with --by-arrival, the camera's delay (default: as it was recorded)
     save
         write what was found into the recordings
     """
 
     recordings: Annotated[tuple[Path, ...], ARGUMENTS]
     within: Annotated[float, RADAR_SEARCH_S] | None = None
+    by_arrival: bool = False
+    camera_delay_ms: float | None = None
     save: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.camera_delay_ms is not None and not self.by_arrival:
+            raise OptionError("--camera-delay-ms is given without --by-arrival", "both")
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -52,6 +65,7 @@ def _align(options: Align) -> int:
       sd2 align walk.sd2
       sd2 align anna.sd2 ben.sd2 --save
       sd2 align walk.sd2 --within 20 --json
+      sd2 align take.sd2 --by-arrival --camera-delay-ms 45 --save
     """
     from sd2core.files.resources import is_bundled
     from sd2core.recording.recording import open_recording
@@ -76,6 +90,8 @@ def _aligned(recording: Recording, options: Align) -> dict[str, Any]:
         "recording": str(recording.folder), "before_s": before_s, "saved": False
     }  # fmt: skip
     try:
+        if options.by_arrival:
+            return entry | _by_arrival(recording, options)
         found = _found(recording, options.within)
         if options.save and not found.problem:
             recording.radar_offset_s = found.offset_s
@@ -95,6 +111,28 @@ def _aligned(recording: Recording, options: Align) -> dict[str, Any]:
     }
 
 
+def _by_arrival(recording: Recording, options: Align) -> dict[str, Any]:
+    """Find the offset by the arrivals that were kept, and save it if that is wanted."""
+    from sd2core.live.clocks import Clocks, arrival_line, link_clocks
+
+    clocks = Clocks.read(recording.folder)
+    if clocks is None or recording.radar is None:
+        raise Sd2Error(
+            f"{recording.folder} does not say when its frames arrived",
+            "a recording of `sd2 record`",
+            "Align it by what both saw, without --by-arrival",
+        )
+    if options.camera_delay_ms is not None:
+        clocks = replace(clocks, video_delay_s=1e-3 * options.camera_delay_ms)
+    line = link_clocks(recording, clocks) if options.save else arrival_line(recording.radar)
+    return {
+        "problem": "",
+        "offset_s": clocks.offset_s(line),
+        "jitter_s": line.jitter_s,
+        "saved": options.save,
+    }
+
+
 def _found(recording: Recording, within_s: float | None) -> Alignment:
     from sd2core.cli.recording_maps import maps_of
     from sd2core.doppler.alignment import WITHIN_S, align
@@ -111,14 +149,21 @@ def _found(recording: Recording, within_s: float | None) -> Alignment:
 def _facts(entry: dict[str, Any]) -> dict[str, str]:
     if "offset_s" not in entry:
         return {"not aligned": entry["problem"]}
-    facts = {
-        "confidence": f"{entry['confidence']:.3f}",
-        "correlation": f"{entry['correlation']:.2f}",
-    }
+    if "jitter_s" in entry:
+        facts = {"arrivals": f"± {1e3 * entry['jitter_s']:.1f} ms"}
+    else:
+        facts = _confidence(entry)
     if entry["problem"]:
         return {"not aligned": entry["problem"]} | facts
     return {
         "radar offset": f"{entry['offset_s'] + 0.0:g} s (was {entry['before_s']:g} s)",
         **facts,
         "saved": "yes" if entry["saved"] else "no (--save)",
+    }
+
+
+def _confidence(entry: dict[str, Any]) -> dict[str, str]:
+    return {
+        "confidence": f"{entry['confidence']:.3f}",
+        "correlation": f"{entry['correlation']:.2f}",
     }

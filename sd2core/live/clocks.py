@@ -125,7 +125,7 @@ def link_clocks(recording: Recording, clocks: Clocks) -> ClockLine:
     Sd2Error if the radar's arrivals are not there.
     """
     assert recording.radar is not None
-    line = fit_line(*_arrivals(recording.radar))
+    line = arrival_line(recording.radar)
     recording.radar_offset_s = clocks.offset_s(line)
     recording.save()
     clocks.write(
@@ -151,11 +151,11 @@ def correct_drift(radar: Path, line: ClockLine) -> None:
     atomic_write_text(radar / HEAD_NAME, told.model_dump_json(indent=2) + "\n")
 
 
-def _arrivals(radar: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times of the frames of a growing capture, and their arrivals, (frames,)."""
+def arrival_line(radar: Path) -> ClockLine:
+    """Clock of a growing capture, by the arrivals that were kept; Sd2Error if none were."""
     path = radar / ARRIVALS_NAME
     if not path.is_file():
         raise Sd2Error(f"There is no file {path}", "a recording of `sd2 record`")
     arrivals_s = np.fromfile(path, np.float64)
     frames = min(frame_count(radar, read_head(radar)), len(arrivals_s))
-    return np.array(read_entries(radar, frames)["time_s"]), arrivals_s[:frames]
+    return fit_line(np.array(read_entries(radar, frames)["time_s"]), arrivals_s[:frames])

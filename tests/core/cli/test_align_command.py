@@ -13,6 +13,10 @@ from cli_outcome import Sd2
 
 from sd2core.cli import align
 from sd2core.files.resources import resource_path
+from sd2core.live.clocks import Clocks
+from sd2core.live.recording import GrowingRecording
+from sd2core.live.rehearsal import TestSource
+from sd2core.live.sources import Frame
 from sd2core.recording.recording import open_recording
 
 
@@ -79,3 +83,38 @@ def test_what_another_saved_while_it_was_aligned_is_kept(
     assert "since it was read: another title" in entry["problem"]
     assert not entry["saved"]
     assert open_recording(folder).title == "theirs"
+
+
+def _kept_arrivals(folder: Path) -> Path:
+    """A radar whose frames arrived 2 ms late, and a video that began 3 s before."""
+    source, recording = TestSource(20.0), GrowingRecording(folder, keep_arrivals=True)
+    head = source.head(0.0)
+    for number in range(40):
+        frame = Frame(10.0 + 0.05 * number, 0.05 * number, 0.0)
+        recording.append(
+            source.words(frame), head, time_s=0.05 * number, received_s=103.002 + 0.05 * number
+        )
+    recording.close()
+    Clocks(video_first_s=100.0, video_delay_s=0.0, radar_delay_s=0.002).write(folder)
+    return folder
+
+
+def test_an_offset_is_put_right_by_the_arrivals(sd2: Sd2, tmp_path: Path) -> None:
+    folder = _kept_arrivals(tmp_path / "take.sd2")
+    outcome = sd2("align", folder, "--by-arrival", "--json")
+    assert outcome.code == 0, outcome.err
+    assert json.loads(outcome.out)["recordings"][0]["offset_s"] == pytest.approx(3.0)
+    assert open_recording(folder).radar_offset_s == 0.0
+    outcome = sd2("align", folder, "--by-arrival", "--camera-delay-ms", "50", "--save")
+    assert "radar offset  3.05 s (was 0 s)" in outcome.out
+    assert open_recording(folder).radar_offset_s == pytest.approx(3.05)
+    # The delay is kept for the next time.
+    outcome = sd2("align", folder, "--by-arrival")
+    assert "3.05 s (was 3.05 s)" in outcome.out
+
+
+def test_without_arrivals_it_is_said(sd2: Sd2, tmp_path: Path) -> None:
+    bare = swinging_recordings.recording(tmp_path / "bare.sd2").folder
+    outcome = sd2("align", bare, "--by-arrival")
+    assert outcome.code == 1
+    assert "does not say when its frames arrived" in outcome.out
