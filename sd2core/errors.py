@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TypeVar
 
 Value = TypeVar("Value")
 _LONGEST = 60
+
+
+@dataclass(frozen=True)
+class Cure:
+    """Setting that puts right how a mesh is read, and the words for its button."""
+
+    setting: str  # field of sd2core.files.recording_json.MeshReading
+    value: float | str
+    words: str
 
 
 class Sd2Error(Exception):
@@ -30,6 +40,9 @@ class Sd2Error(Exception):
     times that increase from frame to frame
     """
 
+    cure: Cure | None = None
+    """What is to be done, for a button."""
+
     def __init__(self, found: str, expected: str = "", remedy: str = "") -> None:
         self.found = found
         self.expected = expected
@@ -40,7 +53,9 @@ class Sd2Error(Exception):
         """Return the same error, said of a file; itself if it names that already."""
         if str(place) in self.found:
             return self
-        return Sd2Error(f"{place}: {self.found}", self.expected, self.remedy)
+        error = Sd2Error(f"{place}: {self.found}", self.expected, self.remedy)
+        error.cure = self.cure
+        return error
 
     def __str__(self) -> str:
         parts = [self.found]

@@ -14,7 +14,7 @@ from sd2core.files.paths import PICKLE_SUFFIXES, as_path, is_pattern
 from sd2core.files.texts import errors_in
 from sd2core.io.fitted import fitted_doubts
 from sd2core.io.mesh_arrays import RawMesh, read_npz, read_zarr, write_npz, write_zarr
-from sd2core.io.mesh_checks import check_mesh, mark_empty_frames, uncertainty_of
+from sd2core.io.mesh_checks import check_mesh, judge_body, mark_empty_frames, uncertainty_of
 from sd2core.io.mesh_files import SURFACE_SUFFIXES, read_faces, read_mesh_files
 from sd2core.io.mesh_models import read_model_output
 from sd2core.io.readers import MESH_FILES, FileReader, MeshHints, plug_in_for
@@ -106,12 +106,20 @@ def load_mesh(
     check_mesh(raw, times_s, source, check_size=scale is None)
     with errors_in(source, remedy=""):
         timebase = Timebase(times_s)
+    judge_body(raw, times_s)
     known = uncertainty_of(raw, source)
     if known is not None:
         known = known.times(_velocity_factor(raw.times_s, times_s, scale))
-    notes = (*raw.notes, *fitted_doubts(path))
     return MeshSequence(
-        raw.vertices, raw.faces, timebase, source, notes, raw.vertex_counts, raw.present, known
+        raw.vertices,
+        raw.faces,
+        timebase,
+        source,
+        (*raw.notes, *map(str, raw.findings), *fitted_doubts(path)),
+        raw.vertex_counts,
+        raw.present,
+        known,
+        tuple(raw.findings),
     )
 
 

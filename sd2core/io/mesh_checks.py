@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -12,22 +13,33 @@ from sd2core.files.texts import errors_in
 from sd2core.io.mesh_arrays import RawMesh
 from sd2core.io.stored_vertices import StoredVertices
 from sd2core.mesh.presence import checked
-from sd2core.mesh.sequence import place_in_words
+from sd2core.mesh.sequence import VertexArray, place_in_words
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.numerics.precision import ROUNDING, SHARE_OF_A_BIN, stored_velocity_error_mps
+from sd2core.plausibility.clock import judge_clock
+from sd2core.plausibility.mesh import (
+    LARGEST_BODY_M,
+    BodyPoints,
+    judge_motion,
+    judge_place,
+    judge_size,
+)
 from sd2core.sensor import VelocityAxis
 
 _SAMPLE_FRAMES = 5
-_LARGEST_BODY_M = 10.0
-_SMALLEST_BODY_M = 0.02
-_LIKELY_BODY_M = (0.3, 3.0)
+_POINTS = 64
+"""Vertices of a frame whose motion is judged."""
+_STRETCH_FRAMES = 64
+_JUDGED_BYTES, _JUDGED_ON_DISK_BYTES = 512 * 2**20, 32 * 2**20
+_FEWEST = 3
+"""Of so few vertices nothing is judged: they are no body."""
 _CLOSED_SHARE = 0.95
 _MIXED_SHARE = 0.01
 _SMPL_VERTICES = 6890
 
 
 def mark_empty_frames(raw: RawMesh, source: str) -> None:
-    """Mark frames without a single finite vertex as frames without a person; refuse other gaps.
+    """Mark frames without a finite vertex, or all in one point, as empty; refuse other gaps.
 
     Trackers write such frames where they lost the person. They hold the last known
     pose (before the first known one, that). Vertices that stay on disk are not touched
@@ -41,6 +53,10 @@ def mark_empty_frames(raw: RawMesh, source: str) -> None:
         return
     vertices: NDArray[Any] = np.asarray(raw.vertices)
     finite = np.isfinite(vertices).all(axis=2)  # (T, V)
+    if vertices.shape[1] > _FEWEST:
+        # Slots of an array that were never filled, or frames that were lost.
+        lost = (vertices == vertices[:, :1]).all(axis=(1, 2))
+        finite &= ~lost[:, None] | lost.all()
     whole = finite.all(axis=1)
     if whole.all():
         return
@@ -68,11 +84,15 @@ def mark_empty_frames(raw: RawMesh, source: str) -> None:
     raw.vertices = vertices[np.where(known < 0, np.argmin(empty), known)]
     unsaid = np.flatnonzero(empty & there)
     if unsaid.size:
-        raw.notes.append(
-            f"{unsaid.size:,} frames hold no body (all NaN), the first is frame {unsaid[0]}; they"
-            " are taken as frames without a person."
-        )
+        raw.notes.append(_no_body(unsaid, "all NaN, or all vertices in one point"))
     raw.present = there & ~empty
+
+
+def _no_body(frames: NDArray[np.int64], why: str) -> str:
+    return (
+        f"{len(frames):,} {'frame holds' if len(frames) == 1 else 'frames hold'} no body ({why}),"
+        f" the first is frame {frames[0]}; taken as time without a person."
+    )
 
 
 def uncertainty_of(raw: RawMesh, source: str) -> VelocityUncertainty | None:
@@ -86,7 +106,7 @@ def uncertainty_of(raw: RawMesh, source: str) -> VelocityUncertainty | None:
 
 
 def check_mesh(raw: RawMesh, times_s: NDArray[np.float64], source: str, check_size: bool) -> None:
-    """Check size, place, rounding and faces on a few frames; flip faces that look inwards.
+    """Check size, rounding and faces on a few frames; flip faces that look inwards.
 
     Parameters
     ----------
@@ -110,13 +130,6 @@ def check_mesh(raw: RawMesh, times_s: NDArray[np.float64], source: str, check_si
     sample = [np.asarray(raw.vertices[int(k)], dtype=np.float64) for k in chosen]  # (V, 3) each
     if check_size and sample[0].shape[0] > 3:
         _check_size(raw, sample, source)
-    depth_m = float(np.mean([frame[:, 2].mean() for frame in sample]))
-    if depth_m <= 0:
-        raw.notes.append(
-            f"The mesh is at a mean depth of {depth_m:.2f} m, at or behind the camera. Expected is "
-            "the camera's frame: x right, y down, z forward. A mesh with y up and z backward needs "
-            "a half turn about x; one centred on its root needs its distance (--distance-m)."
-        )
     _note_rounding(raw, sample, times_s)
     if raw.faces is None:
         _note_missing_faces(raw)
@@ -126,23 +139,62 @@ def check_mesh(raw: RawMesh, times_s: NDArray[np.float64], source: str, check_si
 
 def _check_size(raw: RawMesh, sample: list[NDArray[np.float64]], source: str) -> None:
     extent_m = float(np.median([np.ptp(frame, axis=0).max() for frame in sample]))
-    if extent_m > _LARGEST_BODY_M:
-        for factor, unit in ((0.01, "centimetres"), (0.001, "millimetres")):
-            if _LIKELY_BODY_M[0] <= extent_m * factor <= _LIKELY_BODY_M[1]:
-                guess = f"These are probably {unit}: pass --scale {factor:g}"
-                break
-        else:
-            guess = "Pass --scale with the factor to metres"
-        raise Sd2Error(
-            f"{source}: the body measures {extent_m:,.0f} m",
-            f"metres, a body below {_LARGEST_BODY_M:g} m",
-            f"{guess} (or --scale 1 when the size is right)",
-        )
-    if extent_m < _SMALLEST_BODY_M:
-        raw.notes.append(
-            f"The mesh measures {extent_m * 1000:.3g} mm. When that is not its size in metres, "
-            "pass --scale with the factor."
-        )
+    finding = judge_size(extent_m)
+    if finding is not None and extent_m > LARGEST_BODY_M:
+        raise finding.error().within(source)
+    if finding is not None:
+        raw.findings.append(finding)
+
+
+def judge_body(raw: RawMesh, times_s: NDArray[np.float64]) -> None:
+    """Add findings on clock, place and motion; those on disk are judged in some stretches.
+
+    Frames there whose vertices all lie in one point become frames without a person.
+    """
+    frames = int(raw.vertices.shape[0])
+    there = np.ones(frames, bool) if raw.present is None else np.array(raw.present, bool)
+    seen = []
+    for start, stop in _stretches(raw.vertices):
+        with suppress(Sd2Error):  # vertices that are not finite: said when these frames are used
+            seen.append(_looked_at(np.asarray(raw.vertices[start:stop]), start))
+    if not seen:
+        return
+    numbers, points_m, extent_m = (np.concatenate(part) for part in zip(*seen, strict=True))
+    if points_m.shape[1] > _FEWEST:
+        empty = numbers[~extent_m.any(axis=1) & there[numbers]]
+        if 0 < len(empty) < int(there[numbers].sum()):
+            there[empty] = False
+            raw.present = there
+            raw.notes.append(_no_body(empty, "all vertices in one point"))
+    raw.findings += judge_clock(times_s, there, of_a_mesh=True)
+    if points_m.shape[1] > _FEWEST:
+        body = BodyPoints(numbers, points_m, times_s[numbers], there[numbers], extent_m)
+        raw.findings += [*judge_place(body), *judge_motion(body)]
+
+
+def _stretches(vertices: VertexArray) -> list[tuple[int, int]]:
+    """Frames that are judged, all of them or stretches spread evenly."""
+    frames = int(vertices.shape[0])
+    frame_bytes = int(np.prod(vertices.shape[1:])) * np.dtype(vertices.dtype).itemsize
+    length, most_bytes = _STRETCH_FRAMES, _JUDGED_BYTES
+    if isinstance(vertices, StoredVertices):
+        most_bytes = _JUDGED_ON_DISK_BYTES
+        if not vertices.large_chunks:
+            length = vertices.frames_per_chunk
+    starts = np.arange(0, frames, length)
+    most = max(most_bytes // (length * frame_bytes), 1)
+    if len(starts) > most:
+        starts = starts[np.linspace(0, len(starts) - 1, most).astype(int)]
+    return [(int(start), min(int(start) + length, frames)) for start in starts]
+
+
+def _looked_at(
+    vertices: NDArray[Any], first: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Numbers of frames, some of their vertices (n, N, 3), and how large they are (n, 3)."""
+    some = np.unique(np.linspace(0, vertices.shape[1] - 1, _POINTS).astype(int))
+    extent_m = vertices.max(axis=1).astype(np.float64) - vertices.min(axis=1)
+    return np.arange(first, first + len(vertices)), vertices[:, some].astype(np.float64), extent_m
 
 
 def _note_rounding(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.mesh.presence import Presence, checked
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
+from sd2core.plausibility.findings import Finding
 from sd2core.timebase import Timebase
 
 
@@ -54,6 +55,8 @@ class MeshSequence:
         nothing may be concluded from. None: there is one in every frame.
     uncertainty : VelocityUncertainty, optional
         Standard deviations of the velocities; None: not stated.
+    findings : tuple of Finding
+        What the reader found unlikely; in words it is among the notes.
 
     Examples
     --------
@@ -79,6 +82,7 @@ class MeshSequence:
     vertex_counts: NDArray[np.int64] | None = None
     present: NDArray[np.bool_] | None = None
     uncertainty: VelocityUncertainty | None = None
+    findings: tuple[Finding, ...] = ()
 
     def __post_init__(self) -> None:
         shape = tuple(self.vertices.shape)

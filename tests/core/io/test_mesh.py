@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.io import mesh_arrays, stored_vertices
+from sd2core.io import mesh_arrays, mesh_checks, stored_vertices
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.presence import runs
@@ -168,6 +168,7 @@ def test_a_zarr_mesh_stays_on_disk(
     vertices, faces = body(400)
     path = tmp_path / f"m{suffix}"
     save_mesh(MeshSequence(vertices, faces, Timebase(times(400))), path)
+    monkeypatch.setattr(mesh_checks, "_JUDGED_ON_DISK_BYTES", 0)  # one chunk is judged
     read: list[int] = []
     original = mesh_arrays.StoredVertices.__getitem__
 
@@ -178,7 +179,7 @@ def test_a_zarr_mesh_stays_on_disk(
 
     monkeypatch.setattr(mesh_arrays.StoredVertices, "__getitem__", counted)
     mesh = load_mesh(path)
-    assert sum(read) < 0.03 * vertices.size
+    assert sum(read) < 0.05 * vertices.size
     np.testing.assert_array_equal(mesh.read(5, 25), vertices[5:25])
     assert mesh.vertices.frames_per_chunk == 10
 
@@ -540,7 +541,8 @@ def test_a_mesh_without_faces_is_a_point_cloud(tmp_path: Path) -> None:
 
 
 def test_smpl_vertices_without_faces_are_explained(tmp_path: Path) -> None:
-    vertices = np.random.default_rng(0).normal((0, 0, 3), 0.3, (2, 6890, 3))
+    pose = np.random.default_rng(0).normal((0, 0, 3), 0.3, (6890, 3))
+    vertices = np.stack([pose, pose])
     mesh = load_mesh(write(tmp_path / "m.npz", vertices=vertices, times_s=times(2)))
     one_note(mesh, "6,890 vertices are SMPL's.*licensed")
 
