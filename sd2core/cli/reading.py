@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from sd2core.cli.output import picked, progress_bar
 from sd2core.errors import Sd2Error
-from sd2core.files.paths import PICKLE_SUFFIXES
+from sd2core.files.paths import PICKLE_SUFFIXES, is_pattern
 from sd2core.options.records import given_flags
 
 if TYPE_CHECKING:
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
     from sd2core.sensor import VelocityAxis, VirtualSensor
 
 
-_OF_THE_MESH = ("faces", "fps", "scale", "person", "distance_m", "image_size", "focal_px")
 _OF_BODY_MODELS = ("person", "image_size", "focal_px")
+_OF_THE_MESH = ("faces", "fps", "scale", "distance_m", "turn", *_OF_BODY_MODELS)
 
 
 def mesh_reading(options: MeshReading) -> StoredReading:
     """Options for reading a mesh from the command line."""
     from sd2core.recording.recording import MeshReading as StoredReading
 
-    alike = picked(options, "scale", "person", "distance_m", "image_size", "focal_px")
+    alike = picked(options, "scale", "distance_m", "turn", *_OF_BODY_MODELS)
     return StoredReading(frames_per_s=options.fps, **alike)
 
 
@@ -102,6 +102,8 @@ def refuse_unused_mesh_options(
         for name in given_flags(options, (n for n in _OF_THE_MESH if n not in but)):
             raise Sd2Error(f"{name} is given, and {path} holds no mesh", f"{name} for a mesh only")
     elif mesh.suffix.lower() not in PICKLE_SUFFIXES:
+        if is_pattern(mesh) or mesh.is_dir():  # files whose names may tell persons
+            but += ("person",)
         for name in given_flags(options, (n for n in _OF_BODY_MODELS if n not in but)):
             raise Sd2Error(
                 f"{name} is given, and {mesh} is not the output of a body model",

@@ -18,6 +18,7 @@ from pydantic import (
 
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import check_version, faults_in, read_json
+from sd2core.files.turns import Turn
 
 FILE_NAME = "recording.json"
 FORMAT: Literal["sd2-recording"] = "sd2-recording"
@@ -83,6 +84,7 @@ class MeshReading(BaseModel):
     image_size: tuple[Pixels, Pixels] | None = None
     focal_px: Focal | None = None
     distance_m: FiniteFloat | None = None
+    turn: Turn | None = None
 
     def options(self) -> dict[str, Any]:
         """Arguments for ``load_mesh``: those that are given."""

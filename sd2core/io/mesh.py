@@ -12,9 +12,16 @@ from sd2core.errors import Sd2Error, wanted
 from sd2core.files.limits import check_regular
 from sd2core.files.paths import PICKLE_SUFFIXES, as_path, is_pattern
 from sd2core.files.texts import errors_in
+from sd2core.files.turns import Turn, rotation_of
 from sd2core.io.fitted import fitted_doubts
 from sd2core.io.mesh_arrays import RawMesh, read_npz, read_zarr, write_npz, write_zarr
-from sd2core.io.mesh_checks import check_mesh, judge_body, mark_empty_frames, uncertainty_of
+from sd2core.io.mesh_checks import (
+    check_mesh,
+    judge_body,
+    mark_empty_frames,
+    mark_gaps,
+    uncertainty_of,
+)
 from sd2core.io.mesh_files import SURFACE_SUFFIXES, read_faces, read_mesh_files
 from sd2core.io.mesh_models import read_model_output
 from sd2core.io.readers import MESH_FILES, FileReader, MeshHints, plug_in_for
@@ -39,6 +46,7 @@ def load_mesh(
     image_size: tuple[int, int] | None = None,
     focal_px: float | None = None,
     distance_m: float | None = None,
+    turn: Turn | None = None,
     progress: Progress = silent,
 ) -> MeshSequence:
     """Read a mesh sequence or point cloud.
@@ -68,6 +76,9 @@ def load_mesh(
         Focal length for ``image_size``; by default the image's diagonal.
     distance_m : float, optional
         Moves the mesh forward, for one that is centred on the body's root.
+    turn : optional
+        Turns the mesh about an axis of the camera's frame before it is moved, right-handed:
+        ``x180`` for one with y up and z backward, ``x90`` for one with z up.
     progress : callable
         Called while files are read; may raise ``Cancelled``.
 
@@ -100,9 +111,10 @@ def load_mesh(
     if faces is not None:
         raw.faces = read_faces(Path(faces))
     _as_vertices(raw, source)
+    mark_gaps(raw)
     times_s = _times(raw, frames_per_s, source)
     mark_empty_frames(raw, source)
-    _place(raw, 1.0 if scale is None else scale, distance_m or 0.0)
+    _place(raw, 1.0 if scale is None else scale, turn, distance_m or 0.0)
     check_mesh(raw, times_s, source, check_size=scale is None)
     with errors_in(source, remedy=""):
         timebase = Timebase(times_s)
@@ -184,7 +196,7 @@ def _is_zarr(path: Path) -> bool:
 
 
 def _read_surfaces(path: Path, hints: MeshHints) -> RawMesh:
-    return read_mesh_files(path, hints.progress)
+    return read_mesh_files(path, hints.person, hints.progress)
 
 
 def _read_model_output(path: Path, hints: MeshHints) -> RawMesh:
@@ -230,14 +242,18 @@ def _as_vertices(raw: RawMesh, source: str) -> None:
         )
 
 
-def _place(raw: RawMesh, scale: float, distance_m: float) -> None:
+def _place(raw: RawMesh, scale: float, turn: str | None, distance_m: float) -> None:
     shift_m = np.array([0, 0, distance_m], np.float32)
+    rotation = None if turn is None else rotation_of(turn)
     if isinstance(raw.vertices, StoredVertices):
         raw.vertices.scale, raw.vertices.shift_m = scale, shift_m
+        raw.vertices.rotation = rotation
         return
     vertices: NDArray[Any] = np.asarray(raw.vertices)
     if scale != 1.0:
         vertices = vertices * vertices.dtype.type(scale)
+    if rotation is not None:
+        vertices = vertices @ rotation.T.astype(vertices.dtype)
     if distance_m:
         vertices = vertices + shift_m.astype(vertices.dtype)
     raw.vertices = vertices

@@ -28,6 +28,7 @@ from sd2core.files.stores import (
     open_group,
     unreadable,
 )
+from sd2core.io.mesh_clock import clock_of, is_of_clock
 from sd2core.io.stored_vertices import StoredVertices
 from sd2core.mesh.sequence import MeshSequence, VertexArray, refuse_missing
 from sd2core.plausibility.findings import Finding
@@ -35,13 +36,8 @@ from sd2core.progress import Progress, silent
 
 VERTEX_NAMES = ("vertices", "verts")
 FACE_NAMES = ("faces", "triangles")
-TIME_NAMES = ("times_s", "times")
-RATE_NAMES = ("frames_per_s", "fps")
 UNCERTAINTY_NAMES = ("vertex_limb", "limb_velocity_sigma_mps", "limb_velocity_sigma_across_mps")
-SMALL_NAMES = (
-    *(*FACE_NAMES, *TIME_NAMES, *RATE_NAMES, *UNCERTAINTY_NAMES),
-    *("vertex_counts", "present", "limbs"),
-)
+_SMALL_NAMES = (*FACE_NAMES, *UNCERTAINTY_NAMES, "vertex_counts", "present", "limbs")
 
 _PARAMETER = re.compile(
     r"^(smplx?|smpl_.*|poses?|betas|thetas|(root|global)_orient|body_pose|transl?|pose_body)$"
@@ -75,8 +71,7 @@ def read_npz(path: Path) -> RawMesh:
     expected = "a complete .npz file that holds plain numbers"
     remedy = "Write it again with numpy.savez(path, vertices=..., faces=..., times_s=...)"
     with open_npz_file(path, ".npz", expected, remedy) as archive:
-        wanted = VERTEX_NAMES + SMALL_NAMES
-        arrays = {name: archive[name] for name in archive if name in wanted}
+        arrays = {name: archive[name] for name in archive if name in VERTEX_NAMES or is_small(name)}
         names = list(archive)
     return named_arrays(arrays, names, str(path))
 
@@ -106,13 +101,16 @@ def no_vertices(source: str, names: Sequence[str]) -> Sd2Error:
     )
 
 
+def is_small(name: str) -> bool:
+    """True for the name of an array beside the vertices that is read."""
+    return name in _SMALL_NAMES or is_of_clock(name)
+
+
 def named_arrays(arrays: dict[str, Any], names: list[str], source: str) -> RawMesh:
     """Pick vertices, faces, times and rate out of arrays by their names."""
     vertices = _first(arrays, VERTEX_NAMES)
     if vertices is None:
         raise no_vertices(source, sorted(names))
-    times = _first(arrays, TIME_NAMES)
-    rate = _first(arrays, RATE_NAMES)
     held = [name for name in UNCERTAINTY_NAMES if name in arrays]
     if held and len(held) < len(UNCERTAINTY_NAMES):
         raise Sd2Error(
@@ -120,18 +118,15 @@ def named_arrays(arrays: dict[str, Any], names: list[str], source: str) -> RawMe
             f"{', '.join(UNCERTAINTY_NAMES)}: all of them, or none",
         )
     limbs = arrays.get("limbs")
-    try:
-        times_s = None if times is None else np.asarray(times, dtype=np.float64)
-        frames_per_s = None if rate is None else float(np.asarray(rate).reshape(-1)[0])
-    except (TypeError, ValueError, IndexError) as error:
-        raise Sd2Error(
-            f"{source}: its times or frames per second are no numbers ({error})", "real numbers"
-        ) from error
+    shape = np.shape(vertices)
+    clock = clock_of([arrays], shape[0] if len(shape) == 3 else 1, source)
     return RawMesh(
         vertices=vertices,
         faces=_first(arrays, FACE_NAMES),
-        times_s=times_s,
-        frames_per_s=frames_per_s,
+        times_s=clock.times_s,
+        frames_per_s=clock.frames_per_s,
+        frame_numbers=clock.frame_numbers,
+        notes=[*clock.notes],
         vertex_counts=arrays.get("vertex_counts"),
         present=arrays.get("present"),
         limbs=() if limbs is None else tuple(map(str, np.atleast_1d(limbs))),
@@ -146,13 +141,17 @@ def read_zarr(path: Path) -> RawMesh:
     """
     group = open_group(path)
     names = array_names(path)
-    small = [name for name in names if name in SMALL_NAMES]
+    small = [name for name in names if is_small(name)]
     arrays: dict[str, Any] = {name: array_in(group, path, name, "rows")[...] for name in small}
     stored = _vertices(group, path, names)
     if stored is not None:
         arrays["vertices"] = stored
-    if "limbs" in group.attrs:
-        arrays["limbs"] = group.attrs["limbs"]
+    attributes = dict(group.attrs)
+    arrays |= {
+        name: value
+        for name, value in attributes.items()
+        if name not in arrays and (name == "limbs" or is_of_clock(name))
+    }
     raw = named_arrays(arrays, names, str(path))
     if raw.faces is not None and not len(raw.faces):
         raw.faces = None
@@ -179,7 +178,7 @@ def stored_arrays(path: Path) -> list[StoredArray]:
     group = open_group(path)
     names = array_names(path)
     vertices = _vertices(group, path, names)
-    small = [array_in(group, path, name, "rows") for name in names if name in SMALL_NAMES]
+    small = [array_in(group, path, name, "rows") for name in names if is_small(name)]
     return small if vertices is None else [vertices, *small]
 
 

@@ -95,6 +95,33 @@ def _no_body(frames: NDArray[np.int64], why: str) -> str:
     )
 
 
+def mark_gaps(raw: RawMesh) -> None:
+    """Put one frame without a person where video frames are missing, lasting as long.
+
+    Of vertices that stay on disk, the frame before is taken for it.
+    """
+    numbers = raw.frame_numbers
+    if numbers is None or not (np.diff(numbers) > 0).all():
+        return  # what does not increase is said when times are made of it
+    gaps = np.flatnonzero(np.diff(numbers) > 1)
+    if not gaps.size:
+        return
+    missing = int(numbers[-1] - numbers[0] + 1 - len(numbers))
+    raw.notes.append(
+        f"{missing:,} video frames hold no mesh, the first after frame {numbers[gaps[0]]}; they are"
+        " taken as time without a person."
+    )
+    there = np.ones(len(numbers), bool) if raw.present is None else np.array(raw.present, bool)
+    if isinstance(raw.vertices, StoredVertices):
+        there[gaps] = False
+        raw.present = there
+        return
+    held = np.insert(np.arange(len(numbers)), gaps + 1, gaps)
+    raw.vertices = np.asarray(raw.vertices)[held]
+    raw.frame_numbers = np.insert(numbers, gaps + 1, numbers[gaps] + 1)
+    raw.present = np.insert(there, gaps + 1, False)
+
+
 def uncertainty_of(raw: RawMesh, source: str) -> VelocityUncertainty | None:
     """Uncertainty of velocities that a file states, or None."""
     if raw.uncertainty is None:

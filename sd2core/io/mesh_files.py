@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import re
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular, check_size
 from sd2core.files.numpy_files import open_npy_file, open_npz_file
 from sd2core.files.paths import files_of_pattern
+from sd2core.io.frame_names import frames_among, numbered_frames
 from sd2core.io.mesh_arrays import FACE_NAMES, RawMesh
 from sd2core.progress import Progress, silent
 
@@ -23,15 +23,16 @@ _GLB_BYTES = 64
 """Memory of an entry of an array, a matrix of 4 × 4 at most."""
 
 
-def natural_key(name: str) -> tuple[Any, ...]:
-    """Sort key by which ``frame9`` comes before ``frame10``."""
-    parts = re.findall(r"[0-9]+|[^0-9]+", name)
-    return (*((0, int(p)) if p[0] in "0123456789" else (1, p) for p in parts), (2, name))
+def read_mesh_files(
+    path: Path, person: int | str | None = None, progress: Progress = silent
+) -> RawMesh:
+    """Read one file, all files of a folder, or those that match a pattern, as frames.
 
-
-def read_mesh_files(path: Path, progress: Progress = silent) -> RawMesh:
-    """Read one file, all files of a folder, or those that match a pattern, as frames."""
-    files = _files(path)
+    Of several persons, whose numbers are in the names, one is read.
+    """
+    notes: list[str] = []
+    found = numbered_frames(_files(path, notes), person, str(path))
+    files = found.files
     frames: list[NDArray[np.float32]] = []
     faces: NDArray[Any] | None = None
     for number, file in enumerate(files):
@@ -55,7 +56,9 @@ def read_mesh_files(path: Path, progress: Progress = silent) -> RawMesh:
             )
         frames.append(vertices.astype(np.float32))
     progress(len(files), len(files))
-    return RawMesh(vertices=np.stack(frames), faces=faces)
+    return RawMesh(
+        np.stack(frames), faces, notes=[*notes, *found.notes], frame_numbers=found.numbers
+    )
 
 
 def read_surface(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64] | None]:
@@ -146,11 +149,13 @@ def read_faces(path: Path) -> NDArray[Any]:
     raise Sd2Error(f"{path} holds {held}", "an array 'faces' of shape (faces, 3)")
 
 
-def _files(path: Path) -> list[Path]:
+def _files(path: Path, notes: list[str]) -> list[Path]:
+    """Files of frames in natural order."""
     if path.is_file():
         return [path]
     if path.is_dir():
         found = [file for file in path.iterdir() if file.suffix.lower() in SURFACE_SUFFIXES]
+        found = frames_among(found, notes)
         kinds = sorted({file.suffix.lower() for file in found})
         if len(kinds) > 1:
             raise Sd2Error(
@@ -161,13 +166,14 @@ def _files(path: Path) -> list[Path]:
     else:
         found = files_of_pattern(path)
         found = [file for file in found if file.suffix.lower() in SURFACE_SUFFIXES]
+        found = frames_among(found, notes)
     if not found:
         raise Sd2Error(
             f"{path} matches no mesh file",
             "one .obj, .ply or .glb file per frame",
             "Check the folder or the pattern",
         )
-    return sorted(found, key=lambda file: natural_key(str(file)))
+    return found
 
 
 def _same_faces(first: NDArray[Any] | None, second: NDArray[Any] | None) -> bool:

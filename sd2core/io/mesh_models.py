@@ -7,7 +7,6 @@ on the body's root, beside a weak-perspective camera per frame.
 
 from __future__ import annotations
 
-import operator
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +15,9 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_size
-from sd2core.io.mesh_arrays import (
-    FACE_NAMES,
-    RATE_NAMES,
-    TIME_NAMES,
-    VERTEX_NAMES,
-    RawMesh,
-    no_vertices,
-)
+from sd2core.io.frame_names import chosen_person
+from sd2core.io.mesh_arrays import FACE_NAMES, VERTEX_NAMES, RawMesh, no_vertices
+from sd2core.io.mesh_clock import clock_of
 from sd2core.io.pickles import read_pickle
 
 _AT_ROOT_M = 0.6
@@ -69,13 +63,12 @@ def read_model_output(
         entry = _choose(path, people, person, notes)
     raw = RawMesh(vertices=_stacked(_vertices_of(entry), path), notes=notes)
     raw.faces = _array(entry, content, FACE_NAMES)
-    times = _array(entry, content, TIME_NAMES)
-    raw.times_s = None if times is None else times.astype(np.float64)
-    rate = _array(entry, content, RATE_NAMES)
-    raw.frames_per_s = None if rate is None or not rate.size else float(rate.reshape(-1)[0])
-    _number_frames(raw, entry, path)
+    shape = np.shape(raw.vertices)
+    clock = clock_of([entry, content], shape[0] if shape else 0, str(path))
+    raw.times_s, raw.frames_per_s = clock.times_s, clock.frames_per_s
+    raw.frame_numbers = clock.frame_numbers
+    notes += clock.notes
     _place_in_front(raw, entry, path, image_size, focal_px, distance_m)
-    _mark_gaps(raw)
     return raw
 
 
@@ -136,18 +129,7 @@ def _choose(
         key: len(one if isinstance(one, list | tuple) else _stacked(one, path))
         for key, one in held.items()
     }
-    listed = ", ".join(f"{key} ({count:,} frames)" for key, count in lengths.items())
-    if person is None:
-        key = max(lengths, key=lambda k: lengths[k])
-        if len(people) > 1:
-            notes.append(f"Person {key} is read, seen longest of: {listed}.")
-    else:
-        matching = [k for k in people if str(k) == str(person)]
-        if not matching:
-            raise Sd2Error(f"{path} holds no person {person}", f"one of: {listed}")
-        key = matching[0]
-        if len(people) > 1:
-            notes.append(f"Person {key} is read, as asked, of: {listed}.")
+    key = chosen_person(lengths, person, str(path), notes)
     chosen: dict[Any, Any] = people[key]
     return chosen
 
@@ -183,47 +165,6 @@ def _array(entry: dict[Any, Any], content: dict[Any, Any], names: tuple[str, ...
             if isinstance(place.get(name), np.ndarray | int | float):
                 return np.asarray(place[name])
     return None
-
-
-def _number_frames(raw: RawMesh, entry: dict[Any, Any], path: Path) -> None:
-    ids = entry.get("frame_ids")
-    if ids is None or raw.times_s is not None:
-        return
-    try:
-        if not isinstance(ids, np.ndarray):
-            ids = [operator.index(number) for number in ids]
-        numbers = np.asarray(ids, dtype=np.int64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise Sd2Error(
-            f"{path}: frame_ids are no numbers of frames ({error})",
-            "one video frame number per frame",
-        ) from error
-    count = len(raw.vertices)  # type: ignore[arg-type]
-    if numbers.shape != (count,):
-        raise Sd2Error(
-            f"{path}: {count} frames of vertices but frame_ids of shape {numbers.shape}",
-            "one video frame number per frame",
-        )
-    raw.frame_numbers = numbers
-
-
-def _mark_gaps(raw: RawMesh) -> None:
-    """Put one frame without a person where video frames are missing, lasting as long."""
-    numbers = raw.frame_numbers
-    if numbers is None or not (np.diff(numbers) > 0).all():
-        return  # what does not increase is said when times are made of it
-    gaps = np.flatnonzero(np.diff(numbers) > 1)
-    if not gaps.size:
-        return
-    missing = int(numbers[-1] - numbers[0] + 1 - len(numbers))
-    raw.notes.append(
-        f"{missing:,} video frames hold no mesh, the first after frame {numbers[gaps[0]]}; they are"
-        " taken as time without a person."
-    )
-    held = np.insert(np.arange(len(numbers)), gaps + 1, gaps)
-    raw.vertices = np.asarray(raw.vertices)[held]
-    raw.frame_numbers = np.insert(numbers, gaps + 1, numbers[gaps] + 1)
-    raw.present = np.insert(np.ones(len(numbers), bool), gaps + 1, False)
 
 
 def _place_in_front(

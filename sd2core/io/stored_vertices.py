@@ -18,7 +18,7 @@ _KEPT_BYTES = 32 * 2**20
 
 
 class StoredVertices:
-    """Vertices (T, V, 3) that stay on disk; scaled, moved and checked when they are read.
+    """Vertices (T, V, 3) that stay on disk; scaled, turned, moved and checked when read.
 
     Frames in ``damaged`` chunks hold the last pose before them (at the start, the next after them).
     """
@@ -31,6 +31,7 @@ class StoredVertices:
         self.damaged = damaged
         self._lost = {one.start // self.frames_per_chunk for one in damaged}  # chunk numbers
         self.scale = 1.0
+        self.rotation: NDArray[np.float64] | None = None  # (3, 3)
         self.shift_m = np.zeros(3, np.float32)
         self.shape: tuple[int, ...] = array.shape
         self.dtype = real_type(array.dtype)
@@ -74,6 +75,8 @@ class StoredVertices:
             )
         if self.scale != 1.0:
             part = part * part.dtype.type(self.scale)
+        if self.rotation is not None:
+            part = part @ self.rotation.T.astype(part.dtype)
         if self.shift_m.any():
             part = part + self.shift_m.astype(part.dtype)
         return part

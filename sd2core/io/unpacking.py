@@ -13,7 +13,7 @@ import numpy as np
 from sd2core.errors import Sd2Error
 from sd2core.files.numpy_files import NpzArrays, open_npz_file, read_array_header
 from sd2core.files.stores import create_array, create_group
-from sd2core.io.mesh_arrays import SMALL_NAMES, VERTEX_NAMES, create_vertices, frames_per_chunk
+from sd2core.io.mesh_arrays import VERTEX_NAMES, create_vertices, frames_per_chunk, is_small
 
 _EXPECTED = "a complete .npz file that holds plain numbers"
 Header = tuple[tuple[int, ...], bool, np.dtype[Any]]
@@ -44,15 +44,23 @@ def unpack_npz(path: Path, out: Path) -> None:
             group = create_group(workspace / "new")
             with _vertices(arrays, path) as stream:
                 _copy_vertices(stream, group, path)
-            for name in arrays.keys() & SMALL_NAMES:
+            for name in filter(is_small, arrays):
                 if name == "limbs":
                     group.attrs[name] = [str(one) for one in np.atleast_1d(arrays[name])]
                 else:
-                    create_array(group, name, data=arrays[name])
+                    name, array = _storable(name, arrays[name])
+                    create_array(group, name, data=array)
         if not out.exists():
             os.rename(workspace / "new", out)
     finally:
         shutil.rmtree(workspace, ignore_errors=True)
+
+
+def _storable(name: str, array: np.ndarray) -> tuple[str, np.ndarray]:
+    """An array by its name; dates, which a store may not hold, as nanoseconds."""
+    if array.dtype.kind not in "mM":
+        return name, array
+    return f"{name.removesuffix('_s')}_ns", array.astype(f"{array.dtype.kind}8[ns]").astype("i8")
 
 
 def _copy_vertices(stream: IO[bytes], group: Any, path: Path) -> None:

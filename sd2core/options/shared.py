@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from sd2core.files.figure_files import SUFFIXES as FIGURES
+from sd2core.files.turns import Turn
 from sd2core.options.bounds import Bounds
 from sd2core.options.kinds import Count, ImageSize, Names, Natural, Positive, Text, Vector
 from sd2core.options.records import ARGUMENT, Group, OptionError, OptionRecord, Place
@@ -73,9 +74,13 @@ class MeshReading(OptionRecord):
     scale : M
         metres per unit of the mesh, e.g. 0.001 for millimetres (default: 1)
     person : ID
-        which person of a file of several (default: seen longest)
+        which person of a file, or of a folder with a file per person and frame (default: seen
+        longest)
     distance_m : M
         move a mesh that is centred on the body's root this far forward
+    turn : AXIS
+        turn the mesh about an axis: x180 where y is up and z backward (OBJ files of 4D-Humans),
+        x90 where z is up
     image_size : WxH
         size of the video in pixels, to place the output of VIBE (default: that of the
         recording's video)
@@ -90,6 +95,7 @@ class MeshReading(OptionRecord):
     scale: Positive | None = None
     person: str | None = None
     distance_m: float | None = None
+    turn: Turn | None = None
     image_size: ImageSize | None = None
     focal_px: Positive | None = None
 

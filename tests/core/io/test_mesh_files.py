@@ -15,8 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
+from sd2core.io.frame_names import natural_key
 from sd2core.io.mesh import load_mesh
-from sd2core.io.mesh_files import natural_key, read_surface
+from sd2core.io.mesh_files import read_surface
 from sd2core.progress import Cancelled
 
 SHAPE = trimesh.creation.icosphere(subdivisions=1, radius=0.85)

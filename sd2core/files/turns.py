@@ -1,0 +1,34 @@
+"""Quarter turns of a mesh, as commands and recordings name them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal, get_args
+
+from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+Turn = Literal["x90", "x180", "x270", "y90", "y180", "y270", "z90", "z180", "z270"]
+"""Axis of the camera's frame, and degrees about it, right-handed."""
+
+
+def rotation_of(turn: str) -> NDArray[np.float64]:
+    """Matrix (3, 3) of a turn; Sd2Error if it is none.
+
+    Examples
+    --------
+    >>> rotation_of("x180") @ [1.0, 2.0, 3.0]
+    array([ 1., -2., -3.])
+    """
+    import numpy as np
+
+    if turn not in get_args(Turn):
+        raise Sd2Error(f"The turn is {turn!r}", f"one of {', '.join(get_args(Turn))}")
+    axis = "xyz".index(turn[0])
+    second, third = (axis + 1) % 3, (axis + 2) % 3
+    quarter = np.zeros((3, 3))
+    quarter[axis, axis] = quarter[third, second] = 1.0
+    quarter[second, third] = -1.0
+    return np.linalg.matrix_power(quarter, int(turn[1:]) // 90)
