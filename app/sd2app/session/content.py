@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sd2core.errors import Sd2Error
+from sd2core.errors import Cure, Sd2Error
 from sd2core.files.resources import is_bundled
 from sd2core.io.kinds import Kind, kind_of
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.plausibility.findings import Finding
 from sd2core.progress import Progress
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.recording.relinking import role_words
@@ -39,6 +40,14 @@ _TOLD: dict[str, tuple[str, str]] = {
 """Message and remedy for known kinds of files that are no part of a recording."""
 
 
+@dataclass(frozen=True)
+class Offer:
+    """Something unlikely about the mesh in words, and how it can be read instead."""
+
+    text: str
+    cure: Cure
+
+
 @dataclass(frozen=True, eq=False)
 class Content:
     """A recording with its parts opened; what could not be opened is in ``problems``.
@@ -56,6 +65,7 @@ class Content:
     radar_labels: Labels | None = None
     notes: tuple[str, ...] = ()
     problems: tuple[str, ...] = ()
+    offers: tuple[Offer, ...] = ()
 
     @property
     def saved(self) -> bool:
@@ -186,7 +196,13 @@ def load_content(recording: Recording, progress: Progress) -> Content:
         radar_labels=None if recorded is None else recorded.labels,
         notes=tuple(notes),
         problems=tuple(str(problem) for problem in problems),
+        offers=offers_of([*problems, *(() if mesh is None else mesh.findings)]),
     )
+
+
+def offers_of(unlikely: Iterable[Sd2Error | Finding]) -> tuple[Offer, ...]:
+    """What can be read another way, of errors and findings."""
+    return tuple(Offer(str(one), one.cure) for one in unlikely if one.cure is not None)
 
 
 def common_clock(clocks: Sequence[Timebase]) -> Timebase:

@@ -16,12 +16,15 @@ from sd2app.session.content import (
     PARTS,
     UNTITLED,
     Content,
+    Offer,
     common_clock,
     load_content,
+    offers_of,
     recording_of,
 )
 from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
+from sd2core.errors import Cure, Sd2Error
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
@@ -45,6 +48,7 @@ class DocumentModel(QObject):
     changed = Signal()  # something in it, or its place on disk
     grown = Signal()  # frames were added at its end
     saved = Signal()  # on disk with all edits, maybe in another place than before
+    offered = Signal()  # to read the mesh another way, or no longer
     noted = Signal(str)
     failed = Signal(str)
 
@@ -56,8 +60,12 @@ class DocumentModel(QObject):
         self.count: HowCounted = "expected"  # of vertices whose mesh states its uncertainty
         self.same_recording = False  # as was open before, with other files
         self.growing = False  # a radar is listened to, and adds frames
+        self.offers: tuple[Offer, ...] = ()  # of reading the mesh another way
         self._base: Recording | None = None
+        self._asked: list[Path] = []  # files that were opened last
+        self._cured = False
         self._runner = ListedRunner("open", jobs, self, self._receive)
+        self._runner.failed.connect(self._offer_instead)
         self._maps = ListedRunner("radar", jobs, self, self._receive_map)
         for runner in (self._runner, self._maps):
             runner.failed.connect(lambda error: self.failed.emit(str(error)))
@@ -170,6 +178,26 @@ class DocumentModel(QObject):
         recording = self.recording
         self._start(replace(recording) if recording is not None else None, list(paths))
 
+    def read_mesh_so(self, cure: Cure) -> None:
+        """Read the mesh again with a setting that puts it right, or open what was refused so."""
+        if self.content is not None and self.offers == self.content.offers:
+            self._start(replace(self.content.recording), [], cure)
+        else:
+            self._start(self._base, self._asked, cure)
+
+    def decline_offers(self) -> None:
+        """Leave the mesh as it was read."""
+        self._offer(())
+
+    def _offer(self, offers: tuple[Offer, ...]) -> None:
+        if offers != self.offers:
+            self.offers = offers
+            self.offered.emit()
+
+    def _offer_instead(self, error: object) -> None:
+        if isinstance(error, Sd2Error) and error.cure is not None:
+            self._offer(offers_of([error]))
+
     def follow(self, content: Content) -> None:
         """Show a recording that a radar's frames are added to, from now on by :meth:`grow`.
 
@@ -187,6 +215,7 @@ class DocumentModel(QObject):
         if before is not None:
             before.close()
         self.same_recording = False
+        self._offer(content.offers)
         self._tell_opened(unsaved=False)
 
     def grow(self, radar_map: DopplerMap) -> None:
@@ -221,12 +250,16 @@ class DocumentModel(QObject):
             self.content.close()
             self.content = None
 
-    def _start(self, base: Recording | None, paths: list[Path]) -> None:
+    def _start(self, base: Recording | None, paths: list[Path], cure: Cure | None = None) -> None:
+        self._asked, self._cured = paths, cure is not None
         name = paths[0].name if paths else (base.title if base else "")
         self._base = base
 
         def read(emit: Emit) -> Content:
             recording = recording_of(paths, base) if paths or base is None else base
+            if cure is not None:
+                changed = {cure.setting: cure.value}
+                recording.mesh_reading = recording.mesh_reading.model_copy(update=changed)
             return load_content(recording, lambda done, total: emit((done, total)))
 
         self._runner.submit(read, f"Opening {name}")
@@ -236,7 +269,7 @@ class DocumentModel(QObject):
         if before is not None and before.video is not content.video:
             before.close()
         self.same_recording = before is not None and content.recording is self._base
-        unsaved = self.same_recording and self.modified
+        unsaved = (self.same_recording and self.modified) or (self._cured and content.saved)
         if before is not None and self.same_recording:
             _keep_edits(before.recording, content.recording)
         self.growing = False
@@ -245,6 +278,7 @@ class DocumentModel(QObject):
             self.failed.emit(problem)
         if content.notes:
             self.noted.emit(" ".join(content.notes))
+        self._offer(content.offers)
         self._process_capture()
 
     def _tell_opened(self, unsaved: bool) -> None:

@@ -15,8 +15,10 @@ from sd2app.fit.request import read_request
 from sd2app.labels.edits import LabelEdits
 from sd2app.session.content import recording_of
 from sd2app.session.session import Session
+from sd2app.shell.mesh_offer import MeshOffer
 from sd2app.shell.open_dialog import ask_to_open
 from sd2app.widgets.dialogs import Answer, ask_folder, ask_new, confirmed
+from sd2app.widgets.notices import Notice
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
 from sd2core.files.resources import resource_path
@@ -91,6 +93,10 @@ class FilesFeature(Feature):
                 "A simulated person, four gestures", self.open_sample,
             ),
         )  # fmt: skip
+
+    def notices(self) -> Sequence[Notice]:
+        """Offer to read the mesh another way."""
+        return (MeshOffer(self._document),)
 
     def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
         """Recordings that were open lately."""

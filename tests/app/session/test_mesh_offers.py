@@ -1,0 +1,69 @@
+"""What is unlikely about a mesh is offered to be read another way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sd2app.session.document import DocumentModel
+from sd2app.session.tasks import TaskList
+from sd2core.recording.recording import Recording, open_recording
+
+POSE = np.random.default_rng(0).uniform((-0.3, -0.9, 2.5), (0.3, 0.9, 2.9), (60, 3))
+BODY = POSE - np.array([0, 0, 0.01]) * np.arange(20)[:, None, None]
+TIMES_S = np.arange(20) / 30
+
+
+@pytest.fixture
+def document(qapp):
+    made = DocumentModel(TaskList())
+    yield made
+    made.close()
+
+
+def opened(document, path, qtbot, signal="opened"):
+    with qtbot.waitSignal(getattr(document, signal), timeout=10_000):
+        document.open([path])
+
+
+def test_a_mesh_behind_the_camera_is_turned_by_what_is_offered(document, qtbot, tmp_path):
+    np.savez(tmp_path / "m.npz", vertices=BODY * [1, -1, -1], times_s=TIMES_S)
+    folder = Recording.create(tmp_path / "walk.sd2", mesh=tmp_path / "m.npz").folder
+    opened(document, folder, qtbot)
+    (offer,) = document.offers
+    assert "--turn x180" in offer.text
+    assert not document.modified
+    with qtbot.waitSignal(document.opened, timeout=10_000):
+        document.read_mesh_so(offer.cure)
+    np.testing.assert_allclose(document.mesh.read(0, 20), BODY)
+    assert document.offers == ()
+    assert document.modified
+    assert open_recording(folder).mesh_reading.turn is None
+    document.save()
+    assert open_recording(folder).mesh_reading.turn == "x180"
+
+
+def test_a_mesh_in_millimetres_is_opened_by_what_is_offered(document, qtbot, tmp_path):
+    np.savez(tmp_path / "m.npz", vertices=1000 * BODY, times_s=TIMES_S)
+    opened(document, tmp_path / "m.npz", qtbot, "failed")
+    assert document.content is None
+    (offer,) = document.offers
+    with qtbot.waitSignal(document.opened, timeout=10_000):
+        document.read_mesh_so(offer.cure)
+    np.testing.assert_allclose(document.mesh.read(0, 20), BODY)
+    assert document.recording.mesh_reading.scale == 0.001
+    assert document.offers == ()
+
+
+def test_nothing_is_offered_for_a_sane_mesh_or_after_declining(document, qtbot, tmp_path):
+    np.savez(tmp_path / "m.npz", vertices=BODY * [1, -1, -1], times_s=TIMES_S)
+    np.savez(tmp_path / "sane.npz", vertices=BODY, times_s=TIMES_S)
+    opened(document, tmp_path / "m.npz", qtbot)
+    assert document.offers
+    with qtbot.waitSignal(document.offered):
+        document.decline_offers()
+    assert document.offers == ()
+    opened(document, tmp_path / "m.npz", qtbot)
+    assert document.offers
+    opened(document, tmp_path / "sane.npz", qtbot)
+    assert document.offers == ()

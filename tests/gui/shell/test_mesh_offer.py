@@ -1,0 +1,28 @@
+"""The button with which an unlikely mesh is read another way."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sd2app.session.document import DocumentModel
+from sd2app.session.tasks import TaskList
+from sd2app.shell.mesh_offer import MeshOffer
+
+POSE = np.random.default_rng(0).uniform((-0.3, -0.9, 2.5), (0.3, 0.9, 2.9), (60, 3))
+
+
+def test_a_click_reads_the_mesh_so_and_the_offer_is_gone(qapp, qtbot, tmp_path):
+    path = tmp_path / "m.npz"
+    np.savez(path, vertices=np.stack([1000 * POSE] * 5), times_s=np.arange(5) / 30)
+    document = DocumentModel(TaskList())
+    notice = MeshOffer(document)
+    qtbot.addWidget(notice)
+    with qtbot.waitSignal(document.failed, timeout=10_000):
+        document.open([path])
+    assert "--scale 0.001" in notice.text
+    assert notice.buttons["cure"].text() == "Read it as millimetres"
+    with qtbot.waitSignal(document.opened, timeout=10_000):
+        notice.buttons["cure"].click()
+    assert notice.text == ""
+    np.testing.assert_allclose(document.mesh.frame(0), POSE)
+    document.close()
