@@ -17,6 +17,7 @@ from sd2core.imu.mounting import mounted, place_near
 from sd2core.imu.signals import InertialSignals
 from sd2core.imu.virtual import virtual_imu
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.plausibility.samples import judge_inertial
 from sd2core.recording.recording import Recording
 
 _FOLDED = "inertial/folded"
@@ -234,7 +235,11 @@ class ImuModel(ReportingModel):
 
     def _take_file(self, read: tuple[Path, InertialSignals]) -> None:
         self._read = read
-        self.measured = read[1]
+        self.measured = signals = read[1]
+        for finding in judge_inertial(
+            signals.times_s, signals.acceleration_mps2, signals.turn_rate_radps
+        ):
+            self.noted.emit(str(finding))
         self.changed.emit()
 
     def _refuse_file(self, error: Exception) -> None:

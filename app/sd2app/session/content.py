@@ -16,6 +16,7 @@ from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.plausibility.findings import Finding
+from sd2core.plausibility.spans import judge_spans
 from sd2core.progress import Progress
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.recording.relinking import role_words
@@ -186,9 +187,12 @@ def load_content(recording: Recording, progress: Progress) -> Content:
         for radar in (capture, recorded)
         if radar is not None
     )
+    timebase = common_clock(clocks)
+    spans_s = [(span.start_s, span.end_s) for span in recording.labelled.spans]
+    notes.extend(map(str, judge_spans(spans_s, timebase.start_s, timebase.end_s)))
     return Content(
         recording=recording,
-        timebase=common_clock(clocks),
+        timebase=timebase,
         video=video,
         mesh=mesh,
         capture=capture,

@@ -69,9 +69,10 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
         "bundled_denoiser": recording.bundled_denoiser,
         "spans": [picked(span, *_SPAN) for span in recording.labelled.spans],
         "missing": {role: str(path) for role, path in missing.items()},
-        "notes": list(recording.notes),
     }
     data |= {part.data["kind"]: part.data for part in parts}
+    beyond = _labels_beyond(recording, parts)
+    data["notes"] = [*recording.notes, *beyond]
     facts = {
         "title": recording.title + (" (simulated)" if recording.simulated else ""),
         "camera": _camera(recording),
@@ -86,7 +87,8 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
     notes = tuple(f"the {role_words(role)} is not at {path}" for role, path in missing.items())
     if missing:
         notes += (f"find it with: sd2 relink {recording.folder} FOLDER",)
-    return Description(f"Recording {recording.folder}", data, facts, notes + recording.notes, parts)
+    notes += (*recording.notes, *beyond)
+    return Description(f"Recording {recording.folder}", data, facts, notes, parts)
 
 
 def describe_parts(recording: Recording) -> list[Description]:
@@ -186,6 +188,7 @@ def describe_recorded_map(path: Path, recorded: RecordedMap) -> Description:
 def describe_imu(path: Path) -> Description:
     """Open samples of an inertial sensor and describe them."""
     from sd2core.imu.files import read_signals
+    from sd2core.plausibility.samples import judge_inertial
 
     signals = read_signals(path)
     told = signals_data(signals)
@@ -209,7 +212,10 @@ def describe_imu(path: Path) -> Description:
         "axes": str(signals.meta.get("axes", "")),
     }
     simulated = " (simulated)" if signals.meta.get("simulated") is True else ""
-    return Description(f"Inertial sensor {path}{simulated}", data, facts)
+    unlikely = judge_inertial(signals.times_s, signals.acceleration_mps2, signals.turn_rate_radps)
+    notes = tuple(map(str, unlikely))
+    data["notes"] = list(notes)
+    return Description(f"Inertial sensor {path}{simulated}", data, facts, notes)
 
 
 def signals_data(signals: InertialSignals) -> dict[str, Any]:
@@ -268,6 +274,8 @@ def describe_capture(path: Path, capture: RadarCapture) -> Description:
 
 def describe_map(path: Path, doppler: DopplerMap) -> Description:
     """Describe a Doppler map."""
+    from sd2core.plausibility.radar import judge_map
+
     data = {
         "kind": "map",
         "path": str(path),
@@ -297,7 +305,13 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "limbs": "" if doppler.limbs is None else ", ".join(doppler.limbs.parts),
         **_synthesis_facts(doppler.meta),
     }
-    notes = tuple(doppler.meta.get("notes", ()))
+    unlikely = judge_map(
+        doppler.values,
+        doppler.timebase.times_s,
+        doppler.present,
+        measured=doppler.kind == "real",
+    )
+    notes = (*doppler.meta.get("notes", ()), *map(str, unlikely))
     return Description(f"Doppler map {path}", data, facts, notes)
 
 
@@ -406,6 +420,24 @@ def _labels(recording: Recording) -> str:
     for span in recording.labelled.spans:
         counts[span.label] = counts.get(span.label, 0) + 1
     return ", ".join(f"{count} x {label}" for label, count in counts.items())
+
+
+def _labels_beyond(recording: Recording, parts: list[Description]) -> tuple[str, ...]:
+    """Notes on labels beyond all parts, on the recording's clock."""
+    from sd2core.plausibility.spans import judge_spans
+
+    offsets_s = {"radar": recording.radar_offset_s, "imu": recording.imu_offset_s}
+    times_s = [
+        (start_s, start_s + float(part.data["duration_s"]))
+        for part in parts
+        if "duration_s" in part.data
+        for start_s in [float(part.data["start_s"]) + offsets_s.get(part.data["kind"], 0.0)]
+    ]
+    if not times_s:
+        return ()
+    spans_s = [(span.start_s, span.end_s) for span in recording.labelled.spans]
+    first_s, last_s = min(start for start, _ in times_s), max(end for _, end in times_s)
+    return tuple(map(str, judge_spans(spans_s, first_s, last_s)))
 
 
 def _clock_data(timebase: Timebase) -> dict[str, float]:

@@ -12,6 +12,7 @@ from sd2core.cli.output import counted, listed
 from sd2core.datasets.card import describe_dataset, duration_text, limits
 from sd2core.datasets.reading import open_dataset
 from sd2core.pairs.store import PairSet
+from sd2core.plausibility.radar import judge_map
 
 
 def describe_dataset_at(path: Path) -> Description:
@@ -83,7 +84,14 @@ def describe_pairs(path: Path, pairs: PairSet) -> Description:
         "velocity": axis_in_words(pairs.axis),
         "nulled bins": bins_in_words(pairs.axis, pairs.null_bins),
     }
-    return Description(f"Pairs {path}", data, facts)
+    notes = tuple(
+        f"Take {take.title}: {finding}"
+        for take in pairs.takes
+        for values, measured in ((take.synthetic, False), (take.radar, pairs.kind == "real"))
+        for finding in judge_map(values.T, take.times_s, measured=measured)
+    )
+    data["notes"] = list(notes)
+    return Description(f"Pairs {path}", data, facts, notes)
 
 
 def _protocol_in_words(pairs: PairSet) -> str:

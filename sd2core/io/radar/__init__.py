@@ -44,6 +44,7 @@ from sd2core.io.radar.points import (
 from sd2core.io.radar.sigmf import DATA, META
 from sd2core.io.radar.stored_arrays import array_names
 from sd2core.io.readers import RADAR_FILES, FileReader, plug_in_for
+from sd2core.plausibility.radar import judge_map
 from sd2core.radar_config import RadarConfig
 from sd2core.radar_profiles import PAPER, RADAR_PLUG_INS, RADARS, find_radar
 from sd2core.sensor import VelocityAxis
@@ -107,8 +108,7 @@ def load_capture(path: Path | str) -> RadarCapture:
             return capture if own else judged(capture)
     plug_in, said = plug_in_for(path, RADAR_FILES)
     if plug_in is not None:
-        read: RadarCapture = plug_in.use(lambda reader: reader.read(path), RadarCapture)
-        return read
+        return judged(plug_in.use(lambda reader: reader.read(path), RadarCapture))
     holds = sorted(entry.name for entry in path.iterdir())[:6] if path.is_dir() else []
     found = f"; it holds {', '.join(holds) or 'nothing'}" if path.is_dir() else ""
     raise Sd2Error(f"{path} is not a radar recording that can be read{found}", SUPPORTED, said)
@@ -244,10 +244,11 @@ def load_recorded_map(path: Path | str, axis: VelocityAxis | None = None) -> Rec
     :mod:`sd2core.io.radar.points`), or is damaged.
     """
     path = Path(path).expanduser()
-    recorded = load_points_map(path, axis) if looks_like_points(path) else load_kkt(path)
-    if recorded.doppler.values.any():
-        return recorded
-    return replace(recorded, notes=(*recorded.notes, "The map holds nothing but zeros."))
+    of_points = looks_like_points(path)
+    recorded = load_points_map(path, axis) if of_points else load_kkt(path)
+    # Without points a frame of such a map is empty.
+    found = judge_map(recorded.doppler.values, recorded.timebase.times_s, measured=not of_points)
+    return replace(recorded, notes=(*recorded.notes, *map(str, found)))
 
 
 def named_radar(name: str) -> RadarConfig:

@@ -95,6 +95,7 @@ def walk(body: Path, tmp_path: Path) -> Path:
 
 def samples(start_s: float, count: int = 50) -> InertialSignals:
     values = np.random.default_rng(3).normal(size=(2, count, 3))
+    values[0, :, 1] += 9.81
     return InertialSignals(start_s + np.arange(count) / 100, *values)
 
 
