@@ -105,7 +105,8 @@ def judge_samples(
                 "Packets were probably lost on the way, and zeros stand for them",
             )
         )
-    return findings + _judge_range(samples[:, heard], converter_bits)
+    arrived = ~np.broadcast_to(flat, same.shape[:3])
+    return findings + _judge_range(samples[arrived], converter_bits)
 
 
 def _judge_range(samples: NDArray[np.generic], converter_bits: int | None) -> list[Finding]:

@@ -12,7 +12,7 @@ _GRAVITY_MPS2 = 9.81
 _USUAL_MPS2 = (7.0, 13.0)
 _FASTEST_TURN_RADPS = 70.0
 """Twice what usual gyroscopes reach."""
-_UNITS = {"g": 1 / _GRAVITY_MPS2, "thousandths of g": 1000 / _GRAVITY_MPS2, "cm/s²": 100.0}
+_UNITS = {"g": 1 / _GRAVITY_MPS2, "thousandths of g, or cm/s²": 1000 / _GRAVITY_MPS2}
 
 
 def judge_inertial(
