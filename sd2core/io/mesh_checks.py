@@ -27,7 +27,7 @@ from sd2core.plausibility.mesh import (
 from sd2core.sensor import VelocityAxis
 
 _SAMPLE_FRAMES = 5
-_POINTS = 64
+_POINTS = 128
 """Vertices of a frame whose motion is judged."""
 _STRETCH_FRAMES = 64
 _JUDGED_BYTES, _JUDGED_ON_DISK_BYTES = 512 * 2**20, 32 * 2**20
@@ -55,7 +55,8 @@ def mark_empty_frames(raw: RawMesh, source: str) -> None:
     finite = np.isfinite(vertices).all(axis=2)  # (T, V)
     if vertices.shape[1] > _FEWEST:
         # Slots of an array that were never filled, or frames that were lost.
-        lost = (vertices == vertices[:, :1]).all(axis=(1, 2))
+        lost = (vertices[:, 0] == vertices[:, -1]).all(axis=1)
+        lost[lost] = (vertices[lost] == vertices[lost, :1]).all(axis=(1, 2))
         finite &= ~lost[:, None] | lost.all()
     whole = finite.all(axis=1)
     if whole.all():
@@ -218,10 +219,16 @@ def _stretches(vertices: VertexArray) -> list[tuple[int, int]]:
 def _looked_at(
     vertices: NDArray[Any], first: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Numbers of frames, some of their vertices (n, N, 3), and how large they are (n, 3)."""
+    """Numbers of frames, some of their vertices (n, N, 3), and the extent of these (n, 3).
+
+    It is 0 for none but frames with all vertices in one point.
+    """
     some = np.unique(np.linspace(0, vertices.shape[1] - 1, _POINTS).astype(int))
-    extent_m = vertices.max(axis=1).astype(np.float64) - vertices.min(axis=1)
-    return np.arange(first, first + len(vertices)), vertices[:, some].astype(np.float64), extent_m
+    points_m = vertices[:, some].astype(np.float64)
+    extent_m = np.ptp(points_m, axis=1)
+    for frame in np.flatnonzero(~extent_m.any(axis=1)):
+        extent_m[frame] = np.ptp(vertices[frame], axis=0)
+    return np.arange(first, first + len(vertices)), points_m, extent_m
 
 
 def _note_rounding(

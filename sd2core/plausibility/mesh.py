@@ -45,7 +45,7 @@ class BodyPoints:
     there : bool array, shape (K,)
         False in frames without a person.
     extent_m : float64 array, shape (K, 3)
-        Size of the whole body along x, y and z.
+        Size of the body along x, y and z.
     """
 
     frames: NDArray[np.int64]
