@@ -95,8 +95,7 @@ def _record(options: Record) -> None:
     hardware: `test`.
 
       sd2 record --camera test --radar test --out try.sd2 --seconds 10
-      sd2 record --camera 0 --size 1280x720 --rate 30 --radar 192.168.33.30
-                 --setup profile.cfg --out take.sd2
+      sd2 record --camera 0 --radar 192.168.33.30 --setup profile.cfg --out take.sd2
       sd2 record --camera walk.mp4 --radar walk.sd2 --out again.sd2
     """
     from sd2core.cli.listen import Status, follow

@@ -101,7 +101,7 @@ def test_a_capture_of_any_radar_is_shown(tmp_path, kind):
         path = write_a121(tmp_path / "a.h5")
     else:
         path = tmp_path / "wave.npy"
-        np.save(path, np.ones((3, 20, 1), np.complex64))
+        np.save(path, np.exp(1j * np.arange(60)).reshape(3, 20, 1).astype(np.complex64))
         wave = RadarDescription(
             axes=("frame", "chirp", "sample"),
             carrier_hz=5.8e9,
