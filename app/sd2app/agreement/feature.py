@@ -39,7 +39,7 @@ class AgreementFeature(Feature):
                 lambda: self._shell.bring_up("Agree"),
             ),
             Action(
-                "compare_labels", "Labels", "Compare with another's labels…", ("Ctrl+K",),
+                "compare_labels", "Labels", "Compare with another's labels…", ("Ctrl+Shift+K",),
                 "Show how far another person's labels agree with these, and where they do not",
                 self._compare, self._session.has_content,
             ),

@@ -69,7 +69,7 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
         "compare_models", "live", "-", "@classifiers", "open_classifier", "classifier_card",
         "show_classes", "train_classifier", "study",
     ),
-    "Help": ("first_five_minutes", "manual", "keys", "-", "sample", "-", "about"),
+    "Help": ("first_five_minutes", "manual", "find_action", "keys", "-", "sample", "-", "about"),
 }  # fmt: skip
 """Order of the menus: ids of actions, ``-`` lines, ``@`` places that a feature fills, ``>`` menus
 within a menu."""

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtWidgets import QMessageBox
+from PySide6.QtWidgets import QMainWindow, QMessageBox
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.feature import LabelsFeature
 from sd2app.manual.pages import FIRST_FIVE_MINUTES, INDEX
 from sd2app.manual.window import ManualOpener
 from sd2app.session.session import Session
+from sd2app.shell.action_search import ActionSearch
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.dialog import KeysDialog
 from sd2app.shell.keys.model import KeyListModel
@@ -96,6 +97,10 @@ class ProgramFeature(Feature):
                 lambda: shell.attempt(lambda: self.manual.show_page(INDEX)),
             ),
             Action(
+                "find_action", "Help", "Find an action…", ("Ctrl+Shift+P", "Ctrl+K"),
+                "Everything the menus offer, by any of its words", self._find_action,
+            ),
+            Action(
                 "keys", "Help", "Keys…", ("?",), "All keys, to be found and changed",
                 self._show_keys,
             ),
@@ -111,6 +116,14 @@ class ProgramFeature(Feature):
 
     def _quit(self) -> None:
         self._shell.dialog_parent.close()
+
+    def _find_action(self) -> None:
+        self._shell.action("find_action")  # all actions follow the models before they are listed
+        window = self._shell.dialog_parent
+        assert isinstance(window, QMainWindow)
+        search = ActionSearch(window.menuBar())
+        if accepted(search) and search.chosen is not None:
+            search.chosen.trigger()
 
     def _show_keys(self) -> None:
         bindings = self._shell.keys

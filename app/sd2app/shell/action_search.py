@@ -1,0 +1,143 @@
+"""Search of all that the menus offer: some words of it, and Return does it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction, QKeyEvent, QKeySequence
+from PySide6.QtWidgets import QDialog, QHeaderView, QMenu, QMenuBar, QTreeWidget, QTreeWidgetItem
+
+from sd2app.widgets.inputs import SearchLine
+from sd2app.widgets.layouts import column_of
+from sd2app.widgets.panel import say, sentence
+
+_MOVING = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
+_SIZE_PX = 640, 480
+
+
+@dataclass(frozen=True)
+class Offer:
+    """Entry of a menu."""
+
+    menus: tuple[str, ...]  # those that it stands in, the outermost first
+    text: str
+    tip: str  # what it does, or why it cannot be done now
+    action: QAction
+
+    def rank(self, words: Iterable[str]) -> int | None:
+        """How well words of a search fit, 0 best; None where one of them fits nothing."""
+        beginnings = self.text.casefold().split()
+        about = f"{' '.join(self.menus)} {self.tip}".casefold()
+        rank = 0
+        for word in words:
+            if any(one.startswith(word) for one in beginnings):
+                continue
+            if word in self.text.casefold():
+                rank += 1
+            elif word in about:
+                rank += 4
+            else:
+                return None
+        return rank
+
+
+def offers_of(bar: QMenuBar) -> list[Offer]:
+    """Entries of all menus, in their order, as they stand now."""
+    return list(_offers(bar, ()))
+
+
+def _offers(menu: QMenuBar | QMenu, menus: tuple[str, ...]) -> Iterator[Offer]:
+    if isinstance(menu, QMenu):
+        menu.aboutToShow.emit()  # what it lists may be others by now
+    for entry in menu.actions():
+        text = _plain(entry.text())
+        inner = QMenu.menuInAction(entry)
+        if isinstance(inner, QMenu):
+            yield from _offers(inner, (*menus, text))
+        elif text and not entry.isSeparator():
+            yield Offer(menus, text, entry.toolTip(), entry)
+
+
+def _plain(text: str) -> str:
+    """Text of an entry without the mark of its letter, and without its key."""
+    return text.split("\t")[0].replace("&&", "\0").replace("&", "").replace("\0", "&")
+
+
+def found(offers: Iterable[Offer], text: str) -> list[Offer]:
+    """Offers that have all words of a search, the best first; what can be done before the rest."""
+    words = text.casefold().split()
+    ranked = [(rank, one) for one in offers if (rank := one.rank(words)) is not None]
+    order = sorted(ranked, key=lambda at: (at[0], bool(words) and not at[1].action.isEnabled()))
+    return [one for _, one in order]
+
+
+class ActionSearch(QDialog):
+    """A line to type in, and what is found; an entry that is disabled says why."""
+
+    def __init__(self, bar: QMenuBar) -> None:
+        super().__init__(bar.window())
+        self.setWindowTitle("Find an action")
+        self._offers = offers_of(bar)
+        self.chosen: QAction | None = None
+        self._line = SearchLine("What do you want to do?", self)
+        self._list = QTreeWidget(self)
+        self._list.setAccessibleName("Actions found")
+        self._list.setHeaderLabels(["Action", "Menu", "Keys"])
+        self._list.setRootIsDecorated(False)
+        self._list.setUniformRowHeights(True)
+        self._list.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._list.header().setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        for column in (1, 2):
+            self._list.header().setSectionResizeMode(
+                column, QHeaderView.ResizeMode.ResizeToContents
+            )
+        self._list.header().setStretchLastSection(False)
+        self._list.itemClicked.connect(lambda: self._choose())
+        self._list.currentItemChanged.connect(lambda: self._explain())
+        self._about = sentence("")
+        self.setLayout(column_of(self._line, (self._list, 1), self._about))
+        self.resize(*_SIZE_PX)
+        self._line.textChanged.connect(self._find)
+        self._find("")
+
+    def _find(self, text: str) -> None:
+        self._found = found(self._offers, text)
+        self._list.clear()
+        for one in self._found:
+            keys = ", ".join(
+                key.toString(QKeySequence.SequenceFormat.NativeText)
+                for key in one.action.shortcuts()
+            )
+            item = QTreeWidgetItem(self._list, [one.text, " › ".join(one.menus), keys])
+            item.setDisabled(not one.action.isEnabled())
+        self._list.setCurrentIndex(self._list.model().index(0, 0))
+        self._explain()
+
+    @property
+    def current(self) -> Offer | None:
+        """Entry that Return would do."""
+        row = self._list.currentIndex().row()
+        return self._found[row] if 0 <= row < len(self._found) else None
+
+    def _explain(self) -> None:
+        if self.current is None:
+            self._about.setText("" if self._found else "Nothing in the menus has all these words.")
+            return
+        role = "muted" if self.current.action.isEnabled() else "warning"
+        say(self._about, self.current.tip, role)
+
+    def _choose(self) -> None:
+        if self.current is not None and self.current.action.isEnabled():
+            self.chosen = self.current.action
+            self.accept()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Return does what is marked; arrows move the mark while one types."""
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self._choose()
+        elif event.key() in _MOVING:
+            self._list.keyPressEvent(event)
+        else:
+            super().keyPressEvent(event)

@@ -1,0 +1,119 @@
+"""Everything in the menus found by its words, and done by Return."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QApplication, QMainWindow
+from window_models import models_of
+
+from sd2app.shell.action_search import ActionSearch, found, offers_of
+
+
+@pytest.fixture
+def bar(qtbot):
+    window = QMainWindow()
+    qtbot.addWidget(window)
+    menus = window.menuBar()
+    file, view = menus.addMenu("&File"), menus.addMenu("&View")
+    for text, tip in (("&Open…", "Look at a recording"), ("Save &as…", "Write a copy")):
+        action = QAction(text, window)
+        action.setToolTip(tip)
+        file.addAction(action)
+    file.addSeparator()
+    inner = view.addMenu("Colours")
+    off = QAction("Open the palette", window)
+    off.setToolTip("There is no mesh")
+    off.setEnabled(False)
+    inner.addAction(off)
+    yield menus  # the window lives as long
+
+
+def texts(offers):
+    return [one.text for one in offers]
+
+
+def test_all_entries_of_all_menus_are_there_by_their_plain_texts(bar):
+    offers = offers_of(bar)
+    assert texts(offers) == ["Open…", "Save as…", "Open the palette"]
+    assert [one.menus for one in offers] == [("File",), ("File",), ("View", "Colours")]
+
+
+def test_beginnings_go_before_what_is_within_and_that_before_tips(bar):
+    offers = offers_of(bar)
+    assert texts(found(offers, "open")) == ["Open…", "Open the palette"]  # the rest is disabled
+    assert texts(found(offers, "AS")) == ["Save as…"]
+    assert texts(found(offers, "re")) == ["Open…"]  # "recording", in its tip
+    assert texts(found(offers, "file copy")) == ["Save as…"]
+    assert texts(found(offers, "pale open")) == ["Open the palette"]
+    assert found(offers, "open zebra") == []
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(
+        st.sampled_from(["open", "save", "as", "the", "file", "view", "mesh", "copy", "o", "p"]),
+        max_size=3,
+    )
+)
+def test_more_words_never_find_more(bar, words):
+    offers = offers_of(bar)
+    before = set(map(id, offers))
+    for count in range(len(words) + 1):
+        after = set(map(id, found(offers, " ".join(words[:count]))))
+        assert after <= before
+        before = after
+
+
+def test_typing_and_return_do_it(bar, qtbot):
+    done = []
+    bar.actions()[0].menu().actions()[1].triggered.connect(lambda: done.append("save as"))
+    search = ActionSearch(bar)
+    qtbot.addWidget(search)
+    search.show()
+    qtbot.keyClicks(search.focusWidget() or search._line, "write")
+    assert search.current.text == "Save as…"
+    qtbot.keyClick(search.focusWidget() or search._line, Qt.Key.Key_Return)
+    assert search.chosen.text() == "Save &as…"
+    search.chosen.trigger()
+    assert done == ["save as"]
+
+
+def test_what_is_disabled_says_why_and_is_not_done(bar, qtbot):
+    search = ActionSearch(bar)
+    qtbot.addWidget(search)
+    search.show()
+    qtbot.keyClicks(search._line, "open")
+    qtbot.keyClick(search._line, Qt.Key.Key_Down)
+    assert search.current.tip == "There is no mesh"
+    qtbot.keyClick(search._line, Qt.Key.Key_Return)
+    assert search.chosen is None
+    assert search.isVisible()
+
+
+def test_the_key_opens_it_and_what_is_chosen_is_done(empty_window, qtbot):
+    display = models_of(empty_window).display
+    before = display.dark
+
+    def type_it():
+        search = QApplication.activeModalWidget()
+        qtbot.keyClicks(search._line, "dark theme")
+        qtbot.keyClick(search._line, Qt.Key.Key_Return)
+
+    QTimer.singleShot(0, type_it)
+    qtbot.keyClick(
+        empty_window,
+        Qt.Key.Key_P,
+        Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier,
+    )
+    assert display.dark != before
+
+
+def test_every_action_of_the_window_can_be_found_by_its_own_text(empty_window):
+    offers = offers_of(empty_window.menuBar())
+    assert len(offers) > 100
+    for one in offers:
+        assert one in found(offers, one.text)
