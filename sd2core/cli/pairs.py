@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -160,7 +161,7 @@ def _label(options: Label) -> None:
       sd2 pairs label mars.zarr --table movements.csv
       sd2 pairs label mine.zarr --take anna/walk-1=anna.eaf
     """
-    from sd2core.labels.formats import read_labels
+    from sd2core.labels.formats import read_label_file
     from sd2core.pairs.labelling import TakeLabel, label_pairs, read_take_labels
     from sd2core.pairs.store import read_pairs
     from sd2core.timebase import Timebase
@@ -175,9 +176,11 @@ def _label(options: Label) -> None:
         if name not in clocks:
             raise Sd2Error(f"{options.pairs} has no take {name}", f"one of {', '.join(clocks)}")
         subject, _, take = name.rpartition("/")
+        reading = read_label_file(Path(file), clocks[name])
+        print(f"sd2: {file}: {reading.sentence}", file=sys.stderr)
         rows += [
             TakeLabel(subject, take, span.label, span.start_s, span.end_s)
-            for span in read_labels(Path(file), clocks[name]).spans
+            for span in reading.labels.spans
             if span.origin != "suggestion"
         ]
     if not rows:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import save_figure
-from sd2core.labels.formats.rows import apart
+from sd2core.labels.formats.lanes import apart
 from sd2core.labels.spans import Labels, Span
 from sd2core.maps import DopplerMap, draw_cells
 

@@ -51,10 +51,18 @@ def _typed_frames(text: str) -> int | None:
 
 
 def _typed_seconds(text: str) -> float:
-    found = _SECONDS.fullmatch(text.strip())
-    if found is None:
+    seconds = seconds_of(text)
+    if seconds is None:
         shown = text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"
         raise Sd2Error(f"{shown!r} was typed as a time", "seconds (1.5 or 1:02.5) or a frame (f48)")
+    return seconds
+
+
+def seconds_of(text: str) -> float | None:
+    """Parse ``1.5``, ``1:02.5`` or ``0:01:02,5``; None for any other text."""
+    found = _SECONDS.fullmatch(text.strip())
+    if found is None:
+        return None
     hours, minutes = (int(found[name] or 0) for name in ("h", "min"))
     seconds = 3600.0 * hours + 60.0 * minutes + float(found["s"].replace(",", "."))
     return -seconds if found["sign"] else seconds

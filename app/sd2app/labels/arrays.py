@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.labels.formats.rows import apart
+from sd2core.labels.formats.lanes import apart
 from sd2core.labels.spans import Labels, Span
 
 WIDE_PX = 4.0

@@ -13,13 +13,19 @@ from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
 from sd2app.manual.help import with_help
 from sd2app.widgets.dialogs import accepted, accepting, ask_file
-from sd2app.widgets.inputs import Choice
+from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import column_of, form_of
 from sd2app.widgets.panel import FactRows, rule, say, sentence, title
 from sd2app.widgets.text import counted
 from sd2core.io.imu_columns import holds_inertial_signals
-from sd2core.labels.formats import FORMATS, all_formats, format_for, read_labels
-from sd2core.labels.formats.boris import observations
+from sd2core.labels.formats import (
+    FORMATS,
+    READ_ONLY,
+    LabelReading,
+    observations,
+    read_label_file,
+    readable_formats,
+)
 from sd2core.labels.import_labels import Incoming, Way, set_after, take_in
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
@@ -29,12 +35,13 @@ _WAYS: dict[Way, str] = {
     "replace": "instead of all labels of this recording",
 }
 _MAX_NAMED = 6
-_MAX_FACTS = 6
+_MAX_FACTS = 7
+_LONGEST_MARK_S = 600.0
 
 
 def label_files() -> str:
     """Files of labels, for a dialog."""
-    suffixes = dict.fromkeys(suffix for one in all_formats() for suffix in one.suffixes)
+    suffixes = dict.fromkeys(suffix for one in readable_formats() for suffix in one.suffixes)
     return f"Labels ({' '.join(f'*{suffix}' for suffix in suffixes)});;All files (*)"
 
 
@@ -43,7 +50,7 @@ def is_label_file(path: Path) -> bool:
 
     Those that only plug-ins read are imported from the menu.
     """
-    known = {suffix for one in FORMATS for suffix in one.suffixes}
+    known = {suffix for one in (*FORMATS, *READ_ONLY) for suffix in one.suffixes}
     if path.suffix.lower() not in known or path.name == "recording.json":
         return False
     return not holds_inertial_signals(path)
@@ -88,7 +95,8 @@ class LabelImportDialog(QDialog):
     ) -> None:
         super().__init__(parent)
         self._path, self._labels, self._timebase = path, labels, timebase
-        self.incoming: Incoming | None = None  # fitted to the recording; None while reading
+        self.reading: LabelReading | None = None  # what the file has; None while reading
+        self.incoming: Incoming | None = None  # the same, fitted to the recording
         self.problem = ""  # why the file cannot be read
         self.observations: tuple[str, ...] = ()  # to choose from, where there are several videos
         self._observed: str | None = None
@@ -98,7 +106,10 @@ class LabelImportDialog(QDialog):
         self._format = Choice(
             "The program that the file is of",
             self,
-            {None: "found by name and content", **{one.name: one.title for one in all_formats()}},
+            {
+                None: "found by name and content",
+                **{one.name: one.title for one in readable_formats()},
+            },
             self._read_as,
         )
         self._observation = Choice("Which of the videos in the file", self)
@@ -110,7 +121,16 @@ class LabelImportDialog(QDialog):
         self._way.show_value("add" if labels.spans else "replace")
         self._way.currentIndexChanged.connect(self._refresh)
         buttons, self._import = accepting(self, "Import")
-        form = form_of(("Read as", self._format), (self._observation_name, self._observation))
+        self._mark = NumberBox(
+            0.0, _LONGEST_MARK_S, " s", "Length of marks without a duration", decimals=3
+        )
+        self._mark.setSpecialValueText("the frame shown then")
+        self._mark.valueChanged.connect(self._read)
+        form = form_of(
+            ("Read as", self._format),
+            (self._observation_name, self._observation),
+            ("Marks become", self._mark),
+        )
         take = form_of(("Take them", self._way))
         content = form, rule(), self._said, self._facts, rule(), take, self._consequence
         parts = title(path.name), *content, 8, with_help("Import labels", buttons)
@@ -145,6 +165,8 @@ class LabelImportDialog(QDialog):
             spans, base = counted(len(found.outside), "span"), self._timebase
             where = f"outside the recording ({base.start_s:.3f} to {base.end_s:.3f} s)"
             facts.append(("Left out", f"{spans} {where}"))
+        if self.reading is not None and (self.reading.left_out or self.reading.remarks):
+            facts.append(("Of the file", self.reading.sentence))
         return facts
 
     def consequence(self) -> str:
@@ -172,14 +194,12 @@ class LabelImportDialog(QDialog):
     def _read(self) -> None:
         self.incoming, self.problem = None, ""
         path, name, base = self._path, self._format.currentData(), self._timebase
-        observation = self._observed
+        observation, mark_s = self._observed, self._mark.value() or None
 
-        def read(emit: Emit) -> Incoming:
-            chosen = name or format_for(path, writing=False).name
-            if chosen == "boris":
-                emit(observations(path))
-            labels = read_labels(path, base, chosen, observation=observation)
-            return Incoming.of(labels, base)
+        def read(emit: Emit) -> tuple[LabelReading, Incoming]:
+            emit(observations(path, name))
+            reading = read_label_file(path, base, name, observation=observation, mark_s=mark_s)
+            return reading, Incoming.of(reading.labels, base)
 
         self._runner.submit(read)
         self._refresh()
@@ -187,8 +207,8 @@ class LabelImportDialog(QDialog):
     def _learn(self, names: tuple[str, ...]) -> None:
         self.observations = names if len(names) > 1 else ()
 
-    def _receive(self, incoming: Incoming) -> None:
-        self.incoming = incoming
+    def _receive(self, found: tuple[LabelReading, Incoming]) -> None:
+        self.reading, self.incoming = found
         self._refresh()
 
     def _refuse(self, error: Exception) -> None:

@@ -90,8 +90,8 @@ def _show(options: Show) -> None:
     """Print labels with their number and durations.
 
     FILE is a labels.json, a recording, the .h5 of a K60168A, or a file of ELAN, Praat,
-    BORIS, Audacity, MNE-Python or a table (.csv, .tsv). With frame times the frames of
-    each span are printed as well: half-open, the second is the first one after it.
+    BORIS, Audacity, MNE-Python, Label Studio, subtitles or a table (.csv, .tsv). With
+    frame times the frames of each span are printed as well: the first and the last one.
 
       sd2 labels show walk.sd2
       sd2 labels show walk.eaf --video walk.mp4 --json

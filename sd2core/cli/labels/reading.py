@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -49,20 +50,31 @@ class LabelFile(FrameTimes):
     file : FILE
         the file with labels
     format : NAME
-        the format of FILE: sd2, csv, audacity, elan, textgrid, boris or mne
+        the format of FILE: sd2, csv, audacity, elan, textgrid, boris, mne, subtitles,
+        label-studio
     observation : NAME
-        which one of a BORIS project with several
+        which one of a BORIS project or a Label Studio export with several
+    mark_s : SECONDS
+        length of marks without a duration; by default the frame that is shown then
     """
 
     file: Annotated[Path, ARGUMENT]
     format: str | None = None
     observation: str | None = None
+    mark_s: Positive | None = None
 
 
 def read_named(options: LabelFile) -> tuple[Labels, Timebase | None]:
     """Read the labels that are named, and the frame times as far as they are known."""
     clock = clock_of(options, options.file)
-    labels = labels_at(options.file, clock, options.format, options.observation)
+    labels = labels_at(
+        options.file,
+        clock,
+        options.format,
+        options.observation,
+        frames_per_s=options.fps,
+        mark_s=options.mark_s,
+    )
     return labels, with_rate(options, clock, labels)
 
 
@@ -71,33 +83,50 @@ def labels_at(
     timebase: Timebase | None = None,
     file_format: str | None = None,
     observation: str | None = None,
+    *,
+    frames_per_s: float | None = None,
+    mark_s: float | None = None,
 ) -> Labels:
     """Read labels of a ``labels.json``, a recording, a radar file or another program's file.
+
+    What was taken of another program's file, and what was not, is said on standard error.
 
     Parameters
     ----------
     path : Path
         Sd2Error if it does not exist, or cannot be read.
     timebase : Timebase, optional
-        Times of frames, for tables that have frames only and for marks without a duration.
+        Times of frames, for files that have frames only and for marks without a duration.
     file_format : str, optional
         Name of a program's format; by default found by kind, suffix and content.
     observation : str, optional
-        Which one of a BORIS project with several.
+        Which one of a BORIS project or a Label Studio export with several.
+    frames_per_s : float, optional
+        Rate of frames from 0 s on, where there is no timebase.
+    mark_s : float, optional
+        Length of marks without a duration.
     """
     from sd2core.io.radar import holds_map, load_recorded_map
-    from sd2core.labels.formats import read_labels
+    from sd2core.labels.formats import is_own, read_label_file
     from sd2core.recording.recording import is_recording, open_recording
 
     if not path.exists():
         raise Sd2Error(f"{path} does not exist", "a file with labels", "Check the path")
-    if file_format is not None:
-        return read_labels(path, timebase, file_format, observation=observation)
-    if is_recording(path):
+    if file_format is None and is_recording(path):
         return open_recording(path).effective_labels()
-    if holds_map(path):
+    if file_format is None and holds_map(path):
         return load_recorded_map(path).labels
-    return read_labels(path, timebase, observation=observation)
+    reading = read_label_file(
+        path,
+        timebase,
+        file_format,
+        observation=observation,
+        frames_per_s=frames_per_s,
+        mark_s=mark_s,
+    )
+    if reading.beyond or not (file_format == "sd2" or (file_format is None and is_own(path))):
+        print(f"sd2: {path}: {reading.sentence}", file=sys.stderr)
+    return reading.labels
 
 
 def clock_of(options: FrameTimes, *sources: Path) -> Timebase | None:
@@ -108,6 +137,7 @@ def clock_of(options: FrameTimes, *sources: Path) -> Timebase | None:
     """
     from sd2core.io.radar import holds_map, load_recorded_map
     from sd2core.labels import files
+    from sd2core.labels.formats import is_own
     from sd2core.recording.recording import is_recording, open_recording
 
     if options.recording is not None:
@@ -123,7 +153,7 @@ def clock_of(options: FrameTimes, *sources: Path) -> Timebase | None:
             return recording_clock(open_recording(path))
         if holds_map(path):
             return load_recorded_map(path).timebase
-        if path.suffix.lower() == ".json" and path.exists():
+        if path.suffix.lower() == ".json" and path.exists() and is_own(path):
             file = files.read_labels(path)
             if file.recording is not None and file.recording.exists():
                 return recording_clock(open_recording(file.recording))

@@ -23,7 +23,9 @@ from sd2core.labels.formats import (
     csv_table,
     elan,
     elan_reading,
+    label_studio,
     mne_annotations,
+    subtitles,
     textgrid,
 )
 from sd2core.labels.formats.losses import (
@@ -34,6 +36,7 @@ from sd2core.labels.formats.losses import (
     losses_by_format,
     sentences,
 )
+from sd2core.labels.formats.rows import LabelClock, LabelReading, LabelRows, assembled
 from sd2core.labels.spans import Labels
 from sd2core.plug_ins import Group, PlugIn
 from sd2core.timebase import Timebase
@@ -45,10 +48,15 @@ __all__ = [
     "Aspect",
     "LabelFormat",
     "LabelProgram",
+    "LabelReading",
     "Loss",
     "all_formats",
     "format_for",
+    "is_own",
+    "observations",
+    "read_label_file",
     "read_labels",
+    "readable_formats",
     "sentences",
     "would_lose",
     "write_labels",
@@ -65,14 +73,14 @@ class LabelProgram:
         The format; a plug-in's has the plug-in's name.
     read : callable
         Takes the path, the recording's frame times and the id of an observation, each of which may
-        be None, and returns the labels.
+        be None, and returns the labels, or the :class:`~sd2core.labels.formats.rows.LabelRows`.
     write : callable
         Takes the path, the labels, the frame times and the video, which may be None, and returns
         the losses that depend on more than the format.
     """
 
     about: LabelFormat
-    read: Callable[[Path, Timebase | None, str | None], Labels]
+    read: Callable[[Path, Timebase | None, str | None], Labels | LabelRows]
     write: Callable[[Path, Labels, Timebase, Path | None], list[Loss]]
 
     def __post_init__(self) -> None:
@@ -91,6 +99,7 @@ OWN = LabelFormat(
 _TIME = r"\s*[-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?\s*"
 _AUDACITY = re.compile(rf"{_TIME}\t{_TIME}(?:\t.*)?")
 _MNE = re.compile(rf"{_TIME},{_TIME},[^,]*(?:,[^,]*)?")
+_LOOKED_AT = 4096
 _EXPECTED_TEXT = "labels of Audacity, MNE, Praat, or a table with a heading"
 
 
@@ -101,33 +110,47 @@ def _write_own(
     return []
 
 
-def _read_own(path: Path, timebase: Timebase | None, observation: str | None) -> Labels:
+def _read_own(path: Path, observation: str | None) -> Labels:
     return files.read_labels(path).labels
 
 
-_PROGRAMS = {
-    program.about.name: program
-    for program in (
-        LabelProgram(OWN, _read_own, _write_own),
-        LabelProgram(csv_table.FORMAT, csv_table.read, csv_table.write),
-        LabelProgram(audacity.FORMAT, audacity.read, audacity.write),
-        LabelProgram(elan.FORMAT, elan_reading.read, elan.write),
-        LabelProgram(textgrid.FORMAT, textgrid.read, textgrid.write),
-        LabelProgram(boris.FORMAT, boris.read, boris.write),
-        LabelProgram(mne_annotations.FORMAT, mne_annotations.read, mne_annotations.write),
-    )
-}
+_Read = Callable[[Path, str | None], Labels | LabelRows]
+_Write = Callable[[Path, Labels, Timebase, Path | None], list[Loss]]
 
-FORMATS: tuple[LabelFormat, ...] = tuple(program.about for program in _PROGRAMS.values())
-"""All formats of the program, in the order in which they are offered."""
+_PROGRAMS: tuple[tuple[LabelFormat, _Read, _Write | None], ...] = (
+    (OWN, _read_own, _write_own),
+    (csv_table.FORMAT, csv_table.read, csv_table.write),
+    (audacity.FORMAT, audacity.read, audacity.write),
+    (elan.FORMAT, elan_reading.read, elan.write),
+    (textgrid.FORMAT, textgrid.read, textgrid.write),
+    (boris.FORMAT, boris.read, boris.write),
+    (mne_annotations.FORMAT, mne_annotations.read, mne_annotations.write),
+    (subtitles.FORMAT, subtitles.read, None),
+    (label_studio.FORMAT, label_studio.read, None),
+)
+_KNOWN = {about.name: about for about, _, _ in _PROGRAMS}
+_READ = {about.name: read for about, read, _ in _PROGRAMS}
+_WRITTEN = {about.name: write for about, _, write in _PROGRAMS if write is not None}
+_OBSERVED = {"boris": boris.observations, "label-studio": label_studio.observations}
 
-LABEL_PLUG_INS = Group("label_files", LabelProgram, _PROGRAMS)
+FORMATS: tuple[LabelFormat, ...] = tuple(_KNOWN[name] for name in _WRITTEN)
+"""All formats that the program reads and writes, in the order in which they are offered."""
+
+READ_ONLY: tuple[LabelFormat, ...] = tuple(_KNOWN[name] for name in _KNOWN if name not in _WRITTEN)
+"""Formats that it reads only."""
+
+LABEL_PLUG_INS = Group("label_files", LabelProgram, _KNOWN)
 """Formats of other packages."""
 
 
 def all_formats() -> tuple[LabelFormat, ...]:
-    """All formats, those of plug-ins last."""
+    """All formats that are read and written, those of plug-ins last."""
     return (*FORMATS, *_plugged_formats())
+
+
+def readable_formats() -> tuple[LabelFormat, ...]:
+    """All formats that are read, those of plug-ins last."""
+    return (*FORMATS, *READ_ONLY, *_plugged_formats())
 
 
 def _plugged_formats() -> list[LabelFormat]:
@@ -145,37 +168,70 @@ def read_labels(
     *,
     observation: str | None = None,
 ) -> Labels:
-    """Read the labels of a file.
+    """Read the labels of a file; :func:`read_label_file` also says what was left out.
+
+    Parameters, and what is raised, are those of that function.
+    """
+    return read_label_file(path, timebase, format, observation=observation).labels
+
+
+def read_label_file(
+    path: Path | str,
+    timebase: Timebase | None = None,
+    format: str | None = None,
+    *,
+    observation: str | None = None,
+    frames_per_s: float | None = None,
+    mark_s: float | None = None,
+) -> LabelReading:
+    """Read the labels of a file, and say what was not taken of it.
+
+    An odd entry is left out and listed; spans beyond the recording keep their times.
 
     Parameters
     ----------
     timebase : Timebase, optional
-        Of the recording: for tables that have frames only, and for marks without a duration,
+        Of the recording: for files that have frames only, and for marks without a duration,
         which become the frame that is shown then.
     format : str, optional
-        Name of one of :data:`FORMATS`; otherwise found by suffix and content.
+        Name of one of :func:`readable_formats`; otherwise found by suffix and content.
     observation : str, optional
-        Id of the observation, where the file has those of several videos (BORIS).
+        Id of the observation, where the file has those of several videos (BORIS, Label Studio).
+    frames_per_s : float, optional
+        Rate of the frames from 0 s on, where there is no timebase.
+    mark_s : float, optional
+        Length of marks without a duration, in place of a frame.
 
     Returns
     -------
-    Labels
-        Of origin ``"import"`` where the file does not say who made them.
+    LabelReading
+        Labels, of origin ``"import"`` where the file does not say who made them, and a sentence.
 
     Raises
     ------
     Sd2Error
-        Naming the file, what was found in it and what to do.
+        Naming the file, what was found in it and what to do; also when nothing could be taken.
     """
     path = Path(path)
+    clock = LabelClock(timebase, frames_per_s, mark_s)
     chosen = format_for(path, writing=False) if format is None else _named(format)
     with errors_in(path):
-        if chosen.name in _PROGRAMS:
-            return _PROGRAMS[chosen.name].read(path, timebase, observation)
-        read: Labels = _plug_in(chosen.name).use(
-            lambda program: program.read(path, timebase, observation), Labels
+        if chosen.name in _READ:
+            found = _READ[chosen.name](path, observation)
+        else:
+            found = _plug_in(chosen.name).use(
+                lambda program: program.read(path, timebase, observation), (Labels, LabelRows)
+            )
+        reading = (
+            assembled(path, found, clock) if isinstance(found, LabelRows) else LabelReading(found)
         )
-        return read
+        return reading.beside(timebase)
+
+
+def observations(path: Path, format: str | None = None) -> tuple[str, ...]:
+    """Ids of the observations of a file, one per video; empty for formats that have none."""
+    chosen = format_for(path, writing=False) if format is None else _named(format)
+    return _OBSERVED[chosen.name](path) if chosen.name in _OBSERVED else ()
 
 
 def write_labels(
@@ -212,8 +268,13 @@ def write_labels(
     path = Path(path)
     chosen = format_for(path, writing=True) if format is None else _named(format)
     linked = None if media is None else Path(media)
-    if chosen.name in _PROGRAMS:
-        unheld = _PROGRAMS[chosen.name].write(path, labels, timebase, linked)
+    if chosen.name in _WRITTEN:
+        unheld = _WRITTEN[chosen.name](path, labels, timebase, linked)
+    elif chosen in READ_ONLY:
+        raise Sd2Error(
+            f"{path} would be a file of {chosen.title}, which is only read",
+            f"one of {', '.join(one.name for one in all_formats())}",
+        )
     else:
         unheld = _plug_in(chosen.name).use(
             lambda program: program.write(path, labels, timebase, linked), list
@@ -248,13 +309,15 @@ def format_for(path: Path, *, writing: bool) -> LabelFormat:
 
     Raises Sd2Error when that is not certain.
     """
-    suffix = path.suffix.lower()
-    fitting = [one for one in FORMATS if suffix in one.suffixes]
+    suffix, by_name = path.suffix.lower(), writing
+    built_in = FORMATS if writing else (*FORMATS, *READ_ONLY)
+    fitting = [one for one in built_in if suffix in one.suffixes]
     if not fitting:
         fitting = [one for one in _plugged_formats() if suffix in one.suffixes]
-        writing = True  # There is no looking into a file for them.
+        by_name = True  # There is no looking into a file for them.
     if not fitting:
-        known = ", ".join(dict.fromkeys(end for one in all_formats() for end in one.suffixes))
+        usable = all_formats() if writing else readable_formats()
+        known = ", ".join(dict.fromkeys(end for one in usable for end in one.suffixes))
         raise Sd2Error(
             f"{path} has the suffix {suffix!r}",
             f"one of {known}",
@@ -262,26 +325,40 @@ def format_for(path: Path, *, writing: bool) -> LabelFormat:
         )
     if len(fitting) == 1:
         return fitting[0]
-    if not writing:
-        return _named(_format_of_text(path))
+    if not by_name:
+        return _named(_format_of_json(path) if suffix == ".json" else _format_of_text(path))
     titles = " or ".join(one.title for one in fitting)
     raise Sd2Error(
         f"{path} could be a file for {titles}", "a format that is certain", "Name the format"
     )
 
 
+def is_own(path: Path) -> bool:
+    """True if a file of labels is this program's, and so may name its recording."""
+    return format_for(path, writing=False) == OWN
+
+
 def _named(name: str) -> LabelFormat:
-    if name in _PROGRAMS:
-        return _PROGRAMS[name].about
+    if name in _KNOWN:
+        return _KNOWN[name]
     return replace(_plug_in(name).load().about, name=name)
 
 
 def _plug_in(name: str) -> PlugIn[LabelProgram]:
     plug_in = LABEL_PLUG_INS.find(name)
     if plug_in is None:
-        known = ", ".join([*_PROGRAMS, *LABEL_PLUG_INS.names()])
+        known = ", ".join([*_KNOWN, *LABEL_PLUG_INS.names()])
         raise Sd2Error(f"A label format {name!r} is not known", f"one of {known}")
     return plug_in
+
+
+def _format_of_json(path: Path) -> str:
+    """Name of the format of a JSON file: tasks of Label Studio come as a list, or one alone."""
+    try:
+        begins = read_text(path, OWN.title)[:_LOOKED_AT].lstrip()
+    except Sd2Error:
+        return OWN.name  # Whose reader says what is wrong.
+    return label_studio.FORMAT.name if label_studio.begins_so(begins) else OWN.name
 
 
 def _format_of_text(path: Path) -> str:
@@ -292,6 +369,8 @@ def _format_of_text(path: Path) -> str:
         return "textgrid"
     if first.startswith("#"):
         return "mne"
+    if first.startswith("WEBVTT"):
+        return "subtitles"
     if _AUDACITY.fullmatch(first):
         return "audacity"
     if _MNE.fullmatch(first):

@@ -13,7 +13,7 @@ from sd2core.files.atomic import atomic_write_text
 from sd2core.files.texts import read_text
 from sd2core.labels.formats.losses import LabelFormat, Loss
 from sd2core.labels.formats.numbers import finite_number, positional
-from sd2core.labels.formats.rows import UNNAMED, Row, assemble
+from sd2core.labels.formats.rows import UNNAMED, LabelRows, Row
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 
@@ -53,12 +53,12 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     return []
 
 
-def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
-    """Read labels; a point label needs the timebase and becomes one frame.
+def read(path: Path, observation: str | None = None) -> LabelRows:
+    """Read labels; a point label is a mark without a duration.
 
     Raises Sd2Error naming the line that is no label.
     """
-    rows: list[Row] = []
+    found = LabelRows()
     for number, line in enumerate(read_text(path, _EXPECTED).split("\n"), start=1):
         line = line.removesuffix("\r")
         if not line.strip() or line.startswith("\\"):
@@ -66,10 +66,11 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
         cells = line.split("\t", 2)
         if len(cells) < 2:
             raise Sd2Error(f"{path}, line {number} is {line[:100]!r}", _EXPECTED)
-        start_s, end_s = (_seconds(path, number, cell) for cell in cells[:2])
-        text = cells[2] if len(cells) > 2 else ""
-        rows.append(Row(f"line {number}", start_s, end_s, text or UNNAMED))
-    return assemble(path, rows, timebase=timebase)
+        with found.entry():
+            start_s, end_s = (_seconds(path, number, cell) for cell in cells[:2])
+            text = cells[2] if len(cells) > 2 else ""
+            found.rows.append(Row(f"line {number}", start_s, end_s, text or UNNAMED))
+    return found
 
 
 def _seconds(path: Path, line: int, text: str) -> float:

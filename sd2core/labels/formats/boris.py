@@ -4,6 +4,9 @@ Source: BORIS user guide, and projects saved by BORIS 7 to 9. A span is a START 
 same subject and behaviour, in that order; the subject is the track, the behaviour the label. Its
 note is the comment of the START; author, confidence, origin and number stand in the comment of
 the STOP. The file is ASCII, because BORIS reads it in the encoding of the system.
+
+Times of events have the observation's time offset in them, and count from the start of the first
+player: another player's media begin so many seconds later as its offset says.
 """
 
 from __future__ import annotations
@@ -19,10 +22,11 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import plain_path, stored_path
 from sd2core.files.texts import read_json
+from sd2core.labels.formats.lanes import Lane, edges_s, lanes_of, track_of
 from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, counted
-from sd2core.labels.formats.rows import Lane, Row, assemble, clean_name, edges_s, lanes_of, track_of
+from sd2core.labels.formats.rows import LabelRows, Row, clean_name
 from sd2core.labels.label_set import GESTURES, Label, LabelSet, with_own_keys
-from sd2core.labels.spans import Labels, Overlap, Span
+from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
 
 FORMAT = LabelFormat(
@@ -36,6 +40,7 @@ FORMAT = LabelFormat(
 
 _GREY = "#999999"
 _PLAYERS = 8
+_LAST_S = 1e15
 
 _DETAILS = "sd2 "
 """Prefix of the comment of a STOP that holds id, author, confidence and origin."""
@@ -106,11 +111,11 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     return _unwelcome(labels)
 
 
-def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
-    """Read the state events of one observation; point events become one frame each.
+def read(path: Path, observation: str | None = None) -> LabelRows:
+    """Read the state events of one observation; point events are marks without a duration.
 
     The observation's id is needed when the project has several. Raises Sd2Error when the file is no
-    project, the observation is not certain, or a state that has begun does not end.
+    project, or the observation is not certain.
     """
     project = _project(path)
     name = _chosen(path, project["observations"], observation)
@@ -122,17 +127,41 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
     points = {
         str(one.get("code")) for one in behaviours if "point" in str(one.get("type")).casefold()
     }
-    rows = _rows(path, events, points)
+    found = LabelRows(label_set=_label_set(project.get(_LABEL_SET), behaviours))
+    _add_rows(found, path, events, points, _start_s(content))
     subjects = [str(one.get("name", "")) for one in _entries(project, "subjects_conf")]
-    used = {row.track for row in rows}
+    used = {row.track for row in found.rows}
     ours = _LABEL_SET in project
-    tracks: list[tuple[str, Overlap | None]] = []
     for subject in subjects:
         track, overlap = track_of(subject)
         if ours or track in used:
-            tracks.append((track, overlap))
-    label_set = _label_set(project.get(_LABEL_SET), behaviours)
-    return assemble(path, rows, tracks=tracks, label_set=label_set, timebase=timebase)
+            found.tracks.append((track, overlap))
+    return found
+
+
+def _start_s(observation: dict[str, Any]) -> float:
+    """Time of events at which the video begins: its first player's that has pictures."""
+    media, players = observation.get("media_info"), observation.get("file")
+    media = media if isinstance(media, dict) else {}
+    offsets, pictures = media.get("offset"), media.get("hasVideo")
+    player = next(
+        (
+            number
+            for number, files in (players.items() if isinstance(players, dict) else ())
+            if isinstance(files, list)
+            and any(isinstance(pictures, dict) and pictures.get(one) is True for one in files)
+        ),
+        "1",
+    )
+    return _seconds(observation.get("time offset")) + _seconds(
+        offsets.get(player) if isinstance(offsets, dict) else None
+    )
+
+
+def _seconds(value: Any) -> float:
+    """A number of seconds that may be absent."""
+    known = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < _LAST_S
+    return float(value) if known else 0.0
 
 
 def _project(path: Path) -> dict[str, Any]:
@@ -169,40 +198,56 @@ def _chosen(path: Path, observations: dict[str, Any], wanted: str | None) -> str
     )
 
 
-def _rows(path: Path, events: list[Any], points: set[str]) -> list[Row]:
-    """Spans of events: each second one of a subject, behaviour and modifiers is a stop."""
-    rows: list[Row] = []
+def _add_rows(
+    found: LabelRows, path: Path, events: list[Any], points: set[str], zero_s: float
+) -> None:
+    """Add spans of events: each second one of a subject, behaviour and modifiers is a stop.
+
+    Parameters
+    ----------
+    found : LabelRows
+        Gets the rows.
+    path : Path
+    events : list
+        Of the observation.
+    points : set of str
+        Codes of behaviours without a duration.
+    zero_s : float
+        Time of events at which the video begins.
+    """
     begun: dict[tuple[str, str, str], tuple[float, str]] = {}
     for number, event in enumerate(events, start=1):
         place = f"event {number}"
-        time_s, subject, code, modifiers, comment = _event(path, place, event)
-        track = track_of(subject or _NO_SUBJECT)[0]
-        key = (subject, code, modifiers)
-        if code in points:
-            rows.append(Row(place, time_s, time_s, code, track, _note(modifiers, comment, "")))
-        elif key not in begun:
-            begun[key] = (time_s, comment)
-        else:
-            start_s, first = begun.pop(key)
-            details = _details(comment)
-            note = _note(modifiers, first, comment if details is None else "")
-            rows.append(Row(place, start_s, time_s, code, track, note, **(details or {})))
-    if begun:
-        (subject, code, _), (time_s, _) = next(iter(begun.items()))
-        raise Sd2Error(
-            f"{path}: {code!r} of {subject or _NO_SUBJECT!r} begins at {time_s:g} s and does not "
-            "end",
-            "a stop for every start",
-            "Mend it in BORIS: Observations, Fix unpaired events",
-        )
-    return rows
+        with found.entry():
+            time_s, subject, code, modifiers, comment = _event(path, place, event)
+            time_s -= zero_s
+            track = track_of(subject or _NO_SUBJECT)[0]
+            key = (subject, code, modifiers)
+            if code in points:
+                note = _note(modifiers, comment, "")
+                found.rows.append(Row(place, time_s, time_s, code, track, note))
+            elif key not in begun:
+                begun[key] = (time_s, comment)
+            else:
+                start_s, first = begun.pop(key)
+                details = _details(comment)
+                note = _note(modifiers, first, comment if details is None else "")
+                found.rows.append(Row(place, start_s, time_s, code, track, note, **(details or {})))
+    for (subject, code, _), (time_s, _) in begun.items():
+        with found.entry():
+            raise Sd2Error(
+                f"{path}, {code!r} of {subject or _NO_SUBJECT!r} begins at {time_s:g} s and does"
+                " not end",
+                "a stop for every start",
+                "Mend it in BORIS: Observations, Fix unpaired events",
+            )
 
 
 def _event(path: Path, place: str, event: Any) -> tuple[float, str, str, str, str]:
     if not isinstance(event, list) or len(event) < 3 or isinstance(event[0], bool):
         raise Sd2Error(f"{path}, {place} is {str(event)[:100]!r}", "time, subject and behaviour")
     time_s = event[0] if isinstance(event[0], int | float) else math.nan
-    if not abs(time_s) < 1e15:
+    if not abs(time_s) < _LAST_S:
         raise Sd2Error(f"{path}, {place}: the time is {str(event[0])[:50]!r}", "seconds")
     subject, code, modifiers, comment = (
         "" if one is None else str(one) for one in (*event[1:5], *[""] * (5 - len(event)))

@@ -28,8 +28,9 @@ from sd2core.files.tables import as_cell, of_cell
 from sd2core.files.texts import read_text
 from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, hold_texts
 from sd2core.labels.formats.numbers import finite_number, whole_number
-from sd2core.labels.formats.rows import UNNAMED, TableRows, assemble
+from sd2core.labels.formats.rows import UNNAMED, LabelRows, Row
 from sd2core.labels.spans import Labels
+from sd2core.labels.typed_times import seconds_of
 from sd2core.timebase import Timebase
 
 FORMAT = LabelFormat(
@@ -56,7 +57,7 @@ _NAMES = {
     "label": ("label", "gesture", "behavior", "behaviour", "description", "annotation",
               "trial_type", "class", "text"),
     "start_s": ("start_s", "start_time_s", "start_time", "start", "onset_s", "onset", "begin_s",
-                "begin", "begin_time_ss_msec", "tmin"),
+                "begin", "begin_time_ss_msec", "begin_time", "tmin"),
     "end_s": ("end_s", "end_time_s", "end_time", "end", "stop_s", "stop", "offset_s", "offset",
               "end_time_ss_msec", "tmax"),
     "duration_s": ("duration_s", "duration", "duration_ss_msec"),
@@ -111,45 +112,42 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     return replaced
 
 
-def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
+def read(path: Path, observation: str | None = None) -> LabelRows:
     """Read a table, of this program or another.
 
     Separators may be commas, semicolons, tabs or bars; decimal points may be commas where these do
-    not separate. A table that has frames only needs the timebase. Raises Sd2Error when columns are
-    missing or it is not certain what a number means.
+    not separate; times may be hours, minutes and seconds. Raises Sd2Error when columns are missing
+    or it is not certain what a number means.
     """
     text = read_text(path, _EXPECTED)
-    heading, lines = _table(path, text)
+    separator = _separator(path, text)
+    heading, lines = _table(path, text, separator)
     where = _columns(path, heading)
-    if "observation" in where:
-        lines = _of_observation(path, lines, where["observation"], observation)
-    numbers = _Numbers(path, lines, where)
-    table = TableRows()
+    found = LabelRows()
+    whole: list[tuple[int, list[str]]] = []
     for line, cells in lines:
-        cell = {name: of_cell(cells[index]) for name, index in where.items()}
-        edges_s = _edges_s(path, line, numbers, cell, timebase)
-        known = cell.get("confidence")
-        confidence = numbers.of(line, "confidence", known) if known else None
-        table.add(line, edges_s, cell["label"] or UNNAMED, confidence, cell)
-    return assemble(path, table.rows, tracks=table.tracks.items(), timebase=timebase)
+        with found.entry():
+            _check_width(path, line, cells, heading, separator)
+            whole.append((line, cells))
+    if "observation" in where:
+        whole = _of_observation(path, whole, where["observation"], observation)
+    numbers = _Numbers(path, whole, where)
+    for line, cells in whole:
+        with found.entry():
+            cell = {name: of_cell(cells[index]) for name, index in where.items()}
+            start_s, end_s, frames = _times(path, line, numbers, cell)
+            known = cell.get("confidence")
+            confidence = numbers.of(line, "confidence", known) if known else None
+            label = cell["label"] or UNNAMED
+            row = Row(f"line {line}", start_s, end_s, label, confidence=confidence, frames=frames)
+            found.add_line(row, cell)
+    return found
 
 
-def _table(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
+def _table(path: Path, text: str, separator: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """Heading and rows, each with the number of its first line."""
-    csv.field_size_limit(max(csv.field_size_limit(), len(text)))
-    first = next(line for line in text.splitlines() if line.strip())
-    fitting = [mark for mark in ",;\t|" if _spoken_for(next(csv.reader([first], delimiter=mark)))]
-    if not fitting:
-        raise Sd2Error(f"The first line of {path} is {first[:100]!r}", _EXPECTED, _remedy(first))
-    if len(fitting) > 1:
-        raise Sd2Error(
-            f"The first line of {path} is {first[:100]!r}, a heading with {fitting[0]!r} and with "
-            f"{fitting[1]!r} between the columns",
-            "one kind of separator",
-            "Save the table with commas",
-        )
     reader = csv.reader(
-        io.StringIO(text, newline=""), delimiter=fitting[0], skipinitialspace=True, strict=True
+        io.StringIO(text, newline=""), delimiter=separator, skipinitialspace=True, strict=True
     )
     rows: list[tuple[int, list[str]]] = []
     start = 1
@@ -162,20 +160,39 @@ def _table(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str]]
         raise Sd2Error(
             f"{path}, line {start}: {error}", "rows whose quotation marks are closed", "Mend it"
         ) from None
-    heading = rows[0][1]
-    for line, cells in rows[1:]:
-        if len(cells) != len(heading):
-            hint = (
-                "Decimal commas in a table separated by commas? Save it with semicolons"
-                if len(cells) > len(heading) and fitting[0] == ","
-                else "Mend that line, or export the table again"
-            )
-            raise Sd2Error(
-                f"{path}, line {line} has {len(cells)} columns, its heading {len(heading)}",
-                "as many as the heading",
-                hint,
-            )
-    return heading, rows[1:]
+    return rows[0][1], rows[1:]
+
+
+def _separator(path: Path, text: str) -> str:
+    """What stands between the columns: the one mark by which the heading names what is needed."""
+    csv.field_size_limit(max(csv.field_size_limit(), len(text)))
+    first = next(line for line in text.splitlines() if line.strip())
+    fitting = [mark for mark in ",;\t|" if _spoken_for(next(csv.reader([first], delimiter=mark)))]
+    if not fitting:
+        raise Sd2Error(f"The first line of {path} is {first[:100]!r}", _EXPECTED, _remedy(first))
+    if len(fitting) > 1:
+        raise Sd2Error(
+            f"The first line of {path} is {first[:100]!r}, a heading with {fitting[0]!r} and with "
+            f"{fitting[1]!r} between the columns",
+            "one kind of separator",
+            "Save the table with commas",
+        )
+    return fitting[0]
+
+
+def _check_width(
+    path: Path, line: int, cells: Sequence[str], heading: Sequence[str], separator: str
+) -> None:
+    if len(cells) == len(heading):
+        return
+    hint = "Mend that line, or export the table again"
+    if len(cells) > len(heading) and separator == ",":
+        hint = "Decimal commas in a table separated by commas? Save it with semicolons"
+    raise Sd2Error(
+        f"{path}, line {line} has {len(cells)} columns, its heading {len(heading)}",
+        "as many as the heading",
+        hint,
+    )
 
 
 def _spoken_for(heading: Sequence[str]) -> bool:
@@ -196,7 +213,8 @@ def _remedy(first: str) -> str:
 
 
 def _plain(heading: str) -> str:
-    return re.sub(r"[^\w]+", "_", heading.strip().casefold()).strip("_")
+    plain = re.sub(r"[^\w]+", "_", heading.strip().casefold()).strip("_")
+    return re.sub(r"_hh_mm_ss(_ms|_msec)?$", "", plain)
 
 
 def _columns(path: Path, heading: Sequence[str]) -> dict[str, int]:
@@ -236,6 +254,7 @@ class _Numbers:
         self._path = path
         columns = [where[one] for one in ("start_s", "end_s", "duration_s") if one in where]
         texts = [cells[column].strip() for _, cells in lines for column in columns]
+        texts = [text for text in texts if _NUMBER.fullmatch(text) or _GROUPED.fullmatch(text)]
         commas = [text for text in texts if "," in text]
         points = [text for text in texts if "." in text]
         if commas and points:
@@ -252,7 +271,9 @@ class _Numbers:
             )
 
     def of(self, line: int, column: str, text: str) -> float:
-        """The number in a cell."""
+        """The number in a cell, of a time also in hours, minutes and seconds."""
+        if ":" in text and column.endswith("_s"):
+            return self._clock(line, column, text)
         plain = _NUMBER.fullmatch(text.strip())
         value = finite_number(plain[0].replace(",", ".")) if plain else None
         if value is None:
@@ -261,37 +282,33 @@ class _Numbers:
             )
         return value
 
+    def _clock(self, line: int, column: str, text: str) -> float:
+        value = seconds_of(text)
+        if value is None:
+            raise Sd2Error(
+                f"{self._path}, line {line}: {column} is {text[:50]!r}",
+                "seconds, or hours:minutes:seconds",
+            )
+        return value
 
-def _edges_s(
-    path: Path, line: int, numbers: _Numbers, cell: dict[str, str], timebase: Timebase | None
-) -> tuple[float, float]:
+
+def _times(
+    path: Path, line: int, numbers: _Numbers, cell: dict[str, str]
+) -> tuple[float, float, tuple[int, int] | None]:
+    """Start and end in seconds, or the frames that stand for them."""
     if "start_s" in cell and "end_s" in cell:
-        return (
-            numbers.of(line, "start_s", cell["start_s"]),
-            numbers.of(line, "end_s", cell["end_s"]),
-        )
+        start_s = numbers.of(line, "start_s", cell["start_s"])
+        return start_s, numbers.of(line, "end_s", cell["end_s"]), None
     if "start_s" in cell and "duration_s" in cell:
         start_s = numbers.of(line, "start_s", cell["start_s"])
-        return start_s, start_s + numbers.of(line, "duration_s", cell["duration_s"])
-    if timebase is None:
-        raise Sd2Error(
-            f"{path} gives frames and no seconds",
-            "columns start_s and end_s",
-            "Read the table together with its recording, which knows the times of frames",
-        )
+        return start_s, start_s + numbers.of(line, "duration_s", cell["duration_s"]), None
     first = _frame(path, line, "start_frame", cell["start_frame"])
     end = (
         _frame(path, line, "end_frame", cell["end_frame"])
         if "end_frame" in cell
         else _frame(path, line, "last_frame", cell["last_frame"]) + 1
     )
-    if not first < end <= len(timebase):
-        raise Sd2Error(
-            f"{path}, line {line}: a span from frame {first} up to frame {end}, exclusive",
-            f"frames of the {len(timebase)} of the recording, counted from 0",
-            "Check that the table is of this recording",
-        )
-    return float(timebase.edges_s[first]), float(timebase.edges_s[end])
+    return 0.0, 0.0, (first, end)
 
 
 def _frame(path: Path, line: int, column: str, text: str) -> int:

@@ -29,6 +29,7 @@ from sd2core.labels.formats.elan_reading import (
     VOCABULARY_LANGUAGE,
     vocabulary_id,
 )
+from sd2core.labels.formats.lanes import Lane, edges_s, lanes_of
 from sd2core.labels.formats.losses import (
     ASPECTS,
     LabelFormat,
@@ -36,7 +37,6 @@ from sd2core.labels.formats.losses import (
     counted,
     hold_texts,
 )
-from sd2core.labels.formats.rows import Lane, edges_s, lanes_of
 from sd2core.labels.label_set import LabelSet
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase

@@ -13,11 +13,12 @@ from defusedxml.ElementTree import fromstring
 
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import read_content
+from sd2core.labels.formats.elan_times import ElanTimes
+from sd2core.labels.formats.lanes import track_of
+from sd2core.labels.formats.losses import counted
 from sd2core.labels.formats.numbers import whole_number
-from sd2core.labels.formats.rows import Row, assemble, clean_name, track_of
+from sd2core.labels.formats.rows import LabelRows, Row, clean_name
 from sd2core.labels.label_set import GESTURES, Label, LabelSet, with_own_keys
-from sd2core.labels.spans import Labels
-from sd2core.timebase import Timebase
 
 LABELS = "sd2-labels"
 DETAILS = {
@@ -41,39 +42,42 @@ _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#
 _EXPECTED = "an ELAN file (.eaf)"
 
 
-def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
+def read(path: Path, observation: str | None = None) -> LabelRows:
     """Read the tiers of a document; what depends on an annotation becomes its note.
 
-    Raises Sd2Error when the file is no such document, has no times, or holds a document type:
-    entities in one can make a small file huge or name other files, and ELAN writes none.
+    Edges without a time are put evenly between those with one, as ELAN draws them. Raises Sd2Error
+    when the file is no such document, or holds a document type: entities in one can make a small
+    file huge or name other files, and ELAN writes none.
     """
     document = _document(path)
-    slots = _slots(path, document)
-    # Time in the linked video of ELAN's zero.
-    media = document.find("HEADER/MEDIA_DESCRIPTOR")
-    origin = "" if media is None else media.get("TIME_ORIGIN", "")
-    shift_s = int(origin) / 1000 if re.fullmatch(r"-?\d{1,18}", origin) else 0.0
+    slots = ElanTimes(document)
+    shift_s = _origin_s(document)
     below = _dependents(document)
-    rows: list[Row] = []
-    tracks: list[str] = []
+    found = LabelRows(label_set=_label_set(document))
     for tier in document.iter("TIER"):
         if tier.find("ANNOTATION/REF_ANNOTATION") is not None or (
             tier.get("LINGUISTIC_TYPE_REF") in DETAILS.values()
         ):
             continue
         name = tier.get("TIER_ID", "")
-        tracks.append(name)
-        rows.extend(
-            _row(path, tier, annotation, slots, shift_s, below)
-            for annotation in tier.iter("ALIGNABLE_ANNOTATION")
+        found.tracks.append(track_of(name))
+        times_ms = slots.of_tier(tier)
+        for annotation in tier.iter("ALIGNABLE_ANNOTATION"):
+            with found.entry():
+                found.rows.append(_row(path, tier, annotation, times_ms, shift_s, below))
+    if slots.placed:
+        found.remarks.append(
+            f"{counted(len(slots.placed), 'edge')} without a time put evenly between those with one"
         )
-    return assemble(
-        path,
-        rows,
-        tracks=[track_of(name) for name in tracks],
-        label_set=_label_set(document),
-        timebase=timebase,
-    )
+    return found
+
+
+def _origin_s(document: Element) -> float:
+    """Time in the linked video of ELAN's zero; of the first linked file, where none is a video."""
+    linked = document.findall("HEADER/MEDIA_DESCRIPTOR")
+    videos = [one for one in linked if one.get("MIME_TYPE", "").startswith("video")]
+    origin = next((one.get("TIME_ORIGIN", "") for one in [*videos, *linked]), "")
+    return int(origin) / 1000 if re.fullmatch(r"-?\d{1,18}", origin) else 0.0
 
 
 def _document(path: Path) -> Element:
@@ -105,22 +109,6 @@ def _document(path: Path) -> Element:
     return document
 
 
-def _slots(path: Path, document: Element) -> dict[str, int]:
-    found: dict[str, int] = {}
-    for slot in document.iter("TIME_SLOT"):
-        text = slot.get("TIME_VALUE")
-        if text is None:
-            continue
-        value = whole_number(text)
-        if value is None:
-            name = slot.get("TIME_SLOT_ID")
-            raise Sd2Error(
-                f"{path}: the time slot {name} is at {text[:50]!r}", "whole milliseconds from 0 on"
-            )
-        found[slot.get("TIME_SLOT_ID", "")] = value
-    return found
-
-
 def _dependents(document: Element) -> dict[str, list[tuple[str, str, str]]]:
     """Type, tier and text of what refers to each annotation, by the annotation's id."""
     found: dict[str, list[tuple[str, str, str]]] = {}
@@ -138,17 +126,17 @@ def _row(
     path: Path,
     tier: Element,
     annotation: Element,
-    slots: dict[str, int],
+    times_ms: dict[str, float],
     shift_s: float,
     below: dict[str, list[tuple[str, str, str]]],
 ) -> Row:
     name = annotation.get("ANNOTATION_ID", "")
     place = f"annotation {name}"
     edges = [annotation.get(f"TIME_SLOT_REF{side}", "") for side in (1, 2)]
-    missing = [edge for edge in edges if edge not in slots]
+    missing = [edge for edge in edges if edge not in times_ms]
     if missing:
         raise Sd2Error(
-            f"{path}, {place}: the time slot {missing[0]!r} has no time",
+            f"{path}, {place}: the time slot {missing[0][:50]!r} has no time",
             "annotations with a start and an end",
             "Align it in ELAN, or delete its tier",
         )
@@ -162,8 +150,8 @@ def _row(
     ours = tier.get("LINGUISTIC_TYPE_REF") == LABELS
     return Row(
         place,
-        slots[edges[0]] / 1000 + shift_s,
-        slots[edges[1]] / 1000 + shift_s,
+        times_ms[edges[0]] / 1000 + shift_s,
+        times_ms[edges[1]] / 1000 + shift_s,
         annotation.findtext("ANNOTATION_VALUE") or "",
         track_of(tier.get("TIER_ID", ""))[0],
         texts["note"] if ours else texts["note"].rstrip("\n"),

@@ -19,7 +19,7 @@ from sd2core.files.atomic import atomic_write_text
 from sd2core.files.texts import read_text
 from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, counted
 from sd2core.labels.formats.numbers import finite_number, positional
-from sd2core.labels.formats.rows import TableRows, assemble
+from sd2core.labels.formats.rows import LabelRows, Row
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
 
@@ -72,8 +72,8 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     return _changed(labels)
 
 
-def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
-    """Read annotations; those without a duration need the timebase and become one frame.
+def read(path: Path, observation: str | None = None) -> LabelRows:
+    """Read annotations; those without a duration are marks.
 
     Raises Sd2Error naming the line that is no annotation.
     """
@@ -82,26 +82,28 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
     # Lone surrogates are decoded as well.
     decode = partial(unquote, errors="surrogatepass") if _ENCODED in heading else str
     columns = _columns(path, heading)
-    table = TableRows()
+    found = LabelRows()
     for number, line in enumerate(lines, start=1):
         if line.startswith("#") or not line.strip():
             continue
         cells = line.split(",")
         if columns is None:
             columns = [*_BASIC, "ch_names"][: max(len(cells), 3)]
-        if len(cells) != len(columns):
-            raise Sd2Error(
-                f"{path}, line {number} has {len(cells)} columns: {line[:100]!r}",
-                f"the {len(columns)} columns {', '.join(columns)}",
-                "Descriptions cannot hold commas: mend that line",
-            )
-        cell = {name: decode(text) for name, text in zip(columns, cells, strict=True)}
-        start_s = _number(path, number, "onset", cell["onset"])
-        end_s = start_s + _number(path, number, "duration", cell["duration"])
-        known = cell.get("confidence", "").strip()
-        confidence = _number(path, number, "confidence", known) if known else None
-        table.add(number, (start_s, end_s), cell["description"], confidence, cell)
-    return assemble(path, table.rows, tracks=table.tracks.items(), timebase=timebase)
+        with found.entry():
+            if len(cells) != len(columns):
+                raise Sd2Error(
+                    f"{path}, line {number} has {len(cells)} columns: {line[:100]!r}",
+                    f"the {len(columns)} columns {', '.join(columns)}",
+                    "Descriptions cannot hold commas: mend that line",
+                )
+            cell = {name: decode(text) for name, text in zip(columns, cells, strict=True)}
+            start_s = _number(path, number, "onset", cell["onset"])
+            end_s = start_s + _number(path, number, "duration", cell["duration"])
+            known = cell.get("confidence", "").strip()
+            confidence = _number(path, number, "confidence", known) if known else None
+            row = Row(f"line {number}", start_s, end_s, cell["description"], confidence=confidence)
+            found.add_line(row, cell)
+    return found
 
 
 def _columns(path: Path, heading: list[str]) -> list[str] | None:

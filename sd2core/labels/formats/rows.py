@@ -1,21 +1,21 @@
-"""Rows of label files: made into labels when read, and free of overlaps when written.
+"""Rows of label files, as they are read, and the labels that are made of them.
 
-Tiers of ELAN and Praat hold no two intervals at one instant, and BORIS pairs the start and the
-stop of a behaviour by its subject. A free track therefore becomes the rows ``NAME [overlap 1]``,
-``NAME [overlap 2]`` and so on; an exclusive one stays ``NAME``. Whatever tracks are called, they
-come back: an exclusive track whose own name looks like such a row becomes ``NAME [overlap 0]``.
+A reader adds what a file says, entry by entry; an odd entry is left out and listed
+(:meth:`LabelRows.entry`). What frames and marks without a duration are in seconds is decided here
+(:class:`LabelClock`), for all formats alike.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeVar
 
 from sd2core.errors import Sd2Error
-from sd2core.labels.formats.losses import DEFAULT_TRACK
+from sd2core.files.texts import errors_in
+from sd2core.labels.formats.losses import DEFAULT_TRACK, counted
 from sd2core.labels.formats.numbers import whole_number
 from sd2core.labels.label_set import GESTURES, LONGEST_NAME, LabelSet
 from sd2core.labels.spans import (
@@ -33,6 +33,10 @@ from sd2core.timebase import Timebase
 UNNAMED = "unnamed"
 """Label of a span for which the file has none, and name of a track without one."""
 
+_ROUNDING_S = 1e-3
+"""What times in whole milliseconds may lie beyond a recording without being worth a word."""
+_MOST_LISTED = 5
+
 
 @dataclass(frozen=True)
 class Row:
@@ -48,88 +52,184 @@ class Row:
     confidence: float | None = None
     origin: str = "import"
     id: int | None = None
+    frames: tuple[int, int] | None = None  # First and end, exclusive, where these stand for times.
 
 
-class TableRows:
-    """Rows of a table by the names of its columns, and the tracks that they name."""
+@dataclass
+class LabelRows:
+    """Content of a label file: rows, tracks, a label set, and what could not be read.
 
-    def __init__(self) -> None:
-        self.rows: list[Row] = []
-        self.tracks: dict[str, Overlap | None] = {}
+    Parameters
+    ----------
+    rows : list of Row
+    tracks : list of (str, Overlap or None)
+        In their order, also those without spans; further ones of the rows follow. A track is
+        ``"free"`` where spans do overlap, else as it says; where it says None, ``"exclusive"``.
+    label_set : LabelSet
+    odd : list of Sd2Error
+        Why entries are left out.
+    remarks : list of str
+        What else a reader of the file should know, each without a full stop.
+    """
 
-    def add(
-        self,
-        line: int,
-        edges_s: tuple[float, float],
-        label: str,
-        confidence: float | None,
-        cells: Mapping[str, str],
-    ) -> None:
-        """Add a line of the table, with what has been read of it.
+    rows: list[Row] = field(default_factory=list)
+    tracks: list[tuple[str, Overlap | None]] = field(default_factory=list)
+    label_set: LabelSet = GESTURES
+    odd: list[Sd2Error] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
 
-        Parameters
-        ----------
-        line : int
-            Number of the line in the file, for messages.
-        edges_s : (float, float)
-            Start and end.
-        label : str
-        confidence : float or None
-        cells : mapping of str to str
-            Texts of the other columns: ``track``, ``overlap``, ``note``, ``author``, ``origin`` and
-            ``id``, as far as there are any.
+    @contextmanager
+    def entry(self) -> Iterator[None]:
+        """Read one entry of the file; it is left out where that raises Sd2Error."""
+        try:
+            yield
+        except Sd2Error as error:
+            self.odd.append(error)
+
+    def add_line(self, row: Row, cells: Mapping[str, str]) -> None:
+        """Add a row of a table, with the texts of its other columns, as far as there are any.
+
+        These are ``track``, ``overlap``, ``note``, ``author``, ``origin`` and ``id``.
         """
         track = cells.get("track") or DEFAULT_TRACK
         stated = next((one for one in OVERLAPS if one == cells.get("overlap")), None)
-        self.tracks[clean_name(track)] = stated
-        row = Row(
-            f"line {line}",
-            *edges_s,
-            label,
-            track,
-            note=cells.get("note", ""),
-            author=cells.get("author", ""),
-            confidence=confidence,
-            origin=cells.get("origin", ""),
-            id=whole_number(cells.get("id", "")),
+        self.tracks.append((clean_name(track), stated))
+        self.rows.append(
+            replace(
+                row,
+                track=track,
+                note=cells.get("note", ""),
+                author=cells.get("author", ""),
+                origin=cells.get("origin", ""),
+                id=whole_number(cells.get("id", "")),
+            )
         )
-        self.rows.append(row)
 
 
-def assemble(
-    path: Path,
-    rows: Sequence[Row],
-    *,
-    tracks: Iterable[tuple[str, Overlap | None]] = (),
-    label_set: LabelSet = GESTURES,
-    timebase: Timebase | None = None,
-) -> Labels:
-    """Make labels of rows.
+@dataclass(frozen=True)
+class LabelClock:
+    """What is known of a recording's time while labels are read for it.
+
+    Parameters
+    ----------
+    timebase : Timebase, optional
+        Of the recording.
+    frames_per_s : float, optional
+        Rate of frames from 0 s on, where there is no timebase.
+    mark_s : float, optional
+        Length of marks without a duration; by default the frame that is shown then.
+    """
+
+    timebase: Timebase | None = None
+    frames_per_s: float | None = None
+    mark_s: float | None = None
+
+    def __post_init__(self) -> None:
+        for what, value in (
+            ("rate of frames", self.frames_per_s),
+            ("length of marks", self.mark_s),
+        ):
+            if value is not None and not 0 < value < math.inf:
+                raise Sd2Error(f"The {what} is {value!r}", "a positive number")
+
+    def of_frames(self, first: int, end: int) -> tuple[float, float]:
+        """Times of a half-open range of frames."""
+        known = math.inf if self.timebase is None else len(self.timebase)
+        if not first < end <= known:
+            counted_from = "frames, counted from 0"
+            if self.timebase is not None:
+                counted_from = f"frames of the {known} of the recording, counted from 0"
+            raise Sd2Error(
+                f"a span from frame {first} up to frame {end}, exclusive",
+                counted_from,
+                "Check that the file is of this recording",
+            )
+        if self.timebase is not None:
+            return float(self.timebase.edges_s[first]), float(self.timebase.edges_s[end])
+        assert self.frames_per_s is not None
+        return first / self.frames_per_s, end / self.frames_per_s
+
+    def of_mark(self, at_s: float) -> tuple[float, float]:
+        """Times of a mark: of its length, or of the frame shown then; beyond all, where it is."""
+        if self.mark_s is not None:
+            return at_s, at_s + self.mark_s
+        if self.timebase is None:
+            assert self.frames_per_s is not None
+            frame = math.floor(at_s * self.frames_per_s + _ROUNDING_S)
+            return frame / self.frames_per_s, (frame + 1) / self.frames_per_s
+        if not self.timebase.covers(at_s):
+            return at_s, at_s + self.timebase.frame_duration_s
+        frame = self.timebase.frame_at(at_s)
+        return self.of_frames(frame, frame + 1)
+
+    @property
+    def knows_frames(self) -> bool:
+        """True if the times of frames are known."""
+        return self.timebase is not None or self.frames_per_s is not None
+
+
+@dataclass(frozen=True)
+class LabelReading:
+    """Labels of a file, and what was not taken of it."""
+
+    labels: Labels
+    left_out: tuple[str, ...] = ()  # Entries, each with its place and what is wrong.
+    remarks: tuple[str, ...] = ()
+    beyond: str = ""  # How many spans reach beyond the recording.
+
+    @property
+    def sentence(self) -> str:
+        """What was taken, and what was not."""
+        spans, tracks = len(self.labels.spans), len(self.labels.tracks)
+        said = [f"{counted(spans, 'span')} on {counted(tracks, 'track')} taken", *self.remarks]
+        if self.beyond:
+            said.insert(1, self.beyond)
+        if not self.left_out:
+            said.append("nothing left out")
+        else:
+            more = len(self.left_out) - _MOST_LISTED
+            listed = [*self.left_out[:_MOST_LISTED], *([f"{more} more"] if more > 0 else [])]
+            said.append(f"{len(self.left_out):,} left out ({'; '.join(listed)})")
+        return ", ".join(said) + "."
+
+    def beside(self, timebase: Timebase | None) -> LabelReading:
+        """The same, with a remark on spans that reach beyond a recording; their times stay."""
+        if timebase is None:
+            return self
+        low_s, high_s = timebase.start_s - _ROUNDING_S, timebase.end_s + _ROUNDING_S
+        beyond = sum(one.start_s < low_s or one.end_s > high_s for one in self.labels.spans)
+        if not beyond:
+            return self
+        reach = "reaches" if beyond == 1 else "reach"
+        extent = f"{timebase.start_s:.3f} to {timebase.end_s:.3f} s"
+        return replace(self, beyond=f"of which {beyond} {reach} beyond the recording ({extent})")
+
+
+def assembled(path: Path, found: LabelRows, clock: LabelClock) -> LabelReading:
+    """Make labels of what a reader found.
 
     Ids are kept where they are positive and differ; the other spans are numbered after them, in
     the order of time.
 
-    Parameters
-    ----------
-    path : Path
-        The file, for messages.
-    rows : sequence of Row
-    tracks : iterable of (str, Overlap or None)
-        In their order, also those without spans; further ones of the rows follow. A track is
-        ``"free"`` where spans do overlap, else as it says; where it says None, ``"exclusive"``.
-    label_set : LabelSet
-    timebase : Timebase, optional
-        Needed for a row without extent, which becomes the frame that is shown at that instant.
-
     Raises
     ------
     Sd2Error
-        Naming the file and the place, when a row is not a span.
+        When frames or marks need a clock that is not known, or when nothing is left to be taken.
     """
-    ids = _ids(rows)
-    spans = tuple(_span(path, row, number, timebase) for row, number in zip(rows, ids, strict=True))
+    _check_clock(path, found.rows, clock)
+    rows: list[Row] = []
+    unnumbered: list[Span] = []
+    for row in found.rows:
+        with found.entry(), errors_in(f"{path}, {row.place}"):
+            timed = _timed(row, clock)
+            unnumbered.append(_span(timed))
+            rows.append(timed)
+    if found.odd and not rows:
+        raise found.odd[0]
+    numbered = zip(unnumbered, _ids(rows), strict=True)
+    spans = tuple(replace(span, id=number) for span, number in numbered)
     overlaps: dict[str, Overlap | None] = {}
-    for name, overlap in tracks:
+    for name, overlap in found.tracks:
         clean = clean_name(name)
         overlaps[clean] = overlap or overlaps.get(clean)
     for span in spans:
@@ -141,7 +241,39 @@ def assemble(
         LabelTrack(name, "free" if name in crowded else overlap or "exclusive")
         for name, overlap in overlaps.items()
     )
-    return Labels(made, spans, label_set)
+    left_out = tuple(error.found.removeprefix(f"{path}, ") for error in found.odd)
+    return LabelReading(Labels(made, spans, found.label_set), left_out, tuple(found.remarks))
+
+
+def assemble(
+    path: Path,
+    rows: Sequence[Row],
+    *,
+    tracks: Iterable[tuple[str, Overlap | None]] = (),
+    label_set: LabelSet = GESTURES,
+    timebase: Timebase | None = None,
+) -> Labels:
+    """Make labels of rows that must all be spans, for readers of plug-ins.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for messages.
+    rows, tracks, label_set
+        As in :class:`LabelRows`.
+    timebase : Timebase, optional
+        Needed for a row without extent, which becomes the frame that is shown at that instant.
+
+    Raises
+    ------
+    Sd2Error
+        Naming the file and the place, when a row is not a span.
+    """
+    found = LabelRows(list(rows), list(tracks), label_set)
+    made = assembled(path, found, LabelClock(timebase))
+    if found.odd:
+        raise found.odd[0]
+    return made.labels
 
 
 def clean_name(name: str) -> str:
@@ -150,6 +282,56 @@ def clean_name(name: str) -> str:
         return name
     line = " ".join("".join(one if one.isprintable() else " " for one in name).split())
     return line[:LONGEST_NAME].strip() or UNNAMED
+
+
+def _check_clock(path: Path, rows: Iterable[Row], clock: LabelClock) -> None:
+    if clock.knows_frames:
+        return
+    for row in rows:
+        if row.frames is not None:
+            raise Sd2Error(
+                f"{path} gives frames and no seconds",
+                "times in seconds",
+                "Read it together with its recording, which knows the times of frames, or with"
+                " their rate",
+            )
+        if row.start_s == row.end_s and clock.mark_s is None:
+            raise Sd2Error(
+                f"{path}, {row.place}: {row.label!r} at {row.start_s:g} s has no duration",
+                "spans with a start before the end",
+                "Read the file together with its recording: such a mark becomes one frame; or give"
+                " marks a length",
+            )
+
+
+def _timed(row: Row, clock: LabelClock) -> Row:
+    """A row with times, where it has frames or no duration."""
+    if row.frames is not None:
+        start_s, end_s = clock.of_frames(*row.frames)
+    elif row.start_s == row.end_s:
+        start_s, end_s = clock.of_mark(row.start_s)
+    else:
+        return row
+    return replace(row, start_s=start_s, end_s=end_s)
+
+
+def _span(row: Row) -> Span:
+    origin: Origin = next((one for one in ORIGINS if one == row.origin), "import")
+    try:
+        return Span(
+            1,  # Numbered when all are known.
+            clean_name(row.track),
+            row.start_s,
+            row.end_s,
+            clean_name(row.label),
+            row.note,
+            row.author,
+            row.confidence,
+            origin,
+        )
+    except Sd2Error as error:
+        why = error.found.replace("Span 1", "the span", 1)
+        raise Sd2Error(why, error.expected, "Mend that place") from None
 
 
 def _ids(rows: Sequence[Row]) -> list[int]:
@@ -168,35 +350,6 @@ def _ids(rows: Sequence[Row]) -> list[int]:
     return [number for number in kept if number is not None]
 
 
-def _span(path: Path, row: Row, number: int, timebase: Timebase | None) -> Span:
-    where = f"{path}, {row.place}"
-    start_s, end_s = row.start_s, row.end_s
-    if start_s == end_s:
-        if timebase is None:
-            raise Sd2Error(
-                f"{where}: {row.label!r} at {start_s:g} s has no duration",
-                "spans with a start before the end",
-                "Read the file together with its recording: such a mark becomes one frame",
-            )
-        frame = timebase.frame_at(start_s)
-        start_s, end_s = timebase.edges_s[frame : frame + 2].tolist()
-    origin: Origin = next((one for one in ORIGINS if one == row.origin), "import")
-    try:
-        return Span(
-            number,
-            clean_name(row.track),
-            start_s,
-            end_s,
-            clean_name(row.label),
-            row.note,
-            row.author,
-            row.confidence,
-            origin,
-        )
-    except Sd2Error as error:
-        raise Sd2Error(f"{where}: {error.found}", error.expected, "Mend that place") from None
-
-
 def _overlapping(spans: Sequence[Span]) -> set[str]:
     last_end_s: dict[str, float] = {}
     found: set[str] = set()
@@ -205,64 +358,3 @@ def _overlapping(spans: Sequence[Span]) -> set[str]:
             found.add(span.track)
         last_end_s[span.track] = max(span.end_s, last_end_s.get(span.track, span.end_s))
     return found
-
-
-_ROW = re.compile(r"(.+) \[overlap (\d{1,18})\]")
-
-Time = TypeVar("Time", int, float)
-
-
-@dataclass(frozen=True)
-class Lane:
-    """Spans that do not overlap, in order, and the name of their row in a file."""
-
-    name: str
-    track: LabelTrack
-    spans: tuple[Span, ...]
-
-
-def lanes_of(labels: Labels, edges: Callable[[Span], tuple[Time, Time]]) -> list[Lane]:
-    """Distribute the spans of every track over rows, at least one each.
-
-    ``edges`` gives start and end of a span in the times of the file, half-open.
-    """
-    found: list[Lane] = []
-    for track in labels.tracks:
-        rows = apart(labels.of_track(track.name), edges)
-        free = track.overlap == "free" or len(rows) > 1
-        first = 1 if free else 0
-        bare = not free and not _ROW.fullmatch(track.name)
-        for number, spans in enumerate(rows, start=first):
-            name = track.name if bare else f"{track.name} [overlap {number}]"
-            found.append(Lane(name, track, tuple(spans)))
-    return found
-
-
-def edges_s(span: Span) -> tuple[float, float]:
-    """Start and end of a span, for files that have times in seconds."""
-    return span.start_s, span.end_s
-
-
-def track_of(row: str) -> tuple[str, Overlap | None]:
-    """Return the track that a row belongs to, and its overlap where the row says so."""
-    match = _ROW.fullmatch(row)
-    if match is None:
-        return row, None
-    return match[1], "exclusive" if int(match[2]) == 0 else "free"
-
-
-def apart(spans: Sequence[Span], edges: Callable[[Span], tuple[Time, Time]]) -> list[list[Span]]:
-    """Distribute spans over rows without overlaps: first fit by start; at least one."""
-    rows: list[list[Span]] = [[]]
-    ends: list[Time | None] = [None]
-    for span in sorted(spans, key=lambda one: (*edges(one), one.id)):
-        start, end = edges(span)
-        for number, last in enumerate(ends):
-            if last is None or last <= start:
-                rows[number].append(span)
-                ends[number] = end
-                break
-        else:
-            rows.append([span])
-            ends.append(end)
-    return rows

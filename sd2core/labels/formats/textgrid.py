@@ -14,10 +14,11 @@ from pathlib import Path
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.texts import read_text
+from sd2core.labels.formats.lanes import Lane, edges_s, lanes_of, track_of
 from sd2core.labels.formats.losses import LabelFormat, Loss
 from sd2core.labels.formats.numbers import finite_number, positional, whole_number
-from sd2core.labels.formats.rows import Lane, Row, assemble, edges_s, lanes_of, track_of
-from sd2core.labels.spans import Labels, Overlap
+from sd2core.labels.formats.rows import LabelRows, Row
+from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
 
 FORMAT = LabelFormat(
@@ -74,8 +75,8 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     return []
 
 
-def read(path: Path, timebase: Timebase | None = None, observation: str | None = None) -> Labels:
-    """Read all tiers; a point needs the timebase and becomes one frame.
+def read(path: Path, observation: str | None = None) -> LabelRows:
+    """Read all tiers; a point is a mark without a duration.
 
     Raises Sd2Error when the file is no TextGrid in text form, or ends too early.
     """
@@ -83,14 +84,13 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
     tokens.heading()
     tokens.number("xmin")
     tokens.number("xmax")
-    rows: list[Row] = []
-    tracks: list[tuple[str, Overlap | None]] = []
+    found = LabelRows()
     for _ in range(tokens.count("tiers") if tokens.has_tiers() else 0):
         kind, name = tokens.text("class of a tier"), tokens.text("name of a tier")
         if kind not in ("IntervalTier", "TextTier"):
             raise Sd2Error(f"{path} has a tier of class {kind[:50]!r}", "IntervalTier or TextTier")
         track, overlap = track_of(name)
-        tracks.append((track, overlap))
+        found.tracks.append((track, overlap))
         tokens.number("xmin")
         tokens.number("xmax")
         for number in range(tokens.count("intervals")):
@@ -100,8 +100,8 @@ def read(path: Path, timebase: Timebase | None = None, observation: str | None =
             # An interval of nothing is the gap between two spans, a point of nothing is not.
             if text.strip() or kind == "TextTier":
                 place = f"tier {name!r}, interval {number + 1}"
-                rows.append(Row(place, start_s, end_s, text, track))
-    return assemble(path, rows, tracks=tracks, timebase=timebase)
+                found.rows.append(Row(place, start_s, end_s, text, track))
+    return found
 
 
 def _tier(number: int, lane: Lane, start_s: float, end_s: float) -> list[str]:

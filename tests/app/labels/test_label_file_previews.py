@@ -10,7 +10,7 @@ from finding import named
 
 from sd2app.labels.export_dialog import LabelExportDialog
 from sd2app.labels.import_dialog import LabelImportDialog, is_label_file
-from sd2app.widgets.inputs import Choice
+from sd2app.widgets.inputs import Choice, NumberBox
 from sd2core.labels.formats import read_labels, write_labels
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
@@ -127,3 +127,16 @@ def test_an_export_says_its_losses_before_and_after(qtbot, tmp_path) -> None:
     qtbot.waitUntil(lambda: bool(model.problem), timeout=10_000)
     assert not model.exporting
     model.finish()
+
+
+def test_what_of_the_file_was_not_read_is_listed_and_marks_get_a_length(
+    importing, qtbot, tmp_path
+) -> None:
+    path = tmp_path / "ben.csv"
+    path.write_text("label,start,end\nwave,1,2\nwave,n/a,3\ntap,5,5\n")
+    model = importing(path)
+    assert "1 left out (line 3: start_s is 'n/a')" in dict(model.facts())["Of the file"]
+    assert model.incoming.labels.spans[-1].duration_s == pytest.approx(0.1)
+    named(model, NumberBox, "Length of marks without a duration").setValue(0.5)
+    qtbot.waitUntil(lambda: model.incoming is not None, timeout=10_000)
+    assert model.incoming.labels.spans[-1].duration_s == pytest.approx(0.5)

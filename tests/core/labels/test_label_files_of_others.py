@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from sd2core.labels.formats import FORMATS, read_labels, write_labels
 from sd2core.labels.formats.elan import edges_ms
-from sd2core.labels.formats.rows import lanes_of, track_of
+from sd2core.labels.formats.lanes import lanes_of, track_of
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
