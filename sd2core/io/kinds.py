@@ -19,7 +19,14 @@ Kind = Literal["recording", "video", "mesh", "radar", "map", "imu", "pairs", "mo
 
 DATASET_FORMAT = "sd2-dataset"
 
-VIDEO_SUFFIXES = frozenset({".mp4", ".mkv", ".mov", ".avi", ".webm", ".m4v", ".mpg", ".ts", ".wmv"})
+_DRAWN_TEXT = "tty"
+"""Format by which FFmpeg draws any text as a terminal would."""
+
+VIDEO_SUFFIXES = frozenset({
+    ".mp4", ".mkv", ".mov", ".avi", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts",
+    ".wmv", ".3gp", ".3g2", ".flv", ".ogv", ".mxf", ".gif",
+})  # fmt: skip
+"""Usual ones, for dialogs and patterns; others are recognised by what is in them."""
 RADAR_MAP_SUFFIXES = frozenset({".h5", ".hdf5"})
 RADAR_SUFFIXES = (
     frozenset({".npy", ".mat", ".bin", ".sigmf-meta", ".sigmf-data"}) | RADAR_MAP_SUFFIXES
@@ -61,6 +68,8 @@ def kind_of(path: Path) -> Kind:
     kind, said = _kind_by_plug_ins(path)
     if kind is not None:
         return kind
+    if _holds_pictures(path):
+        return "video"
     raise Sd2Error(
         f"{path} is of no kind that is known",
         "a recording (.sd2), a video (.mp4, .mkv …), a mesh (.npz, .zarr, .obj, .ply, .glb, .pkl),"
@@ -130,6 +139,17 @@ def _kind_by_plug_ins(path: Path) -> tuple[Kind | None, str]:
             return kind, ""
         faults.append(said)
     return None, " ".join(filter(None, faults))
+
+
+def _holds_pictures(path: Path) -> bool:
+    from sd2core.io.video_index import open_stream  # loads FFmpeg
+
+    try:
+        container, _ = open_stream(path)
+    except Sd2Error:
+        return False
+    with container:
+        return container.format.name != _DRAWN_TEXT
 
 
 def _is_doppler_map(path: Path) -> bool:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import as_path
+from sd2core.io.upright import Upright
 from sd2core.io.video_index import FrameIndex, build_index, decoded_frames, open_stream
 from sd2core.progress import Progress, silent
 from sd2core.timebase import Timebase
@@ -70,13 +71,10 @@ class VideoReader:
         except BaseException:
             self.close()
             raise
-        self._turns = round(first.rotation / 90) % 4
-        if first.rotation % 90:
-            self._notes.append(
-                f"The file asks for a rotation by {first.rotation}°; only quarter turns are made."
-            )
+        self._turned = Upright.of(first)
+        self._notes.extend(self._turned.notes)
         self._size = (first.width, first.height)
-        self.width, self.height = self._size[:: -1 if self._turns % 2 else 1]
+        self.width, self.height = self._size[:: -1 if self._turned.swaps else 1]
         aspect = self._stream.sample_aspect_ratio
         if aspect and aspect != 1:
             self._notes.append(
@@ -141,7 +139,7 @@ class VideoReader:
             # A frame that converts itself makes a converter of its own, with a pool of threads.
             picture = self._converter.reformat(self._find(frame), width, height, "rgb24", threads=1)
             rgb = picture.to_ndarray()
-        return np.ascontiguousarray(np.rot90(rgb, self._turns))
+        return np.ascontiguousarray(self._turned.picture(rgb))
 
     def frames(self, start: int = 0, stop: int | None = None) -> Iterator[NDArray[np.uint8]]:
         """Pictures of frames ``start`` to ``stop`` (exclusive), in order."""

@@ -23,7 +23,7 @@ from sd2app.widgets.text import counted
 from sd2core.denoise.card import ModelCard
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
-from sd2core.io.kinds import VIDEO_SUFFIXES
+from sd2core.io.kinds import kind_of
 from sd2core.placements.placements import Placements, read_placements
 from sd2core.recording.recording import is_recording, open_recording
 
@@ -237,10 +237,11 @@ def paths_of(result: Result) -> list[Path]:
     Raises Sd2Error if the recording is damaged.
     """
     source = Path(result.source)
-    video = source if source.suffix.lower() in VIDEO_SUFFIXES else None
     if is_recording(source):
         recording = open_recording(source)
         video = recording.video if recording.mesh is None else None
+    else:
+        video = source if kind_of(source) == "video" else None
     return [source] if video is None else [video, Path(result.mesh)]
 
 

@@ -137,6 +137,6 @@ def test_what_of_the_file_was_not_read_is_listed_and_marks_get_a_length(
     model = importing(path)
     assert "1 left out (line 3: start_s is 'n/a')" in dict(model.facts())["Of the file"]
     assert model.incoming.labels.spans[-1].duration_s == pytest.approx(0.1)
-    named(model, NumberBox, "Length of marks without a duration").setValue(0.5)
+    named(model, "Length of marks without a duration", NumberBox).setValue(0.5)
     qtbot.waitUntil(lambda: model.incoming is not None, timeout=10_000)
     assert model.incoming.labels.spans[-1].duration_s == pytest.approx(0.5)

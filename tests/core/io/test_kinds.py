@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+from pathlib import Path
+
+import av
 import numpy as np
 import pytest
 
@@ -128,3 +131,29 @@ def test_a_pattern_below_a_folder_with_brackets_finds_its_frames(tmp_path):
     assert load_mesh(folder / "*.obj", frames_per_s=30, scale=1).frame_count == 3
     with pytest.raises(Sd2Error, match="does not exist"):
         load_mesh(folder / "walk.npz")
+
+
+@pytest.mark.parametrize(
+    ("name", "codec"),
+    [("a.MTS", "libx264"), ("a.3gp", "libx264"), ("a.gif", "gif"), ("a", "mpeg4")],
+)
+def test_a_video_is_known_by_what_is_in_it(tmp_path, name, codec):
+    formats = {".MTS": "mpegts", ".gif": "gif"}
+    with av.open(str(tmp_path / name), "w", format=formats.get(Path(name).suffix, "mp4")) as made:
+        stream = made.add_stream(codec, rate=10)
+        stream.width, stream.height = 64, 64
+        stream.pix_fmt = "rgb8" if codec == "gif" else "yuv420p"
+        for _ in range(3):
+            picture = av.VideoFrame.from_ndarray(np.zeros((64, 64, 3), np.uint8), format="rgb24")
+            made.mux(stream.encode(picture))
+        made.mux(stream.encode())
+    assert kind_of(tmp_path / name) == "video"
+    renamed = (tmp_path / name).rename(tmp_path / "x.camera")
+    assert kind_of(renamed) == "video"
+
+
+@pytest.mark.parametrize("name", ["notes.txt", "notes.nfo", "notes", "notes.ans"])
+def test_a_text_is_no_video(tmp_path, name):
+    (tmp_path / name).write_text("Ten lines\n" * 10)
+    with pytest.raises(Sd2Error, match="no kind that is known"):
+        kind_of(tmp_path / name)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import random
+import struct
 import threading
 from pathlib import Path
 
@@ -300,6 +301,37 @@ def test_rotation_is_honoured(tmp_path: Path, degrees: int, turns: int) -> None:
         image = reader.read(2)
         assert image.shape == (reader.height, reader.width, 3) == expected.shape
         assert np.abs(image.astype(int) - expected).mean() < 12
+
+
+def with_matrix(path: Path, rows: tuple[int, int, int, int]) -> None:
+    """Write a display matrix into the track's header of an MP4."""
+    content = bytearray(path.read_bytes())
+    at = content.find(b"tkhd") + 44  # version 0: what stands before the matrix
+    a, b, c, d = (one << 16 for one in rows)
+    content[at : at + 36] = struct.pack(">9i", a, b, 0, c, d, 0, 0, 0, 1 << 30)
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [(1, 0, 0, 1), (-1, 0, 0, 1), (1, 0, 0, -1), (-1, 0, 0, -1),
+     (0, 1, 1, 0), (0, -1, 1, 0), (0, 1, -1, 0), (0, -1, -1, 0)],
+)  # fmt: skip
+def test_pictures_are_turned_and_mirrored(tmp_path: Path, rows: tuple[int, int, int, int]) -> None:
+    path = write_video(tmp_path / "v.mp4", 3, options={"crf": "1"})
+    with_matrix(path, rows)
+    stored = picture(2, 128, 64)
+    a, b, c, d = rows
+    y, x = np.indices(stored.shape[:2])
+    shown_x, shown_y = a * x + c * y, b * x + d * y
+    shown_x, shown_y = shown_x - shown_x.min(), shown_y - shown_y.min()
+    expected = np.empty((shown_y.max() + 1, shown_x.max() + 1, 3), np.uint8)
+    expected[shown_y, shown_x] = stored
+    with open_video(path) as reader:
+        image = reader.read(2)
+        assert image.shape == (reader.height, reader.width, 3) == expected.shape
+        assert np.abs(image.astype(int) - expected).mean() < 12
+        assert ["mirrored" in note for note in reader.notes] == [True] * (a * d - b * c < 0)
 
 
 def test_colours_are_red_green_blue(tmp_path: Path) -> None:
