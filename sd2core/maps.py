@@ -214,10 +214,7 @@ class DopplerMap:
         if self.kind not in get_args(MapKind):
             raise Sd2Error(f"The map is of kind {self.kind!r}", f"one of {get_args(MapKind)}")
         for name in ("null_bins", "unseen_bins"):
-            bins = tuple(sorted({int(index) for index in getattr(self, name)}))
-            if bins and not 0 <= bins[0] <= bins[-1] < self.axis.bins:
-                raise Sd2Error(f"{name} is {bins}", f"bins from 0 to {self.axis.bins - 1}")
-            object.__setattr__(self, name, bins)
+            object.__setattr__(self, name, self.axis.checked_bins(getattr(self, name), name))
         object.__setattr__(self, "values", values)
         if self.present is not None:
             present = checked(self.present, values.shape[1])
@@ -459,6 +456,8 @@ class DopplerMap:
         if arrays["values"].dtype.kind != "f" or not np.isfinite(arrays["values"]).all():
             raise Sd2Error(f"{path}: values hold NaN, infinity or no numbers", "finite numbers")
         try:
+            from sd2core.declared import MapMeta, check_record  # loads pydantic
+
             meta = json.loads(str(arrays["meta"]))
             version = meta.get("version", 0)
             if meta.get("format") != "sd2-doppler-map" or version > FORMAT_VERSION:
@@ -467,6 +466,7 @@ class DopplerMap:
                     f"'sd2-doppler-map' up to version {FORMAT_VERSION}",
                     "Open it with the version of SD² Studio that wrote it",
                 )
+            check_record(MapMeta, meta["provenance"], f"{path}: its provenance")
             axis = VelocityAxis(len(arrays["velocity_mps"]), float(meta["v_max_mps"]))
             if not np.allclose(axis.centres_mps, arrays["velocity_mps"], atol=1e-6):
                 raise Sd2Error(f"{path}: velocity_mps does not match v_max_mps {axis.v_max_mps}")

@@ -7,6 +7,7 @@ is positive when approaching the sensor.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +17,9 @@ from sd2core.errors import Sd2Error
 
 FARTHEST_M = 1e9
 """Largest distance of a sensor from the camera: squares of ranges stay in single precision."""
+
+MAX_BINS = 1 << 16
+"""Most bins of a velocity axis; a radar's chirps per frame are a few hundred."""
 
 Vector = tuple[float, float, float]
 
@@ -27,7 +31,7 @@ class VelocityAxis:
     Parameters
     ----------
     bins : int
-        Number of bins, at least 2.
+        Number of bins, 2 to :data:`MAX_BINS`.
     v_max_mps : float
         Outer edge of the last bin.
 
@@ -43,8 +47,8 @@ class VelocityAxis:
     v_max_mps: float = 2.0
 
     def __post_init__(self) -> None:
-        if self.bins < 2:
-            raise Sd2Error(f"The velocity axis has {self.bins} bins", "2 or more")
+        if not 2 <= self.bins <= MAX_BINS:
+            raise Sd2Error(f"The velocity axis has {self.bins} bins", f"2 to {MAX_BINS:,}")
         if not (math.isfinite(self.v_max_mps) and self.v_max_mps > 0):
             raise Sd2Error(
                 f"The velocity axis ends at {self.v_max_mps} m/s", "a positive velocity in m/s"
@@ -64,6 +68,13 @@ class VelocityAxis:
     def centres_mps(self) -> NDArray[np.float64]:
         """Bin centres, shape (bins,)."""
         return (np.arange(self.bins, dtype=np.float64) + 0.5) * self.bin_width_mps - self.v_max_mps
+
+    def checked_bins(self, numbers: Iterable[int], what: str) -> tuple[int, ...]:
+        """Numbers of bins in order, each once; Sd2Error where there is no such bin."""
+        bins = tuple(sorted({int(number) for number in numbers}))
+        if bins and not 0 <= bins[0] <= bins[-1] < self.bins:
+            raise Sd2Error(f"{what} is {bins!r:.60}", f"bins from 0 to {self.bins - 1}")
+        return bins
 
     def bin_of(self, velocity_mps: float) -> int | None:
         """Bin of a velocity, or None beyond the axis."""

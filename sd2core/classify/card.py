@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +15,7 @@ from sd2core.classify.features import Features
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import damage_in
 from sd2core.labels.label_set import check_name
+from sd2core.options.bounds import FRAME_RATE_HZ
 from sd2core.sensor import VelocityAxis
 
 FORMAT = "sd2-classifier"
@@ -43,8 +43,10 @@ class ClassifierCard:
     path: Path | None = None
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.frame_rate_hz) and self.frame_rate_hz > 0):
-            raise Sd2Error(f"The classifier's frame rate is {self.frame_rate_hz}", "above 0")
+        if self.frame_rate_hz not in FRAME_RATE_HZ:
+            raise Sd2Error(
+                f"The classifier's frame rate is {self.frame_rate_hz}", FRAME_RATE_HZ.words
+            )
         if len(self.classes) < 2 or len(set(self.classes)) < len(self.classes):
             raise Sd2Error(
                 f"The classes are {', '.join(self.classes) or 'none'}", "two or more, each once"

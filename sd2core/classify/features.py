@@ -71,7 +71,7 @@ class Features:
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise Sd2Error(f"The features are {self.kind!r}", f"one of {', '.join(KINDS)}")
-        if len(set(self.null_bins)) >= self.axis.bins:
+        if len(self.axis.checked_bins(self.null_bins, "null_bins")) >= self.axis.bins:
             raise Sd2Error(
                 f"All {self.axis.bins} bins are nulled", "bins in which a movement can be seen"
             )

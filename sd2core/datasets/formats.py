@@ -146,6 +146,12 @@ def open_npz(path: Path) -> tuple[Header, dict[str, Any], list[dict[str, Any]]]:
     return header, arrays, lines
 
 
+def count_hdf5_sources(file: Any, path: Path) -> int:
+    """Number of the sources of an open HDF5 data set."""
+    with refusing_damage(path, _EXPECTED):
+        return len(member_of(file, path, SOURCES))
+
+
 def hdf5_sources(file: Any, path: Path) -> Iterator[dict[str, Any]]:
     """Yield the sources of an open HDF5 data set."""
     with refusing_damage(path, _EXPECTED):

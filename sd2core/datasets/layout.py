@@ -6,16 +6,18 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import TypeAdapter
 
 from sd2core.datasets.source import KINDS
+from sd2core.declared import check_names
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import damage_in
 from sd2core.io.kinds import DATASET_FORMAT
 from sd2core.maps import MapKind
 from sd2core.mesh.vertex_parts import QUANTITIES
+from sd2core.options.bounds import FRAME_RATE_HZ, NUMBER_OF_ROWS, SEGMENT_FRAMES, UP_TO_ONE
 from sd2core.options.exporting import LabelRule, SpanOptions
 from sd2core.sensor import VelocityAxis
 
@@ -63,14 +65,14 @@ class Header:
     :class:`~sd2core.datasets.options.DatasetOptions`.
     """
 
-    length: int  # Frames of a segment.
-    overlap: int  # Frames that neighbouring segments share.
+    length: Annotated[int, SEGMENT_FRAMES]  # Frames of a segment.
+    overlap: Annotated[int, NUMBER_OF_ROWS]  # Frames that neighbouring segments share.
     axis: VelocityAxis
     null_bins: tuple[int, ...]  # Bins set to zero in all kinds.
-    frame_rate_hz: float
+    frame_rate_hz: Annotated[float, FRAME_RATE_HZ]
     label_rule: LabelRule
-    min_share: float
-    min_purity: float = 0.0
+    min_share: Annotated[float, UP_TO_ONE]
+    min_purity: Annotated[float, UP_TO_ONE] = 0.0
     spans: SpanOptions | None = None
     kinds_wanted: tuple[MapKind, ...] = KINDS  # Those that were asked for.
     kinds: tuple[MapKind, ...] = ()  # Those that some segment has.
@@ -113,7 +115,18 @@ class Header:
             # Before there were limb maps, headers did not have parts.
             content = {name: ({"parts": (), "joints": ()} | _ADDED | entry)[name] for name in names}
             spans = None if content["spans"] is None else SpanOptions(**content["spans"])
-            return _HEADER.validate_python({**content, "axis": axis, "spans": spans})
+            header = _HEADER.validate_python({**content, "axis": axis, "spans": spans})
+            axis.checked_bins(header.null_bins, "null_bins")
+        for what in ("labels", "subjects", "kinds", "parts", "joints", "imu"):
+            check_names(getattr(header, what), what, path)
+        unknown = {one for people in header.splits.values() for one in people} - {*header.subjects}
+        if unknown or not header.labels or {*header.splits} - {*SPLITS}:
+            raise Sd2Error(
+                f"{path}: its description is damaged (splits {header.splits!r:.150},"
+                f" {len(header.labels)} labels)",
+                "splits of its subjects, and a label",
+            )
+        return header
 
 
 _ADDED: dict[str, Any] = {"imu": (), "spans": None, "min_purity": 0.0}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sd2core.datasets import formats, store
 from sd2core.datasets.layout import SPLITS, FileFormat, Header, format_of
+from sd2core.declared import DeclaredColumn, SourceEntry, check_record, column_bounds
 from sd2core.errors import Sd2Error
 
 
@@ -54,12 +55,25 @@ class Dataset:
 
     def sources(self) -> Iterator[dict[str, Any]]:
         """Yield the facts of each source, in the order of the array ``source``."""
+        found: Iterable[dict[str, Any]]
         if self._sources is not None:
-            yield from self._sources
+            found = self._sources
         elif self.form == "zarr":
-            yield from store.read_sources(self.path / store.SOURCES_NAME)
+            found = store.read_sources(self.path / store.SOURCES_NAME)
         else:
-            yield from formats.hdf5_sources(self._file, self.path)
+            found = formats.hdf5_sources(self._file, self.path)
+        for number, entry in enumerate(found, start=1):
+            check_record(SourceEntry, entry, f"{self.path}: source {number}")
+            yield entry
+
+    @property
+    def source_count(self) -> int:
+        """Number of sources; none of them is read."""
+        if self._sources is not None:
+            return len(self._sources)
+        if self.form == "zarr":
+            return store.count_sources(self.path / store.SOURCES_NAME)
+        return formats.count_hdf5_sources(self._file, self.path)
 
     def of_split(self, split: str) -> NDArray[np.int64]:
         """Return the indices of the segments of a split, ascending.
@@ -79,7 +93,18 @@ def open_dataset(path: Path) -> Dataset:
     Sd2Error
         When it is none, damaged, not finished, or of a later version.
     """
-    path = Path(path)
+    opened = _opened(Path(path))
+    header = opened.header
+    bounds = column_bounds(
+        len(header.labels), len(header.subjects), opened.source_count, len(SPLITS)
+    )
+    for name in bounds.keys() & opened.arrays.keys():
+        array = opened.arrays[name]
+        opened.arrays[name] = DeclaredColumn(array, f"{path}: {name}", bounds[name])
+    return opened
+
+
+def _opened(path: Path) -> Dataset:
     form = format_of(path)
     if not path.exists():
         raise Sd2Error(f"{path} does not exist", "a data set that `sd2 export` made")

@@ -250,6 +250,14 @@ def read_sources(path: Path) -> Iterator[dict[str, Any]]:
             yield entry
 
 
+def count_sources(path: Path) -> int:
+    """Number of the lines of sources."""
+    if not path.exists():
+        return 0
+    with path.open("rb") as stream:
+        return sum(1 for _ in whole_lines(stream))
+
+
 @contextmanager
 def _new_group(path: Path, header: Header) -> Iterator[Any]:
     """Make a group in place of all but the lock; until the block ends :func:`is_begun` knows it."""

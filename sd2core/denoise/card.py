@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -15,6 +14,7 @@ from sd2core.denoise.texture import Texture
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import damage_in
 from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, PARTS, QUANTITIES
+from sd2core.options.bounds import FRAME_RATE_HZ
 from sd2core.sensor import VelocityAxis
 
 FORMAT = "sd2-denoiser"
@@ -72,16 +72,13 @@ class ModelCard:
     path: Path | None = None  # File that holds the card.
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.frame_rate_hz) and self.frame_rate_hz > 0):
-            raise Sd2Error(f"The model's frame rate is {self.frame_rate_hz}", "a number above 0")
+        if self.frame_rate_hz not in FRAME_RATE_HZ:
+            raise Sd2Error(f"The model's frame rate is {self.frame_rate_hz}", FRAME_RATE_HZ.words)
         if self.trained_on not in get_args(TrainedOn):
             raise Sd2Error(
                 f"The model was trained on {self.trained_on!r}", f"one of {get_args(TrainedOn)}"
             )
-        bins = tuple(sorted({int(number) for number in self.null_bins}))
-        if bins and not 0 <= bins[0] <= bins[-1] < self.axis.bins:
-            raise Sd2Error(f"null_bins is {bins}", f"bins from 0 to {self.axis.bins - 1}")
-        object.__setattr__(self, "null_bins", bins)
+        object.__setattr__(self, "null_bins", self.axis.checked_bins(self.null_bins, "null_bins"))
 
     @property
     def inputs(self) -> Inputs:

@@ -197,7 +197,7 @@ def damage_in(place: str | Path, expected: str = "") -> Iterator[None]:
         yield
     except Sd2Error as error:
         raise error.within(place) from error
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise Sd2Error(f"{place}: its description is damaged ({error!r})", expected) from error
 
 

@@ -62,7 +62,7 @@ def read_model_output(
             raise no_vertices(str(path), [str(one) for one in first if isinstance(one, str | int)])
         entry = _choose(path, people, person, notes)
     raw = RawMesh(vertices=_stacked(_vertices_of(entry), path), notes=notes)
-    raw.faces = _array(entry, content, FACE_NAMES)
+    raw.faces = _numbers(path, entry, content, FACE_NAMES)
     shape = np.shape(raw.vertices)
     clock = clock_of([entry, content], shape[0] if shape else 0, str(path))
     raw.times_s, raw.frames_per_s = clock.times_s, clock.frames_per_s
@@ -138,7 +138,8 @@ def _stacked(vertices: Any, path: Path) -> NDArray[Any]:
     """One array (T, V, 3) out of an array or a list with one array per frame."""
     if isinstance(vertices, np.ndarray):
         # Some keep the axis of a batch of one clip.
-        return vertices[0] if vertices.ndim == 4 and len(vertices) == 1 else vertices
+        one = vertices[0] if vertices.ndim == 4 and len(vertices) == 1 else vertices
+        return _as_numbers(one, "the vertices", path)
     if isinstance(vertices, list | tuple) and all(isinstance(v, np.ndarray) for v in vertices):
         shapes = [v.shape[1:] if v.ndim == 3 and len(v) == 1 else v.shape for v in vertices]
         for frame, shape in enumerate(shapes):
@@ -151,7 +152,8 @@ def _stacked(vertices: Any, path: Path) -> NDArray[Any]:
         if shapes:
             # All frames may be one and the same array in the file.
             check_size(path, sum(v.nbytes for v in vertices), path.stat().st_size)
-            return np.stack([v.reshape(shapes[0]) for v in vertices])
+            stacked = np.stack([v.reshape(shapes[0]) for v in vertices])
+            return _as_numbers(stacked, "the vertices", path)
     raise Sd2Error(
         f"{path}: the vertices are a {type(vertices).__name__}",
         "a NumPy array (frames, vertices, 3), or a list with one array per frame",
@@ -159,12 +161,26 @@ def _stacked(vertices: Any, path: Path) -> NDArray[Any]:
     )
 
 
-def _array(entry: dict[Any, Any], content: dict[Any, Any], names: tuple[str, ...]) -> Any:
+def _numbers(
+    path: Path, entry: dict[Any, Any], content: dict[Any, Any], names: tuple[str, ...]
+) -> Any:
+    """Numbers under the first of these names, of the person or of all; None where there are none.
+
+    Raises Sd2Error where a text, or an array of anything else, stands there.
+    """
     for place in (entry, content):
         for name in names:
-            if isinstance(place.get(name), np.ndarray | int | float):
-                return np.asarray(place[name])
+            found = place.get(name)
+            if isinstance(found, np.ndarray | int | float | str | bytes):
+                return _as_numbers(np.asarray(found), name, path)
     return None
+
+
+def _as_numbers(values: NDArray[Any], name: str, path: Path) -> NDArray[Any]:
+    if values.dtype.kind not in "biuf":
+        shown = " ".join(str(values).split())[:60]
+        raise Sd2Error(f"{path}: {name} is {shown!r}, of type {values.dtype}", "numbers")
+    return values
 
 
 def _place_in_front(

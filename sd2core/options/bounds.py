@@ -1,10 +1,12 @@
-"""Least and greatest values of settings, stated once for library, commands, plans and window."""
+"""Least and greatest values, stated once: of settings, and of numbers that files declare."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from typing import Any
+
+from sd2core.sensor import FARTHEST_M, MAX_BINS
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,16 @@ STRIP_FRAMES = Bounds(1, 100, whole=True)
 RANGE_EXPONENT = Bounds(0.0, 8.0)
 REFERENCE_RANGE_M = Bounds(0.0, 1000.0, above=True)
 """Within these, the range law stays within single precision at any range."""
+
+BINS = Bounds(2, MAX_BINS, whole=True)
+FRAME_RATE_HZ = Bounds(0.0, 1e6, above=True)
+SEGMENT_FRAMES = Bounds(1, 1_000_000, whole=True)
+NUMBER_OF_ROWS = Bounds(0, 1 << 40, whole=True)
+"""Of arrays, and of frames."""
+PLACEMENT = Bounds(0, 2**31 - 1, whole=True)
+TIME_S = Bounds(-1e15, 1e15)
+"""Whole seconds are still told apart."""
+COORDINATE_M = Bounds(-FARTHEST_M, FARTHEST_M)
 
 EPOCHS = Bounds(1, 1_000_000, whole=True)
 BATCH_SIZE = Bounds(1, 100_000, whole=True)

@@ -8,10 +8,18 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from sd2core.declared import PairProvenance, check_names, check_record
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import open_regular
 from sd2core.files.stores import read_attributes
 from sd2core.files.texts import first_fault, parse_json, whole_lines
+from sd2core.options.bounds import (
+    BINS,
+    COORDINATE_M,
+    FRAME_RATE_HZ,
+    NUMBER_OF_ROWS,
+    PLACEMENT,
+)
 from sd2core.pairs.segments import segment_starts
 
 PairKind = Literal["simulated", "real"]
@@ -23,6 +31,7 @@ INDEX_NAME = "takes.jsonl"
 REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
 
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
+_Coordinate = Annotated[float, COORDINATE_M]
 
 
 class TakeKey(NamedTuple):
@@ -40,10 +49,10 @@ class TakeEntry(BaseModel):
 
     subject: str
     name: str
-    placement: Annotated[int, Field(ge=0)]
-    start: Annotated[int, Field(ge=0)]
-    stop: Annotated[int, Field(le=1 << 40)]  # Its frames in all arrays, from start on.
-    sensor_position_m: tuple[_Finite, _Finite, _Finite]
+    placement: Annotated[int, PLACEMENT]
+    start: Annotated[int, NUMBER_OF_ROWS]
+    stop: Annotated[int, NUMBER_OF_ROWS]  # Its frames in all arrays, from start on.
+    sensor_position_m: tuple[_Coordinate, _Coordinate, _Coordinate]
 
     @property
     def key(self) -> TakeKey:
@@ -63,10 +72,10 @@ class PairFacts(BaseModel):
 
     path: Path
     kind: PairKind
-    bins: Annotated[int, Field(ge=2, le=1 << 16)]
+    bins: Annotated[int, BINS]
     v_max_mps: Annotated[_Finite, Field(gt=0)]
     null_bins: tuple[int, ...]
-    frame_rate_hz: Annotated[_Finite, Field(gt=0)]
+    frame_rate_hz: Annotated[float, FRAME_RATE_HZ]
     labels: Annotated[tuple[str, ...], Field(min_length=1)]
     provenance: dict[str, Any]
     parts: tuple[str, ...] = ()  # Of the body, by which the input is also split.
@@ -152,6 +161,8 @@ def pair_facts(path: Path) -> PairFacts:
         facts = PairFacts.model_validate({**header, "path": path, "takes": ()})
         if any(not 0 <= number < facts.bins for number in facts.null_bins):
             raise ValueError(f"null_bins are {list(facts.null_bins)}")
+        check_names(facts.labels, "labels", path)
+        check_record(PairProvenance, facts.provenance, f"{path}: its provenance")
     except ValueError as error:
         raise Sd2Error(
             f"{path}: its header is damaged ({_reason_of(error)})", "one as it was written", REMAKE

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import pickle
 import shutil
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,12 +18,18 @@ import zarr
 from numcodecs import Blosc, GZip, Zstd
 
 from sd2core.classify.files import load_classifier, save_classifier
+from sd2core.datasets.card import card_text, describe_dataset
+from sd2core.datasets.clips import clips_of_dataset
+from sd2core.datasets.labelled import labelled_facts
+from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.sources import pair_sources
+from sd2core.datasets.torch_dataset import SegmentDataset
 from sd2core.datasets.writing import write_dataset
 from sd2core.denoise.files import load_model, save_model
+from sd2core.errors import Sd2Error
 from sd2core.fmcw import doppler_map
 from sd2core.imu.files import read_signals, write_signals
 from sd2core.imu.signals import InertialSignals
@@ -42,6 +50,7 @@ from tests.core.io.radar.acconeer_files import write_a121
 from tests.core.io.radar.dca1000_files import TiRecording, write_ti
 from tests.core.io.radar.kkt_files import write_kkt
 from tests.mutants.target import Target
+from tests.mutants.telling import tell
 from tests.small_pairs import write_pairs
 
 
@@ -135,7 +144,21 @@ def _write_surface(path: Path) -> None:
 def _write_map(path: Path) -> None:
     values = np.random.default_rng(3).random((16, 60)).astype(np.float32)
     time = Timebase.regular(60, 30.0)
-    DopplerMap(values, VelocityAxis(16, 2.0), time, "synthetic", "share", meta={}).save(path)
+    meta = {
+        "sensor": {"position_m": [0.0, 0.0, 2.0], "azimuth_deg": 3.0},
+        "visibility": "raster",
+        "visible_share": [0.5] * 60,
+        "beyond_share": [0.01] * 60,
+        "mask_stride": 2,
+        "count": "expected",
+        "plan": {"text": "every second mask"},
+        "body_error_l1": 0.3,
+        "plan_error_l1": 0.05,
+        "options": {"visibility": "raster", "weight": "area"},
+        "radar": {"name": "r", "start_frequency_hz": 6e10, "end_frequency_hz": 6.1e10},
+        "notes": ["A note."],
+    }
+    DopplerMap(values, VelocityAxis(16, 2.0), time, "synthetic", "share", meta=meta).save(path)
 
 
 def _read_mesh(path: Path) -> None:
@@ -160,33 +183,60 @@ def _write_dataset(path: Path) -> None:
 
 
 def _read_dataset(path: Path) -> None:
+    """Read all of it as whoever asks for facts, learns from it or looks at it does."""
     with open_dataset(path) as dataset:
         list(dataset.sources())
         for name in dataset.arrays:
             dataset[name][:]
+        card_text(describe_dataset(dataset))
+    tell(path)
+    with suppress(Sd2Error):  # nothing to learn from
+        items = SegmentDataset(path, "synthetic", "class")
+        items.__getitems__(list(range(len(items))))
+    labelled_facts(LabelledSource(path))
+    with open_dataset(path) as dataset:
+        clips_of_dataset(dataset, "synthetic")
+
+
+def _read_pairs(path: Path) -> None:
+    read_pairs(path)
+    tell(path)
+    labelled_facts(LabelledSource(path))
+
+
+def _told(read: Callable[[Path], object]) -> Callable[[Path], None]:
+    """A reader, and what is said of the file to people and programs."""
+
+    def both(path: Path) -> None:
+        read(path)
+        tell(path)
+
+    return both
 
 
 TARGETS = [
-    Target("mesh.zarr", _write_mesh, _read_mesh),
-    Target("mesh.zarr.zip", _write_mesh, _read_mesh),
-    Target("pairs.zarr", _write_pairs, read_pairs),
+    Target("mesh.zarr", _write_mesh, _told(_read_mesh)),
+    Target("mesh.zarr.zip", _write_mesh, _told(_read_mesh)),
+    Target("pairs.zarr", _write_pairs, _read_pairs),
     Target("set.zarr", _write_dataset, _read_dataset),
     Target("set.h5", _write_dataset, _read_dataset),
     Target("set.npz", _write_dataset, _read_dataset),
-    Target("old.zarr", _write_old_mesh, _read_mesh),
-    Target("mesh.npz", _write_mesh, _read_mesh),
-    Target("body.pkl", lambda path: path.write_bytes(pickle.dumps(_person())), _read_mesh),
-    Target("old.pkl", lambda path: path.write_bytes(pickle.dumps(_person(), 2)), _read_mesh),
-    Target("body.joblib", lambda path: joblib.dump(_person(), path, compress=1), _read_mesh),
-    Target("plain.joblib", lambda path: joblib.dump(_person(), path), _read_mesh),
-    Target("body.obj", _write_surface, _read_mesh),
-    Target("body.ply", _write_surface, _read_mesh),
-    Target("body.glb", _write_surface, _read_mesh),
-    Target("imu.npz", _write_imu, read_signals),
-    Target("map.npz", _write_map, DopplerMap.load),
-    Target("model.safetensors", lambda path: save_model(path, trained("s4")), load_model),
+    Target("old.zarr", _write_old_mesh, _told(_read_mesh)),
+    Target("mesh.npz", _write_mesh, _told(_read_mesh)),
+    Target("body.pkl", lambda path: path.write_bytes(pickle.dumps(_person())), _told(_read_mesh)),
+    Target("old.pkl", lambda path: path.write_bytes(pickle.dumps(_person(), 2)), _told(_read_mesh)),
+    Target("body.joblib", lambda path: joblib.dump(_person(), path, compress=1), _told(_read_mesh)),
+    Target("plain.joblib", lambda path: joblib.dump(_person(), path), _told(_read_mesh)),
+    Target("body.obj", _write_surface, _told(_read_mesh)),
+    Target("body.ply", _write_surface, _told(_read_mesh)),
+    Target("body.glb", _write_surface, _told(_read_mesh)),
+    Target("imu.npz", _write_imu, _told(read_signals)),
+    Target("map.npz", _write_map, _told(DopplerMap.load)),
+    Target("model.safetensors", lambda path: save_model(path, trained("s4")), _told(load_model)),
     Target(
-        "gestures.safetensors", lambda path: save_classifier(path, classifier()), load_classifier
+        "gestures.safetensors",
+        lambda path: save_classifier(path, classifier()),
+        _told(load_classifier),
     ),
     Target("radar.h5", write_kkt, load_recorded_map),
     Target("a121.h5", write_a121, _read_capture),

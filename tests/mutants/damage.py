@@ -11,11 +11,13 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+from tests.mutants.array_damage import damage_arrays, damages_arrays
 from tests.mutants.text_damage import WAYS, damage_record
 
 _HOSTILE: tuple[Any, ...] = (
-    None, True, -1, 0, 1, 7, 65537, 10**9, 2**62, 1e300, 1e-300, 0.5, "", "x", "NaN", "Infinity",
-    [], {}, [[]], [0], [-1], [3, 3], [10**9], {"name": "x"}, "blosc", "float64", "S4", "🦆",
+    None, True, -1, 0, 1, 7, 65537, 10**9, 50_000_000, 700_000_000, 2**62, 1e300, 1e-300, 0.5,
+    "", "x", "NaN", "Infinity", [], {}, [[]],
+    [0], [-1], [3, 3], [10**9], {"name": "x"}, "blosc", "float64", "S4", "🦆",
 )  # fmt: skip
 _SIZES = (0, 1, 255, 65537, 10**9, 2**31, 2**40, 2**62, 2**64 - 1)
 
@@ -23,6 +25,8 @@ _SIZES = (0, 1, 255, 65537, 10**9, 2**31, 2**40, 2**62, 2**64 - 1)
 def mutate(path: Path, seed: int) -> str:
     """Damage a file, or one file of a folder; returns how."""
     rng = random.Random(seed)
+    if damages_arrays(path) and rng.random() < 0.5:
+        return f"{damage_arrays(path, rng, _replace_value)} in {path.name}"
     files = [path] if path.is_file() else sorted(one for one in path.rglob("*") if one.is_file())
     texts = [one for one in files if one.suffix in (".json", ".jsonl")]
     file = rng.choice(texts if texts and rng.random() < 0.5 else files)
@@ -114,6 +118,8 @@ def _replace_value(content: bytes, rng: random.Random) -> bytes:
     node, key = rng.choice(places)
     if rng.random() < 0.2:
         del node[key]
+    elif isinstance(node[key], list) and node[key] and rng.random() < 0.5:
+        node[key] = [node[key][0]] * (len(node[key]) + rng.randrange(2))  # names repeated
     else:
         node[key] = rng.choice(_HOSTILE)
     return json.dumps(document).encode()

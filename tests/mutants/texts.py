@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
-from contextlib import redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,8 +10,6 @@ import numpy as np
 
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan_file import read_plan
-from sd2core.cli.command_parser import record_of
-from sd2core.cli.parser import build_parser
 from sd2core.errors import Sd2Error
 from sd2core.files.recording_json import CameraEntry
 from sd2core.imu.files import read_signals, write_signals
@@ -38,6 +34,7 @@ from sd2core.train.folder import TrainingFolder
 from tests.core.mocap.mars_files import approaching, write_part
 from tests.labelled import imported
 from tests.mutants.target import Target
+from tests.mutants.telling import sd2, tell
 from tests.numbered_videos import write_video
 
 _CLOCK = Timebase.regular(120, 30.0)
@@ -90,21 +87,13 @@ elevation_deg = [0.0, 10.0]
 """
 
 
-def _sd2(*command: object) -> None:
-    """Run a command and print what it prints as a terminal in UTF-8 would."""
-    parser, _ = build_parser()
-    options = parser.parse_args(list(map(str, command)))
-    with redirect_stdout(io.TextIOWrapper(io.BytesIO(), encoding="utf-8")):
-        options.handler(record_of(options))
-
-
 def _labels(name: str, format: str) -> Target:
     def write(path: Path) -> None:
         write_labels(path, _LABELS, _CLOCK, format)
 
     def read(path: Path) -> None:
         read_labels(path, _CLOCK, format)
-        _sd2("labels", "show", path, "--format", format)
+        sd2("labels", "show", path, "--format", format)
 
     return Target(name, write, read)
 
@@ -181,24 +170,19 @@ _REAL_IMU = "time (ms);acc_x [g];acc_y [g];acc_z [g];gx_dps;gy_dps;gz_dps\n" + "
 
 
 def _read_imu(path: Path) -> None:
-    _sd2("info", path)
+    sd2("info", path)
     read_signals(path)
 
 
 def _read_video(path: Path) -> None:
-    _sd2("info", path)
+    sd2("info", path)
     with open_video(path) as video:
         for frame in (0, len(video) // 2, len(video) - 1):
             video.read(frame)
 
 
-def _info(path: Path) -> None:
-    _sd2("info", path, "--json")
-    _sd2("info", path)
-
-
 TARGETS = [
-    Target("recording.sd2", _write_recording, _info),
+    Target("recording.sd2", _write_recording, tell),
     Target("labels.json", lambda path: files.write_labels(path, _LABELS), files.read_labels),
     Target(
         "label-set.json", lambda path: files.write_label_set(path, GESTURES), files.read_label_set
@@ -226,7 +210,7 @@ TARGETS = [
     Target("errors.json", lambda path: FitErrors.load().save(path), FitErrors.load),
     Target("run", _write_run, lambda path: TrainingFolder(path).status()),
     Target("batch", _write_batch, lambda path: BatchFolder(path).status()),
-    Target("infineon", _write_capture, _info),
+    Target("infineon", _write_capture, tell),
     Target("mars", _write_mars, _read_mars),
     Target("imu.csv", _write_imu, _read_imu),
     Target("imu.sto", _write_imu, _read_imu),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from statistics import fmean
@@ -336,10 +337,11 @@ def bins_in_words(axis: VelocityAxis, bins: tuple[int, ...]) -> str:
 
 
 def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
-    if "visible_share" not in provenance:
+    if provenance.get("visible_share") is None:
         return {}
-    x, y, z = provenance["sensor"]["position_m"]
-    visible, beyond = provenance["visible_share"], provenance["beyond_share"]
+    sensor = provenance.get("sensor")
+    x, y, z = (math.nan,) * 3 if sensor is None else sensor["position_m"]
+    visible, beyond = provenance["visible_share"], provenance.get("beyond_share") or [0.0]
     worst = max(range(len(beyond)), key=beyond.__getitem__)
     stride = provenance.get("mask_stride", 1)
     shared = "" if stride == 1 else f", computed for one frame in {stride}"
@@ -347,10 +349,10 @@ def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
     return {
         "plan": "" if plan is None else plan["text"],
         # Both are the same map of a mesh that says nothing.
-        "count": provenance["count"] if "body_error_l1" in provenance else "",
-        "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
-        "visibility": f"{provenance['visibility']}: {fmean(visible):.1%} visible on average"
-        + shared,
+        "count": provenance.get("count", "") if "body_error_l1" in provenance else "",
+        "sensor": "" if sensor is None else f"at x {x:g}, y {y:g}, z {z:g} m",
+        "visibility": f"{provenance.get('visibility') or 'not stated'}:"
+        f" {fmean(visible):.1%} visible on average" + shared,
         "beyond axis": f"{fmean(beyond):.1%} of what is visible on average"
         + (f", {beyond[worst]:.1%} in frame {worst}" if beyond[worst] > 0 else ""),
     }
