@@ -456,7 +456,7 @@ class DopplerMap:
         if arrays["values"].dtype.kind != "f" or not np.isfinite(arrays["values"]).all():
             raise Sd2Error(f"{path}: values hold NaN, infinity or no numbers", "finite numbers")
         try:
-            from sd2core.declared import MapMeta, check_record  # loads pydantic
+            from sd2core.options.declared import MapMeta, check_record  # loads pydantic
 
             meta = json.loads(str(arrays["meta"]))
             version = meta.get("version", 0)

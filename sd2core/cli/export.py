@@ -246,6 +246,7 @@ def _forecast_facts(forecast: Forecast) -> dict[str, str]:
 
 def _said(written: Written, sheet: Path) -> dict[str, Any]:
     from sd2core.datasets.card import card_paths
+    from sd2core.files.texts import read_json
 
     markdown, as_json, _ = card_paths(written.path)
     return {
@@ -254,6 +255,7 @@ def _said(written: Written, sheet: Path) -> dict[str, Any]:
         "card": str(markdown),
         "card_json": str(as_json),
         "sheet": str(sheet),
+        "frames_damaged": read_json(as_json)["frames_damaged"],
         "failed": [f"{one.key.title}: {one.reason}" for one in written.failed],
     }
 
@@ -270,6 +272,10 @@ def _print(written: Written, sheet: Path) -> None:
             "sheet": said["sheet"],
         },
     )
+    if said["frames_damaged"]:
+        from sd2core.datasets.card import damage_text
+
+        print(f"sd2: {damage_text(said['frames_damaged'])}", file=sys.stderr)
     _complain(said["failed"])
 
 

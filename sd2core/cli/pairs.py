@@ -238,13 +238,24 @@ def _recordings(options: Recordings) -> None:
             name: {"takes": takes, "frames": frames}
             for name, (takes, frames) in made.subjects.items()
         }
-        print_json({"pairs": str(options.out), "subjects": subjects, "left_out_s": made.left_out_s})
+        print_json(
+            {
+                "pairs": str(options.out),
+                "subjects": subjects,
+                "left_out_s": made.left_out_s,
+                "damaged_frames": made.damaged,
+            }
+        )
         return
     facts = {
         name: f"{takes} takes, {frames:,} frames" for name, (takes, frames) in made.subjects.items()
     }
     if made.left_out_s > 0:
         facts["left out"] = f"{made.left_out_s:.1f} s without a person or a radar frame"
+    if made.damaged:
+        facts["damaged"] = ", ".join(
+            f"{count:,} frames of {name}, left out" for name, count in made.damaged.items()
+        )
     print_facts(str(options.out), facts)
 
 

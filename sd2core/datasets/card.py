@@ -110,6 +110,7 @@ def _count_sources(sources: Iterable[dict[str, Any]], header: Header) -> dict[st
         if views[recording] == 1:
             minutes += entry["frames"] / entry["frame_rate_hz"] / 60
             totals["without person"] += entry["frames"] - entry["frames_with_person"]
+            totals["damaged"] += provenance.get("damaged_frames", 0)
             totals["simulated"] += bool(provenance.get("simulated"))
             spans.update(entry.get("spans", {}))
         cutoffs_hz += [made["cutoff_hz"] for made in provenance.get("imu", {}).values()]
@@ -124,6 +125,7 @@ def _count_sources(sources: Iterable[dict[str, Any]], header: Header) -> dict[st
         "minutes": minutes,
         "placements": max(views.values(), default=0),  # from which a recording is seen, at most
         "frames_without_person": totals["without person"],
+        "frames_damaged": totals["damaged"],
         "sources_without_segments": totals["empty"],
         "simulated_recordings": totals["simulated"],
         # Of the median source with fitted bodies.
@@ -268,9 +270,12 @@ def limits(card: dict[str, Any]) -> list[str]:
             f"{card['resampled_segments']:,} segments had uneven frames or another frame rate and"
             f" were brought to {card['frame_rate_hz']:g} frames/s by linear interpolation."
         )
-    if card["frames_without_person"]:
+    if damaged := card["frames_damaged"]:
+        found.append(damage_text(damaged))
+    if card["frames_without_person"] > damaged:
         found.append(
-            f"{card['frames_without_person']:,} frames without a person are in no segment."
+            f"{card['frames_without_person'] - damaged:,} frames without a person are in no"
+            " segment."
         )
     if card["sources_without_segments"]:
         found.append(
@@ -292,6 +297,14 @@ def limits(card: dict[str, Any]) -> list[str]:
             "Placements show the same movements from other places: they add views, not movements."
         )
     return found
+
+
+def damage_text(frames: int) -> str:
+    """What became of frames that were lost to damaged chunks of meshes."""
+    return (
+        f"{frames:,} frames are lost to damaged chunks of their meshes and are in no segment:"
+        " copy those meshes again, or write them again."
+    )
 
 
 def duration_text(card: dict[str, Any]) -> str:

@@ -11,13 +11,13 @@ from typing import Annotated, Any, Literal
 from pydantic import TypeAdapter
 
 from sd2core.datasets.source import KINDS
-from sd2core.declared import check_names
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import damage_in
 from sd2core.io.kinds import DATASET_FORMAT
 from sd2core.maps import MapKind
 from sd2core.mesh.vertex_parts import QUANTITIES
 from sd2core.options.bounds import FRAME_RATE_HZ, NUMBER_OF_ROWS, SEGMENT_FRAMES, UP_TO_ONE
+from sd2core.options.declared import check_names
 from sd2core.options.exporting import LabelRule, SpanOptions
 from sd2core.sensor import VelocityAxis
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from sd2core.datasets import formats, store
 from sd2core.datasets.layout import SPLITS, FileFormat, Header, format_of
-from sd2core.declared import DeclaredColumn, SourceEntry, check_record, column_bounds
 from sd2core.errors import Sd2Error
+from sd2core.options.declared import DeclaredColumn, SourceEntry, check_record, column_bounds
 
 
 @dataclass(eq=False)

@@ -38,6 +38,7 @@ from sd2core.fmcw.processing import doppler_map
 from sd2core.imu.mounting import mounted
 from sd2core.imu.signals import InertialSignals
 from sd2core.imu.virtual import imu_at_frames
+from sd2core.io.stored_vertices import damaged_frames
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.mesh.sequence import MeshSequence
@@ -270,6 +271,7 @@ class _Opened:
                 "simulated": self.recording.simulated,
                 "radar_offset_s": self.recording.radar_offset_s,
                 **({"radar_channel": channel} if channel else {}),
+                **({"damaged_frames": self._damaged} if self._damaged else {}),
                 **plan,
             },
             self._imu,
@@ -329,6 +331,11 @@ class _Opened:
             return self.recording.sensor
         assert self._target_m is not None
         return places_of(self.recording, self._making)[placement - 1].sensor(self._target_m)
+
+    @property
+    def _damaged(self) -> int:
+        """Frames of the mesh in damaged chunks, which are in no segment."""
+        return 0 if self._mesh is None else damaged_frames(self._mesh.vertices)
 
     @cached_property
     def _target_m(self) -> Vector | None:

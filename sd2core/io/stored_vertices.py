@@ -132,6 +132,11 @@ class StoredVertices:
             raise Sd2Error(error.found, error.expected, remedy) from error
 
 
+def damaged_frames(vertices: Any) -> int:
+    """Number of frames of a mesh that were lost to damaged chunks of its file."""
+    return sum(one.stop - one.start for one in getattr(vertices, "damaged", ()))
+
+
 def real_type(dtype: Any) -> np.dtype[Any]:
     """Single precision where it holds every number of this type, otherwise double."""
     return np.dtype(np.float32 if np.can_cast(dtype, np.float32) else np.float64)

@@ -16,6 +16,7 @@ from sd2core.body.parts import synthetic_map
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
+from sd2core.io.stored_vertices import damaged_frames
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
 from sd2core.mesh.vertex_parts import PARTS
@@ -41,6 +42,7 @@ class PairsMade:
     subjects: dict[str, tuple[int, int]]  # takes and frames
     left_out_s: float
     """Time without a radar frame, without a person, or in rests shorter than a second."""
+    damaged: dict[str, int]  # Frames lost to damaged chunks, of the recordings that have some.
 
 
 def make_recording_pairs(
@@ -85,8 +87,9 @@ def make_recording_pairs(
     first: tuple[Path, float, bool] | None = None
     found: dict[str, tuple[int, int]] = {}
     left_out_s = 0.0
+    damaged: dict[str, int] = {}
     for number, (recording, subject) in enumerate(named):
-        synthetic, radar = _maps(
+        synthetic, radar, lost = _maps(
             recording, synthesis, limbs, part_of(progress, number, number + 1, len(opened))
         )
         rate_hz = synthetic.timebase.frames_per_s
@@ -110,6 +113,8 @@ def make_recording_pairs(
                 },
                 parts=PARTS if limbs else (),
             )
+        if lost:
+            damaged[recording.folder.name] = lost
         takes, without_s = _takes(recording, subject, synthetic, radar, labels)
         left_out_s += without_s
         for take in takes:
@@ -119,7 +124,7 @@ def make_recording_pairs(
         found[subject] = (
             count + len(takes), frames + sum(len(take.times_s) for take in takes),
         )  # fmt: skip
-    return PairsMade(found, left_out_s)
+    return PairsMade(found, left_out_s, damaged)
 
 
 def named_recordings(
@@ -159,13 +164,14 @@ def check_there(recordings: Sequence[Recording], roles: Sequence[Literal["mesh",
 
 def _maps(
     recording: Recording, synthesis: SynthesisOptions, limbs: bool, progress: Progress
-) -> tuple[DopplerMap, DopplerMap]:
+) -> tuple[DopplerMap, DopplerMap, int]:
+    """Synthetic map, radar map, and the mesh's frames in damaged chunks."""
     mesh = recording.load_mesh()
     maker, counting = Synthesizer(mesh, synthesis), part_of(progress, 0.0, 0.9)
     made = synthetic_map(maker, recording.sensor, limbs=limbs, progress=counting)
     radar = doppler_map(recording.load_capture(), axis=synthesis.axis, clutter=CLUTTER)
     progress(1, 1)
-    return made, radar
+    return made, radar, damaged_frames(mesh.vertices)
 
 
 def check_rates(rates_hz: Mapping[Path, float]) -> None:

@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from sd2core.declared import PairProvenance, check_names, check_record
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import open_regular
 from sd2core.files.stores import read_attributes
@@ -20,6 +19,7 @@ from sd2core.options.bounds import (
     NUMBER_OF_ROWS,
     PLACEMENT,
 )
+from sd2core.options.declared import PairProvenance, check_names, check_record
 from sd2core.pairs.segments import segment_starts
 
 PairKind = Literal["simulated", "real"]

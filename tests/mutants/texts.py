@@ -65,6 +65,24 @@ format = "zarr"
 segment_frames = 72
 test_subjects = ["Ada"]
 """
+_CUES = """\
+WEBVTT
+
+1
+00:00:00.500 --> 00:00:01.500
+<v Ada>wave
+
+00:02.000 --> 00:03.000
+tap
+"""
+_STUDIO = """[{"id": 1, "data": {"video": "/data/a.mp4"}, "annotations": [{
+  "completed_by": 3, "result": [
+    {"type": "timelinelabels", "from_name": "hand",
+     "value": {"ranges": [{"start": 15, "end": 45}], "timelinelabels": ["wave"]}},
+    {"type": "timeserieslabels",
+     "value": {"start": 2.0, "end": 3.0, "timeserieslabels": ["tap"]}}
+  ]}]}]
+"""
 _SETTINGS = """\
 [data]
 pairs = ["campaign.zarr"]
@@ -198,6 +216,8 @@ TARGETS = [
         "track\tlabel\tfirst_frame\tlast_frame\nleft\twave\t3\t9\nleft\ttap\t20\t40\n",
         lambda path: read_labels(path, _CLOCK),
     ),
+    _text("cues.vtt", _CUES, lambda path: read_labels(path, _CLOCK)),
+    _text("studio.json", _STUDIO, lambda path: read_labels(path, _CLOCK, "label-studio")),
     Target("000001-000001.journal", lambda path: path.write_bytes(_journal()), _read_journal),
     _text("plan.toml", _PLAN, read_plan),
     _text("training.toml", _SETTINGS, read_config),

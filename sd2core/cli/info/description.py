@@ -340,7 +340,7 @@ def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
     if provenance.get("visible_share") is None:
         return {}
     sensor = provenance.get("sensor")
-    x, y, z = (math.nan,) * 3 if sensor is None else sensor["position_m"]
+    x, y, z = sensor["position_m"] if isinstance(sensor, dict) else (math.nan,) * 3
     visible, beyond = provenance["visible_share"], provenance.get("beyond_share") or [0.0]
     worst = max(range(len(beyond)), key=beyond.__getitem__)
     stride = provenance.get("mask_stride", 1)
@@ -350,7 +350,7 @@ def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
         "plan": "" if plan is None else plan["text"],
         # Both are the same map of a mesh that says nothing.
         "count": provenance.get("count", "") if "body_error_l1" in provenance else "",
-        "sensor": "" if sensor is None else f"at x {x:g}, y {y:g}, z {z:g} m",
+        "sensor": "" if math.isnan(x) else f"at x {x:g}, y {y:g}, z {z:g} m",
         "visibility": f"{provenance.get('visibility') or 'not stated'}:"
         f" {fmean(visible):.1%} visible on average" + shared,
         "beyond axis": f"{fmean(beyond):.1%} of what is visible on average"

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import zarr
 from small_pairs import write_pairs
 from swinging_recordings import FRAMES, RATE_HZ, recording
 
@@ -15,6 +16,7 @@ from sd2core.accuracy.places import PlacedPlan
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.accuracy.trial import synthesizer_for
 from sd2core.body.parts import synthetic_map
+from sd2core.datasets.card import describe_dataset, limits
 from sd2core.datasets.forecast import Counting
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
@@ -31,6 +33,7 @@ from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.labels.files import write_labels
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Span
+from sd2core.mocap.recording_pairs import make_recording_pairs
 from sd2core.pairs.store import read_pairs
 from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import PlacementGrid
@@ -307,3 +310,35 @@ def test_what_cannot_be_exported_is_named(tmp_path: Path) -> None:
         source.load(silent)
     assert len(one.load_mesh().timebase) == FRAMES
     assert one.load_mesh().timebase.frames_per_s == pytest.approx(RATE_HZ)
+
+
+def damaged_recording(folder: Path) -> Recording:
+    """A recording of 120 frames whose mesh has lost frames 40 to 59."""
+    one = recording(folder, radar_frames=FRAMES)
+    mesh = one.load_mesh()
+    group = zarr.open_group(str(folder / "mesh.zarr"), mode="w")
+    group.create_array("vertices", data=mesh.vertices[:], chunks=(20, 6, 3))
+    for name, values in (("times_s", mesh.timebase.times_s), ("faces", mesh.faces)):
+        group.create_array(name, data=values)
+    (folder / "mesh.zarr" / "vertices" / "c" / "2" / "0" / "0").unlink()
+    again = replace(one, mesh=folder / "mesh.zarr")
+    again.save()
+    return again
+
+
+def test_frames_of_damaged_chunks_are_in_no_segment_and_told(tmp_path: Path) -> None:
+    one = damaged_recording(tmp_path / "anna.sd2")
+    out = tmp_path / "set.zarr"
+    options = DatasetOptions(length=20, overlap=0)
+    write_dataset(out, gather([one.folder], Making(kinds=("synthetic",))), options)
+    with open_dataset(out) as opened:
+        card = describe_dataset(opened)
+        starts = opened["start_frame"][:]
+    assert card["frames_damaged"] == 20
+    assert [one for one in limits(card) if "20 frames are lost to damaged chunks" in one]
+    assert not [one for one in limits(card) if "without a person" in one]
+    assert not [start for start in starts if 20 < start < 60]
+    made_pairs = make_recording_pairs([one.folder], tmp_path / "pairs.zarr")
+    assert made_pairs.damaged == {"anna.sd2": 20}
+    takes = read_pairs(tmp_path / "pairs.zarr").takes
+    assert sum(len(take.times_s) for take in takes) == FRAMES - 20

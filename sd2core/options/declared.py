@@ -60,7 +60,7 @@ class _Plan(_Record):
 class MapMeta(_Record):
     """Provenance of a Doppler map, as far as anything is done with it."""
 
-    sensor: SensorMeta | None = None
+    sensor: SensorMeta | list[_Number] | None = None
     options: dict[str, Any] = {}
     plan: _Plan | None = None
     count: str = ""
@@ -81,6 +81,7 @@ class _InertialMeta(_Record):
 
 class _SourceProvenance(MapMeta):
     maps: dict[MapKind, MapMeta]
+    damaged_frames: _Rows = 0
     imu: dict[str, _InertialMeta] = {}
 
 
