@@ -154,7 +154,7 @@ def made_text(kind: str, made: dict[str, Any], provenance: dict[str, Any]) -> st
         if "pairs" in provenance:
             return f"from the pairs {provenance['pairs']}"
         plan = provenance.get("plan") or made.get("plan")
-        count = f"{made['count']}, " if "body_error_l1" in made else ""
+        count = f"{made.get('count', 'plain')}, " if "body_error_l1" in made else ""
         if plan is not None:
             return f"counted from a mesh: {count}by the plan {plan['text']}"
         return (

@@ -66,7 +66,7 @@ class MapMeta(_Record):
     count: str = ""
     visibility: str = ""
     visible_share: Annotated[list[_Share], Field(min_length=1)] | None = None
-    beyond_share: Annotated[list[_Share], Field(min_length=1)] | None = None
+    beyond_share: Annotated[list[_Share], Field(min_length=1)] | _Share | None = None
     mask_stride: Annotated[int, COUNT] = 1
     body_error_l1: _Error | None = None
     plan_error_l1: _Error | None = None
@@ -110,8 +110,8 @@ class SourceEntry(_Record):
 
 
 class _Protocol(_Record):
-    name: str
-    order: str
+    name: str = ""
+    order: str = ""
 
 
 class PairProvenance(_Record):

@@ -341,7 +341,8 @@ def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
         return {}
     sensor = provenance.get("sensor")
     x, y, z = sensor["position_m"] if isinstance(sensor, dict) else (math.nan,) * 3
-    visible, beyond = provenance["visible_share"], provenance.get("beyond_share") or [0.0]
+    visible, beyond = provenance["visible_share"], provenance.get("beyond_share") or 0.0
+    beyond = beyond if isinstance(beyond, list) else [beyond]
     worst = max(range(len(beyond)), key=beyond.__getitem__)
     stride = provenance.get("mask_stride", 1)
     shared = "" if stride == 1 else f", computed for one frame in {stride}"

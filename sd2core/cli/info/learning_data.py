@@ -97,5 +97,5 @@ def describe_pairs(path: Path, pairs: PairSet) -> Description:
 def _protocol_in_words(pairs: PairSet) -> str:
     if pairs.provenance.get("made_by") != "sd2 simulate campaign":
         return ""
-    protocol = pairs.provenance.get("protocol", {"name": "varied", "order": "random"})
+    protocol = {"name": "varied", "order": "random"} | (pairs.provenance.get("protocol") or {})
     return f"{protocol['name']}, swipes {protocol['order'].replace('random', 'in random order')}"
