@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_json, print_rows, progress_bar
-from sd2core.files.paths import PICKLE_SUFFIXES
 from sd2core.options.kinds import Words
 from sd2core.options.records import ARGUMENTS, OptionError
 from sd2core.options.shared import Figure, Json, MeshReading, Sensor
@@ -151,12 +150,13 @@ def _load(path: Path, options: CompareMeshes) -> MeshSequence:
     from sd2core.body.model import own_resolution
     from sd2core.cli.reading import mesh_reading
     from sd2core.io.mesh import load_mesh
+    from sd2core.io.mesh_models import is_estimate
     from sd2core.recording.recording import is_recording, open_recording
 
     if is_recording(path):
         return open_recording(path).load_mesh()
     told: dict[str, Any] = mesh_reading(options).options() | {"faces": options.faces}
-    if path.suffix.lower() in PICKLE_SUFFIXES:
+    if is_estimate(path):
         return load_mesh(path, **told)
     mesh = load_mesh(path)
     general = {name: told[name] for name in ("frames_per_s", "scale", "faces") if told.get(name)}

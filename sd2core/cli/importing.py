@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import shutil
+import sys
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from sd2core.recording.recording import Recording
     from sd2core.sensor import VirtualSensor
 
+_VERTICES = "mesh.zarr"
 _CHANNEL = ("receiver", "transmitter")
 _ABOUT_THE_BODY = ("range_m", "azimuth_deg", "elevation_deg")
 _LEFT_OUT = {
@@ -45,8 +48,8 @@ class Content(MeshReading, Channel):
     video : FILE
         video of the person
     mesh : FILE
-        body mesh fitted to the video (.npz, .zarr, a folder of .obj/.ply/.glb, or the output of
-        VIBE, WHAM or 4D-Humans)
+        body mesh fitted to the video (.npz, .zarr, a folder of .obj/.ply/.glb), the output of an
+        estimator of bodies, or motion capture; with --body-model its vertices are kept instead
     radar : CAPTURE
         radar capture of the same scene
     radar_offset_s : S
@@ -184,6 +187,7 @@ def _import(options: Import) -> None:
     that what cannot be read is said here and not later.
 
       sd2 import --video walk.mkv --mesh walk.npz --out walk.sd2
+      sd2 import --mesh walk_poses.npz --body-model SMPLH_NEUTRAL.npz --distance-m 3 --out a.sd2
       sd2 import --radar capture/ --title 'Empty lab' --out lab.sd2
       sd2 import --radar capture/ --receiver 2 --out lab.sd2
       sd2 import --video a.mkv --radar capture/ --radar-offset-s -0.35 --copy --out a.sd2
@@ -200,13 +204,49 @@ def _import(options: Import) -> None:
     if options.sensor is not None:
         recording.sensor = VirtualSensor(options.sensor)
     recording.learn_camera()
-    # Opens every file, so that nothing is made of what cannot be read.
-    parts = describe_parts(recording)
-    with progress_bar("Copying", unit="file") as progress:
-        recording = recording.save_as(options.out, copy=options.copy, progress=progress)
+    with ExitStack() as made:
+        if options.body_model is not None:
+            _keep_vertices(recording, _new_folder_for_vertices(options.out, made))
+        # Opens every file, so that nothing is made of what cannot be read.
+        parts = describe_parts(recording)
+        with progress_bar("Copying", unit="file") as progress:
+            recording = recording.save_as(options.out, copy=options.copy, progress=progress)
+        made.pop_all()
     if options.copy:
         parts = describe_parts(recording)
     show(describe_recording(recording, parts), as_json=options.json)
+
+
+def _new_folder_for_vertices(out: Path, made: ExitStack) -> Path:
+    """Folder of the recording that is made, before it is one; gone again if it comes to nothing."""
+    from sd2core.files.paths import remove
+    from sd2core.recording.recording import new_folder
+
+    folder = new_folder(out)
+    if not folder.exists():
+        folder.mkdir()
+        made.callback(remove, folder)
+    return folder
+
+
+def _keep_vertices(recording: Recording, folder: Path) -> None:
+    """Put the vertices that a body model makes in place of parameters, which no one else can read.
+
+    The model itself is licensed to its user, and is not kept.
+    """
+    from sd2core.files.paths import free_path
+    from sd2core.io.mesh import save_mesh
+
+    with progress_bar("Posing the body", unit="frame") as progress:
+        mesh = recording.load_mesh(progress)
+    for note in mesh.notes:
+        print(f"note: {note}", file=sys.stderr)
+    vertices = free_path(folder, _VERTICES, "posed", reserved="")
+    with progress_bar("Writing the mesh", unit="frame") as progress:
+        save_mesh(mesh, vertices, progress)
+    recording.mesh, recording.faces = vertices, None
+    focal_px = recording.mesh_reading.focal_px
+    recording.mesh_reading = type(recording.mesh_reading)(focal_px=focal_px)
 
 
 def _content(options: Content) -> dict[str, Any]:
@@ -260,6 +300,8 @@ def _set(options: Set) -> None:
     if options.video is not None or options.mesh is not None:
         recording.camera = None
         recording.learn_camera()
+    if options.body_model is not None:
+        _keep_vertices(recording, recording.folder)
     parts = describe_parts(recording)
     recording.sensor = _placed(recording, options)
     recording.save()

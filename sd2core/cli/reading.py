@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from sd2core.cli.output import picked, progress_bar
 from sd2core.errors import Sd2Error
-from sd2core.files.paths import PICKLE_SUFFIXES, is_pattern
+from sd2core.files.paths import is_pattern, plain_path
 from sd2core.options.records import given_flags
 
 if TYPE_CHECKING:
@@ -19,16 +19,17 @@ if TYPE_CHECKING:
     from sd2core.sensor import VelocityAxis, VirtualSensor
 
 
-_OF_BODY_MODELS = ("person", "image_size", "focal_px")
-_OF_THE_MESH = ("faces", "fps", "scale", "distance_m", "turn", *_OF_BODY_MODELS)
+_OF_ESTIMATORS = ("person", "image_size", "focal_px", "body_model")
+_OF_THE_MESH = ("faces", "fps", "scale", "distance_m", "turn", *_OF_ESTIMATORS)
 
 
 def mesh_reading(options: MeshReading) -> StoredReading:
     """Options for reading a mesh from the command line."""
     from sd2core.recording.recording import MeshReading as StoredReading
 
-    alike = picked(options, "scale", "distance_m", "turn", *_OF_BODY_MODELS)
-    return StoredReading(frames_per_s=options.fps, **alike)
+    alike = picked(options, "scale", "person", "distance_m", "turn", "image_size", "focal_px")
+    model = None if options.body_model is None else str(plain_path(options.body_model))
+    return StoredReading(frames_per_s=options.fps, body_model=model, **alike)
 
 
 def load_mesh_from_options(path: Path, options: MeshReading) -> MeshSequence:
@@ -101,13 +102,16 @@ def refuse_unused_mesh_options(
     if mesh is None:
         for name in given_flags(options, (n for n in _OF_THE_MESH if n not in but)):
             raise Sd2Error(f"{name} is given, and {path} holds no mesh", f"{name} for a mesh only")
-    elif mesh.suffix.lower() not in PICKLE_SUFFIXES:
-        if is_pattern(mesh) or mesh.is_dir():  # files whose names may tell persons
-            but += ("person",)
-        for name in given_flags(options, (n for n in _OF_BODY_MODELS if n not in but)):
+        return
+    if is_pattern(mesh) or mesh.is_dir():  # files whose names may tell persons
+        but += ("person",)
+    for name in given_flags(options, (n for n in _OF_ESTIMATORS if n not in but)):
+        from sd2core.io.mesh_models import is_estimate
+
+        if not is_estimate(mesh):
             raise Sd2Error(
-                f"{name} is given, and {mesh} is not the output of a body model",
-                f"{name} for {', '.join(sorted(PICKLE_SUFFIXES))} files only",
+                f"{name} is given, and {mesh} is not the output of an estimator of bodies",
+                f"{name} for such files only (docs/formats.md)",
             )
 
 

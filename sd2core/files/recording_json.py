@@ -85,6 +85,7 @@ class MeshReading(BaseModel):
     focal_px: Focal | None = None
     distance_m: FiniteFloat | None = None
     turn: Turn | None = None
+    body_model: StoredPath | None = None  # in full: what a recording keeps are the vertices
 
     def options(self) -> dict[str, Any]:
         """Arguments for ``load_mesh``: those that are given."""

@@ -10,7 +10,9 @@ from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular
 from sd2core.files.paths import PICKLE_SUFFIXES, is_pattern
 from sd2core.files.stores import read_attributes
+from sd2core.io.estimator_files import files_of_people, holds_objects
 from sd2core.io.imu_columns import holds_inertial_signals
+from sd2core.io.mesh_files import MOTION_SUFFIXES
 from sd2core.io.readers import MESH_FILES, RADAR_FILES, plug_in_for
 from sd2core.pairs.summary import is_pair_store
 from sd2core.plug_ins import Group
@@ -31,7 +33,7 @@ RADAR_MAP_SUFFIXES = frozenset({".h5", ".hdf5"})
 RADAR_SUFFIXES = (
     frozenset({".npy", ".mat", ".bin", ".sigmf-meta", ".sigmf-data"}) | RADAR_MAP_SUFFIXES
 )
-MESH_SUFFIXES = frozenset({".obj", ".ply", ".glb"}) | PICKLE_SUFFIXES
+MESH_SUFFIXES = frozenset({".obj", ".ply", ".glb", ".pt", ".pth"}) | PICKLE_SUFFIXES
 
 
 def kind_of(path: Path) -> Kind:
@@ -54,7 +56,7 @@ def kind_of(path: Path) -> Kind:
     if suffix in MESH_SUFFIXES or path.name.endswith(".zarr.zip"):
         return "mesh"
     if suffix in RADAR_SUFFIXES:
-        return "radar"
+        return "mesh" if suffix == ".npy" and holds_objects(path) else "radar"
     if suffix == ".safetensors":
         return "model"
     if holds_inertial_signals(path):
@@ -68,6 +70,8 @@ def kind_of(path: Path) -> Kind:
     kind, said = _kind_by_plug_ins(path)
     if kind is not None:
         return kind
+    if suffix in MOTION_SUFFIXES:
+        return "mesh"  # whose reader says what to do
     if _holds_pictures(path):
         return "video"
     raise Sd2Error(
@@ -115,7 +119,7 @@ def _kind_of_folder(folder: Path) -> Kind:
     if (folder / "radar.npy").exists() or any(folder.glob("*/radar.npy")):
         return "radar"
     suffixes = {entry.suffix.lower() for entry in folder.iterdir()}
-    if suffixes & MESH_SUFFIXES:
+    if suffixes & MESH_SUFFIXES or files_of_people(folder):
         return "mesh"
     if ".bin" in suffixes and suffixes & {".cfg", ".json"}:
         return "radar"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error, wanted
 from sd2core.files.limits import check_regular
-from sd2core.files.paths import PICKLE_SUFFIXES, as_path, is_pattern
+from sd2core.files.paths import as_path, is_pattern
 from sd2core.files.texts import errors_in
 from sd2core.files.turns import Turn, rotation_of
 from sd2core.io.fitted import fitted_doubts
@@ -22,8 +22,14 @@ from sd2core.io.mesh_checks import (
     mark_gaps,
     uncertainty_of,
 )
-from sd2core.io.mesh_files import SURFACE_SUFFIXES, read_faces, read_mesh_files
-from sd2core.io.mesh_models import read_model_output
+from sd2core.io.mesh_files import (
+    MOTION_SUFFIXES,
+    SURFACE_SUFFIXES,
+    read_faces,
+    read_mesh_files,
+    refuse_motion,
+)
+from sd2core.io.mesh_models import is_estimate, read_model_output
 from sd2core.io.readers import MESH_FILES, FileReader, MeshHints, plug_in_for
 from sd2core.io.stored_vertices import StoredVertices, real_type
 from sd2core.mesh.sequence import MeshSequence
@@ -32,7 +38,7 @@ from sd2core.timebase import Timebase
 
 _KNOWN = (
     ".npz, .zarr, .zarr.zip, .obj/.ply/.glb (one, a folder or a pattern such as 'frames/*.obj'), "
-    "or the .pkl of VIBE, WHAM or another tool that holds 'verts'"
+    "or the output of an estimator (.pkl, .npz, .npy, .pt, .json)"
 )
 
 
@@ -47,6 +53,7 @@ def load_mesh(
     focal_px: float | None = None,
     distance_m: float | None = None,
     turn: Turn | None = None,
+    body_model: Path | str | None = None,
     progress: Progress = silent,
 ) -> MeshSequence:
     """Read a mesh sequence or point cloud.
@@ -56,8 +63,8 @@ def load_mesh(
     path : path
         ``.npz`` or Zarr (``vertices`` (T, V, 3), ``faces`` (F, 3), ``times_s``
         (T,)); a file, folder or pattern of OBJ, PLY or GLB, one file per frame
-        in natural order of their names; the pickle of VIBE, WHAM or any tool
-        that stores ``verts``, of which nothing is executed.
+        in natural order of their names; the output of an estimator of bodies or
+        motion capture (docs/formats.md), of which nothing is executed.
     faces : path, optional
         ``.npy``, ``.npz`` or a mesh file with the triangles, instead of those
         in the file.
@@ -70,15 +77,17 @@ def load_mesh(
     person : optional
         Which person of a file of several; by default the one seen longest.
     image_size : (width, height), optional
-        Of the video that VIBE saw: places its root-centred mesh in front of
+        Of the video that an estimator saw: places its root-centred mesh in front of
         the camera.
     focal_px : float, optional
-        Focal length for ``image_size``; by default the image's diagonal.
+        Focal length of that video; by default the file's, or the image's diagonal.
     distance_m : float, optional
         Moves the mesh forward, for one that is centred on the body's root.
     turn : optional
         Turns the mesh about an axis of the camera's frame before it is moved, right-handed:
         ``x180`` for one with y up and z backward, ``x90`` for one with z up.
+    body_model : path, optional
+        Model of SMPL, SMPL-H or SMPL-X that makes vertices of parameters.
     progress : callable
         Called while files are read; may raise ``Cancelled``.
 
@@ -106,7 +115,8 @@ def load_mesh(
     path = as_path(path)
     if scale is not None and not (np.isfinite(scale) and scale > 0):
         raise Sd2Error(f"The scale is {scale}", "a positive factor to metres, such as 0.001")
-    raw = _read(path, MeshHints(person, image_size, focal_px, distance_m, progress))
+    model = None if body_model is None else as_path(body_model)
+    raw = _read(path, MeshHints(person, image_size, focal_px, distance_m, model, progress))
     source = str(path)
     if faces is not None:
         raw.faces = read_faces(Path(faces))
@@ -185,6 +195,8 @@ def _read(path: Path, hints: MeshHints) -> RawMesh:
     if plug_in is not None:
         read: RawMesh = plug_in.use(lambda reader: reader.read(path, hints), RawMesh)
         return read
+    if path.suffix.lower() in MOTION_SUFFIXES:
+        refuse_motion(path)
     raise Sd2Error(f"{path} is not a mesh of a kind that is known", f"a mesh: {_KNOWN}", said)
 
 
@@ -199,26 +211,13 @@ def _read_surfaces(path: Path, hints: MeshHints) -> RawMesh:
     return read_mesh_files(path, hints.person, hints.progress)
 
 
-def _read_model_output(path: Path, hints: MeshHints) -> RawMesh:
-    return read_model_output(path, hints.person, hints.image_size, hints.focal_px, hints.distance_m)
-
-
-def _refuse_torch(path: Path, hints: MeshHints) -> RawMesh:
-    raise Sd2Error(
-        f"{path} is a torch file",
-        f"a mesh: {_KNOWN}",
-        "Save the vertices as numpy.savez('mesh.npz', vertices=verts.cpu().numpy())",
-    )
-
-
 _READERS: tuple[FileReader[RawMesh], ...] = (
     FileReader(_read_surfaces, looks=is_pattern),
     FileReader(lambda path, hints: read_zarr(path), looks=_is_zarr),
+    FileReader(read_model_output, looks=is_estimate),
     FileReader(_read_surfaces, looks=Path.is_dir),
     FileReader(lambda path, hints: read_npz(path), (".npz",)),
-    FileReader(_read_model_output, tuple(PICKLE_SUFFIXES)),
     FileReader(_read_surfaces, SURFACE_SUFFIXES),
-    FileReader(_refuse_torch, (".pt", ".pth", ".ckpt")),
 )
 """Readers of meshes; the first that fits is taken, and those of plug-ins after all of them."""
 

@@ -87,13 +87,6 @@ def no_vertices(source: str, names: Sequence[str]) -> Sd2Error:
             "Give the model file with sd2 import --body-model, or let that tool export one OBJ per"
             " frame and open the folder",
         )
-    if list(names) == ["results"]:
-        return Sd2Error(
-            f"{source} holds 'results', Python objects as ROMP and BEV save them",
-            "plain arrays",
-            "Write its vertices anew: r = numpy.load(FILE, allow_pickle=True)['results'][()];"
-            " numpy.savez('mesh.npz', vertices=r['verts'] + r['cam_trans'][:, None], fps=30)",
-        )
     return Sd2Error(
         f"{source} holds {shown}",
         "'vertices' (or 'verts') of shape (frames, vertices, 3), in a pickle perhaps per person",

@@ -132,8 +132,9 @@ def _frame_numbers(numbers: Any, frames: int, source: str) -> NDArray[np.int64]:
     try:
         if not isinstance(numbers, np.ndarray):
             numbers = [operator.index(number) for number in numbers]
-        array = np.asarray(numbers, dtype=np.int64)
-    except (TypeError, ValueError, OverflowError) as error:
+        with np.errstate(invalid="raise"):
+            array = np.asarray(numbers, dtype=np.int64)
+    except (ArithmeticError, TypeError, ValueError) as error:
         raise Sd2Error(
             f"{source}: frame_ids are no numbers of frames ({error})",
             "one video frame number per frame",

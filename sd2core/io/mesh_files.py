@@ -19,8 +19,27 @@ from sd2core.io.mesh_arrays import FACE_NAMES, RawMesh
 from sd2core.progress import Progress, silent
 
 SURFACE_SUFFIXES = (".obj", ".ply", ".glb")
+MOTION_SUFFIXES = (".bvh", ".fbx", ".gltf", ".abc", ".usd", ".usdc", ".usdz")
+"""Of files with motion that no library that is installed reads."""
+_OUT_OF_BLENDER = (
+    "Open it in Blender and export an OBJ for each frame (File → Export → Wavefront, Animation);"
+    " then name the folder"
+)
 _GLB_BYTES = 64
 """Memory of an entry of an array, a matrix of 4 × 4 at most."""
+
+
+def refuse_motion(path: Path) -> None:
+    """Raise Sd2Error for a file with motion that is not read, with the way out."""
+    without = " and no surface" if path.suffix.lower() == ".bvh" else ""
+    raise Sd2Error(
+        f"{path} holds the motion of a skeleton{without} ({path.suffix[1:].upper()}), which is not"
+        " read here",
+        "vertices for every frame, or the parameters of a body model",
+        _OUT_OF_BLENDER
+        + (", of a body that the skeleton moves" if without else "")
+        + ". Motion as AMASS has it is read with --body-model",
+    )
 
 
 def read_mesh_files(
@@ -73,6 +92,7 @@ def read_surface(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64] | N
             content = _geometry_of_obj(content)
         elif kind == "glb":
             check_size(path, _declared_bytes_of_glb(content), len(content))
+            _refuse_animation(path, content)
         # From memory, so that no other file is looked for that this one names.
         loaded = trimesh.load(
             io.BytesIO(content), file_type=kind, process=False, maintain_order=True
@@ -106,10 +126,26 @@ def _geometry_of_obj(content: bytes) -> bytes:
     return b"\n".join(lines) + b"\n"
 
 
+def _scene_of_glb(content: bytes) -> Any:
+    """What a GLB file says of its numbers."""
+    length = int.from_bytes(content[12:16], "little")
+    return json.loads(content[20 : 20 + length])
+
+
+def _refuse_animation(path: Path, content: bytes) -> None:
+    """Raise Sd2Error for a GLB file that moves by itself: it would be read as one still pose."""
+    moves = _scene_of_glb(content).get("animations")
+    if moves:
+        raise Sd2Error(
+            f"{path} holds an animation ({len(moves)} in all), which is not read here",
+            "a file for every frame, without an animation",
+            _OUT_OF_BLENDER,
+        )
+
+
 def _declared_bytes_of_glb(content: bytes) -> int:
     """Memory that the numbers of a GLB file take, and its meshes where they are placed."""
-    length = int.from_bytes(content[12:16], "little")
-    scene = json.loads(content[20 : 20 + length])
+    scene = _scene_of_glb(content)
     counts = [abs(accessor["count"]) for accessor in scene.get("accessors", ())]
     views = sum(abs(view["byteLength"]) for view in scene.get("bufferViews", ()))
     meshes = [

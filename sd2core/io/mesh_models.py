@@ -1,12 +1,12 @@
-"""Output of body-estimation tools: VIBE, WHAM, 4D-Humans, and pickles with ``verts``.
+"""Output of body-estimation tools, and motion that was captured: one person's mesh in metres.
 
-The first two store, per person, SMPL vertices and the numbers of the video
-frames they belong to. WHAM's stand in the camera's frame. VIBE's are centred
-on the body's root, beside a weak-perspective camera per frame.
+Vertices are taken where a file has them; parameters become vertices by a body model that the user
+has. A body that is centred on its root is placed by the camera in the file.
 """
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -15,60 +15,112 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_size
+from sd2core.files.numpy_files import open_zip
+from sd2core.files.paths import PICKLE_SUFFIXES
+from sd2core.io.body_model import read_body_model
+from sd2core.io.body_parameters import PARAMETER_NAMES, parameters_of
+from sd2core.io.estimator_files import (
+    ESTIMATED,
+    FOCAL_NAMES,
+    TORCH_SUFFIXES,
+    files_of_people,
+    first_of,
+    holds_objects,
+    people_in,
+)
 from sd2core.io.frame_names import chosen_person
 from sd2core.io.mesh_arrays import FACE_NAMES, VERTEX_NAMES, RawMesh, no_vertices
 from sd2core.io.mesh_clock import clock_of
-from sd2core.io.pickles import read_pickle
+from sd2core.io.readers import MeshHints
 
+_NO_HINTS = MeshHints()
 _AT_ROOT_M = 0.6
+_SHIFTS = {"pred_cam_t": None, "cam_trans": 443.4 / 512, "camera": 5000.0}
+"""Names of a body's place before the camera, and the focal length that was taken for it: in the
+file; of the picture's longer side (ROMP); in pixels (4D-Humans)."""
 
 
-def read_model_output(
-    path: Path,
-    person: int | str | None = None,
-    image_size: tuple[int, int] | None = None,
-    focal_px: float | None = None,
-    distance_m: float | None = None,
-) -> RawMesh:
-    """Read vertices from a pickle or joblib file without executing anything in it.
+def is_estimate(path: Path) -> bool:
+    """True if a file is to be read as an estimator's, or motion capture, rather than as a mesh."""
+    suffix = path.suffix.lower()
+    if path.is_dir():
+        return bool(files_of_people(path))
+    if suffix == ".npz":
+        names = _names_in(path)
+        return not names & {*VERTEX_NAMES} and bool(
+            names & {*ESTIMATED, *PARAMETER_NAMES, "results"}
+        )
+    if suffix == ".npy":
+        return holds_objects(path)
+    return suffix in (*PICKLE_SUFFIXES, *TORCH_SUFFIXES, ".json")
 
-    Parameters
-    ----------
-    path : Path
-    person, image_size, focal_px, distance_m
-        As for :func:`sd2core.io.mesh.load_mesh`, which moves the mesh by the distance: where it is
-        given, the mesh is not placed here.
+
+def _names_in(path: Path) -> set[str]:
+    """Names of the arrays in an ``.npz``; none in a damaged one, which its reader refuses."""
+    try:
+        with open_zip(path) as archive:
+            return {name.removesuffix(".npy") for name in archive.namelist()}
+    except (Sd2Error, OSError, ValueError, zipfile.BadZipFile):
+        return set()
+
+
+def read_model_output(path: Path, hints: MeshHints = _NO_HINTS) -> RawMesh:
+    """Read one person's mesh without executing anything in the file.
 
     Raises
     ------
     Sd2Error
-        If the file holds no vertices, something that is not plain data, no such person, or a camera
-        that does not fit its frames.
+        If the file holds no vertices, and no parameters with a body model for them, something that
+        is not plain data, no such person, or a camera that does not fit its frames.
     """
-    content = read_pickle(path)
-    content = _plain_keys(content) if isinstance(content, dict) else {"verts": content}
+    try:
+        return _person_of(path, hints)
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        # Names are as an estimator's, and what stands under them is anything.
+        raise Sd2Error(
+            f"{path} is not laid out as an estimator of bodies writes it"
+            f" ({type(error).__name__}: {error})",
+            "people, each with arrays of numbers over their frames (docs/formats.md)",
+            "Save its vertices as numpy.savez('mesh.npz', vertices=verts, faces=faces,"
+            " times_s=times)",
+        ) from error
+
+
+def _person_of(path: Path, hints: MeshHints) -> RawMesh:
+    """The person's mesh, from a file that is laid out as it should be."""
     notes: list[str] = []
-    entry = content
-    if _vertices_of(content) is None:
-        people = {
-            key: value
-            for key, value in content.items()
-            if isinstance(key, str | int)
-            and isinstance(value, dict)
-            and _vertices_of(value) is not None
-        }
-        if not people:
-            first = next((one for one in content.values() if isinstance(one, dict)), content)
-            raise no_vertices(str(path), [str(one) for one in first if isinstance(one, str | int)])
-        entry = _choose(path, people, person, notes)
-    raw = RawMesh(vertices=_stacked(_vertices_of(entry), path), notes=notes)
-    raw.faces = _numbers(path, entry, content, FACE_NAMES)
+    people, shared = people_in(path, hints.person, notes)
+    if not people:
+        raise _no_vertices(path, shared)
+    held = [first_of(person, ESTIMATED) for person in people.values()]
+    if hints.body_model is None and all(vertices is None for vertices in held):
+        raise _no_vertices(path, people)
+    entry = _choose(path, people, hints.person, notes)
+    vertices = first_of(entry, ESTIMATED)
+    if vertices is None and hints.body_model is None:
+        raise _no_vertices(path, entry)
+    if vertices is not None and hints.body_model is not None:
+        raise Sd2Error(
+            f"{path} holds vertices, and a body model is given",
+            "a model for a file of parameters only",
+            "Leave out --body-model",
+        )
+    raw = RawMesh(vertices=np.empty(0), notes=notes)
+    rate = None
+    if vertices is None:
+        assert hints.body_model is not None
+        model, parameters = read_body_model(hints.body_model), parameters_of(entry, str(path))
+        raw.vertices, raw.faces = parameters.vertices(model, notes, hints.progress), model.faces
+        rate = parameters.frames_per_s
+    else:
+        raw.vertices = _stacked(vertices, path)
+        raw.faces = _numbers(path, entry, shared, FACE_NAMES)
     shape = np.shape(raw.vertices)
-    clock = clock_of([entry, content], shape[0] if shape else 0, str(path))
-    raw.times_s, raw.frames_per_s = clock.times_s, clock.frames_per_s
+    clock = clock_of([entry, shared], shape[0] if shape else 0, str(path))
+    raw.times_s, raw.frames_per_s = clock.times_s, clock.frames_per_s or rate
     raw.frame_numbers = clock.frame_numbers
     notes += clock.notes
-    _place_in_front(raw, entry, path, image_size, focal_px, distance_m)
+    _place_in_front(raw, {**shared, **entry}, path, hints)
     return raw
 
 
@@ -110,33 +162,28 @@ def weak_perspective_shift(
     )
 
 
-def _plain_keys(content: dict[Any, Any]) -> dict[Any, Any]:
-    """The same with Python's numbers as keys, where a tracker left NumPy's."""
-    return {
-        key.item() if isinstance(key, np.generic) else key: value for key, value in content.items()
-    }
-
-
-def _vertices_of(entry: dict[Any, Any]) -> Any:
-    return next((entry[name] for name in VERTEX_NAMES if entry.get(name) is not None), None)
-
-
 def _choose(
     path: Path, people: dict[Any, Any], person: int | str | None, notes: list[str]
 ) -> dict[Any, Any]:
-    held = {key: _vertices_of(value) for key, value in people.items()}
-    lengths = {
-        key: len(one if isinstance(one, list | tuple) else _stacked(one, path))
-        for key, one in held.items()
-    }
+    lengths = {key: _frames(value, path) for key, value in people.items()}
     key = chosen_person(lengths, person, str(path), notes)
     chosen: dict[Any, Any] = people[key]
     return chosen
 
 
+def _frames(entry: dict[Any, Any], path: Path) -> int:
+    """Number of frames of a person."""
+    vertices = first_of(entry, ESTIMATED)
+    if vertices is None:
+        return len(parameters_of(entry, str(path)).turns)
+    return len(vertices if isinstance(vertices, list | tuple) else _stacked(vertices, path))
+
+
 def _stacked(vertices: Any, path: Path) -> NDArray[Any]:
     """One array (T, V, 3) out of an array or a list with one array per frame."""
     if isinstance(vertices, np.ndarray):
+        if vertices.ndim == 2:
+            return vertices[None]
         # Some keep the axis of a batch of one clip.
         one = vertices[0] if vertices.ndim == 4 and len(vertices) == 1 else vertices
         return _as_numbers(one, "the vertices", path)
@@ -183,42 +230,113 @@ def _as_numbers(values: NDArray[Any], name: str, path: Path) -> NDArray[Any]:
     return values
 
 
-def _place_in_front(
-    raw: RawMesh,
-    entry: dict[Any, Any],
-    path: Path,
-    image_size: tuple[int, int] | None,
-    focal_px: float | None,
-    distance_m: float | None,
-) -> None:
+def _place_in_front(raw: RawMesh, entry: dict[Any, Any], path: Path, hints: MeshHints) -> None:
+    """Move a body that is centred on its root to where the file's camera has it, and say how."""
     vertices = np.asarray(raw.vertices)
     if vertices.ndim != 3 or not np.isfinite(vertices).any():
         return
     centres = np.nanmean(vertices[:: max(len(vertices) // 16, 1)], axis=1)  # (n, 3)
-    if np.nanmax(np.linalg.norm(centres, axis=1)) > _AT_ROOT_M:
+    shift_m = _shift(entry, len(vertices), path)
+    if shift_m is None and np.nanmax(np.linalg.norm(centres, axis=1)) > _AT_ROOT_M:
         return
-    camera, boxes = entry.get("pred_cam"), entry.get("bboxes")
-    if distance_m is not None:
+    if shift_m is not None:
+        sampled = shift_m[:: max(len(vertices) // 16, 1)]
+        if np.nanmedian(np.linalg.norm(centres - sampled, axis=1)) < np.nanmedian(
+            np.linalg.norm(centres, axis=1)
+        ):
+            return  # already there
+    if hints.distance_m is not None:
         raw.notes.append(
-            f"The mesh is centred on the body's root and moved {distance_m:g} m forward; walking "
-            "gives no Doppler."
+            f"The mesh is centred on the body's root and moved {hints.distance_m:g} m forward;"
+            " walking gives no Doppler."
         )
         return
-    have_camera = isinstance(camera, np.ndarray) and isinstance(boxes, np.ndarray)
-    if not have_camera or image_size is None:
+    if shift_m is None:
+        shift_m = _weak_perspective(raw, entry, path, hints)
+    else:
+        shift_m = _with_focal(shift_m, raw, entry, hints)
+    if shift_m is not None:
+        raw.vertices = (vertices + shift_m[:, None, :]).astype(np.float32)
+
+
+def _shift(entry: dict[Any, Any], frames: int, path: Path) -> NDArray[np.float64] | None:
+    """Place (T, 3) of the root that the file names, or None."""
+    name = next((name for name in _SHIFTS if entry.get(name) is not None), None)
+    if name is None:
+        return None
+    shift = np.asarray(entry[name], np.float64)
+    if shift.size != 3 * frames:
+        raise Sd2Error(f"{path}: {name} has shape {shift.shape}", f"({frames}, 3)")
+    return shift.reshape(frames, 3)
+
+
+def _with_focal(
+    shift_m: NDArray[np.float64], raw: RawMesh, entry: dict[Any, Any], hints: MeshHints
+) -> NDArray[np.float64]:
+    """The place by the focal length that is known best.
+
+    A body twice as far off is seen as large by one of twice the length.
+    """
+    name = next(name for name in _SHIFTS if entry.get(name) is not None)
+    size, taken = _image_size(entry, hints), _SHIFTS[name]
+    focal = first_of(entry, FOCAL_NAMES)
+    if focal is not None:
+        taken = float(np.median(np.asarray(focal, np.float64)))
+    elif name == "cam_trans" and taken is not None:
+        taken = taken * max(size) if size is not None else None
+    wanted, how = hints.focal_px, "as given"
+    if wanted is None and focal is None and name == "camera" and size is not None:
+        wanted, how = float(np.hypot(*size)), "assumed: the image's diagonal"
+    if wanted is None or taken is None:
+        wanted, how = taken, "the file's"
+    placed = shift_m.copy()
+    if wanted is not None and taken is not None:
+        placed[:, 2] *= wanted / taken
+    said = "" if wanted is None else f", focal length {wanted:.0f} px ({how})"
+    raw.notes.append(
+        f"The body is placed by the file's camera{said}, at {np.median(placed[:, 2]):.2f} m. Its"
+        " depth follows the size in the picture and jitters: `sd2 refine` makes it smooth."
+    )
+    return placed
+
+
+def _image_size(entry: dict[Any, Any], hints: MeshHints) -> tuple[int, int] | None:
+    """Width and height of the picture, as given or in the file."""
+    if hints.image_size is not None:
+        return hints.image_size
+    size = entry.get("size")  # PHALP: height, width
+    if size is None or np.size(size) < 2:
+        return None
+    height, width = np.asarray(size).reshape(-1, 2)[0]
+    return int(width), int(height)
+
+
+def _weak_perspective(
+    raw: RawMesh, entry: dict[Any, Any], path: Path, hints: MeshHints
+) -> NDArray[np.float64] | None:
+    """Place (T, 3) by a weak-perspective camera, VIBE's in the box or of the whole picture."""
+    frames, size = len(np.asarray(raw.vertices)), _image_size(entry, hints)
+    camera, boxes = entry.get("pred_cam"), entry.get("bboxes")
+    if not isinstance(camera, np.ndarray) or not isinstance(boxes, np.ndarray):
+        camera, boxes = entry.get("orig_cam"), None
+    if not isinstance(camera, np.ndarray) or size is None:
         how = "Give its distance (--distance-m)"
-        if have_camera:
+        if isinstance(camera, np.ndarray):
             how += ", or the video's size (image_size) to place it by the camera in the file"
         raw.notes.append(
             "The mesh is centred on the body's root, so it stands around the camera and walking "
             f"gives no Doppler. {how}."
         )
-        return
-    camera, boxes = np.asarray(camera, np.float64), np.asarray(boxes, np.float64)
-    if camera.shape != (len(vertices), 3) or boxes.shape != (len(vertices), 4):
+        return None
+    camera = np.asarray(camera, np.float64)
+    if boxes is None and camera.shape == (frames, 4):  # s_x, s_y, t_x, t_y in the whole picture
+        camera = camera[:, [0, 2, 3]]
+        boxes = np.tile([size[0] / 2, size[1] / 2, size[0], size[0]], (frames, 1))
+    boxes = np.asarray(boxes, np.float64)
+    if camera.shape != (frames, 3) or boxes.shape != (frames, 4):
         raise Sd2Error(
             f"{path}: pred_cam has shape {camera.shape} and bboxes {boxes.shape}",
-            f"({len(vertices)}, 3) and ({len(vertices)}, 4)",
+            f"({frames}, 3) and ({frames}, 4)",
         )
     if not (np.minimum(camera[:, 0], boxes[:, 2]) > 0).all():
         bad = int(np.argmin(np.minimum(camera[:, 0], boxes[:, 2])))
@@ -228,12 +346,18 @@ def _place_in_front(
             "positive ones",
             "Read it without the video's size and give --distance-m",
         )
-    focal = float(np.hypot(*image_size)) if focal_px is None else focal_px
-    shift_m = weak_perspective_shift(camera, boxes, image_size, focal)
-    raw.vertices = (vertices + shift_m[:, None, :]).astype(np.float32)
-    assumed = " (assumed: the image's diagonal)" if focal_px is None else ""
+    focal = float(np.hypot(*size)) if hints.focal_px is None else hints.focal_px
+    shift_m = weak_perspective_shift(camera, boxes, size, focal)
+    assumed = " (assumed: the image's diagonal)" if hints.focal_px is None else ""
     raw.notes.append(
         f"The body is placed by the file's weak-perspective camera, focal length {focal:.0f} "
         f"px{assumed}, at {np.median(shift_m[:, 2]):.2f} m. Its depth follows the size of the box "
-        "and jitters: smooth the trajectory before reading velocities along the line of sight."
+        "and jitters: `sd2 refine` makes it smooth."
     )
+    return shift_m
+
+
+def _no_vertices(path: Path, entry: dict[Any, Any]) -> Sd2Error:
+    """Error for what is there instead, of the first person if there is one."""
+    first = next((one for one in entry.values() if isinstance(one, dict)), entry)
+    return no_vertices(str(path), [str(one) for one in first if isinstance(one, str | int)])

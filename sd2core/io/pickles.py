@@ -9,41 +9,53 @@ Every other name ends the reading.
 from __future__ import annotations
 
 import bz2
-import collections
 import gzip
 import io
 import lzma
 import pickle
-import re
+import struct
 import sys
+import zipfile
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import VARIABLE, check_regular, read_limit_bytes
+from sd2core.files.numpy_files import open_zip, read_array_header
+from sd2core.io.pickle_objects import (
+    ALLOWED,
+    CALLED,
+    COPIES,
+    DESCRIBED,
+    OF_A_LIST,
+    Described,
+    JoblibArray,
+    PlainArray,
+    PlainDtype,
+    Refused,
+    Storage,
+    StorageKind,
+    TooLarge,
+    tensor_array,
+)
 
 _PIECE = 16 * 2**20
 _OBJECT_BYTES = 100
 """Memory of what one instruction makes, about: an empty set comes of a single byte."""
 
-_NUMBERS = re.compile(r"[<>=|]?(?:[biufc]\d+|[?bBhHiIlLqQefdgFD]|[SUa]\d+)")
+_OLD_TORCH = 0x1950A86A20F9469CFC6C
+_OLD_TORCH_BYTES = 2**16
+"""Of the pickles of an old torch file around its numbers, at most."""
+
 _REMEDY = (
     "Save the vertices where the file was written: "
     "numpy.savez('mesh.npz', vertices=verts, faces=faces, times_s=times)"
 )
 _RAISE = f". If the file is to be trusted, raise the limit by the environment variable {VARIABLE}"
-
-
-class Refused(Exception):
-    """Request of a file that is refused; the text follows the file's name."""
-
-
-class TooLarge(Refused):
-    """Request for more memory than is accepted."""
 
 
 class LimitedFile:
@@ -141,7 +153,7 @@ def decompressed(file: Any) -> Any:
     if start[:4] == b"\x04\x22\x4d\x18":
         raise Refused("is compressed with lz4, which is not read here")
     if start[:4] == b"PK\x03\x04":
-        raise Refused("is a zip archive, as torch.save writes; torch files are not read here")
+        raise Refused("is a zip archive and no pickle; what torch.save writes is named .pt")
     if start[:1] == b"\x78" and int.from_bytes(start[:2], "big") % 31 == 0:
         return io.BufferedReader(_ZlibFile(file), 2**16)
     return file
@@ -150,17 +162,77 @@ def decompressed(file: Any) -> Any:
 def read_pickle(path: Path, limit_bytes: int | None = None) -> Any:
     """Read arrays and containers from a pickle or joblib file, also a compressed one.
 
-    Gives dictionaries, lists, tuples, sets, numbers, text and NumPy arrays of numbers; at most
-    ``limit_bytes``, by default what a file of its size may be read as, are read after decompression
-    and made of it. Raises Sd2Error if the file names anything else, is damaged or too large.
+    Gives dictionaries, lists, tuples, sets, numbers, text and NumPy arrays of these; tensors of
+    torch, arrays of chumpy and sparse matrices of scipy come as arrays. At most ``limit_bytes``, by
+    default what a file of its size may be read as, are read after decompression and made of it.
+    Raises Sd2Error if the file names anything else, is damaged or too large.
     """
+
+    def content(limit: int) -> Any:
+        with path.open("rb") as file:
+            source = LimitedFile(decompressed(file), limit)
+            return _DataUnpickler(source).load()
+
+    return _read(path, content, "pickle or joblib", limit_bytes)
+
+
+def read_torch(path: Path) -> Any:
+    """Read what ``torch.save`` wrote, as :func:`read_pickle` does; nothing is executed."""
+
+    def content(limit: int) -> Any:
+        if not zipfile.is_zipfile(path):
+            with path.open("rb") as file:
+                return _read_old_torch(LimitedFile(file, limit))
+        with open_zip(path) as archive:
+            name = next((n for n in archive.namelist() if n.endswith("/data.pkl")), None)
+            if name is None or any("/code/" in one for one in archive.namelist()):
+                raise Refused("is a program of torch (TorchScript) or no torch file")
+            with archive.open(name) as stream:
+                source = LimitedFile(stream, limit)
+                return _TorchUnpickler(source, archive, name.removesuffix("data.pkl")).load()
+
+    return _read(path, content, "torch.save")
+
+
+def read_object_arrays(path: Path) -> dict[str, Any]:
+    """Arrays of an ``.npz``, or the one of an ``.npy``, of objects as well (``allow_pickle``)."""
+
+    def content(limit: int) -> Any:
+        if path.suffix.lower() == ".npy":
+            with path.open("rb") as file:
+                return {"": _array_or_objects(file, limit)}
+        arrays = {}
+        with open_zip(path) as archive:
+            for name in archive.namelist():
+                if name.endswith(".npy"):
+                    with archive.open(name) as stream:
+                        arrays[name.removesuffix(".npy")] = _array_or_objects(stream, limit)
+        return arrays
+
+    read: dict[str, Any] = _read(path, content, "numpy.save or numpy.savez")
+    return read
+
+
+def _array_or_objects(stream: Any, limit: int) -> Any:
+    """An array; of objects, one by itself or a list."""
+    start = stream.tell()
+    _, _, dtype = read_array_header(stream)
+    if not dtype.hasobject:
+        stream.seek(start)
+        return np.lib.format.read_array(stream, allow_pickle=False)
+    objects = _DataUnpickler(LimitedFile(stream, limit)).load()
+    return np.asarray(objects).tolist() if isinstance(objects, np.ndarray) else objects
+
+
+def _read(
+    path: Path, content: Callable[[int], Any], writer: str, limit_bytes: int | None = None
+) -> Any:
+    """Read by ``content``, within a limit; whatever goes wrong is an Sd2Error."""
     check_regular(path)
     try:
         if limit_bytes is None:
             limit_bytes = read_limit_bytes(path.stat().st_size)
-        with path.open("rb") as file:
-            source = LimitedFile(decompressed(file), limit_bytes)
-            return _DataUnpickler(source).load()
+        return content(limit_bytes)
     except Refused as refusal:
         raise Sd2Error(
             f"{path} {refusal}",
@@ -178,183 +250,10 @@ def read_pickle(path: Path, limit_bytes: int | None = None) -> Any:
     except Exception as error:  # a damaged stream of opcodes fails in any way whatever
         raise Sd2Error(
             f"{path} cannot be read as a pickle ({type(error).__name__}: {error})",
-            "a complete file written by pickle or joblib",
+            f"a complete file written by {writer}",
             _REMEDY,
         ) from error
 
-
-class _Array(np.ndarray):
-    """An array that takes its content from a pickle only when it is plain numbers."""
-
-    def __setstate__(self, state: Any) -> None:
-        if not isinstance(state, tuple) or len(state) not in (4, 5) or self.size:
-            raise Refused("holds an array in a form that is not known")
-        shape, dtype, fortran, content = state[-4:]
-        if isinstance(content, str):  # written by Python 2
-            content = content.encode("latin1")
-        plain = _checked_dtype(content, dtype, shape)
-        super().__setstate__((1, shape, plain, bool(fortran), content))  # type: ignore[arg-type]
-
-
-class _Dtype:
-    """Stands for ``numpy.dtype`` while reading; knows numbers and text only."""
-
-    def __init__(self, code: Any, align: Any = False, copy: Any = False) -> None:
-        if code in ("O", "O8", "|O", "O4"):
-            raise Refused("holds an array of Python objects (dtype object)")
-        if not isinstance(code, str):
-            raise Refused(f"holds a dtype given as {type(code).__name__}")
-        if not _NUMBERS.fullmatch(code) or np.dtype(code).itemsize == 0:
-            raise Refused(f"holds an array of dtype {code[:60]}")
-        self.plain: np.dtype[Any] = np.dtype(code)
-
-    def __setstate__(self, state: Any) -> None:
-        if not isinstance(state, tuple) or len(state) < 5:
-            raise Refused("holds a dtype in a form that is not known")
-        if any(part is not None for part in state[2:5]):
-            raise Refused("holds a structured array")
-        if state[1] in ("<", ">"):
-            self.plain = self.plain.newbyteorder(state[1])
-
-
-class _JoblibArray:
-    """Stands for joblib's note that the bytes of an array follow in the file."""
-
-    def __setstate__(self, state: Any) -> None:
-        if not isinstance(state, dict):
-            raise Refused("holds a joblib array in a form that is not known")
-        self.shape = state.get("shape")
-        self.order = state.get("order")
-        self.dtype = state.get("dtype")
-        self.aligned = state.get("numpy_array_alignment_bytes") is not None
-
-    def read(self, source: LimitedFile) -> NDArray[Any]:
-        """Read the bytes that follow."""
-        if not isinstance(self.dtype, _Dtype):
-            raise Refused("holds a joblib array without a dtype")
-        size = _size(self.shape, self.dtype.plain, source.left)
-        if self.aligned:
-            source.read_exactly(source.read_exactly(1)[0])
-        return _array(source.read_exactly(size), self.dtype, self.shape, self.order)
-
-
-class _Name:
-    """A class that may be named (an array's type) but neither called nor built."""
-
-
-def _array(content: Any, dtype: Any, shape: Any, order: Any) -> NDArray[Any]:
-    plain = _checked_dtype(content, dtype, shape)
-    return np.ndarray(shape, plain, buffer=content, order="F" if order == "F" else "C")
-
-
-def _checked_dtype(content: Any, dtype: Any, shape: Any) -> np.dtype[Any]:
-    """The dtype, when it, the shape and the bytes agree."""
-    if not isinstance(dtype, _Dtype):
-        raise Refused("holds an array without a dtype")
-    if not isinstance(content, bytes | bytearray):
-        raise Refused("holds an array whose content is not bytes")
-    size = _size(shape, dtype.plain, len(content))
-    if size != len(content):
-        raise Refused(f"holds an array of shape {shape} with {len(content):,} bytes, not {size:,}")
-    return dtype.plain
-
-
-def _size(shape: Any, dtype: np.dtype[Any], left: int) -> int:
-    """Bytes of an array; refused when more than there can be."""
-    if not isinstance(shape, tuple) or len(shape) > 32:
-        raise Refused("holds an array without a shape")
-    size = dtype.itemsize
-    for length in shape:
-        if not isinstance(length, int) or length < 0:
-            raise Refused("holds an array with an impossible shape")
-        size *= length
-    if size > left:
-        raise TooLarge(
-            f"claims an array of shape {shape}, {size / 2**30:,.1f} GiB, more than the "
-            f"{left / 2**30:,.1f} GiB that can be there"
-        )
-    return size
-
-
-def _new_array(kind: Any, shape: Any, code: Any) -> _Array:
-    """``numpy.core.multiarray._reconstruct``: an empty array, filled by its state."""
-    return _Array.__new__(_Array, (0,), dtype=np.int8)
-
-
-def _array_from_buffer(content: Any, dtype: Any, shape: Any, order: Any) -> NDArray[Any]:
-    """``numpy.core.numeric._frombuffer`` of pickle protocol 5."""
-    return _array(content, dtype, shape, order)
-
-
-def _scalar(dtype: Any, content: Any = b"") -> Any:
-    """``numpy.core.multiarray.scalar``."""
-    if isinstance(content, str):
-        content = content.encode("latin1")
-    return _array(content, dtype, (), "C")[()]
-
-
-def _encode(text: Any, coding: Any = "latin1") -> bytes:
-    """``_codecs.encode``, by which old protocols store bytes."""
-    if not isinstance(text, str) or coding not in ("latin1", "latin-1"):
-        raise Refused("stores bytes in a way that is not known")
-    return text.encode("latin1")
-
-
-def _bytearray(content: Any = b"", coding: Any = "latin1") -> bytearray:
-    """``bytearray`` of bytes; of a number it would fill the memory."""
-    if isinstance(content, str):
-        return bytearray(_encode(content, coding))
-    if not isinstance(content, bytes):
-        raise Refused("builds a bytearray from something else than bytes")
-    return bytearray(content)
-
-
-def _bytes(content: Any = b"") -> bytes:
-    """``bytes`` of a list of numbers, as old protocols store it."""
-    if not isinstance(content, bytes | list | tuple):
-        raise Refused("builds bytes from something else than bytes")
-    return bytes(content)
-
-
-def _default_dict(factory: Any = None, *content: Any) -> collections.defaultdict[Any, Any]:
-    """``collections.defaultdict`` with one of the plain types as its factory."""
-    if factory is not None and factory not in _FACTORIES:
-        raise Refused("holds a defaultdict with a factory that is not a plain type")
-    return collections.defaultdict(factory, *content)
-
-
-_FACTORIES = (dict, list, set, int, float, str, bool)
-_ALLOWED: dict[tuple[str, str], Any] = {
-    **{("builtins", kind.__name__): kind for kind in (*_FACTORIES, frozenset, complex)},
-    ("builtins", "bytes"): _bytes,
-    ("builtins", "bytearray"): _bytearray,
-    ("collections", "OrderedDict"): collections.OrderedDict,
-    ("collections", "defaultdict"): _default_dict,
-    ("_codecs", "encode"): _encode,
-    ("numpy", "dtype"): _Dtype,
-    ("numpy", "ndarray"): _Name(),
-    ("numpy", "memmap"): _Name(),
-    ("joblib.numpy_pickle", "NumpyArrayWrapper"): _JoblibArray,
-}
-for _core in ("numpy.core", "numpy._core"):
-    _ALLOWED[f"{_core}.multiarray", "_reconstruct"] = _new_array
-    _ALLOWED[f"{_core}.multiarray", "scalar"] = _scalar
-    _ALLOWED[f"{_core}.numeric", "_frombuffer"] = _array_from_buffer
-    _ALLOWED[f"{_core}.memmap", "memmap"] = _Name()
-_OF_A_LIST = (set, frozenset, collections.OrderedDict)
-_COPIES = (*_OF_A_LIST, bytes, bytearray)
-_CALLED = (
-    *_OF_A_LIST,
-    complex,
-    _bytes,
-    _bytearray,
-    _default_dict,
-    _encode,
-    _Dtype,
-    _new_array,
-    _scalar,
-    _array_from_buffer,
-)
 
 # The form of the standard library that is written in Python, because joblib's
 # arrays stand in the middle of the stream and only this form can stop there.
@@ -373,11 +272,13 @@ class _DataUnpickler(_Machine):
     def find_class(self, module: str, name: str) -> Any:
         """Look a name up in the list, and nowhere else."""
         home = "builtins" if module == "__builtin__" else module  # as Python 2 says
-        if (home, name) in _ALLOWED:
-            return _ALLOWED[home, name]
+        if (home, name) in ALLOWED:
+            return ALLOWED[home, name]
+        if (home, name) == ("torch.storage", "_load_from_bytes"):
+            return _storage_of_bytes
         if home.split(".")[0] == "torch":
             raise Refused(
-                f"holds torch tensors ('{module}.{name}'); save them as NumPy arrays "
+                f"holds torch objects ('{module}.{name}'); save them as NumPy arrays "
                 "(tensor.cpu().numpy())"
             )
         raise Refused(f"asks for '{module}.{name}', which is forbidden; nothing was executed")
@@ -393,30 +294,34 @@ class _DataUnpickler(_Machine):
     def load_reduce(self) -> None:
         """Call only what stands in the list, containers only with a list."""
         function, arguments = self.stack[-2:]
-        if not any(function is called for called in _CALLED):
+        if not any(function is called for called in (*CALLED, _storage_of_bytes)):
             raise Refused(f"calls {_named(function)}, which is forbidden")
-        if function in _OF_A_LIST and not all(isinstance(a, list | tuple) for a in arguments):
+        if function in OF_A_LIST and not all(isinstance(a, list | tuple) for a in arguments):
             raise Refused(f"builds {_named(function)} from something else than a list")
         super().load_reduce()
         made = self.stack[-1]
-        self._source.charge(sys.getsizeof(made) if isinstance(made, _COPIES) else 0)
+        self._source.charge(sys.getsizeof(made) if isinstance(made, COPIES) else 0)
+        self._source.charge(made.nbytes if function is tensor_array else 0)
 
     def load_newobj(self) -> None:
-        """Make a :class:`_JoblibArray`, the only object that joblib makes in this form."""
+        """Make an object that stands for an array, of joblib, chumpy or scipy."""
         kind, arguments = self.stack[-2:]
-        if kind is not _JoblibArray or arguments:
+        if kind not in (JoblibArray, *DESCRIBED) or arguments:
             raise Refused(f"makes {_named(kind)} without its constructor, which is forbidden")
         super().load_newobj()
 
     def load_build(self) -> None:
         """Fill arrays and dtypes; nothing else has a state to be set."""
         target = self.stack[-2]
-        if not isinstance(target, _Array | _Dtype | _JoblibArray):
+        if not isinstance(target, PlainArray | PlainDtype | JoblibArray | Described):
             raise Refused(f"sets the state of {_named(target)}, which is forbidden")
         super().load_build()
-        self._source.charge(target.nbytes if isinstance(target, _Array) else 0)
-        if isinstance(target, _JoblibArray):
+        self._source.charge(target.nbytes if isinstance(target, PlainArray) else 0)
+        if isinstance(target, JoblibArray):
             self.stack[-1] = target.read(self._source)
+        if isinstance(target, Described):
+            self.stack[-1] = target.array(self._source.left)
+            self._source.charge(self.stack[-1].nbytes)
 
     def load_frame(self) -> None:
         """Read the instructions of a frame from the file, not all of them at once."""
@@ -439,6 +344,61 @@ class _DataUnpickler(_Machine):
     dispatch[pickle.FRAME[0]] = load_frame
     for _code in (pickle.OBJ, pickle.NEWOBJ_EX, pickle.NEXT_BUFFER, pickle.READONLY_BUFFER):
         dispatch[_code[0]] = load_forbidden
+
+
+class _TorchUnpickler(_DataUnpickler):
+    """The same for torch files, whose numbers are other files of the archive, or come later."""
+
+    def __init__(
+        self, source: LimitedFile, archive: zipfile.ZipFile | None = None, folder: str = ""
+    ) -> None:
+        super().__init__(source)
+        self._archive, self._folder = archive, folder
+        self.storages: dict[str, Storage] = {}
+
+    def persistent_load(self, identity: Any) -> Storage:
+        """Numbers of tensors, by their key."""
+        known = isinstance(identity, tuple) and len(identity) >= 5 and identity[0] == "storage"
+        if not known or not isinstance(identity[1], StorageKind):
+            raise Refused("holds a torch storage of a type that is not known")
+        key = str(identity[2])
+        if key not in self.storages:
+            storage = self.storages[key] = Storage(identity[1].dtype, identity[4])
+            if self._archive is not None:
+                self._source.charge(storage.size_bytes)
+                storage.fill(self._archive.read(f"{self._folder}data/{key}"))
+        return self.storages[key]
+
+
+def _read_old_torch(source: LimitedFile) -> Any:
+    """Content of a torch file from before it was a zip: five pickles, then the numbers.
+
+    Tensors cannot be made before their numbers are there, so that only a storage by itself is read:
+    what a tensor in a plain pickle holds.
+    """
+    if [_DataUnpickler(source).load() for _ in range(2)] != [_OLD_TORCH, 1001]:
+        raise Refused("is no torch file that is known")
+    _DataUnpickler(source).load()  # of the machine that wrote it
+    machine = _TorchUnpickler(source)
+    content = machine.load()
+    for key in _DataUnpickler(source).load():
+        storage = machine.storages[key]
+        (count,) = struct.unpack("<q", source.read_exactly(8))
+        if count != storage.count:
+            raise Refused("holds a torch storage of another size than it says")
+        storage.fill(source.read_exactly(storage.size_bytes))
+    return content
+
+
+def _storage_of_bytes(content: Any) -> Storage:
+    """``torch.storage._load_from_bytes``: the numbers of a tensor in a plain pickle."""
+    if not isinstance(content, bytes):
+        raise Refused("holds a torch storage in a form that is not known")
+    source = LimitedFile(io.BytesIO(content), 2 * len(content) + _OLD_TORCH_BYTES)
+    storage = _read_old_torch(source)
+    if not isinstance(storage, Storage):
+        raise Refused("holds a torch storage in a form that is not known")
+    return storage
 
 
 def _named(thing: Any) -> str:

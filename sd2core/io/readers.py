@@ -59,6 +59,7 @@ class MeshHints:
     image_size: tuple[int, int] | None = None
     focal_px: float | None = None
     distance_m: float | None = None
+    body_model: Path | None = None
     progress: Progress = silent
 
 

@@ -82,10 +82,12 @@ class MeshReading(OptionRecord):
         turn the mesh about an axis: x180 where y is up and z backward (OBJ files of 4D-Humans),
         x90 where z is up
     image_size : WxH
-        size of the video in pixels, to place the output of VIBE (default: that of the
+        size of the video in pixels, to place the output of an estimator (default: that of the
         recording's video)
     focal_px : PX
-        focal length of the video in pixels, likewise (default: the diagonal)
+        focal length of the video in pixels, likewise (default: the file's, or the diagonal)
+    body_model : FILE
+        model of SMPL, SMPL-H or SMPL-X (.npz, .pkl), to make vertices of body parameters
     """
 
     GROUP = Group("mesh file", "what it may not say about itself")
@@ -98,6 +100,7 @@ class MeshReading(OptionRecord):
     turn: Turn | None = None
     image_size: ImageSize | None = None
     focal_px: Positive | None = None
+    body_model: Path | None = None
 
 
 class MeshInput(MeshReading):

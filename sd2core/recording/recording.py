@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_json, full_disk_named
 from sd2core.files.paths import (
-    PICKLE_SUFFIXES,
     as_path,
     free_path,
     is_absolute,
@@ -222,7 +221,7 @@ class Recording:
             When the folder is a recording already, a file does not exist, or
             there is nothing to record.
         """
-        folder = _new_folder(Path(folder))
+        folder = new_folder(Path(folder))
         files: dict[Role, Path] = {}
         for role, path in self._files().items():
             # What went with the folder that it was in can be found again.
@@ -442,12 +441,14 @@ class Recording:
 
     def mesh_options(self) -> dict[str, Any]:
         """Arguments with which ``load_mesh`` reads the mesh."""
+        from sd2core.io.mesh_models import is_estimate
+
         path = self._present("mesh")
         options = self.mesh_reading.options()
         if self.faces is not None:
             options["faces"] = self._present("faces")
-        by_video = path.suffix.lower() in PICKLE_SUFFIXES and self.video and self.video.exists()
-        if by_video and "image_size" not in options:
+        has_video = self.video is not None and self.video.exists()
+        if has_video and "image_size" not in options and is_estimate(path):
             with self.open_video() as video:
                 options["image_size"] = (video.width, video.height)
         return options
@@ -583,7 +584,8 @@ def folder_named(path: Path | str) -> Path:
     return folder if folder.suffix == SUFFIX else folder.with_name(folder.name + SUFFIX)
 
 
-def _new_folder(folder: Path) -> Path:
+def new_folder(folder: Path) -> Path:
+    """Folder of a recording to be made; Sd2Error if it is one already, or cannot be made."""
     folder = folder_named(folder)
     if (folder / FILE_NAME).exists():
         raise Sd2Error(

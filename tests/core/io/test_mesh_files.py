@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
 from sd2core.io.frame_names import natural_key
+from sd2core.io.kinds import kind_of
 from sd2core.io.mesh import load_mesh
 from sd2core.io.mesh_files import read_surface
 from sd2core.progress import Cancelled
@@ -192,3 +193,26 @@ def test_a_pipe_is_not_opened(tmp_path: Path, suffix: str) -> None:
     os.mkfifo(tmp_path / f"pipe{suffix}")
     with pytest.raises(Sd2Error, match=r"pipe\.\w+ is a named pipe"):
         read_surface(tmp_path / f"pipe{suffix}")
+
+
+@pytest.mark.parametrize("name", ["walk.bvh", "walk.FBX", "walk.usdz"])
+def test_motion_of_skeletons_is_refused_with_the_way_out(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(b"HIERARCHY")
+    assert kind_of(tmp_path / name) == "mesh"
+    with pytest.raises(Sd2Error, match=r"motion of a skeleton.*OBJ for each frame") as caught:
+        load_mesh(tmp_path / name)
+    assert ("no surface" in caught.value.found) == name.endswith("bvh")
+
+
+def test_an_animation_is_not_read_as_one_still_pose(tmp_path: Path) -> None:
+    scene = trimesh.Scene(trimesh.creation.box())
+    path = tmp_path / "walk.glb"
+    path.write_bytes(scene.export(file_type="glb"))
+    assert load_mesh(path).frame_count == 1
+
+    def animated(tree: dict[str, Any]) -> None:
+        tree["animations"] = [{"channels": [], "samplers": []}]
+
+    path.write_bytes(trimesh.exchange.gltf.export_glb(scene, tree_postprocessor=animated))
+    with pytest.raises(Sd2Error, match=r"walk\.glb holds an animation"):
+        load_mesh(path)

@@ -193,13 +193,13 @@ def test_an_impossible_camera_is_named(tmp_path: Path) -> None:
 
 
 def test_body_parameters_without_vertices_are_explained(tmp_path: Path) -> None:
-    frame = {"smpl": [{"betas": np.zeros(10)}], "camera": [np.zeros(3)], "tid": [1]}
-    joblib.dump({"frames/000001.jpg": frame}, tmp_path / "demo_phalp.pkl")
+    person = wham(4)
+    del person["verts"]
+    joblib.dump({1: person}, tmp_path / "wham_output.pkl")
     with pytest.raises(
-        Sd2Error,
-        match=r"demo_phalp\.pkl holds body parameters and no vertices.*4D-Humans.*OBJ per frame",
+        Sd2Error, match=r"wham_output\.pkl holds body parameters and no vertices.*--body-model"
     ):
-        load_mesh(tmp_path / "demo_phalp.pkl")
+        load_mesh(tmp_path / "wham_output.pkl")
 
 
 def test_a_pickle_without_vertices_says_what_it_holds(tmp_path: Path) -> None:
@@ -283,10 +283,3 @@ def test_parameters_in_an_npz_are_named_with_the_way_to_vertices(
     with pytest.raises(Sd2Error, match=rf"body parameters.*{names[0]}.*--body-model") as caught:
         load_mesh(tmp_path / "a.npz")
     assert "Rename" not in str(caught.value)
-
-
-def test_results_of_romp_are_named(tmp_path: Path) -> None:
-    people = {"verts": np.zeros((2, 5, 3)), "cam_trans": np.zeros((2, 3))}
-    np.savez(tmp_path / "video_results.npz", results=np.array(people, dtype=object))
-    with pytest.raises(Sd2Error, match=r"ROMP.*\['results'\].*numpy\.savez"):
-        load_mesh(tmp_path / "video_results.npz")
