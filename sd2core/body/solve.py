@@ -371,9 +371,9 @@ def one_thread() -> AbstractContextManager[object]:
 
 
 _FIRST_ROTATION_RADPS2 = 60.0
-_FIRST_TRANSLATION_MPS2 = 6.0
+FIRST_TRANSLATION_MPS2 = 6.0
 _LEAST_ROTATION_RADPS2 = 0.3
-_LEAST_TRANSLATION_MPS2 = 0.05
+LEAST_TRANSLATION_MPS2 = 0.05
 _LIVELINESS = 0.7
 """Standard deviation of an acceleration over what was found around it."""
 _AROUND_S = 0.3
@@ -404,14 +404,16 @@ def solve(
     """
     frames = len(evidence.times_s)
     sd = np.full((max(frames - 2, 0), rig.freedoms), _FIRST_ROTATION_RADPS2)
-    sd[:, -3:] = _FIRST_TRANSLATION_MPS2
+    sd[:, -3:] = FIRST_TRANSLATION_MPS2
     pose = start
     with one_thread():
         for number in range(ROUNDS):
             objective = Objective(rig, evidence, sd)
             pose = _descend(objective, pose, robust=number > 0, tick=partial(tick, number))
             if number < ROUNDS - 1:
-                sd = _liveliness(objective.accelerations(pose), evidence.times_s)
+                least = np.full(rig.freedoms, _LEAST_ROTATION_RADPS2)
+                least[-3:] = LEAST_TRANSLATION_MPS2
+                sd = liveliness(objective.accelerations(pose), evidence.times_s, least)
     return pose
 
 
@@ -450,16 +452,19 @@ def _descend(objective: Objective, pose: Pose, *, robust: bool, tick: Callable[[
     return pose
 
 
-def _liveliness(accelerations: Floats, times_s: Floats) -> Floats:
-    """Root mean square acceleration around each moment, not below what is left at rest."""
+def liveliness(
+    values: Floats, times_s: Floats, least: Floats | float, share: float = _LIVELINESS
+) -> Floats:
+    """Share of the root mean square of values (m, N) around each moment, not below the least.
+
+    Accelerations do not fall below what is left at rest.
+    """
     from scipy.ndimage import correlate1d
 
-    if not len(accelerations):
-        return accelerations
+    if not len(values):
+        return values
     reach = max(round(_AROUND_S / float(np.median(np.diff(times_s)))), 1)
     kernel = np.hanning(2 * reach + 3)[1:-1]
-    share = correlate1d(np.ones(len(accelerations)), kernel, mode="constant")[:, None]
-    mean = correlate1d(accelerations**2, kernel, axis=0, mode="constant") / share
-    least = np.full(accelerations.shape[1], _LEAST_ROTATION_RADPS2)
-    least[-3:] = _LEAST_TRANSLATION_MPS2
-    return np.asarray(np.sqrt(_LIVELINESS**2 * mean + least**2))
+    inside = correlate1d(np.ones(len(values)), kernel, mode="constant")[:, None]
+    mean = correlate1d(values**2, kernel, axis=0, mode="constant") / inside
+    return np.asarray(np.sqrt(share**2 * mean + np.square(least)))

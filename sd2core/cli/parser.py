@@ -52,6 +52,7 @@ COMMANDS = {
     "relink": "find the missing files of a recording in another folder",
     "align": "find the time offset of video and radar from what both saw",
     "fit": "make a moving mesh from a video of a person",
+    "refine": "make a mesh of another tool smooth in time",
     "synth": "compute the Doppler that a radar would have measured of a moving mesh",
     "radar": "turn a raw radar capture into a Doppler map, or say what limits it has",
     "listen": "record a radar while it runs, and follow its Doppler map",

@@ -1,0 +1,278 @@
+"""A mesh of another tool made smooth in time, as our own fit is (docs/decisions/0022).
+
+Estimators look at one frame after the other, and what jitters between frames is false Doppler.
+Every coordinate keeps to what was estimated within the jitter that is found in it, and may
+accelerate as much as it was found to do around each moment. Nothing lags: all frames are solved at
+once. The body's middle is smoothed by itself, because it moves more calmly than its limbs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.parts import body_parts
+from sd2core.body.rotations import Floats
+from sd2core.body.solve import FIRST_TRANSLATION_MPS2, LEAST_TRANSLATION_MPS2, ROUNDS, liveliness
+from sd2core.errors import Sd2Error
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
+from sd2core.progress import Progress, silent
+
+_FEWEST = 8
+"""Frames of a stretch below which jitter cannot be told from motion."""
+_LEAST_JITTER_M = 1e-5
+_LASTING = 1.3
+"""Uncertainty over that of white jitter: what errs for several frames is not taken away. Chosen on
+recorded motion (CMU subjects 1, 2, 5, 8, 49, 127) with the jitter of estimators."""
+_FAR = 8.0
+"""Distance, in standard deviations of the jitter, from where on a place counts less than half."""
+_CUBIC = {-2: -1 / 6, -1: 4 / 6, 1: 4 / 6, 2: -1 / 6}
+_GAUSSIAN = 0.6745  # median of the absolute value, over the standard deviation
+_THIRD = 20.0**0.5  # standard deviation of a third difference of white noise of 1
+_MARGIN_S = 5.0
+"""Time around a part that is smoothed with it; what lies farther away changes nothing there."""
+_PART_BYTES = 64 * 2**20
+_COLUMNS = 2048
+_SAMPLED = 24
+"""Vertices of each limb by which its uncertainty is found."""
+
+
+def refined(mesh: MeshSequence, progress: Progress = silent) -> MeshSequence:
+    """The mesh made smooth in time, with what is uncertain in its velocities.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+        Of another tool; its vertices may stay on disk.
+    progress : callable
+        Called with frames while uncertainty is found; may raise ``Cancelled``.
+
+    Returns
+    -------
+    MeshSequence
+        Its vertices are computed where they are read, in order best.
+
+    Raises
+    ------
+    Sd2Error
+        If its uncertainty is known already: it is then smooth, too.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> import numpy as np
+    >>> import sd2core as sd2
+    >>> from sd2core.files.resources import resource_path
+    >>> true = sd2.load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(0, 40)
+    >>> jitter_m = np.random.default_rng(0).normal(0, 0.005, (40, 1, 3))
+    >>> smooth = refined(replace(true, vertices=true.read(0, 40) + jitter_m))
+    >>> bool(np.abs(smooth.read(0, 40) - true.read(0, 40)).mean() < 0.002)
+    True
+    """
+    if mesh.uncertainty is not None:
+        raise Sd2Error(
+            f"{mesh.source or 'The mesh'} says how uncertain its velocities are",
+            "a mesh that another tool made, frame by frame",
+            "One of `sd2 fit` or `sd2 refine` is smooth already",
+        )
+    vertices = RefinedVertices(mesh)
+    parts = body_parts(mesh)
+    limbs = ("body",) if parts is None else parts.names
+    which = np.zeros(mesh.vertex_count, np.uint8) if parts is None else parts.numbers
+    sampled, taken_m = _Limbs(which, len(limbs)), 0.0
+    along = np.zeros((mesh.frame_count, len(limbs)), np.float32)
+    across = np.zeros_like(along)
+    for start, stop in vertices.parts():
+        progress(start, mesh.frame_count)
+        smooth, removed, sigma = vertices.smooth(start, stop, sampled.columns)
+        along[start:stop], across[start:stop] = sampled.along_and_across(smooth, sigma)
+        taken_m += float(np.square(removed).sum())
+    progress(mesh.frame_count, mesh.frame_count)
+    frames = max(int(mesh.presence.there.sum()), 1)
+    taken_m = (taken_m / (frames * len(sampled.columns))) ** 0.5
+    note = (
+        f"Made smooth in time: {1000 * taken_m:.1f} mm (RMS) of every vertex were taken for jitter."
+        f" Velocities are known to ±{np.median(along[mesh.presence.there]):.2f} m/s (median)."
+    )
+    uncertainty = VelocityUncertainty(limbs, which, along, across)
+    return replace(mesh, vertices=vertices, uncertainty=uncertainty, notes=(*mesh.notes, note))
+
+
+class RefinedVertices:
+    """Vertices (T, V, 3) that are smoothed where they are read, a part of the clip at a time."""
+
+    def __init__(self, mesh: MeshSequence) -> None:
+        self._mesh = mesh
+        self.shape = (mesh.frame_count, mesh.vertex_count, 3)
+        self.dtype = np.dtype(mesh.vertices.dtype)
+        step_s = float(np.median(np.diff(mesh.times_s))) if mesh.frame_count > 1 else 1.0
+        self._margin = int(np.ceil(_MARGIN_S / step_s))
+        frame_bytes = 3 * mesh.vertex_count * self.dtype.itemsize
+        self._step = max(_PART_BYTES // frame_bytes, self._margin)
+        self._kept: tuple[int, NDArray[Any]] | None = None
+
+    def parts(self) -> list[tuple[int, int]]:
+        """Half-open ranges of frames that are smoothed together."""
+        frames = self.shape[0]
+        return [(k, min(k + self._step, frames)) for k in range(0, frames, self._step)]
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        frames, rest = (key[0], key[1:]) if isinstance(key, tuple) else (key, ())
+        rows = np.arange(self.shape[0])[frames]
+        asked = np.atleast_1d(rows)
+        found = np.empty((len(asked), *self.shape[1:]), self.dtype)
+        for start in np.unique(asked // self._step) * self._step:
+            there = asked // self._step == start // self._step
+            found[there] = self._part(int(start))[asked[there] - start]
+        return found[(slice(None) if rows.ndim else 0, *rest)]
+
+    def _part(self, start: int) -> NDArray[Any]:
+        if self._kept is None or self._kept[0] != start:
+            stop = min(start + self._step, self.shape[0])
+            self._kept = start, self.smooth(start, stop)[0].astype(self.dtype)
+        return self._kept[1]
+
+    def smooth(
+        self, start: int, stop: int, columns: NDArray[np.intp] | None = None
+    ) -> tuple[Floats, Floats, Floats]:
+        """Vertices of some frames, smoothed; what was taken away; σ of their velocities, m/s.
+
+        All are (n, C, 3), of some of the vertices or all.
+        """
+        first = max(start - self._margin, 0)
+        last = min(stop + self._margin, self.shape[0])
+        given = self._mesh.read(first, last)
+        middle = given.mean(axis=1, dtype=np.float64)  # (m, 3)
+        chosen = given if columns is None else given[:, columns]
+        limbs = (chosen - middle[:, None]).reshape(len(given), -1)
+        smooth = limbs.astype(np.float64)
+        spread = np.zeros_like(smooth)
+        calm, calm_spread = middle.copy(), np.zeros_like(middle)
+        presence = self._mesh.presence.between(first, last)
+        for begin in np.unique(presence.first[presence.there]):
+            stretch = slice(int(begin), int(presence.last[begin]) + 1)
+            times_s = self._mesh.times_s[first:last][stretch]
+            calm[stretch], calm_spread[stretch] = smooth_paths(times_s, middle[stretch])
+            for column in range(0, smooth.shape[1], _COLUMNS):
+                part = (stretch, slice(column, column + _COLUMNS))
+                smooth[part], spread[part] = smooth_paths(times_s, limbs[part])
+        kept = slice(start - first, stop - first)
+        shape = (stop - start, -1, 3)
+        found = smooth[kept].reshape(shape) + calm[kept, None]
+        sigma = np.hypot(spread[kept].reshape(shape), calm_spread[kept, None])
+        return found, chosen[kept] - found, sigma
+
+
+class _Limbs:
+    """A sample of the vertices of each limb."""
+
+    def __init__(self, which: NDArray[np.uint8], count: int) -> None:
+        rows = [np.flatnonzero(which == limb) for limb in range(count)]
+        chosen = [row[:: max(len(row) // _SAMPLED, 1)] for row in rows]
+        self.columns = np.concatenate(chosen)
+        self._limb = np.repeat(np.arange(count), [len(row) for row in chosen])
+        self._count = count
+
+    def along_and_across(self, places_m: Floats, sigma_mps: Floats) -> tuple[Floats, Floats]:
+        """σ (n, L) of each limb's velocity along the line from the camera, and across it."""
+        along = np.zeros((len(places_m), self._count))
+        across = np.zeros_like(along)
+        for limb in np.unique(self._limb):
+            members = self._limb == limb
+            variance = np.square(sigma_mps[:, members]).mean(axis=1)  # (n, 3)
+            line = places_m[:, members].mean(axis=1)
+            length = np.linalg.norm(line, axis=1, keepdims=True)
+            line = np.divide(line, length, out=np.zeros_like(line), where=length > 0)
+            seen = (line**2 * variance).sum(axis=1)
+            along[:, limb] = np.sqrt(seen)
+            across[:, limb] = np.sqrt(np.maximum(variance.sum(axis=1) - seen, 0.0) / 2.0)
+        return along, across
+
+
+def smooth_paths(times_s: Floats, paths_m: Floats) -> tuple[Floats, Floats]:
+    """Smooth paths (T, N) of coordinates, and the standard deviation of their velocities in m/s.
+
+    Each is solved by itself: squared distances from what is given, over the jitter's variance, and
+    squared accelerations, over those that were found around each moment, are least together.
+    """
+    if len(times_s) < _FEWEST:
+        return paths_m, np.zeros(paths_m.shape)
+    jitter_m = np.median(np.abs(np.diff(paths_m, 3, axis=0)), axis=0) / (_GAUSSIAN * _THIRD)
+    jitter_m = np.maximum(jitter_m, _LEAST_JITTER_M)  # (N,)
+    weights = _second_differences(times_s)
+    sd = np.full((len(times_s) - 2, paths_m.shape[1]), FIRST_TRANSLATION_MPS2)
+    beside = np.zeros(paths_m.shape)  # from the cubic through two frames on each side
+    beside[2:-2] = paths_m[2:-2] - sum(
+        weight * paths_m[2 + k : len(paths_m) - 2 + k] for k, weight in _CUBIC.items()
+    )
+    trust = _trust(beside, 3.0 * jitter_m)  # quick motion looks like a jump here
+    for number in range(ROUNDS):
+        smooth = _solved(weights, paths_m, jitter_m / sd, trust)
+        if number < ROUNDS - 1:
+            trust = _trust(paths_m - smooth, jitter_m)
+            found = sum(weights[k][:, None] * smooth[k : len(smooth) - 2 + k] for k in range(3))
+            sd = liveliness(np.asarray(found), times_s, LEAST_TRANSLATION_MPS2)
+    return smooth, _velocity_sd(times_s, paths_m - smooth, sd)
+
+
+def _trust(off_m: Floats, jitter_m: Floats) -> Floats:
+    """How much a place counts that is off by so much, from 0 to 1."""
+    return np.asarray(1.0 / (1.0 + np.square(off_m / (_FAR * jitter_m))))
+
+
+def _second_differences(times_s: Floats) -> Floats:
+    """Weights (3, T - 2) of three successive places that give the acceleration between them."""
+    before, after = np.diff(times_s)[:-1], np.diff(times_s)[1:]
+    both = before + after
+    return np.stack([2.0 / (before * both), -2.0 / (before * after), 2.0 / (after * both)])
+
+
+def _solved(weights: Floats, given: Floats, stiffness: Floats, trust: Floats) -> Floats:
+    """Solution x (T, N) of (W + Dᵀ S² D) x = W given: second differences D, stiffness S, trust W.
+
+    The matrix has five diagonals; L D Lᵀ is worked out row after row, for all columns at once.
+    """
+    frames = len(given)
+    rows = weights[:, :, None] * stiffness  # (3, T - 2, N)
+    pivots = trust.copy()
+    next_one, next_two = np.zeros(given.shape), np.zeros(given.shape)
+    for k in range(3):
+        pivots[k : frames - 2 + k] += rows[k] ** 2
+    next_one[: frames - 2] += rows[0] * rows[1]
+    next_one[1 : frames - 1] += rows[1] * rows[2]
+    next_two[: frames - 2] = rows[0] * rows[2]
+    x = trust * given
+    for t in range(frames):
+        if t > 0:
+            pivots[t] -= next_one[t - 1] ** 2 * pivots[t - 1]
+            x[t] -= next_one[t - 1] * x[t - 1]
+        if t > 1:
+            pivots[t] -= next_two[t - 2] ** 2 * pivots[t - 2]
+            x[t] -= next_two[t - 2] * x[t - 2]
+        if t > 0:
+            next_one[t] -= next_one[t - 1] * next_two[t - 1] * pivots[t - 1]
+        next_one[t] /= pivots[t]
+        next_two[t] /= pivots[t]
+    x /= pivots
+    for t in range(frames - 2, -1, -1):
+        x[t] -= next_one[t] * x[t + 1]
+        if t < frames - 2:
+            x[t] -= next_two[t] * x[t + 2]
+    return x
+
+
+def _velocity_sd(times_s: Floats, removed_m: Floats, sd_mps2: Floats) -> Floats:
+    """Standard deviation (T, N) of velocities, by what was taken away around each moment.
+
+    White noise of density n² dt that passes 1 / (1 + (ω / ω₀)⁴), with ω₀² = s / n for accelerations
+    s, leaves a velocity of variance n² dt ω₀³ / √8 uncertain.
+    """
+    step_s = float(np.median(np.diff(times_s)))
+    jitter_m = liveliness(removed_m, times_s, _LEAST_JITTER_M, share=1.0)
+    edge = np.concatenate([sd_mps2[:1], sd_mps2, sd_mps2[-1:]])
+    cutoff = np.minimum(np.sqrt(edge / jitter_m), np.pi / step_s)
+    return np.asarray(_LASTING * jitter_m * np.sqrt(step_s * cutoff**3 / 8.0**0.5))
