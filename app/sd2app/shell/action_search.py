@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QKeyEvent, QKeySequence
+from PySide6.QtGui import QAction, QKeyEvent, QKeySequence, QPalette
 from PySide6.QtWidgets import QDialog, QHeaderView, QMenu, QMenuBar, QTreeWidget, QTreeWidgetItem
 
 from sd2app.widgets.inputs import SearchLine
@@ -104,6 +104,7 @@ class ActionSearch(QDialog):
 
     def _find(self, text: str) -> None:
         self._found = found(self._offers, text)
+        grey = self.palette().color(QPalette.ColorGroup.Disabled, QPalette.ColorRole.Text)
         self._list.clear()
         for one in self._found:
             keys = ", ".join(
@@ -111,7 +112,10 @@ class ActionSearch(QDialog):
                 for key in one.action.shortcuts()
             )
             item = QTreeWidgetItem(self._list, [one.text, " › ".join(one.menus), keys])
-            item.setDisabled(not one.action.isEnabled())
+            if not one.action.isEnabled():
+                # Grey, and still marked by the arrow keys, to say why.
+                for column in range(item.columnCount()):
+                    item.setForeground(column, grey)
         self._list.setCurrentIndex(self._list.model().index(0, 0))
         self._explain()
 

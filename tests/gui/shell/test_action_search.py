@@ -14,9 +14,15 @@ from sd2app.shell.action_search import ActionSearch, found, offers_of
 
 
 @pytest.fixture
-def bar(qtbot):
+def bare_window(qtbot):
     window = QMainWindow()
     qtbot.addWidget(window)
+    return window
+
+
+@pytest.fixture
+def bar(bare_window):
+    window = bare_window
     menus = window.menuBar()
     file, view = menus.addMenu("&File"), menus.addMenu("&View")
     for text, tip in (("&Open…", "Look at a recording"), ("Save &as…", "Write a copy")):
@@ -29,7 +35,7 @@ def bar(qtbot):
     off.setToolTip("There is no mesh")
     off.setEnabled(False)
     inner.addAction(off)
-    yield menus  # the window lives as long
+    return menus
 
 
 def texts(offers):
@@ -46,7 +52,7 @@ def test_beginnings_go_before_what_is_within_and_that_before_tips(bar):
     offers = offers_of(bar)
     assert texts(found(offers, "open")) == ["Open…", "Open the palette"]  # the rest is disabled
     assert texts(found(offers, "AS")) == ["Save as…"]
-    assert texts(found(offers, "re")) == ["Open…"]  # "recording", in its tip
+    assert texts(found(offers, "reco")) == ["Open…"]  # "recording", in its tip
     assert texts(found(offers, "file copy")) == ["Save as…"]
     assert texts(found(offers, "pale open")) == ["Open the palette"]
     assert found(offers, "open zebra") == []
