@@ -36,6 +36,8 @@ FOCAL_NAMES = ("focal_length", "img_focal")
 _KEPT = (*ESTIMATED, *PARAMETER_NAMES, *CAMERA_NAMES, *FOCAL_NAMES)
 _SHARED = (*FACE_NAMES, *FOCAL_NAMES, "size")
 _FRAME_NUMBERS = ("frame_number", "frame_idx", "frame_id", "frame")
+_FEWEST_VERTICES = 100
+"""Fewer are points of a radar, or joints."""
 _PEOPLE = ("persons", "people", "outputs")
 
 
@@ -83,13 +85,15 @@ def files_of_people(folder: Path, notes: list[str] | None = None) -> list[Path]:
     return frames_among(files, [] if notes is None else notes)
 
 
-def holds_objects(path: Path) -> bool:
-    """True for an ``.npy`` of objects (TRAM), which no radar writes."""
+def holds_bodies(path: Path) -> bool:
+    """True for an ``.npy`` of objects (TRAM) or of vertices (T, V, 3), which no radar writes."""
     try:
         with open_regular(path) as file:
-            return bool(read_array_header(file)[2].hasobject)
+            shape, _, kind = read_array_header(file)
     except (OSError, ValueError, EOFError):
         return False
+    is_surface = len(shape) == 3 and shape[1] >= _FEWEST_VERTICES and shape[2] == 3
+    return bool(kind.hasobject or (kind.kind == "f" and is_surface))
 
 
 def first_of(entry: Mapping[Any, Any], names: tuple[str, ...]) -> Any:

@@ -10,7 +10,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular
 from sd2core.files.paths import PICKLE_SUFFIXES, is_pattern
 from sd2core.files.stores import read_attributes
-from sd2core.io.estimator_files import files_of_people, holds_objects
+from sd2core.io.estimator_files import files_of_people, holds_bodies
 from sd2core.io.imu_columns import holds_inertial_signals
 from sd2core.io.mesh_files import MOTION_SUFFIXES
 from sd2core.io.readers import MESH_FILES, RADAR_FILES, plug_in_for
@@ -56,7 +56,7 @@ def kind_of(path: Path) -> Kind:
     if suffix in MESH_SUFFIXES or path.name.endswith(".zarr.zip"):
         return "mesh"
     if suffix in RADAR_SUFFIXES:
-        return "mesh" if suffix == ".npy" and holds_objects(path) else "radar"
+        return "mesh" if suffix == ".npy" and holds_bodies(path) else "radar"
     if suffix == ".safetensors":
         return "model"
     if holds_inertial_signals(path):

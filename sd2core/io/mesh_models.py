@@ -25,7 +25,7 @@ from sd2core.io.estimator_files import (
     TORCH_SUFFIXES,
     files_of_people,
     first_of,
-    holds_objects,
+    holds_bodies,
     people_in,
 )
 from sd2core.io.frame_names import chosen_person
@@ -51,7 +51,7 @@ def is_estimate(path: Path) -> bool:
             names & {*ESTIMATED, *PARAMETER_NAMES, "results"}
         )
     if suffix == ".npy":
-        return holds_objects(path)
+        return holds_bodies(path)
     return suffix in (*PICKLE_SUFFIXES, *TORCH_SUFFIXES, ".json")
 
 

@@ -57,7 +57,7 @@ _NAMES = {
     "label": ("label", "gesture", "behavior", "behaviour", "description", "annotation",
               "trial_type", "class", "text"),
     "start_s": ("start_s", "start_time_s", "start_time", "start", "onset_s", "onset", "begin_s",
-                "begin", "begin_time_ss_msec", "begin_time", "tmin"),
+                "begin", "begin_time_ss_msec", "begin_time", "tmin", "time_s", "time"),
     "end_s": ("end_s", "end_time_s", "end_time", "end", "stop_s", "stop", "offset_s", "offset",
               "end_time_ss_msec", "tmax"),
     "duration_s": ("duration_s", "duration", "duration_ss_msec"),
@@ -70,6 +70,11 @@ _NAMES = {
     "origin": ("origin",),
     "observation": ("observation_id",),
 }  # fmt: skip
+
+_UNITS_S = {"_ms": 1e-3, "_msec": 1e-3, "_us": 1e-6, "_ns": 1e-9}
+"""Ends of headings of times that are not in seconds."""
+
+_TIMES = ("start_s", "end_s", "duration_s")
 
 _BANNED = re.compile("[\0\ud800-\udfff]")
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
@@ -131,7 +136,8 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
             whole.append((line, cells))
     if "observation" in where:
         whole = _of_observation(path, whole, where["observation"], observation)
-    numbers = _Numbers(path, whole, where)
+    units_s = {column: _named(heading[where[column]])[1] for column in _TIMES if column in where}
+    numbers = _Numbers(path, whole, where, units_s)
     for line, cells in whole:
         with found.entry():
             cell = {name: of_cell(cells[index]) for name, index in where.items()}
@@ -196,14 +202,16 @@ def _check_width(
 
 
 def _spoken_for(heading: Sequence[str]) -> bool:
-    names = {_plain(one) for one in heading}
+    names = {_named(one)[0] for one in heading}
 
     def has(column: str) -> bool:
         return any(name in names for name in _NAMES[column])
 
-    seconds = has("start_s") and (has("end_s") or has("duration_s"))
     frames = has("start_frame") and (has("end_frame") or has("last_frame"))
-    return has("label") and (seconds or frames)
+    spans = has("start_s") and (has("end_s") or has("duration_s"))
+    # Of marks; not BORIS' events, which have a row for a start and one for its stop.
+    marks = has("start_s") and "behavior_type" not in names
+    return has("label") and (spans or frames or marks)
 
 
 def _remedy(first: str) -> str:
@@ -217,8 +225,19 @@ def _plain(heading: str) -> str:
     return re.sub(r"_hh_mm_ss(_ms|_msec)?$", "", plain)
 
 
+def _named(heading: str) -> tuple[str, float]:
+    """Plain name of a column, and its unit in seconds where it names another one."""
+    plain = _plain(heading)
+    if not any(plain in names for names in _NAMES.values()):
+        for ending, unit_s in _UNITS_S.items():
+            name = plain.removesuffix(ending)
+            if name != plain and any(name in _NAMES[column] for column in _TIMES):
+                return name, unit_s
+    return plain, 1.0
+
+
 def _columns(path: Path, heading: Sequence[str]) -> dict[str, int]:
-    plain = [_plain(one) for one in heading]
+    plain = [_named(one)[0] for one in heading]
     twice = sorted({name for name in plain if name and plain.count(name) > 1})
     if any(name in names for name in twice for names in _NAMES.values()):
         raise Sd2Error(f"{path} has two columns {twice[0]!r}", "columns of different names")
@@ -249,10 +268,14 @@ class _Numbers:
     """Numbers of one table, which agree on what a comma means."""
 
     def __init__(
-        self, path: Path, lines: Sequence[tuple[int, list[str]]], where: dict[str, int]
+        self,
+        path: Path,
+        lines: Sequence[tuple[int, list[str]]],
+        where: dict[str, int],
+        units_s: dict[str, float],
     ) -> None:
-        self._path = path
-        columns = [where[one] for one in ("start_s", "end_s", "duration_s") if one in where]
+        self._path, self._units_s = path, units_s
+        columns = [where[one] for one in _TIMES if one in where]
         texts = [cells[column].strip() for _, cells in lines for column in columns]
         texts = [text for text in texts if _NUMBER.fullmatch(text) or _GROUPED.fullmatch(text)]
         commas = [text for text in texts if "," in text]
@@ -280,7 +303,7 @@ class _Numbers:
             raise Sd2Error(
                 f"{self._path}, line {line}: {column} is {text[:50]!r}", "a finite number"
             )
-        return value
+        return value * self._units_s.get(column, 1.0)
 
     def _clock(self, line: int, column: str, text: str) -> float:
         value = seconds_of(text)
@@ -302,6 +325,9 @@ def _times(
     if "start_s" in cell and "duration_s" in cell:
         start_s = numbers.of(line, "start_s", cell["start_s"])
         return start_s, start_s + numbers.of(line, "duration_s", cell["duration_s"]), None
+    if "start_s" in cell and "start_frame" not in cell:
+        start_s = numbers.of(line, "start_s", cell["start_s"])
+        return start_s, start_s, None  # a mark
     first = _frame(path, line, "start_frame", cell["start_frame"])
     end = (
         _frame(path, line, "end_frame", cell["end_frame"])

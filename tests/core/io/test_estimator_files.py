@@ -349,3 +349,14 @@ def test_whatever_stands_under_a_known_name_is_read_or_refused(tmp_path: Path, n
         except Sd2Error:
             refused += 1
     assert refused
+
+
+def test_an_array_of_vertices_alone_is_a_mesh_and_one_of_points_is_none(tmp_path: Path) -> None:
+    vertices = np.random.default_rng(0).normal(size=(4, 150, 3)) * 0.2 + [0, 0, 3.0]
+    np.save(tmp_path / "vertices.npy", vertices)
+    assert kind_of(tmp_path / "vertices.npy") == "mesh"
+    mesh = load_mesh(tmp_path / "vertices.npy", frames_per_s=25.0)
+    np.testing.assert_allclose(mesh.read(0, 4), vertices, atol=1e-6)
+    assert mesh.faces is None
+    np.save(tmp_path / "points.npy", vertices[:, :64])  # a radar's, of three columns
+    assert kind_of(tmp_path / "points.npy") == "radar"

@@ -299,3 +299,16 @@ def test_formats_that_are_only_read_are_not_written(tmp_path: Path) -> None:
     for name in ("subtitles", "label-studio"):
         with pytest.raises(Sd2Error, match="which is only read"):
             write_labels(tmp_path / "a.x", Labels(), BASE, name)
+
+
+@pytest.mark.parametrize("ending", ["_ms", " (ms)", " [ms]", "_msec"])
+def test_headings_that_name_another_unit_are_understood(tmp_path: Path, ending: str) -> None:
+    table = f"label,start{ending},duration{ending}\nA,500,1000\n"
+    assert spans(reading(tmp_path / "a.csv", table)) == [(0.5, 1.5, "A")]
+
+
+def test_a_table_of_one_time_each_is_of_marks(tmp_path: Path) -> None:
+    found = reading(tmp_path / "a.csv", "time,label\n0.5,tap\n2,tap\n", mark_s=0.2)
+    assert spans(found) == [(0.5, 0.7, "tap"), (2.0, 2.2, "tap")]
+    with pytest.raises(Sd2Error, match="export aggregated events"):
+        reading(tmp_path / "b.csv", "Time,Behavior,Behavior type\n1,wave,START\n2,wave,STOP\n")
