@@ -184,11 +184,12 @@ def _plug_ins() -> list[Finding]:
     from sd2core.denoise.registry import DENOISERS
     from sd2core.io.readers import MESH_FILES, RADAR_FILES
     from sd2core.labels.formats import LABEL_PLUG_INS
+    from sd2core.live.radars import LIVE_RADARS
     from sd2core.radar_profiles import RADAR_PLUG_INS
 
     groups: tuple[Group[Any], ...] = (
         RADAR_PLUG_INS, RADAR_FILES, MESH_FILES, LABEL_PLUG_INS, DENOISERS, CLASSIFIERS,
-        COMMAND_PLUG_INS,
+        COMMAND_PLUG_INS, LIVE_RADARS,
     )  # fmt: skip
     found = []
     for plug_in, made in (one for group in groups for one in group.loaded()):

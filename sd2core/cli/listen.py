@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import counted, print_event, print_facts
-from sd2core.errors import Sd2Error
 from sd2core.options.kinds import Positive
 from sd2core.options.records import OptionError, Place
 from sd2core.options.shared import Json
@@ -43,10 +42,13 @@ class Listen(Json):
         listen to a DCA1000 on this address of this computer (default: 127.0.0.1, which only
         programs on this computer reach; port 4098)
     replay : CAPTURE
-        a capture, or the one of a recording, at its own rate; or `test`, a simulated radar
-        (`test:20`: with 20 frames/s)
+        a capture, or the one of a recording, at its own rate
+    radar : SOURCE
+        `test`, a simulated radar (`test:20`: with 20 frames/s); `a121`, Acconeer's sensor
+        (`a121:PLACE`: at a serial port or IP address); or a plug-in's, NAME[:PLACE]
     setup : FILE
-        the .cfg or .json that the radar runs with (with --dca1000)
+        what the radar runs with: a .cfg or .json of TI's with --dca1000, a session of Acconeer's
+        tool with `a121`
     out : NAME.sd2
         the recording to write
     classifier : FILE
@@ -59,6 +61,7 @@ class Listen(Json):
 
     dca1000: Annotated[str | None, Place(one_of="source", needed=True, bare="")] = None
     replay: Annotated[Path | None, Place(one_of="source", needed=True)] = None
+    radar: Annotated[str | None, Place(one_of="source", needed=True)] = None
     setup: Path | None = None
     out: Path
     classifier: Path | None = None
@@ -72,8 +75,8 @@ class Listen(Json):
                 "--columns is given without --json", "both, for a program that reads them"
             )
         if self.replay is not None and self.setup is not None:
-            raise OptionError("--setup is given with --replay", "--setup with --dca1000 only")
-        if self.replay is None and self.setup is None:
+            raise OptionError("--setup is given with --replay", "--setup with --dca1000 or --radar")
+        if self.dca1000 is not None and self.setup is None:
             raise OptionError(
                 "--dca1000 is given without --setup",
                 "the .cfg or .json that the radar runs with: samples alone do not say their shape",
@@ -132,33 +135,15 @@ def _listen(options: Listen) -> None:
 
 def _source(options: Listen) -> Source:
     """Source that the options name; Sd2Error where it is not to be had."""
+    from sd2core.live.radars import dca1000, open_radar, replayed
+
+    if options.radar is not None:
+        return open_radar(options.radar, options.setup)
     if options.replay is not None:
         return replayed(options.replay)
     assert options.dca1000 is not None
     assert options.setup is not None
     return dca1000(options.dca1000, options.setup)
-
-
-def replayed(path: Path) -> Source:
-    """Capture, or the one of a recording, at its own rate; or the simulated radar ``test``."""
-    from sd2core.live.rehearsal import TEST, TEST_RATE_HZ, TestSource
-    from sd2core.live.sources import ReplaySource
-    from sd2core.recording.recording import is_recording, open_recording
-
-    name, _, rate = str(path).partition(":")
-    if name == TEST and (not rate or rate.isdecimal()):
-        return TestSource(float(rate or TEST_RATE_HZ))
-    return ReplaySource(open_recording(path).load_capture() if is_recording(path) else path)
-
-
-def dca1000(place: str, setup: Path) -> Source:
-    """DCA1000 that sends to ``ADDRESS[:PORT]``."""
-    from sd2core.live.sources import DATA_PORT, LOOPBACK, Dca1000Source
-
-    address, _, port = place.partition(":")
-    if port and not (port.isascii() and port.isdigit()):
-        raise Sd2Error(f"The port is {port!r}", "a number, as in 192.168.33.30:4098")
-    return Dca1000Source(setup, address or LOOPBACK, int(port) if port else DATA_PORT)
 
 
 def follow(

@@ -6,23 +6,25 @@ import argparse
 import contextlib
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.output import counted, print_event, print_facts
+from sd2core.cli.output import counted, print_event, print_facts, print_json
 from sd2core.errors import Sd2Error
 from sd2core.options.kinds import Positive
-from sd2core.options.records import OptionError
+from sd2core.options.records import OptionError, Place
 from sd2core.options.shared import Json
 from sd2core.runs.control import stop_signals
 
 if TYPE_CHECKING:
+    from sd2core.live.cameras import Camera
     from sd2core.live.clocks import ClockLine
-    from sd2core.live.filming import Film
+    from sd2core.live.filming import CameraChoice, Film
     from sd2core.live.listening import Listening
     from sd2core.live.recording import GrowingRecording
     from sd2core.live.sources import Source
 
+_CHECK_S = 10.0
 _SIZE = re.compile(r"(\d{2,5})x(\d{2,5})")
 
 
@@ -35,12 +37,16 @@ class Record(Json):
         a camera's number (0 is the first), the URL of a stream, a video file, which is played at
         its rate, or `test`
     radar : SOURCE
-        `test` (`test:20`: with 20 frames/s); a capture or recording, replayed at its own rate; or
-        with --setup the address of this computer that a DCA1000 sends to, ADDRESS[:PORT]
+        `test` (`test:20`: with 20 frames/s); `a121`, Acconeer's sensor (`a121:PLACE`: at a serial
+        port or IP address); a plug-in's, NAME[:PLACE]; a capture or recording, replayed at its own
+        rate; or with --setup the address of this computer that a DCA1000 sends to, ADDRESS[:PORT]
     setup : FILE
-        the .cfg or .json that the radar runs with
+        what the radar runs with: a .cfg or .json of TI's, a session of Acconeer's tool with `a121`
     out : NAME.sd2
         the recording to write
+    check
+        record nothing: say whether radar and camera see the same person move, where, with which
+        sign and delay; the exit code is 1 if one of four findings is bad
     size : WIDTHxHEIGHT
         of the camera's pictures, where it can (default: as it comes)
     rate : HZ
@@ -53,7 +59,7 @@ class Record(Json):
     radar_delay_ms : MS
         from the middle of a frame's chirps to its arrival (default: half of them)
     seconds : S
-        stop after so long (default: never)
+        stop after so long (default: never; 10 with --check)
     previews
         with --json, small pictures of the camera, and every column of the Doppler map
     """
@@ -61,7 +67,8 @@ class Record(Json):
     camera: str
     radar: str
     setup: Path | None = None
-    out: Path
+    out: Annotated[Path | None, Place(one_of="purpose", needed=True)] = None
+    check: Annotated[bool, Place(one_of="purpose", needed=True)] = False
     size: str | None = None
     rate: Positive | None = None
     exposure: float | None = None
@@ -85,23 +92,22 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     add_command(commands, "record", options=Record, handler=_record)
 
 
-def _record(options: Record) -> None:
+def _record(options: Record) -> int:
     """Record a camera and a radar together, on one clock.
 
     Each frame of both has the time at which it arrived at this computer, less the delay
     of its source; how fast the radar's clock runs is found from all arrivals. The
     recording can be opened at any moment, aligned; `sd2 align` checks it by what both
     saw. The video is encoded in a process of its own. Ctrl-C or q stops. Without
-    hardware: `test`.
+    hardware: `test`. Before the first take, --check says what both see while somebody
+    walks towards them and away again.
 
+      sd2 record --camera 0 --radar 192.168.33.30 --setup profile.cfg --check
       sd2 record --camera test --radar test --out try.sd2 --seconds 10
       sd2 record --camera 0 --radar 192.168.33.30 --setup profile.cfg --out take.sd2
       sd2 record --camera walk.mp4 --radar walk.sd2 --out again.sd2
     """
-    from sd2core.cli.listen import Status, follow
-    from sd2core.live.filming import VIDEO_NAME, CameraChoice, Film
-    from sd2core.live.listening import Listening
-    from sd2core.live.recording import GrowingRecording
+    from sd2core.live.filming import CameraChoice
 
     size = _SIZE.fullmatch(options.size) if options.size else None
     choice = CameraChoice(
@@ -110,8 +116,47 @@ def _record(options: Record) -> None:
         options.rate,
         options.exposure,
     )
+    if options.check:
+        return _check(options, choice)
+    _take(options, choice)
+    return 0
+
+
+def _check(options: Record, choice: CameraChoice) -> int:
+    """Say what radar and camera see; 1 if they cannot be recorded with."""
+    from sd2core.live.checking import check_place
+    from sd2core.live.looking import look
+    from sd2core.live.radars import open_radar
+
+    seconds = options.seconds or _CHECK_S
+    with contextlib.ExitStack() as stack, stop_signals() as told:
+        source = open_radar(options.radar, options.setup)
+        stack.callback(source.close)
+        camera = choice.open()
+        stack.callback(camera.close)
+        if not options.json:
+            print(f"{camera.about}\n{source.about}\n  {seconds:g} s: walk towards both, and away.")
+        delays_s = _delays_s(options, camera, source)
+        seen, moved = look(source, camera, delays_s, seconds, told)
+        findings = check_place(source.head(0.0).radar, seen, moved)
+    if options.json:
+        print_json({"findings": [vars(one) for one in findings]})
+    else:
+        for one in findings:
+            print(f"  {'ok   ' if one.passed else 'WRONG'}  {one.sentence}")
+    return 0 if all(one.passed for one in findings) else 1
+
+
+def _take(options: Record, choice: CameraChoice) -> None:
+    from sd2core.cli.listen import Status, follow
+    from sd2core.live.filming import VIDEO_NAME, Film
+    from sd2core.live.listening import Listening
+    from sd2core.live.radars import open_radar
+    from sd2core.live.recording import GrowingRecording
+
+    assert options.out is not None
     with contextlib.ExitStack() as stack:
-        source = _source(options)
+        source = open_radar(options.radar, options.setup)
         stack.callback(source.close)
         recording = GrowingRecording(options.out, keep_arrivals=True)
         if recording.folder.exists():
@@ -138,12 +183,13 @@ def _record(options: Record) -> None:
         take.end()
 
 
-def _source(options: Record) -> Source:
-    from sd2core.cli.listen import dca1000, replayed
-
-    if options.setup is not None:
-        return dca1000(options.radar, options.setup)
-    return replayed(Path(options.radar))
+def _delays_s(options: Record, camera: Camera | Film, source: Source) -> tuple[float, float]:
+    """Delays of camera and radar, as given or as known of them."""
+    given_ms = options.camera_delay_ms, options.radar_delay_ms
+    return (
+        camera.delay_s if given_ms[0] is None else 1e-3 * given_ms[0],
+        source.delay_s if given_ms[1] is None else 1e-3 * given_ms[1],
+    )
 
 
 def _remove_empty(folder: Path) -> None:
@@ -165,13 +211,7 @@ class _Take:
     ) -> None:
         self._json = options.json
         self._recording, self._listening, self._film = recording, listening, film
-        self._delays_s = tuple(
-            known_s if given_ms is None else 1e-3 * given_ms
-            for given_ms, known_s in (
-                (options.camera_delay_ms, film.delay_s),
-                (options.radar_delay_ms, source.delay_s),
-            )
-        )
+        self._delays_s = _delays_s(options, film, source)
         self._linked = False
 
     def follow(self) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.io.radar.growing import GrowingHead
-from sd2core.live.sources import Frame, Take
+from sd2core.live.sources import Frame, Source, Take
 from sd2core.radar_config import SPEED_OF_LIGHT_MPS
 from sd2core.radar_profiles import RADARS
 
@@ -81,10 +81,11 @@ class TestCamera:
         """Nothing is held."""
 
 
-class TestSource:
+class TestSource(Source):
     """Frames of a small radar in front of a reflector that sways, and of one that appears."""
 
     __test__ = False
+    about = ""
     delay_s = 0.0
 
     def __init__(self, rate_hz: float = TEST_RATE_HZ) -> None:
@@ -138,14 +139,3 @@ class TestSource:
             4.0 * np.pi * range_m[:, None] * frequency_hz / SPEED_OF_LIGHT_MPS
         )
         return beat
-
-    def doubts(self, *, at_end: bool) -> list[str]:
-        """Nothing: it is simulated."""
-        return []
-
-    def silence(self) -> str:
-        """Nothing: it never pauses."""
-        return ""
-
-    def close(self) -> None:
-        """Nothing is held."""

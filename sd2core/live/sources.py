@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,16 +54,19 @@ class Frame:
 Take = Callable[[Frame], None]
 
 
+@runtime_checkable
 class Source(Protocol):
-    """Source of frames."""
+    """Source of frames; a class of one inherits what it need not say otherwise."""
 
     @property
     def about(self) -> str:
         """Radar and place that frames come from, in words."""
+        return "A radar"
 
     @property
     def delay_s(self) -> float:
         """Time from the middle of a burst of chirps to when its frame has arrived."""
+        return 0.0
 
     def head(self, start_unix_s: float) -> GrowingHead:
         """Description of the frames; ``start_unix_s`` is the wall-clock time of the first one."""
@@ -76,15 +79,18 @@ class Source(Protocol):
 
     def doubts(self, *, at_end: bool) -> list[str]:
         """What looks wrong, in sentences; while listening, packets may still be on their way."""
+        return []
 
     def silence(self) -> str:
         """What to check when nothing comes; empty where that is no fault."""
+        return ""
 
     def close(self) -> None:
         """Free what it holds."""
+        return
 
 
-class ReplaySource:
+class ReplaySource(Source):
     """Frames of a capture at the times at which they were taken.
 
     Parameters
@@ -134,17 +140,6 @@ class ReplaySource:
     def words(self, frame: Frame) -> NDArray[Any]:
         """Words of a frame, as the capture holds them."""
         return self._head.as_stored(frame.content)
-
-    def doubts(self, *, at_end: bool) -> list[str]:
-        """Nothing: the capture says what it is."""
-        return []
-
-    def silence(self) -> str:
-        """Nothing: the capture paused."""
-        return ""
-
-    def close(self) -> None:
-        """Nothing is held."""
 
 
 class Dca1000Source:

@@ -8,7 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QDialog, QLabel, QLineEdit, QToolButton, QWidget
 
-from sd2app.live.setup import ListenSetup
+from sd2app.live.setup import DCA1000, REPLAY, ListenSetup, ways
 from sd2app.manual.help import with_help
 from sd2app.widgets.dialogs import accepting, ask_file, ask_new
 from sd2app.widgets.inputs import Choice
@@ -16,14 +16,17 @@ from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence
 from sd2core.io.kinds import RADAR_SUFFIXES
 from sd2core.io.readers import RADAR_FILES, suffixes_of
+from sd2core.live.radars import A121
+from sd2core.live.rehearsal import TEST
 
 _SETUPS = "Configuration of the radar (*.cfg *.json);;All files (*)"
 _CAPTURES = "Radar captures and recordings ({} radar.npy recording.json live.json);;All files (*)"
 _VIDEOS = "Videos (*.mp4 *.mov *.mkv *.avi *.webm);;All files (*)"
 _WAYS = {
-    "dca1000": "a TI radar with a DCA1000",
-    "replay": "a capture, replayed at its own rate",
-    "test": "a test radar (simulated)",
+    DCA1000: "a TI radar with a DCA1000",
+    REPLAY: "a capture, replayed at its own rate",
+    TEST: "a test radar (simulated)",
+    A121: "an Acconeer A121",
 }
 _CAMERAS = {
     "": "none",
@@ -47,8 +50,9 @@ class ListenDialog(QDialog):
         super().__init__(parent)
         self._setup = setup
         self.setWindowTitle("Record")
+        known = {way: _WAYS.get(way, f"{way} (plug-in)") for way in ways()}
         self._way = Choice(
-            "Where frames come from", self, _WAYS, lambda way: setup.choose("way", way)
+            "Where frames come from", self, known, lambda way: setup.choose("way", way)
         )
         self._camera = Choice("Camera", self, dict(_CAMERAS), self._choose_camera)
         self._file = ElidedLabel(self)
@@ -86,11 +90,11 @@ class ListenDialog(QDialog):
 
     def _refresh(self) -> None:
         setup = self._setup
-        is_radar = setup.way == "dca1000"
+        is_radar = setup.way == DCA1000
         self._way.show_value(setup.way)
         self._show_camera()
         for part in (self._file_name, self._file, self._file_button):
-            part.setVisible(setup.way != "test")
+            part.setVisible(setup.way in (DCA1000, REPLAY))
         self._file_name.setText("Configuration" if is_radar else "Capture")
         chosen = setup.setup if is_radar else setup.replay
         self._file.setText(str(chosen) if chosen is not None else _NONE)
@@ -120,7 +124,7 @@ class ListenDialog(QDialog):
 
     def _ask_file(self) -> None:
         setup = self._setup
-        if setup.way == "dca1000":
+        if setup.way == DCA1000:
             start = str(setup.setup or "")
             if path := ask_file(self, "Configuration that the radar runs with", _SETUPS, start):
                 setup.choose("setup", path)

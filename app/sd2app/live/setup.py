@@ -5,20 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
-from typing import Literal
 
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.settings import Settings, StoredChoices
 from sd2core.cli.listen import Listen
 from sd2core.cli.record import Record
+from sd2core.live.radars import A121, LIVE_RADARS
 from sd2core.live.rehearsal import TEST
 from sd2core.live.sources import LOOPBACK
 from sd2core.options.records import words_of
 from sd2core.recording.recording import FILE_NAME, SUFFIX, folder_named
 
-Way = Literal["dca1000", "replay", "test"]
-_WAYS = ("dca1000", "replay", "test")
+DCA1000, REPLAY = "dca1000", "replay"
 _DEFAULTS = {
     "way": "dca1000", "setup": "", "address": "", "replay": "", "beside": "", "camera": ""
 }  # fmt: skip
@@ -27,36 +26,42 @@ _ENDINGS = (".cfg", ".json")
 
 @dataclass(frozen=True)
 class ListenRequest:
-    """Radar by a DCA1000, or capture that is replayed; a camera; and where frames go."""
+    """Radar by a DCA1000 or by name, or capture that is replayed; a camera; where frames go."""
 
     folder: Path  # the recording
     setup: Path | None = None  # configuration of the radar
     address: str = ""  # of this computer, with or without a port; empty: of this computer alone
     replay: Path | None = None
+    radar: str = ""  # by name
     camera: str = ""  # as of `sd2 record`; empty: none
 
     def words(self) -> list[str]:
         """Words of the ``sd2`` command that does it."""
-        replay = self.replay is not None
         if self.camera:
             take = Record(
                 camera=self.camera,
-                radar=str(self.replay) if replay else self.address or LOOPBACK,
-                setup=None if replay else self.setup,
+                radar=self.radar or str(self.replay or self.address or LOOPBACK),
+                setup=self.setup,
                 out=self.folder,
                 json=True,
                 previews=True,
             )
             return words_of("record", take)
         command = Listen(
-            dca1000=None if replay else self.address,
+            dca1000=None if self.replay or self.radar else self.address,
             replay=self.replay,
-            setup=None if replay else self.setup,
+            radar=self.radar or None,
+            setup=self.setup,
             out=self.folder,
             json=True,
             columns=True,
         )
         return words_of("listen", command)
+
+
+def ways() -> tuple[str, ...]:
+    """Kinds of sources: a DCA1000, a replay, and radars by name."""
+    return DCA1000, REPLAY, TEST, A121, *LIVE_RADARS.names()
 
 
 class ListenSetup(QObject):
@@ -66,15 +71,14 @@ class ListenSetup(QObject):
 
     def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._choices = StoredChoices(settings, "listen", _DEFAULTS, {"way": _WAYS})
+        self._choices = StoredChoices(settings, "listen", _DEFAULTS, {"way": ways()})
         beside = Path(self._choices["beside"] or Path.home())
         self.folder = free_name(beside if beside.is_dir() else Path.home())
 
     @property
-    def way(self) -> Way:
-        """Kind of source."""
-        way: Way = self._choices["way"]
-        return way
+    def way(self) -> str:
+        """Kind of source, one of :func:`ways`."""
+        return str(self._choices["way"])
 
     @property
     def address(self) -> str:
@@ -117,12 +121,12 @@ class ListenSetup(QObject):
         """What is missing, or not there; empty where recording can begin."""
         if self.camera and self.folder.exists():
             return f"{self.folder.name} exists: what is filmed is not continued. Choose another."
-        if self.way == "test":
-            return ""
-        if self.way == "replay":
+        if self.way == REPLAY:
             if self.replay is None:
                 return "Choose the capture that is replayed."
             return "" if self.replay.exists() else f"{self.replay} does not exist."
+        if self.way != DCA1000:
+            return ""
         if self.setup is None:
             return "Choose the .cfg or .json that the radar runs with: samples do not say it."
         if not self.setup.is_file():
@@ -133,9 +137,10 @@ class ListenSetup(QObject):
 
     def request(self) -> ListenRequest:
         """What was chosen."""
-        if self.way != "dca1000":
-            replay = Path(TEST) if self.way == "test" else self.replay
-            return ListenRequest(self.folder, replay=replay, camera=self.camera)
+        if self.way == REPLAY:
+            return ListenRequest(self.folder, replay=self.replay, camera=self.camera)
+        if self.way != DCA1000:
+            return ListenRequest(self.folder, radar=self.way, camera=self.camera)
         return ListenRequest(self.folder, self.setup, self.address, camera=self.camera)
 
 

@@ -131,6 +131,39 @@ def load_acconeer(path: Path) -> RadarCapture:
         return _read(file, path)
 
 
+def a121_radar(
+    ranges_m: tuple[float, ...], width_m: float, sweeps: int, sweep_s: float, frame_s: float
+) -> RadarConfig:
+    """Radar that an A121 is with some settings.
+
+    Parameters
+    ----------
+    ranges_m : tuple of float
+        Distances of its points.
+    width_m : float
+        Width of its pulse, of :data:`PULSE_WIDTHS_M`.
+    sweeps : int
+        Sweeps of a frame.
+    sweep_s, frame_s : float
+        Between two sweeps, and two frames.
+    """
+    half_hz = 0.25 * SPEED_OF_LIGHT_MPS / width_m
+    return RadarConfig(
+        start_frequency_hz=CARRIER_HZ - half_hz,
+        end_frequency_hz=CARRIER_HZ + half_hz,
+        samples_per_chirp=len(ranges_m),
+        chirps_per_frame=sweeps,
+        chirp_repetition_s=sweep_s,
+        # Ticks are rounded.
+        frame_repetition_s=max(frame_s, sweeps * sweep_s),
+        sample_rate_hz=len(ranges_m) / sweep_s,
+        adc_bits=16,
+        name="Acconeer A121, 60.5 GHz",
+        sampling="complex",
+        ranges_m=ranges_m,
+    )
+
+
 def _read(file: h5py.File, path: Path) -> RadarCapture:
     generation = _text(file, path, "generation")
     if generation != "a121":
@@ -199,22 +232,8 @@ def _read(file: h5py.File, path: Path) -> RadarCapture:
         shape = (len(frames) // joined, 1, joined, len(ranges_m))
         timebase = Timebase(timebase.times_s[::joined][: shape[0]])
     width_m = max(one.pulse_m for one in sensor.subsweeps)
-    half_hz = 0.25 * SPEED_OF_LIGHT_MPS / width_m
     with errors_in(path):
-        config = RadarConfig(
-            start_frequency_hz=CARRIER_HZ - half_hz,
-            end_frequency_hz=CARRIER_HZ + half_hz,
-            samples_per_chirp=shape[3],
-            chirps_per_frame=shape[2],
-            chirp_repetition_s=sweep_s,
-            # Ticks are rounded.
-            frame_repetition_s=max(frame_s, shape[2] * sweep_s),
-            sample_rate_hz=shape[3] / sweep_s,
-            adc_bits=16,
-            name="Acconeer A121, 60.5 GHz",
-            sampling="complex",
-            ranges_m=tuple(ranges_m.tolist()),
-        )
+        config = a121_radar(tuple(ranges_m.tolist()), width_m, shape[2], sweep_s, frame_s)
     place = f"{entry}/result/frame"
 
     def read(some: slice) -> NDArray[Any]:

@@ -19,7 +19,7 @@ WITHOUT_FACTS = {"labels figure", "strip", "warm-up", "fetch-models", "open", "d
 GO_ON = {
     *("classify table", "export", "labels cut", "pairs mars", "pairs recordings"),
     *("pairs vary", "simulate campaign", "train", "listen"),
-    *("import",),  # and `demo`: recordings are never overwritten
+    *("import", "record"),  # and `demo`: recordings are never overwritten
 }
 """Commands that go on with what is there. All others refuse it, unless told to overwrite."""
 
@@ -39,7 +39,7 @@ SEVERAL_MEANINGS = {
     "--imu": {"FILE", "LIST"},  # a real sensor's samples; places of virtual ones
     "--model": {"FILE", "FILE|NAME", "NAME"},  # one that was trained; kind of one to train
     "--placements": {"FILE", "FILE|planned", None},  # a plan; which of those in pairs are used
-    "--radar": {"CAPTURE", "NAME|CONFIG.json"},  # a real one; one to simulate
+    "--radar": {"CAPTURE", "NAME|CONFIG.json", "SOURCE"},  # recorded; to simulate; live
     "--rate": {"FPS", "HZ"},  # of maps; of an inertial sensor
 }
 """Options whose value differs between commands. Of all others a metavar says it for all."""

@@ -26,7 +26,7 @@ from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
 GROUPS = ("radars", "radar_files", "mesh_files", "label_files", "denoisers", "classifiers",
-          "commands")  # fmt: skip
+          "commands", "live_radars")  # fmt: skip
 RADAR = """
 from sd2core import PAPER_RADAR
 SD2_PLUGIN_API = 1
@@ -85,6 +85,23 @@ class TestEach:
         np.full(shape, 2048, np.uint16).tofile(path)
         assert load_capture(path).samples.shape == shape
         assert kind_of(path) == "radar"
+
+    def test_radar_that_is_listened_to(self, tmp_path: Path) -> None:
+        out = tmp_path / "cup.sd2"
+        words = ["listen", "--radar", "tea-cup:0.7", "--out", str(out), "--seconds", "1", "--json"]
+        assert main(words) == 0
+        assert imported() == {"sd2_sample.live"}
+        found = sd2.doppler_map(sd2.load_capture(out / "radar"), bins=33, v_max_mps=2.0)
+        assert found.values.shape[1] > 10
+        assert found.axis.centres_mps[found.values.sum(axis=1).argmax()] == pytest.approx(
+            0.7, abs=0.1
+        )
+        from sd2core.live.radars import open_radar
+
+        assert "test, a121, tea-cup; or a capture" in refusal(open_radar, "coffee-cup")
+        assert "(live_radars) of the package sd2-sample failed (ValueError" in refusal(
+            open_radar, "tea-cup:hot"
+        )
 
     def test_mesh(self, points: Path) -> None:
         mesh = sd2.load_mesh(points, scale=2.0)
@@ -149,7 +166,7 @@ class TestEach:
 
     def test_all_are_listed_by_the_doctor(self) -> None:
         found = doctor._plug_ins()
-        assert [one.state for one in found] == ["ok"] * 7
+        assert [one.state for one in found] == ["ok"] * len(GROUPS)
         assert {one.found.partition("(")[2].partition(")")[0] for one in found} == {*GROUPS}
         assert all(one.found.endswith("of sd2-sample") for one in found)
 
@@ -273,6 +290,8 @@ class TestRefusals:
             ("classifiers",
              "from sd2core.denoise.registry import Architecture as A\nX = A('a.B', '', 3)",
              "The options of a network are 3"),
+            ("live_radars", "from sd2core.live.radars import LiveRadar as R\nX = R(3)",
+             "The way to open a radar is 3"),
             ("commands", "from sd2core.cli.command_parser import AddedCommand as C\nX = C(1, 2)",
              "The options of a command are 1"),
         ],

@@ -1,0 +1,121 @@
+"""A radar and a camera watched for a while, for the check of the place; nothing is kept."""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.io.radar.capture import RadarCapture
+from sd2core.live.cameras import Camera
+from sd2core.live.checking import PICTURE_WIDTH_PX, Moved, Seen, moved_between, seen_in
+from sd2core.live.sources import Frame, Source
+from sd2core.timebase import Timebase
+
+_WAITING = 64
+"""Frames that may wait; for the check, some may be left out."""
+_PICTURE_S = 0.09
+"""At most ten pictures in a second are compared: in less time a person hardly moves."""
+_WAIT_S, _END_S = 0.05, 5.0
+
+
+def look(
+    source: Source,
+    camera: Camera,
+    delays_s: tuple[float, float],
+    seconds: float,
+    stop: threading.Event,
+) -> tuple[list[Seen], list[Moved]]:
+    """Watch both for a while.
+
+    Parameters
+    ----------
+    source : Source
+    camera : Camera
+    delays_s : (float, float)
+        From what happened to the arrival of its picture, and of its frame.
+    seconds : float
+        How long.
+    stop : Event
+        Set to end earlier; is set at the end.
+    """
+    camera_delay_s, radar_delay_s = delays_s
+    frames: queue.Queue[Frame] = queue.Queue(_WAITING)
+    moved: list[Moved] = []
+    errors: list[BaseException] = []
+
+    def take(frame: Frame) -> None:
+        with contextlib.suppress(queue.Full):
+            frames.put_nowait(frame)
+
+    def watched(watch: Callable[[], None]) -> threading.Thread:
+        def run() -> None:
+            try:
+                watch()
+            except (Sd2Error, OSError) as error:  # raised again below
+                errors.append(error)
+
+        thread = threading.Thread(target=run, daemon=True)
+        thread.start()
+        return thread
+
+    watching = [
+        watched(lambda: source.run(take, stop)),
+        watched(lambda: _watch_pictures(camera, camera_delay_s, moved, stop)),
+    ]
+    seen: list[Seen] = []
+    head = source.head(0.0)
+    like = RadarCapture(
+        np.zeros((1, *head.frame_shape[:3]), head.sample_type),
+        head.radar,
+        Timebase([0.0]),
+        full_scale_known=head.full_scale_known,
+    )
+    end_s = time.monotonic() + seconds
+    while time.monotonic() < end_s and not stop.is_set() and not errors:
+        try:
+            frame = frames.get(timeout=_WAIT_S)
+        except queue.Empty:
+            if not any(one.is_alive() for one in watching):
+                break
+            continue
+        alone = replace(like, samples=head.as_samples(source.words(frame)))
+        seen.append(seen_in(alone, frame.received_s - radar_delay_s))
+    stop.set()
+    for thread in watching:
+        thread.join(_END_S)
+    if errors:
+        raise errors[0]
+    return seen, moved
+
+
+def _watch_pictures(
+    camera: Camera, delay_s: float, moved: list[Moved], stop: threading.Event
+) -> None:
+    before: NDArray[np.uint8] | None = None
+    before_s = 0.0
+    while not stop.is_set() and (taken := camera.read()) is not None:
+        picture, taken_s = taken
+        if taken_s - before_s < _PICTURE_S:
+            continue
+        grey = _small_grey(picture)
+        if before is not None:
+            middle_s = 0.5 * (before_s + taken_s) - delay_s
+            moved.append(moved_between(before, grey, middle_s, taken_s - before_s))
+        before, before_s = grey, taken_s
+
+
+def _small_grey(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    import cv2
+
+    height, width = picture.shape[:2]
+    size = (PICTURE_WIDTH_PX, max(round(PICTURE_WIDTH_PX * height / width), 1))
+    small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.cvtColor(small, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
