@@ -71,6 +71,7 @@ class LiveModel(QObject):
         self._painted = delayed(self._note_latency, 0, self)
         self._document.changed.connect(self._begin_when_open)
         self._document.failed.connect(self._fail_to_open)
+        self._document.opened.connect(self._leave_with_recording)
 
     # --- what is known --------------------------------------------------------------------
 
@@ -139,6 +140,11 @@ class LiveModel(QObject):
         """Forget it, once it has ended."""
         if not self.busy:
             self._set_state("idle")
+
+    def _leave_with_recording(self) -> None:
+        """Forget what has ended once another recording is open, or none."""
+        if not self.on_screen:
+            self.dismiss()
 
     def show(self) -> None:
         """Show the recording again, in place of what was opened meanwhile."""

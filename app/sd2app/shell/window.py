@@ -198,6 +198,8 @@ class MainWindow(QMainWindow):
         self.keys.changed.connect(self._refresh)
         self.side.folded_changed.connect(self._refresh)
         s.document.opened.connect(self._show_document)
+        for signal in (s.document.changed, s.video.frame_changed):
+            signal.connect(self._show_or_hide_video)
         for runs in (features.training.model, features.classify.training):
             runs.changed.connect(self._mark_training)
         # Without a person in the frame there is nothing to aim at.
@@ -217,6 +219,12 @@ class MainWindow(QMainWindow):
         self.messages.dismiss()
         self.maps.refresh()
         self._refresh()
+
+    def _show_or_hide_video(self) -> None:
+        """Leave the video's room to the other views where a radar was recorded alone."""
+        recording, filmed = self.session.document.recording, self.session.video.picture is not None
+        alone = recording is not None and recording.video is None and recording.mesh is None
+        self._panels["video"].setVisible(filmed or not alone)
 
     def _follow_actions(self) -> None:
         """Enable and check the actions, and name the window, as the models stand now."""

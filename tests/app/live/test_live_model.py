@@ -153,6 +153,10 @@ def test_listening_goes_on_beside_another_recording(session, endless, tmp_path, 
     with qtbot.waitSignal(session.document.opened, timeout=LIMIT_MS):
         model.show()  # as any other: it has ended
     assert session.document.capture.frame_count == 12
+    assert model.state == "stopped"
+    with qtbot.waitSignal(session.document.opened, timeout=LIMIT_MS):
+        session.document.open([endless])
+    assert model.state == "idle"  # its message leaves with its recording
 
 
 @pytest.mark.slow
@@ -271,7 +275,7 @@ def test_a_set_up_says_what_is_missing_and_remembers(tmp_path, qtbot):
 
 
 def test_what_is_filmed_is_shown_as_it_comes_and_then_with_its_video(session, tmp_path, qtbot):
-    request = ListenRequest(tmp_path / "take.sd2", replay=Path("test"), camera="test")
+    request = ListenRequest(tmp_path / "take.sd2", radar="test", camera="test")
     model = heard(session, request, qtbot, 20)
     qtbot.waitUntil(lambda: session.video.picture is not None, timeout=LIMIT_MS)
     assert session.video.picture.shape == (180, 320, 3)
@@ -288,7 +292,7 @@ def test_what_is_filmed_is_shown_as_it_comes_and_then_with_its_video(session, tm
 
 
 def test_edits_made_while_filming_are_not_lost(session, tmp_path, qtbot):
-    request = ListenRequest(tmp_path / "take.sd2", replay=Path("test"), camera="test")
+    request = ListenRequest(tmp_path / "take.sd2", radar="test", camera="test")
     model = heard(session, request, qtbot, 20)
     warnings = []
     model.warned.connect(warnings.append)

@@ -134,7 +134,7 @@ def test_what_does_not_go_together_is_refused(sd2: Sd2, tmp_path: Path) -> None:
     out = ("--out", tmp_path / "walk.sd2")
     for arguments, words in (
         (("--dca1000", *out), "without --setup"),
-        (("--replay", SWIPES, "--setup", setup, *out), "--setup with --dca1000 only"),
+        (("--replay", SWIPES, "--setup", setup, *out), "--setup with --dca1000 or --radar"),
         (("--dca1000", "127.0.0.1:x", "--setup", setup, *out), "The port is 'x'"),
         (("--dca1000", "--setup", tmp_path / "none.cfg", *out), "does not exist"),
         (("--replay", tmp_path / "none", *out), "does not exist"),

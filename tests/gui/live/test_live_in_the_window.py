@@ -9,11 +9,12 @@ import pytest
 from answering import answer, once_asked
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QToolButton
+from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QSplitter, QToolButton, QWidget
 from window_models import models_of
 
 from sd2app.live.bar import LiveBar
 from sd2app.live.dialog import ListenDialog
+from sd2app.live.setup import ListenRequest
 from sd2app.widgets.inputs import Choice
 from sd2core.io.radar import write_capture
 from sd2core.recording.recording import open_recording
@@ -40,7 +41,7 @@ def listen(window, monkeypatch, capture: Path, folder: Path) -> None:
 
     def fill(dialog: ListenDialog) -> None:
         begin = next(
-            one for one in dialog.findChild(QDialogButtonBox).buttons() if one.text() == "Listen"
+            one for one in dialog.findChild(QDialogButtonBox).buttons() if one.text() == "Record"
         )
         assert not begin.isEnabled()
         QTest.keyClick(dialog.findChild(Choice), Qt.Key.Key_Down)
@@ -118,3 +119,45 @@ def test_a_window_that_closes_asks_and_stores(empty_window, qtbot, monkeypatch, 
     answer(qtbot, "Close")
     assert window.close()
     assert open_recording(folder).load_capture().frame_count >= shown
+
+
+def test_a_radar_alone_has_no_empty_pane_and_its_message_leaves_with_it(
+    empty_window, qtbot, monkeypatch, capture, tmp_path, small_recording
+):
+    window, folder = empty_window, tmp_path / "walk.sd2"
+    models, live = models_of(window), window.features.live.model
+    top, video = window._top, window._panels["video"]
+    assert video.isVisible()
+    before = top.sizes()
+    listen(window, monkeypatch, capture, folder)
+    qtbot.waitUntil(lambda: live.state == "stopped", timeout=LIMIT_MS)
+    assert not video.isVisible()
+    assert top.sizes()[1] > before[1] + before[0] - 10
+    # What is kept of the layout is that with a video.
+    kept, after = top.saveState(), QSplitter()
+    for _ in range(2):
+        after.addWidget(QWidget())
+    after.resize(top.size())
+    after.restoreState(kept)
+    qtbot.addWidget(after)
+    after.show()
+    assert after.sizes()[0] == pytest.approx(before[0], abs=2)
+    assert window.findChild(LiveBar).isVisible()
+    models.document.open([small_recording])
+    qtbot.waitUntil(lambda: not live.on_screen and window.settled, timeout=LIMIT_MS)
+    assert not window.findChild(LiveBar).isVisible()
+    assert video.isVisible()
+    assert top.sizes() == before
+
+
+def test_a_camera_that_is_filmed_has_its_pane(empty_window, qtbot, tmp_path):
+    window, folder = empty_window, tmp_path / "walk.sd2"
+    live, video = window.features.live.model, window._panels["video"]
+    live.start(ListenRequest(folder, radar="test", camera="test"))
+    qtbot.waitUntil(lambda: live.on_screen and live.pictures > 30, timeout=LIMIT_MS)
+    assert video.isVisible()
+    live.stop()
+    qtbot.waitUntil(lambda: live.state == "stopped" and window.settled, timeout=LIMIT_MS)
+    assert live.on_screen
+    assert video.isVisible()
+    assert window.findChild(LiveBar).isVisible()
