@@ -54,7 +54,7 @@ class LabelFile(FrameTimes):
         label-studio
     observation : NAME
         which one of a BORIS project or a Label Studio export with several
-    mark_s : SECONDS
+    mark_s : S
         length of marks without a duration; by default the frame that is shown then
     """
 

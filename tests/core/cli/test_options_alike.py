@@ -34,6 +34,7 @@ FURTHER_OUTPUTS = {
 """What some commands write beside their result, or without one, and not by default."""
 
 SEVERAL_MEANINGS = {
+    "--columns": {"N", "LIST"},  # of pictures; names of a table's
     "--count": {"N", None},  # of pictures; how vertices are counted
     "--from": {"PATH", "FILE|NAME"},  # where a folder was; a model to go on from
     "--imu": {"FILE", "LIST"},  # a real sensor's samples; places of virtual ones
