@@ -33,7 +33,7 @@ OLD = {
     "nulling.md": _SAME,
     "denoiser.md": _SAME,
     "classifier.md": _SAME,
-    "studies.md": "over an hour; denoisers learn by steps, `sd2 pairs vary` makes what is added",
+    "studies.md": _SAME,
     "real-gestures.md": _SAME,
 }
 """Pages that may be older than the program, and why they were not measured anew."""
