@@ -1,0 +1,141 @@
+"""What a guided session records: who makes which gestures, in what order and for how long."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from sd2core.errors import Sd2Error
+from sd2core.files.resources import resource_path
+from sd2core.files.texts import read_text
+from sd2core.labels.colours import OFFERED
+from sd2core.labels.label_set import GESTURES, Label, LabelSet
+from sd2core.options.bounds import SEED, Bounds
+from sd2core.options.kinds import Text
+from sd2core.options.toml_files import parsed
+
+PAPER = "paper"
+"""Name of the protocol that comes with the program."""
+
+_Name = Annotated[str, Field(pattern=r"^\w[\w-]{0,39}$")]
+"""Part of a recording's name."""
+_Times = Annotated[int, Bounds(1, 1000, whole=True)]
+_TakeS = Annotated[float, Bounds(0.0, 3600.0, above=True)]
+_WaitS = Annotated[float, Bounds(0.0, 3600.0)]
+_ReactionS = Annotated[float, Bounds(0.0, 2.0)]
+
+
+class Take(NamedTuple):
+    """One gesture of one person, to be recorded once."""
+
+    person: str
+    gesture: str
+    repetition: int  # from 1
+
+    @property
+    def name(self) -> str:
+        """Name of its recording, without the suffix."""
+        return f"{self.person}-{self.gesture}-{self.repetition}"
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Gesture(_Section):
+    """Section ``[[gestures]]``: one that all people make."""
+
+    name: _Name
+    """Label of the recordings."""
+    instruction: Text
+    """Sentence that the person reads."""
+    gesture_class: str = ""
+    """What a classifier learns; empty: as of the paper's label of this name, else the name."""
+
+
+class Protocol(_Section):
+    """What is recorded, of whom, and how it is asked for."""
+
+    format: Literal["sd2-protocol"]
+    version: Literal[1]
+    title: Text
+    people: Annotated[tuple[_Name, ...], Field(min_length=1)]
+    """Pseudonyms, in the order in which the people come."""
+    gestures: Annotated[tuple[Gesture, ...], Field(min_length=1)]
+    repetitions: _Times = 1
+    """Rounds, in each of which a person makes every gesture once."""
+    order: Literal["fixed", "random"] = "random"
+    """Of the gestures in a round."""
+    seed: Annotated[int, SEED] = 1
+    """Of the random order."""
+    take_s: _TakeS = 15.0
+    pause_s: _WaitS = 5.0
+    """Between two takes of a person."""
+    countdown_s: _WaitS = 3.0
+    """Recorded: the person stands still."""
+    reaction_s: _ReactionS = 0.3
+    """From the prompt to the first motion of the gesture."""
+    video: Literal["keep", "drop"] = "keep"
+    """Drop: it is deleted once a body was fitted to it."""
+    consent: str = ""
+    """Text that a person agrees to before the first take."""
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> Protocol:
+        names = [take.name.casefold() for take in self.takes]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"two recordings would be called {twice[0]}")
+        return self
+
+    @property
+    def takes(self) -> tuple[Take, ...]:
+        """All that is to be recorded, in order.
+
+        The order of one person does not depend on the others.
+        """
+        takes = []
+        for person in self.people:
+            for repetition in range(1, self.repetitions + 1):
+                names = [gesture.name for gesture in self.gestures]
+                if self.order == "random":
+                    random.Random(f"{self.seed}/{person}/{repetition}").shuffle(names)
+                takes += [Take(person, name, repetition) for name in names]
+        return tuple(takes)
+
+    def gesture(self, name: str) -> Gesture:
+        """The gesture of a name, which is one of them."""
+        return next(one for one in self.gestures if one.name == name)
+
+    @property
+    def label_set(self) -> LabelSet:
+        """Labels of the recordings: those of the gestures, and ``background``."""
+        background = GESTURES.labels[-1]
+        labels = [
+            Label(
+                one.name,
+                known.colour if known else OFFERED[number % len(OFFERED)][1],
+                str(number) if number < 10 else "",
+                one.gesture_class or (known.gesture_class if known else one.name),
+            )
+            for number, one in enumerate(self.gestures, start=1)
+            for known in [GESTURES.find(one.name)]
+        ]
+        if background.name not in {one.name for one in labels}:
+            labels.append(Label(background.name, background.colour, "0", background.gesture_class))
+        return LabelSet(self.title, tuple(labels))
+
+
+def read_protocol(source: Path | str) -> Protocol:
+    """Read a TOML file, or the bundled protocol :data:`PAPER` by its name.
+
+    Raises Sd2Error, with file, line and key, if it cannot be read or holds what is not allowed.
+    """
+    path = resource_path(f"protocols/{PAPER}.toml") if str(source) == PAPER else Path(source)
+    if not path.exists():
+        raise Sd2Error(f"There is no protocol {path}", f"a TOML file, or the name {PAPER}")
+    text = read_text(path, "a protocol of a guided session (.toml)")
+    return parsed(Protocol, text, str(path))

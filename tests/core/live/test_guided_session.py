@@ -1,0 +1,200 @@
+"""Protocols, and sessions without a window, a clock, a camera or a radar."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sd2core.errors import Sd2Error
+from sd2core.labels.label_set import GESTURES
+from sd2core.live.protocol import PAPER, Gesture, Protocol, Take, read_protocol
+from sd2core.live.session import Session
+
+_NAMES = st.lists(
+    st.sampled_from(["anna", "ben", "cem", "dora"]), min_size=1, max_size=4, unique=True
+)
+_GESTURES = st.lists(st.sampled_from(["up", "down", "left"]), min_size=1, max_size=3, unique=True)
+_HEAD = 'format = "sd2-protocol"\nversion = 1\ntitle = "Try"\n'
+
+
+def _protocol(people: list[str], gestures: list[str], **fields: object) -> Protocol:
+    return Protocol(
+        format="sd2-protocol",
+        version=1,
+        title="Try",
+        people=tuple(people),
+        gestures=tuple(Gesture(name=name, instruction=f"Go {name}") for name in gestures),
+        take_s=2.0,
+        pause_s=1.0,
+        countdown_s=1.0,
+        **fields,
+    )
+
+
+PROTOCOLS = st.builds(
+    _protocol,
+    _NAMES,
+    _GESTURES,
+    repetitions=st.integers(1, 3),
+    order=st.sampled_from(["fixed", "random"]),
+    seed=st.integers(0, 99),
+)
+KEYS = ["go on", "again", "skip", ""]
+
+
+def _drive(session: Session, keys: list[str]) -> list[str]:
+    """Names of the takes that are stored, second by second, with a key at each; then to its end."""
+    stored, now_s = [], 0.0
+    while session.phase != "over":
+        key = keys.pop(0) if keys else "go on" if session.phase == "ready" else ""
+        match key:
+            case "go on":
+                session.go_on()
+            case "again":
+                session.again(now_s)
+            case "skip":
+                session.skip(now_s)
+        session.advance(now_s)
+        if session.phase == "opening":
+            session.opened(now_s)
+        elif session.phase == "storing":
+            assert session.take is not None
+            stored.append(session.take.name)
+            session.stored(now_s)
+        now_s += 1.0
+        assert now_s < 10_000.0
+    return stored
+
+
+@given(PROTOCOLS)
+def test_without_keys_every_take_is_made_once(protocol: Protocol) -> None:
+    wanted = {
+        f"{person}-{gesture.name}-{repetition}"
+        for person in protocol.people
+        for gesture in protocol.gestures
+        for repetition in range(1, protocol.repetitions + 1)
+    }
+    session = Session(protocol)
+    stored = _drive(session, [])
+    assert Counter(stored) == Counter(wanted)
+    assert session.missing == ()
+    # People come one after another, and make every gesture once in each round.
+    assert [one.person for one in protocol.takes] == sorted(
+        (one.person for one in protocol.takes), key=protocol.people.index
+    )
+    assert [one.repetition for one in protocol.takes] == [
+        number
+        for _ in protocol.people
+        for number in range(1, protocol.repetitions + 1)
+        for _ in protocol.gestures
+    ]
+
+
+@given(PROTOCOLS, st.lists(st.sampled_from(KEYS), max_size=60))
+def test_whatever_keys_are_pressed_what_was_not_stored_is_missing(
+    protocol: Protocol, keys: list[str]
+) -> None:
+    pressed = list(keys)
+    session = Session(protocol)
+    stored = Counter(_drive(session, list(keys)))
+    names = [take.name for take in protocol.takes]
+    assert [one.name for one in session.missing] == [name for name in names if name not in stored]
+    assert len(session.missing) <= pressed.count("skip")
+    assert stored.total() - len(stored) <= pressed.count("again")
+
+
+@given(PROTOCOLS, st.integers(0, 36))
+def test_a_session_goes_on_where_it_was_interrupted(protocol: Protocol, made: int) -> None:
+    names = [take.name for take in protocol.takes]
+    session = Session(protocol, [*names[:made], "what-is-something-else-1"])
+    assert _drive(session, []) == names[made:]
+
+
+@given(PROTOCOLS)
+def test_a_persons_order_does_not_depend_on_the_others(protocol: Protocol) -> None:
+    last = protocol.people[-1]
+    alone = protocol.model_copy(update={"people": (last,)})
+    assert alone.takes == tuple(one for one in protocol.takes if one.person == last)
+
+
+def test_again_repeats_the_take_that_was_made_last_also_after_the_last_of_all() -> None:
+    session = Session(_protocol(["anna"], ["up", "down"], order="fixed"))
+    session.go_on()
+    for name in ("up", "down"):
+        assert session.take == Take("anna", name, 1)
+        session.opened(0.0)
+        session.advance(1.0)
+        assert (session.phase, session.prompt_s) == ("prompt", 1.0)
+        assert session.left_s(1.5) == 1.5
+        session.advance(3.0)
+        session.stored(3.0)
+        assert session.phase == "pause"
+        session.advance(4.0)
+    assert session.phase == "over"  # nobody has pressed a key in the last pause
+    session = Session(_protocol(["anna"], ["up"]))
+    session.go_on()
+    session.opened(0.0)
+    session.advance(1.0)
+    session.advance(3.0)
+    session.stored(3.0)
+    session.again(3.5)
+    assert session.take == Take("anna", "up", 1)
+    assert session.missing == ()  # the first one is there until the second is
+
+
+def test_a_new_person_is_waited_for() -> None:
+    session = Session(_protocol(["anna", "ben"], ["up", "down"]))
+    session.advance(1e6)
+    assert session.phase == "ready"
+    session.skip(0.0)
+    assert session.phase == "ready"
+    session.skip(0.0)
+    assert session.take is not None
+    assert (session.phase, session.take.person) == ("ready", "ben")
+
+
+def test_the_papers_protocol_is_the_papers() -> None:
+    protocol = read_protocol(PAPER)
+    assert len(protocol.people) == 6
+    assert protocol.take_s == 15.0
+    names = [one.name for one in GESTURES.labels]
+    assert [one.name for one in protocol.gestures] == names[:4]
+    assert [one.name for one in protocol.label_set.labels] == names
+    for label in protocol.label_set.labels:
+        known = GESTURES.find(label.name)
+        assert known is not None
+        assert label.gesture_class == known.gesture_class
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("people = []", r"line 4: people is \[\]"),
+        ('people = ["a/b"]', r"line 4: people\.0 is 'a/b'"),
+        ('people = ["anna"]\ntake_s = 0', r"line 5: take_s is 0"),
+        ('people = ["anna"]\nkeys = 1', r"line 5: keys is not known"),
+        ('people = ["anna"]\nvideo = "burn"', r"line 5: video is 'burn'.*'keep' or 'drop'"),
+        ('people = ["anna", "Anna"]', r"two recordings would be called anna-up-1"),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "mine.toml"
+    gestures = '[[gestures]]\nname = "up"\ninstruction = "Go up"\n'
+    file.write_text(f"{_HEAD}{text}\n{gestures}", encoding="utf-8")
+    with pytest.raises(Sd2Error, match=words) as raised:
+        read_protocol(file)
+    assert "mine.toml" in str(raised.value)
+
+
+def test_two_names_that_run_into_each_other_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="would be called a-b-c-1"):
+        _protocol(["a", "a-b"], ["b-c", "c"])
+
+
+def test_a_protocol_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(Sd2Error, match=r"no protocol .*mine\.toml.*the name paper"):
+        read_protocol(tmp_path / "mine.toml")
