@@ -58,8 +58,8 @@ class _People(OptionRecord):
     Parameters
     ----------
     subjects : LIST
-        subject of each recording and map, separated by commas, in their order (default: each
-        recording shows another person)
+        subject of each recording and map, separated by commas, in their order (default: whom a
+        recording names, or else each shows another person)
     labels : FILE
         labels of a Doppler map; once for each map, in their order
     """

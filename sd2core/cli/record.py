@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import contextlib
 import re
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import counted, print_event, print_facts, print_json
-from sd2core.errors import Sd2Error
 from sd2core.options.kinds import Positive
 from sd2core.options.records import OptionError, Place
 from sd2core.options.shared import Json
@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from sd2core.live.cameras import Camera
     from sd2core.live.clocks import ClockLine
     from sd2core.live.filming import CameraChoice, Film
-    from sd2core.live.listening import Listening
-    from sd2core.live.recording import GrowingRecording
+    from sd2core.live.joint import JointRecording
     from sd2core.live.sources import Source
 
 _CHECK_S = 10.0
@@ -42,8 +41,11 @@ class Record(Json):
         rate; or with --setup the address of this computer that a DCA1000 sends to, ADDRESS[:PORT]
     setup : FILE
         what the radar runs with: a .cfg or .json of TI's, a session of Acconeer's tool with `a121`
-    out : NAME.sd2
-        the recording to write
+    out : NAME.sd2|FOLDER
+        the recording to write, or the folder of a session (--protocol), which goes on
+    protocol : FILE|paper
+        guide people through the takes of this protocol (docs/formats.md): Space goes on, a: again,
+        s: skip, q: stop
     check
         record nothing: say whether radar and camera see the same person move, where, with which
         sign and delay; the exit code is 1 if one of four findings is bad
@@ -68,6 +70,7 @@ class Record(Json):
     radar: str
     setup: Path | None = None
     out: Annotated[Path | None, Place(one_of="purpose", needed=True)] = None
+    protocol: str | None = None
     check: Annotated[bool, Place(one_of="purpose", needed=True)] = False
     size: str | None = None
     rate: Positive | None = None
@@ -82,6 +85,11 @@ class Record(Json):
         if self.previews and not self.json:
             raise OptionError(
                 "--previews is given without --json", "both, for a program that reads them"
+            )
+        if self.protocol is not None and (self.seconds or self.previews or self.check):
+            raise OptionError(
+                "--protocol is given with --seconds, --previews or --check",
+                "the protocol, which says how long",
             )
         if self.size is not None and _SIZE.fullmatch(self.size) is None:
             raise OptionError(f"--size is {self.size!r}", "WIDTHxHEIGHT, as in 1280x720")
@@ -106,6 +114,7 @@ def _record(options: Record) -> int:
       sd2 record --camera test --radar test --out try.sd2 --seconds 10
       sd2 record --camera 0 --radar 192.168.33.30 --setup profile.cfg --out take.sd2
       sd2 record --camera walk.mp4 --radar walk.sd2 --out again.sd2
+      sd2 record --camera test --radar test --protocol paper --out session
     """
     from sd2core.live.filming import CameraChoice
 
@@ -118,7 +127,10 @@ def _record(options: Record) -> int:
     )
     if options.check:
         return _check(options, choice)
-    _take(options, choice)
+    if options.protocol is not None:
+        _guide(options, choice)
+    else:
+        _take(options, choice)
     return 0
 
 
@@ -147,40 +159,51 @@ def _check(options: Record, choice: CameraChoice) -> int:
     return 0 if all(one.passed for one in findings) else 1
 
 
-def _take(options: Record, choice: CameraChoice) -> None:
-    from sd2core.cli.listen import Status, follow
-    from sd2core.live.filming import VIDEO_NAME, Film
-    from sd2core.live.listening import Listening
-    from sd2core.live.radars import open_radar
-    from sd2core.live.recording import GrowingRecording
+def _guide(options: Record, choice: CameraChoice) -> None:
+    from sd2core.cli.guiding import guide
+    from sd2core.live.protocol import read_protocol
 
     assert options.out is not None
-    with contextlib.ExitStack() as stack:
-        source = open_radar(options.radar, options.setup)
-        stack.callback(source.close)
-        recording = GrowingRecording(options.out, keep_arrivals=True)
-        if recording.folder.exists():
-            raise Sd2Error(f"{recording.folder} exists", "a new folder", "Give another as --out")
-        stack.callback(recording.close)
-        listening = Listening(source, recording)
-        recording.folder.mkdir()
-        stack.callback(_remove_empty, recording.folder)
-        film = Film(choice, recording.folder / VIDEO_NAME, previews=options.previews)
-        stack.callback(film.stop)
-        take = _Take(options, source, recording, listening, film)
-        status = Status(listening, source, as_json=options.json, columns=options.previews)
-        status.more, status.each_time = take.progress, take.follow
-        status.begin(recording.folder, False, f"{film.about}\n{source.about}")
+    protocol = read_protocol(options.protocol or "")
+    guide(protocol, options.out, partial(_open, options, choice), as_json=options.json)
+
+
+def _take(options: Record, choice: CameraChoice) -> None:
+    from sd2core.cli.listen import Status, follow
+
+    assert options.out is not None
+    with _open(options, choice, options.out) as take:
+        listening = take.listening
+        status = Status(listening, take.source, as_json=options.json, columns=options.previews)
+        status.more, status.each_time = take.progress, partial(_follow, take)
+        status.begin(take.folder, False, take.about)
         # To be told to end is to be told to stop: what waits to be stored is stored.
         with stop_signals() as told:
             listening.start()
             try:
                 follow(listening, status, options.seconds, told)
             finally:
-                film.stop()
-                listening.stop()
-        status.end(recording.folder)
-        take.end()
+                take.stop()
+        status.end(take.folder)
+        if (line := take.correct_clocks()) is not None:
+            _print_clocks(take, line, as_json=options.json)
+
+
+def _follow(take: JointRecording) -> None:
+    """Link what is recorded as soon as it can be, and tell the newest picture."""
+    take.follow()
+    if (preview := take.film.next_preview()) is not None:
+        print_event("preview", picture=preview, **take.progress())
+
+
+def _open(options: Record, choice: CameraChoice, folder: Path) -> JointRecording:
+    """Camera and radar that the options name, to be recorded into a folder."""
+    from sd2core.live.joint import JointRecording
+    from sd2core.live.radars import open_radar
+
+    source = open_radar(options.radar, options.setup)
+    delays_s = partial(_delays_s, options)
+    return JointRecording(folder, choice, source, delays_s, previews=options.previews)
 
 
 def _delays_s(options: Record, camera: Camera | Film, source: Source) -> tuple[float, float]:
@@ -192,85 +215,27 @@ def _delays_s(options: Record, camera: Camera | Film, source: Source) -> tuple[f
     )
 
 
-def _remove_empty(folder: Path) -> None:
-    """Remove the folder of a recording that did not begin."""
-    with contextlib.suppress(OSError):
-        folder.rmdir()
-
-
-class _Take:
-    """Video and radar of a recording, linked as soon as both are there."""
-
-    def __init__(
-        self,
-        options: Record,
-        source: Source,
-        recording: GrowingRecording,
-        listening: Listening,
-        film: Film,
-    ) -> None:
-        self._json = options.json
-        self._recording, self._listening, self._film = recording, listening, film
-        self._delays_s = _delays_s(options, film, source)
-        self._linked = False
-
-    def follow(self) -> None:
-        """Tell the newest picture; the first time there is something of both, link them."""
-        self._film.check()
-        filmed = self._film.filmed
-        if not self._linked and filmed.first_s is not None and self._recording.frames:
-            self._link()
-            self._linked = True
-        if (preview := self._film.next_preview()) is not None:
-            print_event("preview", picture=preview, **self.progress())
-
-    def progress(self) -> dict[str, Any]:
-        """Numbers of pictures, and whether the recording names its video."""
-        filmed = self._film.filmed
-        told: dict[str, Any] = {
-            "pictures": filmed.recorded, "pictures_dropped": filmed.dropped, "linked": self._linked
-        }  # fmt: skip
-        return told
-
-    def end(self) -> None:
-        """Correct the clocks by all that arrived, and say what they are."""
-        from sd2core.live.clocks import correct_drift
-
-        filmed = self._film.filmed
-        if not (filmed.recorded and self._listening.counts.recorded):
-            return
-        line = self._link()
-        correct_drift(self._recording.radar, line)
-        if self._json:
-            print_event(
-                "clocks",
-                pictures=filmed.recorded,
-                pictures_dropped=filmed.dropped,
-                drift_ppm=line.drift_ppm,
-                jitter_s=line.jitter_s,
-            )
-            return
-        dropped = f", {filmed.dropped:,} dropped" if filmed.dropped else ""
-        print_facts(
+def _print_clocks(take: JointRecording, line: ClockLine, *, as_json: bool) -> None:
+    """Say what the clocks of camera and radar are."""
+    filmed = take.film.filmed
+    if as_json:
+        print_event(
             "clocks",
-            {
-                "pictures": f"{counted(filmed.recorded, 'frame')}{dropped}",
-                "radar": f"runs {line.drift_ppm:+.1f} millionths slow, arrivals ± "
-                f"{1e3 * line.jitter_s:.1f} ms",
-                "delays": "camera {:g} ms, radar {:.1f} ms".format(
-                    *(1e3 * delay_s for delay_s in self._delays_s)
-                ),
-            },
+            pictures=filmed.recorded,
+            pictures_dropped=filmed.dropped,
+            drift_ppm=line.drift_ppm,
+            jitter_s=line.jitter_s,
         )
-
-    def _link(self) -> ClockLine:
-        from sd2core.live.clocks import Clocks, link_clocks
-        from sd2core.live.filming import VIDEO_NAME
-        from sd2core.recording.recording import open_recording
-
-        first_s = self._film.filmed.first_s
-        assert first_s is not None
-        recording = open_recording(self._recording.folder)
-        recording.video = self._recording.folder / VIDEO_NAME
-        recording.simulated = recording.simulated or self._film.simulated
-        return link_clocks(recording, Clocks(first_s, *self._delays_s))
+        return
+    dropped = f", {filmed.dropped:,} dropped" if filmed.dropped else ""
+    print_facts(
+        "clocks",
+        {
+            "pictures": f"{counted(filmed.recorded, 'frame')}{dropped}",
+            "radar": f"runs {line.drift_ppm:+.1f} millionths slow, arrivals ± "
+            f"{1e3 * line.jitter_s:.1f} ms",
+            "delays": "camera {:g} ms, radar {:.1f} ms".format(
+                *(1e3 * delay_s for delay_s in take.delays_s)
+            ),
+        },
+    )

@@ -181,7 +181,7 @@ def _of_recording(source: LabelledSource) -> LabelledFacts:
     return LabelledFacts(
         source.path,
         "recording",
-        (source.subject or recording.title,),
+        (source.subject or recording.person,),
         tuple(maps),
         simulated=recording.simulated and recording.radar is not None,
         spans=len(spans),

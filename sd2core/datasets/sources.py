@@ -39,7 +39,7 @@ from sd2core.maps import DopplerMap, MapKind
 from sd2core.pairs.store import limbs_of, open_takes
 from sd2core.pairs.summary import TakeEntry
 from sd2core.progress import Progress
-from sd2core.recording.recording import SUFFIX, is_recording
+from sd2core.recording.recording import SUFFIX, is_recording, open_recording
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
@@ -60,8 +60,9 @@ def gather(
     paths : sequence of Path
         Recordings, folders of recordings, pairs, Doppler maps.
     subjects : sequence of str, optional
-        Subject of each recording and each map, in their order; by default each shows another
-        person, named like the file. Pairs name their subjects themselves.
+        Subject of each recording and each map, in their order; by default the one that a
+        recording names, or else each shows another person, named like the file. Pairs name their
+        subjects themselves.
     label_files : sequence of Path
         One for each map (``.npz``), or none.
 
@@ -73,7 +74,7 @@ def gather(
     files = [one for path in paths for one in _expanded(Path(path))]
     pairs = [path for path in files if not is_recording(path) and kind_of(path) == "pairs"]
     single = [path for path in files if path not in pairs]
-    names = [path.stem for path in single] if subjects is None else list(subjects)
+    names = [_person(path) for path in single] if subjects is None else list(subjects)
     if len(names) != len(single):
         raise Sd2Error(
             f"{len(names)} people are named for {len(single)} recordings and maps",
@@ -99,6 +100,11 @@ def gather(
         if path in maps:
             found.append(map_source(path, name, labelled.get(path)))
     return found
+
+
+def _person(path: Path) -> str:
+    """Who a recording says is in it, or else the name of the file."""
+    return (open_recording(path).subject if is_recording(path) else "") or path.stem
 
 
 def recordings_in(folder: Path) -> list[Path]:

@@ -118,6 +118,7 @@ class Document(BaseModel):
     format: Literal["sd2-recording"] = FORMAT
     version: int = VERSION
     title: str = ""
+    subject: str = ""
     simulated: bool = False
     video: StoredPath | None = None
     camera: CameraEntry | None = None

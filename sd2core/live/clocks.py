@@ -113,10 +113,13 @@ class Clocks:
         about = {"format": "sd2-clocks", "version": 1, **vars(self), **told}
         atomic_write_json(folder / CLOCKS_NAME, about)
 
+    def recording_s(self, monotonic_s: float) -> float:
+        """Time of an event on the clock of the recording, which is the video's."""
+        return monotonic_s - (self.video_first_s - self.video_delay_s)
+
     def offset_s(self, radar: ClockLine) -> float:
         """Time 0 of the radar on the clock of the video."""
-        pictures_s = self.video_first_s - self.video_delay_s
-        return radar.start_s - self.radar_delay_s - pictures_s
+        return self.recording_s(radar.start_s - self.radar_delay_s)
 
 
 def link_clocks(recording: Recording, clocks: Clocks) -> ClockLine:

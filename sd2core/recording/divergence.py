@@ -23,6 +23,7 @@ WORDS = {
     "denoiser": "denoiser",
     "bundled_denoiser": "denoiser",
     "title": "title",
+    "subject": "name of the person",
     "simulated": "word on what is simulated",
     "camera": "camera",
     "video": "video",

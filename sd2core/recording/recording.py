@@ -68,7 +68,7 @@ _OFFSETS = {
     "imu_offset_s": "inertial sensor's offset in seconds",
 }
 _AS_THEY_ARE = (
-    *("title", "simulated", "camera", "mesh_reading", "bundled_denoiser"),
+    *("title", "subject", "simulated", "camera", "mesh_reading", "bundled_denoiser"),
     *("radar_receiver", "radar_transmitter", "imu_places"),
 )
 """Settings that ``recording.json`` holds as a recording does."""
@@ -132,6 +132,8 @@ class Recording:
         Those in ``labels.json``, which replace ``spans``; see :attr:`labelled`.
     labels_elsewhere : bool
         True while another process edits them: ``labels.json`` is then left as it is.
+    subject : str
+        Name or pseudonym of the person, empty where it is not known.
     simulated : bool
         True for a recording without a real camera and radar.
     camera : CameraEntry or None
@@ -172,6 +174,7 @@ class Recording:
     labels: Labels | None = None
     labels_elsewhere: bool = False
     title: str = ""
+    subject: str = ""
     simulated: bool = False
     camera: CameraEntry | None = None
     # As the files were last read or written; None before.
@@ -270,6 +273,11 @@ class Recording:
     def labelled(self) -> Labels:
         """The labels, wherever they are stored."""
         return labels_of(self.spans) if self.labels is None else self.labels
+
+    @property
+    def person(self) -> str:
+        """Who is in it: the subject, or where that is not known somebody called as the title."""
+        return self.subject or self.title
 
     @property
     def unlabelled(self) -> bool:

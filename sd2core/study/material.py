@@ -155,7 +155,7 @@ def _sources(plan: StudyPlan) -> tuple[list[Path], list[ClipSet], list[Take | No
         elif kind == "recording":
             recording = open_recording(one.path)
             if recording.mesh is not None and not recording.holds_radar_map:
-                with_mesh.append((one.path, one.subject or recording.title))
+                with_mesh.append((one.path, one.subject or recording.person))
             else:
                 sets.append(_of_recording(recording, one.subject, rate_hz))
         else:

@@ -167,7 +167,7 @@ def _single(
             clips_of_map(
                 doppler,
                 labels,
-                subject=one.subject or recording.title,
+                subject=one.subject or recording.person,
                 movement=one.path.stem,
                 frame_rate_hz=found[0].frame_rate_hz if found else frame_rate_hz,
             )

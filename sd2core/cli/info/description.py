@@ -61,7 +61,7 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
     data = {
         "kind": "recording",
         "path": str(recording.folder),
-        **picked(recording, "title", "simulated", "radar_offset_s"),
+        **picked(recording, "title", "subject", "simulated", "radar_offset_s"),
         **picked(recording, "radar_receiver", "radar_transmitter", "imu_offset_s"),
         "imu_places": list(recording.imu_places),
         "camera": None if recording.camera is None else recording.camera.model_dump(mode="json"),
@@ -76,6 +76,7 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
     data["notes"] = [*recording.notes, *beyond]
     facts = {
         "title": recording.title + (" (simulated)" if recording.simulated else ""),
+        "person": recording.subject,
         "camera": _camera(recording),
         "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
         "radar offset": f"{recording.radar_offset_s:g} s" if recording.radar else "",

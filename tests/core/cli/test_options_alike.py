@@ -40,6 +40,7 @@ SEVERAL_MEANINGS = {
     "--imu": {"FILE", "LIST"},  # a real sensor's samples; places of virtual ones
     "--model": {"FILE", "FILE|NAME", "NAME"},  # one that was trained; kind of one to train
     "--placements": {"FILE", "FILE|planned", None},  # a plan; which of those in pairs are used
+    "--protocol": {"FILE|paper", None},  # of a session; how simulated people swipe
     "--radar": {"CAPTURE", "NAME|CONFIG.json", "SOURCE"},  # recorded; to simulate; live
     "--rate": {"FPS", "HZ"},  # of maps; of an inertial sensor
 }
@@ -47,6 +48,7 @@ SEVERAL_MEANINGS = {
 
 ENDINGS = {
     "FILE", "FILE.json", "FILE.npz", "FILE.safetensors", "FILE.zarr", "FOLDER", "NAME.sd2", "RUN",
+    "NAME.sd2|FOLDER",
 }  # fmt: skip
 """Metavars of ``--out``."""
 

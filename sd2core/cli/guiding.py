@@ -1,0 +1,289 @@
+"""Guided sessions on the command line: what is to be done is printed, keys steer it."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from sd2core.cli.keys import pressed_keys
+from sd2core.cli.output import counted, print_event, print_rows
+from sd2core.errors import Sd2Error
+from sd2core.files.paths import remove
+from sd2core.files.tables import capitalised
+from sd2core.labels.spans import Span
+from sd2core.live.joint import JointRecording
+from sd2core.live.prompting import label_take
+from sd2core.live.protocol import Protocol, Take
+from sd2core.live.session import Session
+from sd2core.recording.recording import SUFFIX, is_recording
+from sd2core.runs.control import stop_signals
+
+UNFINISHED = "unfinished"
+"""Folder for the take that is being made."""
+
+_WAIT_S = 0.05
+_OPEN_S = 15.0
+"""By then, camera and radar have given something."""
+
+
+def guide(
+    protocol: Protocol,
+    folder: Path,
+    open_take: Callable[[Path], JointRecording],
+    *,
+    as_json: bool,
+) -> None:
+    """Record the takes of a protocol that are not in a folder yet, and say what is missing.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    folder : Path
+        Is made where only its parent exists.
+    open_take : callable
+        Opens camera and radar, to be recorded into a folder.
+    as_json : bool
+        True if events are printed, for other programs.
+    """
+    if not folder.parent.is_dir():
+        raise Sd2Error(f"The folder {folder.parent} does not exist", "an existing folder")
+    folder.mkdir(exist_ok=True)
+    there = [path.stem for path in folder.glob(f"*{SUFFIX}") if is_recording(path)]
+    session = Session(protocol, there)
+    telling = _Telling(session, as_json=as_json)
+    telling.begin(folder)
+    with (
+        stop_signals() as told,
+        pressed_keys() as key,
+        contextlib.closing(_Takes(session, folder, open_take, telling)) as takes,
+    ):
+        while session.phase != "over" and not told.is_set() and _press(session, key()):
+            takes.leave()
+            session.advance(time.monotonic())
+            telling.step()
+            takes.follow()
+    telling.end()
+
+
+def _press(session: Session, key: str) -> bool:
+    """Take a key; False for the one that stops."""
+    match key.lower():
+        case " " | "\n" | "\r":
+            session.go_on()
+        case "a":
+            session.again(time.monotonic())
+        case "s":
+            session.skip(time.monotonic())
+        case "q":
+            return False
+    return True
+
+
+class _Takes:
+    """The take that is being recorded, and where it goes."""
+
+    def __init__(
+        self,
+        session: Session,
+        folder: Path,
+        open_take: Callable[[Path], JointRecording],
+        telling: _Telling,
+    ) -> None:
+        self._session, self._folder, self._open_take = session, folder, open_take
+        self._telling = telling
+        self._recording: JointRecording | None = None
+        self._silent_after_s = math.inf
+
+    def leave(self) -> None:
+        """Give up what is recorded where a key said so."""
+        if self._recording is not None and not self._session.records:
+            recording, self._recording = self._recording, None
+            with recording:
+                recording.stop()
+            remove(recording.folder)
+
+    def follow(self) -> None:
+        """Record what the session wants to be recorded; else wait a moment."""
+        session, recording = self._session, self._recording
+        if not session.records:
+            time.sleep(_WAIT_S)
+            return
+        if recording is None:
+            recording = self._recording = self._begin()
+        recording.listening.next_column(_WAIT_S)
+        recording.follow()
+        if session.phase == "opening" and recording.linked:
+            session.opened(time.monotonic())
+        elif session.phase == "opening" and time.monotonic() > self._silent_after_s:
+            why = recording.source.silence() or "A camera or a radar gives nothing"
+            raise Sd2Error(f"{why} ({_OPEN_S:g} s)", "pictures and frames")
+        elif session.phase == "storing":
+            self._store(recording)
+            session.stored(time.monotonic())
+        elif recording.listening.is_over or recording.film.is_over:
+            raise Sd2Error(
+                "The camera or the radar has ended within a take",
+                f"{session.protocol.countdown_s + session.protocol.take_s:g} s of both",
+            )
+
+    def close(self) -> None:
+        """Give up the take that is not finished, where the session ends."""
+        if self._recording is not None:
+            with self._recording:
+                self._recording.stop()
+            remove(self._recording.folder)
+        with contextlib.suppress(OSError):
+            (self._folder / UNFINISHED).rmdir()
+
+    def _begin(self) -> JointRecording:
+        assert self._session.take is not None
+        unfinished = self._folder / UNFINISHED
+        unfinished.mkdir(exist_ok=True)
+        folder = unfinished / f"{self._session.take.name}{SUFFIX}"
+        if folder.exists():  # left by a session that was killed
+            remove(folder)
+        recording = self._open_take(folder)
+        recording.listening.start()
+        self._silent_after_s = time.monotonic() + _OPEN_S
+        return recording
+
+    def _store(self, recording: JointRecording) -> None:
+        session, end_s = self._session, time.monotonic()
+        assert session.take is not None
+        with recording:
+            recording.stop()
+        self._recording = None
+        recording.correct_clocks()
+        span = label_take(recording.folder, session.protocol, session.take, session.prompt_s, end_s)
+        place = self._folder / recording.folder.name
+        if place.exists():  # it was made again
+            before = recording.folder.with_suffix(".before")
+            place.rename(before)
+            recording.folder.rename(place)
+            remove(before)
+        else:
+            recording.folder.rename(place)
+        self._telling.stored(session.take, span, _losses(recording))
+
+
+def _losses(recording: JointRecording) -> list[str]:
+    """What went wrong, in sentences."""
+    found = recording.listening.doubts(at_end=True)
+    if missing := recording.listening.counts.missing:
+        found.append(f"Of the radar: {missing}.")
+    if dropped := recording.film.filmed.dropped:
+        found.append(f"Of the camera: {counted(dropped, 'picture')} dropped.")
+    return found
+
+
+class _Telling:
+    """What is printed."""
+
+    def __init__(self, session: Session, *, as_json: bool) -> None:
+        self._session, self._as_json = session, as_json
+        self._said: tuple[Any, ...] = ()
+
+    def begin(self, folder: Path) -> None:
+        """Say what is to be recorded, and the keys."""
+        session, protocol = self._session, self._session.protocol
+        missing = len(session.missing)
+        if self._as_json:
+            print_event(
+                "session",
+                title=protocol.title,
+                out=str(folder),
+                takes=len(session.takes),
+                missing=missing,
+                consent=protocol.consent.strip(),
+            )
+            return
+        print(f"{protocol.title}: {missing:,} of {counted(len(session.takes), 'take')} to record")
+        print(f"  into {folder}. Space or Enter: go on, a: again, s: skip, q: stop.", flush=True)
+
+    def step(self) -> None:
+        """Say what is to be done, where that has changed or another second has passed."""
+        session, left_s = self._session, self._session.left_s(time.monotonic())
+        left = None if left_s is None else math.ceil(left_s)
+        said = (session.phase, session.take, left)
+        if said == self._said:
+            return
+        is_new, self._said = said[:2] != self._said[:2], said
+        take = session.take
+        if self._as_json:
+            asked = None if take is None else session.protocol.gesture(take.gesture)
+            print_event(
+                "step",
+                phase=session.phase,
+                number=session.number,
+                takes=len(session.takes),
+                left_s=left,
+                **({} if take is None else take._asdict()),
+                instruction="" if asked is None else asked.instruction,
+            )
+        elif is_new:
+            for line in self._lines(take):
+                print(line, flush=True)
+        elif session.phase == "countdown":
+            print(f"  {left}", flush=True)
+
+    def _lines(self, take: Take | None) -> list[str]:
+        """What a new phase is told by."""
+        session, protocol = self._session, self._session.protocol
+        if take is None:
+            return ["That was the last take. a: again."] if session.phase == "pause" else []
+        doing = f"{session.number} of {len(session.takes)}, {take.person}: "
+        doing += protocol.gesture(take.gesture).instruction
+        match session.phase:
+            case "ready":
+                consent = protocol.consent.strip()
+                return ["", *([consent] if consent else []), f"{take.person}: Space begins."]
+            case "pause":
+                return ["", f"Next, in {protocol.pause_s:g} s: {doing}"]
+            case "opening":
+                return ["", f"{doing}. Stand still…"]
+            case "countdown":
+                return [f"  {math.ceil(protocol.countdown_s)}"]
+            case "prompt":
+                return [f"  NOW, for {protocol.take_s:g} s"]
+        return []
+
+    def stored(self, take: Take, span: Span, losses: list[str]) -> None:
+        """Say what a take has become."""
+        if self._as_json:
+            print_event(
+                "stored",
+                take=take.name,
+                start_s=span.start_s,
+                end_s=span.end_s,
+                motion=not span.note,
+                doubts=losses,
+            )
+            return
+        found = span.note or "motion"
+        print(f"  {take.name}: {found} from {span.start_s:.2f} to {span.end_s:.2f} s", flush=True)
+        for loss in losses:
+            print(f"sd2: {take.name}: {loss}", file=sys.stderr, flush=True)
+
+    def end(self) -> None:
+        """Say what is missing."""
+        missing = self._session.missing
+        if self._as_json:
+            print_event("missing", takes=[take.name for take in missing])
+        elif missing:
+            rounds: dict[tuple[str, str], list[str]] = {}
+            for take in missing:
+                rounds.setdefault((take.person, take.gesture), []).append(str(take.repetition))
+            print(f"\n{capitalised(counted(len(missing), 'take'))} missing:")
+            print_rows(
+                [
+                    ("person", "gesture", "round"),
+                    *((*who, ", ".join(numbers)) for who, numbers in rounds.items()),
+                ]
+            )
+        else:
+            print("\nNothing is missing.")

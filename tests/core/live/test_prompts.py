@@ -1,0 +1,190 @@
+"""Prompts become labels: of maps that are made here, and of whole sessions with test sources."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sd2core.datasets.reading import open_dataset
+from sd2core.live.clocks import Clocks
+from sd2core.live.prompting import NO_MOTION, prompted_span
+from sd2core.maps import DopplerMap
+from sd2core.options.suggesting import SuggestOptions
+from sd2core.recording.recording import open_recording
+from sd2core.sensor import VelocityAxis
+from sd2core.timebase import Timebase
+
+SD2 = [sys.executable, "-m", "sd2core.cli"]
+BINS, RATE_HZ, FRAMES = 16, 20.0, 200
+MARGINS = SuggestOptions()
+FRAME_S = 1.0 / RATE_HZ
+PROTOCOL = """
+format = "sd2-protocol"
+version = 1
+title = "Try"
+people = ["anna"]
+order = "fixed"
+take_s = 1
+pause_s = 1
+countdown_s = 1
+
+[[gestures]]
+name = "left-to-right"
+instruction = "Swipe to your left"
+
+[[gestures]]
+name = "wave"
+instruction = "Wave"
+"""
+
+
+def _map(*moving_s: tuple[float, float]) -> DopplerMap:
+    """Ten seconds of quiet, but for what moves."""
+    timebase = Timebase.regular(FRAMES, RATE_HZ)
+    values = np.ones((BINS, FRAMES), np.float32)
+    for start_s, end_s in moving_s:
+        moves = (timebase.times_s >= start_s) & (timebase.times_s < end_s)
+        values[:4, moves] = 1000.0
+    return DopplerMap(values, VelocityAxis(BINS, 2.0), timebase, "real")
+
+
+@given(st.floats(1.0, 3.0), st.floats(0.5, 1.0), st.floats(0.5, 2.0), st.floats(0.5, 1.5))
+def test_edges_snap_to_the_motion(
+    prompt_s: float, late_s: float, first_s: float, second_s: float
+) -> None:
+    begin_s = prompt_s + late_s
+    again_s = begin_s + first_s + 1.0
+    found = prompted_span(
+        _map((begin_s, begin_s + first_s), (again_s, again_s + second_s)), "up", prompt_s, 9.5, 0.3
+    )
+    assert (found.label, found.note) == ("up", "")
+    assert found.start_s == pytest.approx(begin_s - MARGINS.margin_s, abs=2 * FRAME_S + 0.05)
+    after_s = MARGINS.margin_s + MARGINS.hold_s
+    assert found.end_s == pytest.approx(again_s + second_s + after_s, abs=2 * FRAME_S + 0.05)
+
+
+def test_motion_that_was_there_before_the_prompt_or_goes_on_after_it_moves_no_edge() -> None:
+    found = prompted_span(_map((1.0, 4.0)), "up", 2.0, 3.5, 0.3)
+    assert (found.start_s, found.end_s, found.note) == (2.3, 3.5, "")
+    before = prompted_span(_map((0.5, 1.0)), "up", 2.0, 3.5, 0.3)
+    assert (before.start_s, before.end_s, before.note) == (2.3, 3.5, NO_MOTION)
+
+
+def test_an_event_is_put_on_the_clock_of_the_video() -> None:
+    clocks = Clocks(video_first_s=100.0, video_delay_s=0.1, radar_delay_s=0.0)
+    assert clocks.recording_s(103.0) == pytest.approx(3.1)
+
+
+def _session(
+    protocol: Path, folder: Path, key_at: Callable[[dict[str, Any]], str]
+) -> list[dict[str, Any]]:
+    """Run a session whose keys are pressed as its events say; return the events."""
+    words = ["record", "--camera", "test", "--radar", "test", "--json"]
+    process = subprocess.Popen(
+        [*SD2, *words, "--protocol", str(protocol), "--out", str(folder)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+    told = []
+    for line in process.stdout:
+        told.append(json.loads(line))
+        if key := key_at(told[-1]):
+            process.stdin.write(key)
+            process.stdin.flush()
+    process.communicate()
+    assert process.returncode == 0
+    return told
+
+
+def test_a_session_ends_in_recordings_of_the_right_labels(tmp_path: Path) -> None:
+    protocol, folder = tmp_path / "try.toml", tmp_path / "session"
+    protocol.write_text(PROTOCOL, encoding="utf-8")
+    pressed: list[str] = []
+
+    def keys(event: dict[str, Any]) -> str:
+        if event["event"] != "step":
+            return ""
+        key = ""
+        match event["phase"], event.get("gesture"):
+            case "ready", _:
+                key = " "
+            case "prompt", "left-to-right" if "a" not in pressed:
+                key = "a"
+            case "pause", "wave" if "s" not in pressed:
+                key = "s"
+        pressed.extend(key)
+        return key
+
+    told = _session(protocol, folder, keys)
+    stored = [one for one in told if one["event"] == "stored"]
+    assert [one["take"] for one in stored] == ["anna-left-to-right-1"]
+    assert told[-1] == {"event": "missing", "takes": ["anna-wave-1"]}
+    assert [one.name for one in folder.iterdir()] == ["anna-left-to-right-1.sd2"]
+
+    # The same command goes on with what is missing; a leftover of a killed one is no take. The
+    # last take is made again after it, in its own place.
+    (folder / "unfinished" / "anna-wave-1.sd2").mkdir(parents=True)
+    pressed = []
+
+    def keys_of_the_second(event: dict[str, Any]) -> str:
+        after_all = event.get("phase") == "pause" and "gesture" not in event
+        key = "\n" if event.get("phase") == "ready" else ""
+        if after_all and "a" not in pressed:
+            key = "a"
+        pressed.extend(key)
+        return key
+
+    told = _session(protocol, folder, keys_of_the_second)
+    assert told[0]["missing"] == 1
+    assert [one["take"] for one in told if one["event"] == "stored"] == 2 * ["anna-wave-1"]
+    assert told[-1] == {"event": "missing", "takes": []}
+    assert not (folder / "unfinished").exists()
+
+    for name, gesture in (("anna-left-to-right-1", "left-to-right"), ("anna-wave-1", "wave")):
+        recording = open_recording(folder / f"{name}.sd2")
+        (span,) = recording.labelled.spans
+        assert (span.label, recording.subject, recording.title) == (gesture, "anna", name)
+        # The prompt came after a second of standing still, and went a second later.
+        assert 0.9 < span.start_s < span.end_s
+        assert span.end_s - span.start_s < 1.3
+        assert recording.missing() == {}
+
+    out = tmp_path / "set.npz"
+    words = ["export", str(folder), "--segments", "spans", "--out", str(out)]
+    subprocess.run([*SD2, *words], check=True, capture_output=True)
+    with open_dataset(out) as made:
+        assert made.header.subjects == ("anna",)
+        segments = [
+            (made.header.labels[label], made.header.classes.get(made.header.labels[label]))
+            for label in made["segment_label"][:].tolist()
+        ]
+    assert sorted(segments) == [("left-to-right", "horizontal"), ("wave", "wave")]
+
+
+def test_what_cannot_be_is_refused_before_anything_is_made(tmp_path: Path) -> None:
+    words = ["record", "--camera", "test", "--radar", "test", "--out", str(tmp_path / "some")]
+    done = subprocess.run(
+        [*SD2, *words, "--protocol", "none.toml"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert "sd2: There is no protocol none.toml" in done.stderr
+    done = subprocess.run(
+        [*SD2, *words, "--protocol", "paper", "--seconds", "3"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "--protocol is given with --seconds" in done.stderr
+    assert not (tmp_path / "some").exists()
