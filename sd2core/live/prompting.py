@@ -12,6 +12,7 @@ from sd2core.labels.suggest import suggest_spans
 from sd2core.live.clocks import Clocks
 from sd2core.live.protocol import Protocol, Take
 from sd2core.maps import DopplerMap
+from sd2core.options.suggesting import SuggestOptions
 from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VelocityAxis
@@ -34,7 +35,8 @@ def prompted_span(
     prompt_s, end_s : float
         When the person was told to begin, and when the prompt went, on the clock of the map.
     reaction_s : float
-        Motion that has ended by so long after the prompt does not count.
+        Motion counts that takes as long as a suggestion must (``SuggestOptions``) from so long
+        after the prompt on: not what ends then.
 
     Returns
     -------
@@ -44,7 +46,12 @@ def prompted_span(
         are both where there is no motion.
     """
     begin_s = min(prompt_s + reaction_s, end_s)
-    motions = [one for one in suggest_spans(doppler) if one.start_s < end_s and one.end_s > begin_s]
+    options = SuggestOptions()
+    motions = [
+        one
+        for one in suggest_spans(doppler, options)
+        if min(one.end_s, end_s) - max(one.start_s, begin_s) >= options.min_duration_s
+    ]
     found = Span(1, TRACK, begin_s, end_s, label, note=NO_MOTION)
     if not motions:
         return found

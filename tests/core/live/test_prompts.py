@@ -79,6 +79,20 @@ def test_motion_that_was_there_before_the_prompt_or_goes_on_after_it_moves_no_ed
     assert (before.start_s, before.end_s, before.note) == (2.3, 3.5, NO_MOTION)
 
 
+@given(
+    st.lists(st.tuples(st.floats(0.0, 9.0), st.floats(0.2, 2.0)), max_size=4),
+    st.floats(1.0, 5.0),
+    st.floats(0.6, 4.0),
+)
+def test_a_label_is_in_its_prompt_and_never_a_sliver(
+    moving: list[tuple[float, float]], prompt_s: float, long_s: float
+) -> None:
+    doppler = _map(*((start_s, start_s + for_s) for start_s, for_s in moving))
+    found = prompted_span(doppler, "up", prompt_s, prompt_s + long_s, 0.3)
+    assert prompt_s <= found.start_s < found.end_s <= prompt_s + long_s
+    assert found.duration_s >= MARGINS.min_duration_s
+
+
 def test_an_event_is_put_on_the_clock_of_the_video() -> None:
     clocks = Clocks(video_first_s=100.0, video_delay_s=0.1, radar_delay_s=0.0)
     assert clocks.recording_s(103.0) == pytest.approx(3.1)
