@@ -16,6 +16,7 @@ from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence
 from sd2core.io.kinds import RADAR_SUFFIXES
 from sd2core.io.readers import RADAR_FILES, suffixes_of
+from sd2core.live.protocol import PAPER
 from sd2core.live.radars import A121
 from sd2core.live.rehearsal import TEST
 
@@ -35,6 +36,12 @@ _CAMERAS = {
     "test": "test pictures (simulated)",
     "file": "a video, played at its rate…",
 }
+_PROTOCOLS = {
+    "": "none: one recording",
+    PAPER: "the paper's: six people, four gestures",
+    "file": "a file…",
+}
+_TOML = "Protocol of a session (*.toml);;All files (*)"
 _NONE = "none chosen"
 
 
@@ -55,6 +62,7 @@ class ListenDialog(QDialog):
             "Where frames come from", self, known, lambda way: setup.choose("way", way)
         )
         self._camera = Choice("Camera", self, dict(_CAMERAS), self._choose_camera)
+        self._protocol = Choice("Protocol", self, dict(_PROTOCOLS), self._choose_protocol)
         self._file = ElidedLabel(self)
         self._folder = ElidedLabel(self)
         self._address = QLineEdit(setup.address, self)
@@ -76,6 +84,7 @@ class ListenDialog(QDialog):
             (self._file_name, row_of((self._file, 1), self._file_button, spacing_px=8)),
             (self._address_name, self._address),
             ("", self._hint),
+            ("Protocol", self._protocol),
             ("Into", row_of((self._folder, 1), self._button(self._ask_folder), spacing_px=8)),
             gaps_px=(16, 12),
         )
@@ -92,7 +101,8 @@ class ListenDialog(QDialog):
         setup = self._setup
         is_radar = setup.way == DCA1000
         self._way.show_value(setup.way)
-        self._show_camera()
+        _show_file(self._camera, setup.camera)
+        _show_file(self._protocol, setup.protocol)
         for part in (self._file_name, self._file, self._file_button):
             part.setVisible(setup.way in (DCA1000, REPLAY))
         self._file_name.setText("Configuration" if is_radar else "Capture")
@@ -102,25 +112,25 @@ class ListenDialog(QDialog):
             widget.setVisible(is_radar)
         self._folder.setText(str(setup.folder))
         words, role = setup.problem, "muted"
-        if not words and setup.continues:
+        if not words and setup.continues and setup.protocol:
+            words = f"{setup.folder.name} exists: takes that it lacks are recorded."
+        elif not words and setup.continues:
             words = f"{setup.folder.name} exists: frames are added to it, if it is of this radar."
         say(self._message, words, role)
         self._begin.setEnabled(not setup.problem)
         self._begin.setText("Continue" if setup.continues else "Record")
 
-    def _show_camera(self) -> None:
-        """Show the camera, or the name of the video that was chosen."""
-        camera = self._setup.camera
-        if self._camera.findData(camera) < 0:
-            with QSignalBlocker(self._camera):
-                self._camera.addItem(Path(camera).name, camera)
-        self._camera.show_value(camera)
-
     def _choose_camera(self, camera: str) -> None:
         if camera == "file":
             camera = str(ask_file(self, "Video to play", _VIDEOS, "") or self._setup.camera)
         self._setup.choose("camera", camera)
-        self._show_camera()
+        _show_file(self._camera, self._setup.camera)
+
+    def _choose_protocol(self, protocol: str) -> None:
+        if protocol == "file":
+            protocol = str(ask_file(self, "Protocol", _TOML, "") or self._setup.protocol)
+        self._setup.choose("protocol", protocol)
+        _show_file(self._protocol, self._setup.protocol)
 
     def _ask_file(self) -> None:
         setup = self._setup
@@ -133,5 +143,14 @@ class ListenDialog(QDialog):
 
     def _ask_folder(self) -> None:
         start = str(self._setup.folder)
-        if folder := ask_new(self, "Record into", start, "Recording (*.sd2)"):
+        kind = "Folder of a session (*)" if self._setup.protocol else "Recording (*.sd2)"
+        if folder := ask_new(self, "Record into", start, kind):
             self._setup.choose_folder(folder)
+
+
+def _show_file(choice: Choice, value: str) -> None:
+    """Show a value that is among the choices, or the name of the file that was chosen."""
+    if choice.findData(value) < 0:
+        with QSignalBlocker(choice):
+            choice.addItem(Path(value).name, value)
+    choice.show_value(value)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, Qt
 from PySide6.QtWidgets import QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.live.bar import LiveBar
 from sd2app.live.dialog import ListenDialog
+from sd2app.live.guided import GuidedModel
 from sd2app.live.model import COMMAND, LiveModel
-from sd2app.live.setup import ListenSetup
+from sd2app.live.prompt_window import PromptWindow
+from sd2app.live.setup import ListenRequest, ListenSetup
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import Answer, accepted, confirmed
 
@@ -25,18 +27,19 @@ class LiveFeature(Feature):
         self._session, self._shell = session, shell
         self.model = LiveModel(session, parent, command or COMMAND)
         self.model.warned.connect(shell.warn)
-        self.changing = (self.model.state_changed,)
-        self.closing = (self.model,)
+        self.guided = GuidedModel(parent, command or COMMAND)
+        self.guided.warned.connect(shell.warn)
+        self.changing = (self.model.state_changed, self.guided.state_changed)
+        self.closing = (self.model, self.guided)
 
     def actions(self) -> Sequence[Action]:
         """Listen, and stop."""
-        model = self.model
         return (
             Action(
                 "listen", "File", "Record…", (),
                 "Record a camera and a radar together, or a radar alone, with its Doppler map",
-                self._ask, lambda: not model.busy,
-                why_not=lambda: "A recording is being made already" if model.busy else "",
+                self._ask, lambda: not self._busy,
+                why_not=lambda: "A recording is being made already" if self._busy else "",
             ),
         )  # fmt: skip
 
@@ -44,13 +47,26 @@ class LiveFeature(Feature):
         """What comes in, and what can be done about it."""
         return (LiveBar(self.model, self._go_on, self._show_again),)
 
+    @property
+    def _busy(self) -> bool:
+        return self.model.busy or self.guided.busy
+
     def _ask(self) -> None:
         window = self._shell.dialog_parent
         setup = ListenSetup(self._session.settings, window)
         listens = accepted(ListenDialog(setup, window)) and not setup.problem
         setup.deleteLater()
-        if listens and self._shell.may_discard():
+        if listens and setup.protocol:
+            self._guide(setup.request())
+        elif listens and self._shell.may_discard():
             self.model.start(setup.request())
+
+    def _guide(self, request: ListenRequest) -> None:
+        """Run a session in a window of its own; what is open stays open."""
+        view = PromptWindow(self.guided, self._shell.dialog_parent)
+        view.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.guided.start(request)
+        view.open_beside()
 
     def _go_on(self) -> None:
         if self.model.on_screen or self._shell.may_discard():
@@ -62,8 +78,9 @@ class LiveFeature(Feature):
 
     def may_close(self) -> bool:
         """Ask whether listening may stop with the window."""
-        request = self.model.request
-        if not self.model.busy or request is None:
+        busy = self.guided if self.guided.busy else self.model
+        request = busy.request
+        if not busy.busy or request is None:
             return True
         words = f"Frames go into {request.folder.name}. What was received so far is kept."
         return confirmed(self._shell.dialog_parent, "Stop recording?", words, Answer.Close)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import base64
-import contextlib
-import json
 import sys
 import time
 from collections import deque
@@ -13,18 +11,18 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, Signal
+from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QImage
 
 from sd2app.background.latest import delayed
 from sd2app.live.growing_map import extended
+from sd2app.live.process import LiveProcess, why_it_ended
 from sd2app.live.setup import ListenRequest
 from sd2app.session.content import Content
 from sd2app.session.session import Session
 from sd2core.errors import Sd2Error
 from sd2core.live.counts import Counts
 from sd2core.maps import DopplerMap
-from sd2core.processes import ONE_THREAD
 from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import FILE_NAME, open_recording
 
@@ -34,8 +32,6 @@ State = Literal["idle", "opening", "starting", "listening", "stopping", "stopped
 _TELL_MS = 100
 """Numbers that change faster cannot be read."""
 _LATENCIES = 100
-_STOP_MS = 10_000
-"""By then, all that waited to be stored is stored, or never will be."""
 
 
 class LiveModel(QObject):
@@ -65,8 +61,7 @@ class LiveModel(QObject):
         self._reference = 0.0  # that was set here: the strongest bin so far is 0 dB
         self._is_linked = True  # false until the recording names its video
         self._is_shown = True  # false where the recording cannot be read
-        self._process: QProcess | None = None
-        self._said = ""  # on standard error
+        self._process: LiveProcess | None = None
         self._teller = delayed(self.changed.emit, _TELL_MS, self)
         self._painted = delayed(self._note_latency, 0, self)
         self._document.changed.connect(self._begin_when_open)
@@ -134,7 +129,7 @@ class LiveModel(QObject):
             self._set_state("stopped")
         elif self._process is not None and self.busy:
             self._set_state("stopping")
-            _tell_to_stop(self._process)
+            self._process.stop()
 
     def dismiss(self) -> None:
         """Forget it, once it has ended."""
@@ -156,15 +151,9 @@ class LiveModel(QObject):
     def close(self) -> None:
         """Stop, and wait until all that was received is stored."""
         self._teller.stop()
-        process = self._process
-        if process is None:
-            return
-        process.blockSignals(True)
-        _tell_to_stop(process)
-        if not process.waitForFinished(_STOP_MS):
-            process.kill()
-            process.waitForFinished(_STOP_MS)
-        self._process, self.state = None, "stopped"
+        if self._process is not None:
+            self._process.close()
+            self._process, self.state = None, "stopped"
 
     # --- the process ----------------------------------------------------------------------
 
@@ -186,33 +175,14 @@ class LiveModel(QObject):
 
     def _launch(self) -> None:
         assert self.request is not None
-        self._said, self._new, self._is_shown = "", [], True
+        self._new, self._is_shown = [], True
         self._is_linked = not self.request.camera
-        process = QProcess(self)
-        environment = QProcessEnvironment.systemEnvironment()
-        for name, value in {**ONE_THREAD, "PYTHONIOENCODING": "utf-8"}.items():
-            environment.insert(name, value)
-        process.setProcessEnvironment(environment)
-        process.readyReadStandardOutput.connect(self._read)
-        process.finished.connect(self._end)
-        process.errorOccurred.connect(self._fail_to_start)
-        self._process = process
+        command = [*self._command, *self.request.words()]
+        self._process = LiveProcess(command, self, self._take, self._show_taken, self._end)
         self._set_state("starting")
-        program, *words = self._command
-        process.start(program, [*words, *self.request.words()])
+        self._process.start()
 
-    def _fail_to_start(self, error: QProcess.ProcessError) -> None:
-        if error == QProcess.ProcessError.FailedToStart and self._process is not None:
-            self._said = f"{self._command[0]} cannot be started: {self._process.errorString()}"
-            self._end(1)
-
-    def _read(self) -> None:
-        process = self._process
-        assert process is not None
-        while process.canReadLine():
-            # A line that another program wrote, or half of one, is left out.
-            with contextlib.suppress(ValueError, KeyError, TypeError):
-                self._take(json.loads(bytes(process.readLine().data())))
+    def _show_taken(self) -> None:
         try:
             self._show_new()
         except (Sd2Error, OSError) as error:
@@ -250,12 +220,8 @@ class LiveModel(QObject):
         self.pictures_dropped = int(event.get("pictures_dropped", self.pictures_dropped))
         self._is_linked = bool(event.get("linked", True))
 
-    def _end(self, code: int) -> None:
-        self._read()
-        process, self._process = self._process, None
-        assert process is not None
-        self._said += bytes(process.readAllStandardError().data()).decode("utf-8", "replace")
-        process.deleteLater()
+    def _end(self, code: int, said: str) -> None:
+        self._process = None
         if self.on_screen:
             try:
                 self._document.end_growth()
@@ -265,7 +231,7 @@ class LiveModel(QObject):
         if code == 0:
             self._set_state("stopped")
         else:
-            self.text = self._said.strip().removeprefix("sd2: ") or "It ended without saying why."
+            self.text = why_it_ended(said)
             self._set_state("failed")
 
     # --- on screen ------------------------------------------------------------------------
@@ -360,9 +326,3 @@ def _pixels(jpeg: bytes) -> NDArray[np.uint8]:
     image = QImage.fromData(jpeg).convertToFormat(QImage.Format.Format_RGB888)
     rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
     return rows[:, : 3 * image.width()].reshape(image.height(), image.width(), 3).copy()
-
-
-def _tell_to_stop(process: QProcess) -> None:
-    """Press the key that stops ``sd2 listen`` on a terminal."""
-    process.write(b"q")
-    process.closeWriteChannel()

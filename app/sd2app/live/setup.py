@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
 
@@ -11,6 +11,8 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.settings import Settings, StoredChoices
 from sd2core.cli.listen import Listen
 from sd2core.cli.record import Record
+from sd2core.errors import Sd2Error
+from sd2core.live.protocol import read_protocol
 from sd2core.live.radars import A121, LIVE_RADARS
 from sd2core.live.rehearsal import TEST
 from sd2core.live.sources import LOOPBACK
@@ -19,7 +21,8 @@ from sd2core.recording.recording import FILE_NAME, SUFFIX, folder_named
 
 DCA1000, REPLAY = "dca1000", "replay"
 _DEFAULTS = {
-    "way": "dca1000", "setup": "", "address": "", "replay": "", "beside": "", "camera": ""
+    "way": "dca1000", "setup": "", "address": "", "replay": "", "beside": "", "camera": "",
+    "protocol": "",
 }  # fmt: skip
 _ENDINGS = (".cfg", ".json")
 
@@ -34,6 +37,7 @@ class ListenRequest:
     replay: Path | None = None
     radar: str = ""  # by name
     camera: str = ""  # as of `sd2 record`; empty: none
+    protocol: str = ""  # of a guided session, likewise
 
     def words(self) -> list[str]:
         """Words of the ``sd2`` command that does it."""
@@ -44,7 +48,8 @@ class ListenRequest:
                 setup=self.setup,
                 out=self.folder,
                 json=True,
-                previews=True,
+                protocol=self.protocol or None,
+                previews=not self.protocol,
             )
             return words_of("record", take)
         command = Listen(
@@ -73,7 +78,8 @@ class ListenSetup(QObject):
         super().__init__(parent)
         self._choices = StoredChoices(settings, "listen", _DEFAULTS, {"way": ways()})
         beside = Path(self._choices["beside"] or Path.home())
-        self.folder = free_name(beside if beside.is_dir() else Path.home())
+        beside = beside if beside.is_dir() else Path.home()
+        self._recording, self._session = free_name(beside), free_name(beside, "session", "")
 
     @property
     def way(self) -> str:
@@ -100,26 +106,46 @@ class ListenSetup(QObject):
         """Camera that is filmed with, as of ``sd2 record``; empty: none."""
         return str(self._choices["camera"])
 
+    @property
+    def protocol(self) -> str:
+        """Protocol of a guided session, as of ``sd2 record``; empty: one recording."""
+        return str(self._choices["protocol"])
+
+    @property
+    def folder(self) -> Path:
+        """The recording, or the folder of the session."""
+        return self._session if self.protocol else self._recording
+
     def choose(self, name: str, value: object) -> None:
-        """Choose ``way``, ``address``, ``setup``, ``replay`` or ``camera``."""
+        """Choose ``way``, ``address``, ``setup``, ``replay``, ``camera`` or ``protocol``."""
         if self._choices.set(name, str(value).strip()):
             self.changed.emit()
 
     def choose_folder(self, folder: Path) -> None:
-        """Choose the recording's folder."""
-        self.folder = folder_named(folder)
+        """Choose the folder of the recording or of the session."""
+        if self.protocol:
+            self._session = folder
+        else:
+            self._recording = folder_named(folder)
         self._choices.set("beside", str(self.folder.parent))
         self.changed.emit()
 
     @property
     def continues(self) -> bool:
-        """True if the recording exists: it goes on."""
-        return (self.folder / FILE_NAME).is_file()
+        """True if the recording or the session exists: it goes on."""
+        return self.folder.is_dir() if self.protocol else (self.folder / FILE_NAME).is_file()
 
     @property
     def problem(self) -> str:
         """What is missing, or not there; empty where recording can begin."""
-        if self.camera and self.folder.exists():
+        if self.protocol:
+            if not self.camera:
+                return "Choose a camera: takes of a protocol are filmed."
+            try:
+                read_protocol(self.protocol)
+            except Sd2Error as error:
+                return str(error)
+        elif self.camera and self.folder.exists():
             return f"{self.folder.name} exists: what is filmed is not continued. Choose another."
         if self.way == REPLAY:
             if self.replay is None:
@@ -137,14 +163,15 @@ class ListenSetup(QObject):
 
     def request(self) -> ListenRequest:
         """What was chosen."""
+        made = ListenRequest(self.folder, camera=self.camera, protocol=self.protocol)
         if self.way == REPLAY:
-            return ListenRequest(self.folder, replay=self.replay, camera=self.camera)
+            return replace(made, replay=self.replay)
         if self.way != DCA1000:
-            return ListenRequest(self.folder, radar=self.way, camera=self.camera)
-        return ListenRequest(self.folder, self.setup, self.address, camera=self.camera)
+            return replace(made, radar=self.way)
+        return replace(made, setup=self.setup, address=self.address)
 
 
-def free_name(beside: Path) -> Path:
-    """Name of a recording in a folder that is not taken."""
-    names = (beside / f"live-{number}{SUFFIX}" for number in count(1))
+def free_name(beside: Path, kind: str = "live", suffix: str = SUFFIX) -> Path:
+    """Name in a folder that is not taken, by default of a recording."""
+    names = (beside / f"{kind}-{number}{suffix}" for number in count(1))
     return next(path for path in names if not path.exists())

@@ -1,0 +1,96 @@
+"""A command that records, in a process beside the window."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from PySide6.QtCore import QObject, QProcess, QProcessEnvironment
+
+from sd2core.processes import ONE_THREAD
+
+_STOP_MS = 10_000
+"""By then, all that waited to be stored is stored, or never will be."""
+
+
+class LiveProcess:
+    """A process that tells lines of JSON, and is steered by keys as on a terminal.
+
+    Parameters
+    ----------
+    command : sequence of str
+        Program and words.
+    parent : QObject
+    take : callable
+        Called with every event that it tells.
+    taken : callable
+        Called once those that had come were taken.
+    ended : callable
+        Called at the end with the exit status, and what was said on standard error.
+    """
+
+    def __init__(
+        self,
+        command: Sequence[str],
+        parent: QObject,
+        take: Callable[[dict[str, Any]], object],
+        taken: Callable[[], object],
+        ended: Callable[[int, str], object],
+    ) -> None:
+        self._command, self._take, self._taken, self._ended = command, take, taken, ended
+        self._process = process = QProcess(parent)
+        environment = QProcessEnvironment.systemEnvironment()
+        for name, value in {**ONE_THREAD, "PYTHONIOENCODING": "utf-8"}.items():
+            environment.insert(name, value)
+        process.setProcessEnvironment(environment)
+        process.readyReadStandardOutput.connect(self._read)
+        process.finished.connect(self._end)
+        process.errorOccurred.connect(self._fail_to_start)
+
+    def start(self) -> None:
+        """Begin."""
+        program, *words = self._command
+        self._process.start(program, words)
+
+    def press(self, key: str) -> None:
+        """Press a key."""
+        self._process.write(key.encode())
+
+    def stop(self) -> None:
+        """Press the key that stops."""
+        self.press("q")
+        self._process.closeWriteChannel()
+
+    def close(self) -> None:
+        """Stop, and wait until all that was received is stored; nothing more is called."""
+        self._process.blockSignals(True)
+        self.stop()
+        if not self._process.waitForFinished(_STOP_MS):
+            self._process.kill()
+            self._process.waitForFinished(_STOP_MS)
+
+    def _read(self) -> None:
+        while self._process.canReadLine():
+            # A line that another program wrote, or half of one, is left out.
+            with contextlib.suppress(ValueError, KeyError, TypeError):
+                self._take(json.loads(bytes(self._process.readLine().data())))
+        self._taken()
+
+    def _end(self, code: int) -> None:
+        self._read()
+        said = bytes(self._process.readAllStandardError().data()).decode("utf-8", "replace")
+        self._process.deleteLater()
+        self._ended(code, said)
+
+    def _fail_to_start(self, error: QProcess.ProcessError) -> None:
+        if error == QProcess.ProcessError.FailedToStart:
+            why = self._process.errorString()
+            self._process.deleteLater()
+            self._ended(1, f"{self._command[0]} cannot be started: {why}")
+
+
+def why_it_ended(said: str) -> str:
+    """Reason of a failure, from what was said on standard error."""
+    return said.strip().removeprefix("sd2: ") or "It ended without saying why."

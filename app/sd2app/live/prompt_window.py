@@ -1,0 +1,190 @@
+"""Window that a person reads from three metres: what to do, how long, and how much is left."""
+
+from __future__ import annotations
+
+import time
+
+from PySide6.QtCore import QRect, QRectF, QSize, Qt, QTimer
+from PySide6.QtGui import (
+    QCloseEvent,
+    QFont,
+    QFontMetricsF,
+    QGuiApplication,
+    QKeyEvent,
+    QPainter,
+    QPaintEvent,
+    QPalette,
+    QResizeEvent,
+)
+from PySide6.QtWidgets import QWidget
+
+from sd2app.live.gesture_picture import draw_gesture, has_picture
+from sd2app.live.guided import GuidedModel
+from sd2app.live.guided_text import KEYS, KEYS_AT_END, count_text, detail, headline, progress_text
+from sd2app.widgets.panel import outlined
+
+_FRAME_MS = 50
+_HEAD, _COUNT, _DETAIL, _SMALL = 0.1, 0.26, 0.075, 0.028
+"""Heights of letters, as shares of the window's height."""
+_MARGIN = 0.05
+_LEAST_PX = 11.0
+_CENTRED = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignVCenter
+_WRAPPED = _CENTRED | Qt.TextFlag.TextWordWrap
+
+
+class PromptWindow(QWidget):
+    """A view of :class:`GuidedModel`; its keys are those of a foot switch, too."""
+
+    def __init__(self, model: GuidedModel, parent: QWidget) -> None:
+        super().__init__(parent, Qt.WindowType.Window)
+        self._model = model
+        self.setWindowTitle("Session")
+        self.setAccessibleName("What to do")
+        self.resize(960, 600)
+        self._full = outlined("Full screen", "Full screen, or back (F11)", self._turn_full, self)
+        self._full.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # Space is for the session
+        self._clock = QTimer(self)
+        self._clock.setInterval(_FRAME_MS)
+        self._clock.timeout.connect(self.update)
+        model.changed.connect(self._refresh)
+        self._refresh()
+
+    def open_beside(self) -> None:
+        """Show it, on another screen than the window where there is one."""
+        window = self.parentWidget()
+        own = None if window is None else window.screen()
+        others = [one for one in QGuiApplication.screens() if one is not own]
+        if others and own is not None:
+            self.setGeometry(others[0].availableGeometry())
+        self.show()
+        self.activateWindow()
+
+    def _refresh(self) -> None:
+        words = (progress_text(self._model), headline(self._model), detail(self._model))
+        self.setAccessibleDescription(". ".join(filter(None, (*words, count_text(self._model)))))
+        self._animate(self._picture())
+        self._full.setVisible(not self._prompts)
+        self.update()
+
+    @property
+    def _prompts(self) -> bool:
+        """True while the person is to move."""
+        step = self._model.step
+        return self._model.state == "running" and step is not None and step.phase == "prompt"
+
+    def _picture(self) -> str:
+        """Gesture that is shown by a body, empty for none."""
+        step = self._model.step
+        shown = step is not None and self._model.state == "running" and step.phase != "ready"
+        return step.gesture if shown and step is not None and has_picture(step.gesture) else ""
+
+    def _animate(self, gesture: str) -> None:
+        if bool(gesture) != self._clock.isActive():
+            self._clock.start() if gesture else self._clock.stop()
+
+    def _turn_full(self) -> None:
+        self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
+
+    # --- keys -----------------------------------------------------------------------------
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Steer the session."""
+        match event.key():
+            case Qt.Key.Key_Space | Qt.Key.Key_Return | Qt.Key.Key_Enter:
+                self._model.go_on()
+            case Qt.Key.Key_A:
+                self._model.again()
+            case Qt.Key.Key_S:
+                self._model.skip()
+            case Qt.Key.Key_Escape if self._model.busy:
+                self._model.stop()
+            case Qt.Key.Key_Escape:
+                self.close()
+            case Qt.Key.Key_F11:
+                self._turn_full()
+            case _:
+                super().keyPressEvent(event)
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """End the session with it."""
+        self._model.stop()
+        self._clock.stop()
+        super().closeEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Keep the button in its corner."""
+        super().resizeEvent(event)
+        margin, size = round(_MARGIN * self.height()), self._full.sizeHint()
+        corner = QRect(self.rect().bottomRight(), QSize(0, 0))
+        self._full.setGeometry(
+            corner.adjusted(-margin - size.width(), -margin - size.height(), -margin, -margin)
+        )
+
+    # --- painting -------------------------------------------------------------------------
+
+    def paintEvent(self, _: QPaintEvent) -> None:
+        """Paint everything as large as the window allows."""
+        model, colours = self._model, self.palette()
+        # The whole window turns: that is seen without reading.
+        step, role = model.step, QPalette.ColorRole
+        figure = role.HighlightedText if self._prompts else role.Highlight
+        pair = (role.Highlight, figure) if self._prompts else (role.Window, role.WindowText)
+        ground, ink = map(colours.color, pair)
+        with QPainter(self) as painter:
+            painter.fillRect(self.rect(), ground)
+            painter.setPen(ink)
+            margin = _MARGIN * self.height()
+            room = QRectF(self.rect()).adjusted(margin, margin, -margin, -margin)
+            small = _SMALL * self.height()
+            who = "" if step is None else step.person
+            left, right = Qt.AlignmentFlag.AlignLeft, Qt.AlignmentFlag.AlignRight
+            self._write(painter, room, progress_text(model), 1.6 * small, left)
+            self._write(painter, room, who, 1.6 * small, right)
+            low = Qt.AlignmentFlag.AlignBottom | left
+            self._write(painter, room, KEYS if model.busy else KEYS_AT_END, small, low)
+            middle = room.adjusted(0.0, 2.5 * small, 0.0, -2.5 * small)
+            if gesture := self._picture():
+                body = QRectF(middle)
+                body.setWidth(0.36 * room.width())
+                draw_gesture(painter, body, gesture, time.monotonic(), colours.color(figure))
+                middle.setLeft(body.right() + margin)
+            self._paint_words(painter, middle)
+
+    def _paint_words(self, painter: QPainter, room: QRectF) -> None:
+        """Headline, count and detail, below each other."""
+        count, height = count_text(self._model), self.height()
+        shares = (0.44, 0.36, 0.2) if count else (0.4, 0.0, 0.6)
+        top = room.top()
+        for text, share, size in zip(
+            (headline(self._model), count, detail(self._model)),
+            shares,
+            (_HEAD, _COUNT, _DETAIL),
+            strict=True,
+        ):
+            part = QRectF(room.left(), top, room.width(), share * room.height())
+            self._write(painter, part, text, size * height, _WRAPPED, bold=size != _DETAIL)
+            top = part.bottom()
+
+    def _write(
+        self,
+        painter: QPainter,
+        room: QRectF,
+        text: str,
+        letters_px: float,
+        how: Qt.AlignmentFlag | Qt.TextFlag,
+        *,
+        bold: bool = False,
+    ) -> None:
+        """Write a text, smaller where it would not fit."""
+        font = QFont(self.font())
+        font.setBold(bold)
+        size_px = max(letters_px, _LEAST_PX)
+        while True:
+            font.setPixelSize(round(size_px))
+            needed = QFontMetricsF(font).boundingRect(room, int(how), text)
+            fits = needed.height() <= room.height() and needed.width() <= room.width() + 1.0
+            if fits or size_px <= _LEAST_PX:
+                break
+            size_px = max(0.9 * size_px, _LEAST_PX)
+        painter.setFont(font)
+        painter.drawText(room, int(how), text)

@@ -1,0 +1,209 @@
+"""A guided session in its window, by real keys; asserted on the model and on what is recorded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from answering import once_asked
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QWidget
+
+from sd2app.live.dialog import ListenDialog
+from sd2app.live.gesture_picture import has_picture
+from sd2app.live.guided import GuidedModel, Step
+from sd2app.live.guided_text import count_text, detail, headline, progress_text
+from sd2app.live.prompt_window import PromptWindow
+from sd2app.live.setup import ListenRequest, ListenSetup
+from sd2app.settings import Settings
+from sd2app.widgets.inputs import Choice
+from sd2core.labels.label_set import GESTURES
+from sd2core.live.protocol import PAPER
+from sd2core.recording.recording import open_recording
+
+LIMIT_MS = 120_000
+PROTOCOL = """
+format = "sd2-protocol"
+version = 1
+title = "Try"
+people = ["anna"]
+order = "fixed"
+take_s = 1
+pause_s = 1
+countdown_s = 1
+consent = "You are filmed."
+
+[[gestures]]
+name = "left-to-right"
+instruction = "Swipe to your left"
+
+[[gestures]]
+name = "wave"
+instruction = "Wave"
+"""
+
+
+@pytest.fixture
+def protocol(tmp_path: Path) -> Path:
+    path = tmp_path / "try.toml"
+    path.write_text(PROTOCOL, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def parent(qtbot) -> QWidget:
+    widget = QWidget()
+    qtbot.addWidget(widget)
+    return widget
+
+
+def _request(protocol: Path, folder: Path) -> ListenRequest:
+    return ListenRequest(folder, radar="test", camera="test", protocol=str(protocol))
+
+
+def test_keys_steer_a_session_that_ends_in_labelled_recordings(
+    parent, qtbot, protocol, tmp_path
+) -> None:
+    model, folder = GuidedModel(parent), tmp_path / "session"
+    view = PromptWindow(model, parent)
+    view.open_beside()
+
+    def wait_for(*phases: str) -> Step:
+        qtbot.waitUntil(
+            lambda: model.step is not None and model.step.phase in phases, timeout=LIMIT_MS
+        )
+        assert model.step is not None
+        return model.step
+
+    model.start(_request(protocol, folder))
+    assert wait_for("ready").person == "anna"
+    assert model.consent == "You are filmed."
+    QTest.keyClick(view, Qt.Key.Key_Space)
+    assert wait_for("prompt").gesture == "left-to-right"
+    assert "Swipe to your left" in view.accessibleDescription()
+    QTest.keyClick(view, Qt.Key.Key_A)
+    wait_for("pause")
+    assert wait_for("countdown").number == 1
+    qtbot.waitUntil(lambda: model.step.gesture == "wave", timeout=LIMIT_MS)
+    QTest.keyClick(view, Qt.Key.Key_S)
+    qtbot.waitUntil(lambda: model.state == "ended", timeout=LIMIT_MS)
+    assert model.missing == ("anna-wave-1",)
+    assert [one.name for one in folder.iterdir()] == ["anna-left-to-right-1.sd2"]
+    (span,) = open_recording(folder / "anna-left-to-right-1.sd2").labelled.spans
+    assert span.label == "left-to-right"
+
+    # Once more into the same folder; Escape stops, and then closes.
+    model.start(_request(protocol, folder))
+    assert wait_for("ready").gesture == "wave"
+    QTest.keyClick(view, Qt.Key.Key_F11)
+    assert view.isFullScreen()
+    QTest.keyClick(view, Qt.Key.Key_Escape)
+    qtbot.waitUntil(lambda: model.state == "ended", timeout=LIMIT_MS)
+    assert model.missing == ("anna-wave-1",)
+    QTest.keyClick(view, Qt.Key.Key_Escape)
+    assert not view.isVisible()
+
+
+def test_why_a_session_cannot_be_is_read_in_its_window(parent, qtbot, tmp_path) -> None:
+    model = GuidedModel(parent)
+    view = PromptWindow(model, parent)
+    with qtbot.waitSignal(model.warned, timeout=LIMIT_MS):
+        model.start(_request(tmp_path / "none.toml", tmp_path / "session"))
+    assert model.state == "failed"
+    assert "There is no protocol" in view.accessibleDescription()
+
+
+def test_what_is_read_at_every_moment(parent) -> None:
+    model = GuidedModel(parent)
+    model.state, model.consent = "running", "You are\nfilmed."
+    asked = ("p1", "left-to-right", "Swipe")
+    read = []
+    for step in (
+        Step("ready", 1, 3, None, *asked),
+        Step("opening", 1, 3, None, *asked),
+        Step("countdown", 1, 3, 2, *asked),
+        Step("prompt", 1, 3, 9, *asked),
+        Step("pause", 2, 3, 4, *asked),
+        Step("pause", 3, 3, 4),
+    ):
+        model.step = step
+        read.append((headline(model), count_text(model), detail(model)))
+    assert read == [
+        ("p1, please", "", "You are filmed.\n\nSpace begins."),
+        ("Swipe", "", "Stand still"),
+        ("Swipe", "2", "Stand still"),
+        ("Swipe", "9", "Now"),
+        ("Swipe", "4", "Next. Rest until then."),
+        ("That was the last take", "4", "A makes it once more."),
+    ]
+    assert progress_text(model) == "Take 3 of 3"
+
+
+def test_the_window_turns_while_a_person_is_to_move_and_a_body_shows_how(parent, qtbot) -> None:
+    model = GuidedModel(parent)
+    view = PromptWindow(model, parent)
+    view.resize(640, 360)
+    view.show()
+
+    def shown(phase: str, gesture: str):
+        model.state, model.step = "running", Step(phase, 1, 3, 5, "p1", gesture, "Go")
+        model.changed.emit()
+        return view.grab().toImage()
+
+    assert all(has_picture(one.name) for one in GESTURES.labels[:4])
+    still, moving = shown("countdown", "wave"), shown("prompt", "wave")
+    assert still.pixelColor(2, 2) != moving.pixelColor(2, 2)
+    with_body = shown("countdown", "up-to-down")
+    ground = with_body.pixelColor(2, 2)
+    # Body in the left third, words beside it; without a picture words are in the middle.
+    left = [with_body.pixelColor(x, 180) for x in range(40, 240)]
+    assert sum(one != ground for one in left) > 10
+    assert all(still.pixelColor(x, 180) == ground for x in range(10, 160))
+
+
+def test_the_dialog_offers_protocols_and_sets_a_session_up(
+    empty_window, monkeypatch, protocol, tmp_path
+) -> None:
+    window, folder = empty_window, tmp_path / "session"
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(protocol), ""))
+    started: list[ListenRequest] = []
+    guided = window.features.live.guided
+    monkeypatch.setattr(guided, "start", started.append)
+
+    def fill(dialog: ListenDialog) -> None:
+        choices = {one.accessibleName(): one for one in dialog.findChildren(Choice)}
+        choices["Where frames come from"].setCurrentIndex(2)
+        choices["Protocol"].setCurrentIndex(2)
+        (begin,) = (
+            one for one in dialog.findChild(QDialogButtonBox).buttons() if one.text() == "Record"
+        )
+        assert not begin.isEnabled()  # takes are filmed
+        choices["Camera"].setCurrentIndex(choices["Camera"].findData("test"))
+        dialog._setup.choose_folder(folder)
+        assert begin.isEnabled()
+        QTest.mouseClick(begin, Qt.MouseButton.LeftButton)
+
+    once_asked(ListenDialog, fill)
+    window.action("listen").trigger()
+    assert started == [_request(protocol, folder)]
+    window.findChild(PromptWindow).close()
+
+
+def test_a_session_has_a_folder_of_its_own_and_words_of_its_own(tmp_path) -> None:
+    settings = Settings.forgetful()
+    setup = ListenSetup(settings)
+    assert setup.folder.suffix == ".sd2"
+    setup.choose("protocol", PAPER)
+    setup.choose("camera", "test")
+    setup.choose("way", "test")
+    setup.choose_folder(tmp_path / "session")
+    assert (setup.folder, setup.problem) == (tmp_path / "session", "")
+    words = setup.request().words()
+    assert words[:1] == ["record"]
+    assert words[words.index("--protocol") + 1] == PAPER
+    assert "--previews" not in words
+    (tmp_path / "session").mkdir()
+    assert setup.continues
+    setup.choose("protocol", str(tmp_path / "none.toml"))
+    assert "There is no protocol" in setup.problem
