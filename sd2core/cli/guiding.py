@@ -20,6 +20,7 @@ from sd2core.live.joint import JointRecording
 from sd2core.live.prompting import label_take
 from sd2core.live.protocol import Protocol, Take
 from sd2core.live.session import Session
+from sd2core.live.videos import drop_video
 from sd2core.recording.recording import SUFFIX, is_recording
 from sd2core.runs.control import stop_signals
 
@@ -57,16 +58,19 @@ def guide(
     session = Session(protocol, there)
     telling = _Telling(session, as_json=as_json)
     telling.begin(folder)
+    if protocol.video == "drop":
+        takes = [folder / f"{take.name}{SUFFIX}" for take in session.takes if take.name in there]
+        telling.dropped([take.stem for take in takes if drop_video(take)])
     with (
         stop_signals() as told,
         pressed_keys() as key,
-        contextlib.closing(_Takes(session, folder, open_take, telling)) as takes,
+        contextlib.closing(_Takes(session, folder, open_take, telling)) as recorder,
     ):
         while session.phase != "over" and not told.is_set() and _press(session, key()):
-            takes.leave()
+            recorder.leave()
             session.advance(time.monotonic())
             telling.step()
-            takes.follow()
+            recorder.follow()
     telling.end()
 
 
@@ -204,6 +208,13 @@ class _Telling:
             return
         print(f"{protocol.title}: {missing:,} of {counted(len(session.takes), 'take')} to record")
         print(f"  into {folder}. Space or Enter: go on, a: again, s: skip, q: stop.", flush=True)
+
+    def dropped(self, names: list[str]) -> None:
+        """Say whose videos were deleted."""
+        if self._as_json:
+            print_event("dropped", takes=names)
+        elif names:
+            print(f"The video was deleted, since there is a body: {', '.join(names)}", flush=True)
 
     def step(self) -> None:
         """Say what is to be done, where that has changed or another second has passed."""

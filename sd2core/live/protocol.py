@@ -79,7 +79,7 @@ class Protocol(_Section):
     reaction_s: _ReactionS = 0.3
     """From the prompt to the first motion of the gesture."""
     video: Literal["keep", "drop"] = "keep"
-    """Drop: it is deleted once a body was fitted to it."""
+    """Drop: it is deleted in takes that have a body, see :func:`sd2core.live.videos.drop_video`."""
     consent: str = ""
     """Text that a person agrees to before the first take."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,11 +16,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.datasets.reading import open_dataset
+from sd2core.files.resources import resource_path
 from sd2core.live.clocks import Clocks
 from sd2core.live.prompting import NO_MOTION, prompted_span
 from sd2core.maps import DopplerMap
 from sd2core.options.suggesting import SuggestOptions
-from sd2core.recording.recording import open_recording
+from sd2core.recording.recording import Recording, open_recording
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
@@ -202,3 +204,30 @@ def test_what_cannot_be_is_refused_before_anything_is_made(tmp_path: Path) -> No
     )
     assert "--protocol is given with --seconds" in done.stderr
     assert not (tmp_path / "some").exists()
+
+
+@pytest.mark.parametrize("kept", ["keep", "drop"])
+def test_a_video_is_dropped_only_where_wanted_and_a_body_is_there(
+    tmp_path: Path, kept: str
+) -> None:
+    folder, sample = tmp_path / "session", resource_path("swipes.sd2")
+    folder.mkdir()
+    for name, mesh in (("anna-left-to-right-1", sample / "fit.zarr"), ("anna-wave-1", None)):
+        video = shutil.copy(sample / "video.mp4", tmp_path / "video.mp4")
+        Recording.create(folder / f"{name}.sd2", video=video, mesh=mesh, copy=True)
+    before = open_recording(folder / "anna-left-to-right-1.sd2")
+    with before.open_video() as reader:
+        times_s = reader.timebase.times_s
+    protocol = tmp_path / "try.toml"
+    protocol.write_text(f'video = "{kept}"\n{PROTOCOL}', encoding="utf-8")
+    told = _session(protocol, folder, lambda _: "")
+    assert told[-1] == {"event": "missing", "takes": []}
+    dropped = [one["takes"] for one in told if one["event"] == "dropped"]
+    assert dropped == ([["anna-left-to-right-1"]] if kept == "drop" else [])
+    with_body, without = (open_recording(path) for path in sorted(folder.iterdir()))
+    assert without.video is not None
+    assert without.video.is_file()
+    assert (folder / "anna-left-to-right-1.sd2" / "video.mp4").exists() == (kept == "keep")
+    assert (with_body.video is None) == (kept == "drop")
+    assert with_body.missing() == {}
+    np.testing.assert_allclose(with_body.load_mesh().timebase.times_s, times_s, atol=1e-6)
