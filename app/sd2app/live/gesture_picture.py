@@ -27,6 +27,11 @@ def _sample() -> tuple[MeshSequence, dict[str, tuple[float, float]]]:
     return recording.load_mesh(), spans
 
 
+def prepare_pictures() -> None:
+    """Read the body, which takes a second, before it is wanted."""
+    _sample()
+
+
 def has_picture(gesture: str) -> bool:
     """True if a body can be shown that makes a gesture."""
     return bool(gesture) and gesture in _sample()[1]

@@ -18,7 +18,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QWidget
 
-from sd2app.live.gesture_picture import draw_gesture, has_picture
+from sd2app.live.gesture_picture import draw_gesture, has_picture, prepare_pictures
 from sd2app.live.guided import GuidedModel
 from sd2app.live.guided_text import KEYS, KEYS_AT_END, count_text, detail, headline, progress_text
 from sd2app.widgets.panel import outlined
@@ -58,6 +58,8 @@ class PromptWindow(QWidget):
             self.setGeometry(others[0].availableGeometry())
         self.show()
         self.activateWindow()
+        # While camera and radar are opened in the process, nobody waits for it.
+        QTimer.singleShot(0, self, prepare_pictures)
 
     def _refresh(self) -> None:
         words = (progress_text(self._model), headline(self._model), detail(self._model))

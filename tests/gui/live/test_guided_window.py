@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -29,8 +30,8 @@ version = 1
 title = "Try"
 people = ["anna"]
 order = "fixed"
-take_s = 1
-pause_s = 1
+take_s = 3
+pause_s = 3
 countdown_s = 1
 consent = "You are filmed."
 
@@ -58,14 +59,21 @@ def parent(qtbot) -> QWidget:
     return widget
 
 
+@pytest.fixture
+def model(parent) -> Iterator[GuidedModel]:
+    made = GuidedModel(parent)
+    yield made
+    made.close()
+
+
 def _request(protocol: Path, folder: Path) -> ListenRequest:
     return ListenRequest(folder, radar="test", camera="test", protocol=str(protocol))
 
 
 def test_keys_steer_a_session_that_ends_in_labelled_recordings(
-    parent, qtbot, protocol, tmp_path
+    model, parent, qtbot, protocol, tmp_path
 ) -> None:
-    model, folder = GuidedModel(parent), tmp_path / "session"
+    folder = tmp_path / "session"
     view = PromptWindow(model, parent)
     view.open_beside()
 
@@ -105,8 +113,7 @@ def test_keys_steer_a_session_that_ends_in_labelled_recordings(
     assert not view.isVisible()
 
 
-def test_why_a_session_cannot_be_is_read_in_its_window(parent, qtbot, tmp_path) -> None:
-    model = GuidedModel(parent)
+def test_why_a_session_cannot_be_is_read_in_its_window(model, parent, qtbot, tmp_path) -> None:
     view = PromptWindow(model, parent)
     with qtbot.waitSignal(model.warned, timeout=LIMIT_MS):
         model.start(_request(tmp_path / "none.toml", tmp_path / "session"))
@@ -114,8 +121,7 @@ def test_why_a_session_cannot_be_is_read_in_its_window(parent, qtbot, tmp_path) 
     assert "There is no protocol" in view.accessibleDescription()
 
 
-def test_what_is_read_at_every_moment(parent) -> None:
-    model = GuidedModel(parent)
+def test_what_is_read_at_every_moment(model) -> None:
     model.state, model.consent = "running", "You are\nfilmed."
     asked = ("p1", "left-to-right", "Swipe")
     read = []
@@ -140,8 +146,7 @@ def test_what_is_read_at_every_moment(parent) -> None:
     assert progress_text(model) == "Take 3 of 3"
 
 
-def test_the_window_turns_while_a_person_is_to_move_and_a_body_shows_how(parent, qtbot) -> None:
-    model = GuidedModel(parent)
+def test_the_window_turns_while_a_person_is_to_move_and_a_body_shows_how(model, parent) -> None:
     view = PromptWindow(model, parent)
     view.resize(640, 360)
     view.show()
