@@ -1,6 +1,6 @@
 """A camera and a radar without hardware: both show the same events, on this computer's clock.
 
-Every two seconds of the monotonic clock a light flashes and a reflector appears, for a tenth of a
+Every 2.03 s of the monotonic clock a light flashes and a reflector appears, for a tenth of a
 second. A frame shows an event by the share of its exposure that it took, so that the centre of an
 event is known far better than to a frame: what is between picture and radar is measured with it.
 """
@@ -22,8 +22,8 @@ from sd2core.live.sources import Frame, Source, Take
 from sd2core.radar_config import SPEED_OF_LIGHT_MPS
 from sd2core.radar_profiles import RADARS
 
-EVENT_S = 2.0
-"""Between two events."""
+EVENT_S = 2.03
+"""Between two events, which so fall anywhere within frames of any usual rate."""
 FLASH_S = 0.1
 """Length of an event."""
 TEST = "test"

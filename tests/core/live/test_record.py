@@ -117,8 +117,10 @@ def test_events_that_both_see_are_at_one_time(tmp_path: Path, rate_hz: int) -> N
     assert recording.simulated
     flashes_s, bursts_s = _events_s(recording)
     assert len(flashes_s) >= 3
-    nearest_s = np.abs(flashes_s[:, None] - bursts_s).min(axis=1)
-    assert np.median(nearest_s) < 0.010 + clocks["jitter_s"]
+    apart_s = flashes_s[:, None] - bursts_s
+    nearest_s = apart_s[np.arange(len(flashes_s)), np.abs(apart_s).argmin(axis=1)]
+    # The radar looks half of the time: one event alone is known to some 10 ms.
+    assert abs(nearest_s.mean()) < 0.010 + clocks["jitter_s"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signal kills there")
