@@ -9,11 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from sd2core.errors import Sd2Error
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 FARTHEST_M = 1e9
 """Largest distance of a sensor from the camera: squares of ranges stay in single precision."""
@@ -62,11 +64,15 @@ class VelocityAxis:
     @property
     def edges_mps(self) -> NDArray[np.float64]:
         """Bin edges, shape (bins + 1,)."""
+        import numpy as np  # not where options are only listed
+
         return np.arange(self.bins + 1, dtype=np.float64) * self.bin_width_mps - self.v_max_mps
 
     @property
     def centres_mps(self) -> NDArray[np.float64]:
         """Bin centres, shape (bins,)."""
+        import numpy as np
+
         return (np.arange(self.bins, dtype=np.float64) + 0.5) * self.bin_width_mps - self.v_max_mps
 
     def checked_bins(self, numbers: Iterable[int], what: str) -> tuple[int, ...]:

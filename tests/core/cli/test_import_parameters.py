@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from body_models import model_arrays, write_model
 from cli_outcome import Sd2
 
 from sd2core.recording.recording import open_recording
+from tests.core.io.body_models import model_arrays, write_model
 
 
 def motion(path: Path) -> Path:

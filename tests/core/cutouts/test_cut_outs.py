@@ -115,12 +115,12 @@ def test_what_is_there_and_the_same_is_left_alone(source, tmp_path) -> None:
 
 def test_something_else_is_replaced_only_when_asked_for(source, tmp_path) -> None:
     (path,) = cut(source, tmp_path, WAVE)
-    moved = replace(source.maps["synthetic"], meta={"sensor": "elsewhere"})
+    moved = replace(source.maps["synthetic"], meta={"source": "elsewhere"})
     changed = replace(source, maps={"synthetic": moved})
     assert cut(changed, tmp_path, WAVE) == []
     assert "sensor" not in DopplerMap.load(path / "synthetic.npz").meta
     assert cut(changed, tmp_path, WAVE, replace_others=True) == [path]
-    assert DopplerMap.load(path / "synthetic.npz").meta["sensor"] == "elsewhere"
+    assert DopplerMap.load(path / "synthetic.npz").meta["source"] == "elsewhere"
     assert sorted(one.name for one in tmp_path.iterdir()) == [
         ".sd2-lock",
         path.name,

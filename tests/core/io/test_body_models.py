@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from body_models import model_arrays, turned_from, write_model
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import sparse
@@ -18,6 +17,7 @@ from sd2core.errors import Sd2Error
 from sd2core.io.body_model import BodyModel, fitted_to, read_body_model
 from sd2core.io.body_parameters import rotation_matrices
 from sd2core.io.mesh import load_mesh
+from tests.core.io.body_models import model_arrays, turned_from, write_model
 
 ANGLES = st.floats(-3.0, 3.0)
 VECTORS = st.tuples(ANGLES, ANGLES, ANGLES).map(np.array)

@@ -13,7 +13,6 @@ import joblib
 import numpy as np
 import pytest
 import torch
-from body_models import model_arrays, write_model
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -22,6 +21,7 @@ from sd2core.io.kinds import kind_of
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
+from tests.core.io.body_models import model_arrays, write_model
 
 REST = model_arrays()["v_template"] - model_arrays()["v_template"].mean(axis=0)
 FRAMES = (3, 4, 5, 9)

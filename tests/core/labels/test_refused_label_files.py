@@ -133,7 +133,7 @@ def test_deeply_nested_files_do_not_end_the_program(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("<html/>", "root is 'html'"),
+        ("<list/>", "root is 'list'"),
         ('<ANNOTATION_DOCUMENT><HEADER TIME_UNITS="PAL-frames"/></ANNOTATION_DOCUMENT>', "PAL"),
         (
             '<ANNOTATION_DOCUMENT><TIER TIER_ID="t"><ANNOTATION><ALIGNABLE_ANNOTATION '

@@ -24,7 +24,7 @@ def compared(window, qtbot, monkeypatch, tmp_path):
     path = tmp_path / "ben.eaf"
     write_labels(path, Labels((LabelTrack("Ben"),), spans), models_of(window).playback.timebase)
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
-    qtbot.keyClick(window, Qt.Key.Key_K, CONTROL)
+    qtbot.keyClick(window, Qt.Key.Key_K, CONTROL | Qt.KeyboardModifier.ShiftModifier)
     model = models_of(window).agreement
     qtbot.waitUntil(lambda: model.found is not None, timeout=10_000)
     return window
@@ -50,7 +50,7 @@ def test_a_file_that_holds_no_labels_is_said(window, qtbot, monkeypatch, tmp_pat
     path = tmp_path / "broken.eaf"
     path.write_text("<ANNOTATION_DOCUMENT>")
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
-    qtbot.keyClick(window, Qt.Key.Key_K, CONTROL)
+    qtbot.keyClick(window, Qt.Key.Key_K, CONTROL | Qt.KeyboardModifier.ShiftModifier)
     qtbot.waitUntil(lambda: "broken.eaf" in window.messages.text, timeout=10_000)
     assert not models_of(window).agreement.active
 

@@ -17,7 +17,7 @@ from sd2app.manual.help import HELP
 from sd2app.shell.program import ProgramFeature
 
 APP = Path(__file__).resolve().parents[3] / "app" / "sd2app"
-SMALL = {"TrackDialog", "MessagesDialog", "ModelCardDialog"}
+SMALL = {"TrackDialog", "MessagesDialog", "ModelCardDialog", "ActionSearch"}
 """Dialogs that say all there is to say."""
 
 
