@@ -175,6 +175,7 @@ class Status:
         self._shown_s = time.monotonic()
         self._said: set[str] = set()
         self.more: Callable[[], Mapping[str, Any]] = dict  # what else is told with every line
+        self.nothing = "No frame came, and nothing was written."
         self.each_time: Callable[[], object] = dict  # called with every column, and between them
 
     def begin(self, folder: Path, continued: bool, about: str = "") -> None:
@@ -245,7 +246,7 @@ class Status:
             )
             return
         if not counts.recorded:
-            print("No frame came, and nothing was written.")
+            print(self.nothing)
             return
         facts = {
             "recorded": counts.frames,

@@ -176,6 +176,7 @@ def _take(options: Record, choice: CameraChoice) -> None:
         listening = take.listening
         status = Status(listening, take.source, as_json=options.json, columns=options.previews)
         status.more, status.each_time = take.progress, partial(_follow, take)
+        status.nothing = "No frame of the radar came: the recording holds the video alone."
         status.begin(take.folder, False, take.about)
         # To be told to end is to be told to stop: what waits to be stored is stored.
         with stop_signals() as told:

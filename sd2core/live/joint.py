@@ -12,7 +12,7 @@ from sd2core.live.clocks import Clocks, correct_drift, link_clocks
 from sd2core.live.filming import VIDEO_NAME, CameraChoice, Film
 from sd2core.live.listening import Listening
 from sd2core.live.recording import GrowingRecording
-from sd2core.recording.recording import open_recording
+from sd2core.recording.recording import Recording, open_recording
 
 if TYPE_CHECKING:
     from sd2core.live.clocks import ClockLine
@@ -98,8 +98,14 @@ class JointRecording:
             self.listening.stop()
 
     def correct_clocks(self) -> ClockLine | None:
-        """Put both on one clock by all that arrived; None where one of them gave nothing."""
+        """Put both on one clock by all that arrived; None where one of them gave nothing.
+
+        A video alone becomes a recording, too.
+        """
         if not (self.film.filmed.recorded and self.listening.counts.recorded):
+            if self.film.filmed.recorded:
+                video = self.folder / VIDEO_NAME
+                Recording.create(self.folder, video=video, simulated=self.film.simulated)
             return None
         line = self._link()
         correct_drift(self._recording.radar, line)

@@ -23,6 +23,7 @@ from sd2core.live.clocks import Clocks, fit_line
 from sd2core.live.filming import CameraChoice, Film
 from sd2core.live.rehearsal import EVENT_S, FLASH_S, share_of_event
 from sd2core.recording.recording import Recording, open_recording
+from tests.core.io.radar.dca1000_files import TiRecording, cfg_of
 
 RECORD = [sys.executable, "-m", "sd2core.cli", "record"]
 
@@ -189,3 +190,16 @@ def test_what_was_recorded_is_not_recorded_over(tmp_path: Path) -> None:
     done = subprocess.run([*RECORD, *words], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "take.sd2 exists. Expected: a new folder." in done.stderr
+
+
+def test_a_radar_that_is_silent_leaves_the_video(tmp_path: Path) -> None:
+    out, setup = tmp_path / "take.sd2", tmp_path / "walk.cfg"
+    setup.write_text(cfg_of(TiRecording()), encoding="utf-8")
+    words = ["--camera", "test", "--radar", "127.0.0.1:0", "--setup", str(setup)]
+    words += ["--out", str(out), "--seconds", "2"]
+    done = subprocess.run([*RECORD, *words], capture_output=True, text=True, check=True)
+    assert "No frame of the radar came: the recording holds the video alone." in done.stdout
+    recording = open_recording(out)
+    assert recording.radar is None
+    with open_video(recording.video) as video:
+        assert len(video) > 10
