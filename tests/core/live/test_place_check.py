@@ -194,6 +194,7 @@ def _check(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_the_command_with_test_sources_records_nothing(tmp_path: Path) -> None:
     done = _check("--camera", "test", "--radar", "test", "--seconds", "8", "--json")
     findings = json.loads(done.stdout)["findings"]

@@ -124,6 +124,7 @@ def _session(
     return told
 
 
+@pytest.mark.slow
 def test_a_session_ends_in_recordings_of_the_right_labels(tmp_path: Path) -> None:
     protocol, folder = tmp_path / "try.toml", tmp_path / "session"
     protocol.write_text(PROTOCOL, encoding="utf-8")

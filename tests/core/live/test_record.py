@@ -100,7 +100,7 @@ def test_a_frame_has_the_share_of_an_event_that_it_sees() -> None:
     assert sum(shares) * 0.01 == pytest.approx(2 * FLASH_S)
 
 
-@pytest.mark.parametrize("rate_hz", [30, 20])
+@pytest.mark.parametrize("rate_hz", [30, pytest.param(20, marks=pytest.mark.slow)])
 def test_events_that_both_see_are_at_one_time(tmp_path: Path, rate_hz: int) -> None:
     out = tmp_path / "take.sd2"
     radar = "test" if rate_hz == 30 else f"test:{rate_hz}"
