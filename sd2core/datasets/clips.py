@@ -36,6 +36,12 @@ def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
     classes = in_order(names)
     table = np.array([classes.index(name) for name in names], np.int8)
     rows = np.flatnonzero(dataset["available"][:][:, KINDS.index(kind)])
+    if not len(rows):
+        raise Sd2Error(
+            f"{dataset.path} says that no segment of it has {kind} maps",
+            "one at least",
+            "Choose another kind of maps, or export it again",
+        )
     source = dataset["source"][:][rows]
     subject, placement = dataset["subject"][:][rows], dataset["placement"][:][rows]
     recordings = [one["recording"] for one in dataset.sources()]

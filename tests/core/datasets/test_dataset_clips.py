@@ -96,6 +96,17 @@ def test_only_sources_that_have_the_map_count(tmp_path: Path) -> None:
             clips_of_dataset(dataset, "simulated")
 
 
+def test_a_data_set_without_a_segment_of_a_kind_says_so(tmp_path: Path) -> None:
+    out = tmp_path / "set.npz"
+    write_dataset(out, [source()], DatasetOptions(length=24, overlap=4))
+    with np.load(out) as file:
+        arrays = dict(file)
+    arrays["available"][:] = False
+    np.savez(out, **arrays)
+    with open_dataset(out) as dataset, pytest.raises(Sd2Error, match="no segment of it has synth"):
+        clips_of_dataset(dataset, "synthetic")
+
+
 def test_classifiers_take_the_split_of_data_sets(tmp_path: Path) -> None:
     out = tmp_path / "set.zarr"
     people = [source(subject=name, kinds=("synthetic", "simulated")) for name in "abcd"]
