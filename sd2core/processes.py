@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import threading
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 """Environment in which a process multiplies matrices on one thread, whichever library does it."""
@@ -23,6 +24,18 @@ _LARGE_BYTES = 8 << 20
 
 _START_TOLERANCE_S = 2.0
 """The start of a process is told by the system's clock, which may be set meanwhile."""
+
+
+def end_beside(process: subprocess.Popen[Any], patience_s: float) -> None:
+    """End a process that works until its input ends: by that, or where it goes on, by a kill."""
+    if process.stdin is not None:
+        with suppress(OSError):  # it has ended already
+            process.stdin.close()
+    try:
+        process.wait(patience_s)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 @dataclass(frozen=True)

@@ -75,14 +75,14 @@ def parameters_of(entry: Mapping[Any, Any], source: str) -> BodyParameters:
     try:
         turns = _turns(entry)
         frames = len(turns)
-        shape = _first(entry, _SHAPES)
+        shape = first_of(entry, _SHAPES)
         betas = np.zeros((1, 1)) if shape is None else np.asarray(shape, np.float64)
         betas = np.atleast_2d(betas.reshape(-1, betas.shape[-1]) if betas.ndim > 2 else betas)
         if len(betas) not in (1, frames):
             raise ValueError(f"{len(betas)} shapes for {frames} frames")
         if len(betas) > 1 and (betas == betas[0]).all():
             betas = betas[:1]
-        place = _first(entry, _PLACES)
+        place = first_of(entry, _PLACES)
         places_m = None if place is None else np.asarray(place, np.float64).reshape(frames, 3)
         if not all(np.isfinite(one).all() for one in (turns, betas)):
             raise ValueError("a pose or a shape is not finite")
@@ -98,7 +98,7 @@ def parameters_of(entry: Mapping[Any, Any], source: str) -> BodyParameters:
     to_camera, rate = None, None
     if any(name in entry for name in CAPTURE_RATES):
         to_camera = _Y_DOWN_OF_Z_UP
-        rate = float(np.asarray(_first(entry, CAPTURE_RATES)).reshape(-1)[0])
+        rate = float(np.asarray(first_of(entry, CAPTURE_RATES)).reshape(-1)[0])
     elif "smpl_scaling" in entry:
         to_camera, rate = _Y_DOWN_OF_Y_UP, _AIST_RATE
         if places_m is not None:
@@ -116,14 +116,14 @@ def _scaling(entry: Mapping[Any, Any], source: str) -> float:
 
 def _turns(entry: Mapping[Any, Any]) -> Floats:
     """Rotations (T, J, 3, 3) of the joints; ValueError or TypeError if they are none."""
-    matrices = _first(entry, _MATRICES)
+    matrices = first_of(entry, _MATRICES)
     if matrices is not None:
         return _as_matrices(matrices, True)
-    vectors = _first(entry, _VECTORS)
+    vectors = first_of(entry, _VECTORS)
     if vectors is not None:
         vectors = np.asarray(vectors, np.float64)
         return _as_matrices(vectors, _are_matrices(vectors))
-    parts = [np.asarray(_first(entry, names), np.float64) for names in (_ROOT, _BODY)]
+    parts = [np.asarray(first_of(entry, names), np.float64) for names in (_ROOT, _BODY)]
     matrices = all(_are_matrices(part) for part in parts)
     return np.concatenate([_as_matrices(part, matrices) for part in parts], axis=1)
 
@@ -149,5 +149,6 @@ def rotation_matrices(vectors: Floats) -> Floats:
     return np.asarray(flat.reshape(*vectors.shape, 3))
 
 
-def _first(entry: Mapping[Any, Any], names: tuple[str, ...]) -> Any:
+def first_of(entry: Mapping[Any, Any], names: tuple[str, ...]) -> Any:
+    """What an entry holds under the first of several names, or None."""
     return next((entry[name] for name in names if entry.get(name) is not None), None)

@@ -17,7 +17,7 @@ from sd2core.files.limits import open_regular
 from sd2core.files.numpy_files import read_array_header
 from sd2core.files.paths import PICKLE_SUFFIXES
 from sd2core.files.texts import read_json
-from sd2core.io.body_parameters import PARAMETER_NAMES, holds_parameters
+from sd2core.io.body_parameters import PARAMETER_NAMES, first_of, holds_parameters
 from sd2core.io.frame_names import frames_among, numbered_frames
 from sd2core.io.mesh_arrays import FACE_NAMES, VERTEX_NAMES
 from sd2core.io.mesh_clock import is_of_clock
@@ -94,11 +94,6 @@ def holds_bodies(path: Path) -> bool:
         return False
     is_surface = len(shape) == 3 and shape[1] >= _FEWEST_VERTICES and shape[2] == 3
     return bool(kind.hasobject or (kind.kind == "f" and is_surface))
-
-
-def first_of(entry: Mapping[Any, Any], names: tuple[str, ...]) -> Any:
-    """What an entry holds under the first of several names, or None."""
-    return next((entry[name] for name in names if entry.get(name) is not None), None)
 
 
 def _content(path: Path) -> Person:

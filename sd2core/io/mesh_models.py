@@ -18,13 +18,12 @@ from sd2core.files.limits import check_size
 from sd2core.files.numpy_files import open_zip
 from sd2core.files.paths import PICKLE_SUFFIXES
 from sd2core.io.body_model import read_body_model
-from sd2core.io.body_parameters import PARAMETER_NAMES, parameters_of
+from sd2core.io.body_parameters import PARAMETER_NAMES, first_of, parameters_of
 from sd2core.io.estimator_files import (
     ESTIMATED,
     FOCAL_NAMES,
     TORCH_SUFFIXES,
     files_of_people,
-    first_of,
     holds_bodies,
     people_in,
 )
@@ -32,9 +31,9 @@ from sd2core.io.frame_names import chosen_person
 from sd2core.io.mesh_arrays import FACE_NAMES, VERTEX_NAMES, RawMesh, no_vertices
 from sd2core.io.mesh_clock import clock_of
 from sd2core.io.readers import MeshHints
+from sd2core.plausibility.mesh import AT_ROOT_M
 
 _NO_HINTS = MeshHints()
-_AT_ROOT_M = 0.6
 _SHIFTS = {"pred_cam_t": None, "cam_trans": 443.4 / 512, "camera": 5000.0}
 """Names of a body's place before the camera, and the focal length that was taken for it: in the
 file; of the picture's longer side (ROMP); in pixels (4D-Humans)."""
@@ -237,7 +236,7 @@ def _place_in_front(raw: RawMesh, entry: dict[Any, Any], path: Path, hints: Mesh
         return
     centres = np.nanmean(vertices[:: max(len(vertices) // 16, 1)], axis=1)  # (n, 3)
     shift_m = _shift(entry, len(vertices), path)
-    if shift_m is None and np.nanmax(np.linalg.norm(centres, axis=1)) > _AT_ROOT_M:
+    if shift_m is None and np.nanmax(np.linalg.norm(centres, axis=1)) > AT_ROOT_M:
         return
     if shift_m is not None:
         sampled = shift_m[:: max(len(vertices) // 16, 1)]

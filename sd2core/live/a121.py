@@ -24,6 +24,7 @@ from sd2core.io.radar.acconeer import PULSE_WIDTHS_M, a121_radar
 from sd2core.io.radar.growing import GrowingHead
 from sd2core.live import a121_client
 from sd2core.live.sources import Frame, Source, Take
+from sd2core.processes import end_beside
 
 PYTHON = "SD2_A121_PYTHON"
 """Environment variable that names the Python with the exploration tool."""
@@ -121,13 +122,7 @@ class A121Source(Source):
 
     def close(self) -> None:
         """End the process."""
-        with contextlib.suppress(OSError):
-            self._input.close()
-        try:
-            self._process.wait(_END_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        end_beside(self._process, _END_S)
         self._output.close()
 
     @property
@@ -141,12 +136,7 @@ class A121Source(Source):
     def _end_after(self, stop: threading.Event) -> None:
         """End the process, so that no frame is waited for that does not come."""
         stop.wait()
-        with contextlib.suppress(OSError):
-            self._input.close()
-        try:
-            self._process.wait(_END_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
+        end_beside(self._process, _END_S)
 
     def _told(self) -> dict[str, Any]:
         """A line of JSON of the process; Sd2Error if it says that something failed."""

@@ -64,6 +64,15 @@ def open_camera(
     return OpenCvCamera(int(name) if name.isdecimal() else name, size_px, rate_hz, exposure)
 
 
+def shrunk(picture: NDArray[np.uint8], width_px: int) -> NDArray[np.uint8]:
+    """Picture (height, width, 3) of another width, each pixel the mean of those it covers."""
+    import cv2
+
+    height, width = picture.shape[:2]
+    size = (width_px, max(round(width_px * height / width), 1))
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
 class OpenCvCamera:
     """Camera or stream that OpenCV opens."""
 

@@ -56,7 +56,7 @@ class Moved(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Finding:
+class Answer:
     """Answer to one question, as a sentence with its numbers."""
 
     name: str
@@ -137,7 +137,7 @@ def moved_between(
     return Moved(time_s, pixels, float(left), float(right), growth / passed_s)
 
 
-def check_place(config: RadarConfig, seen: Sequence[Seen], moved: Sequence[Moved]) -> list[Finding]:
+def check_place(config: RadarConfig, seen: Sequence[Seen], moved: Sequence[Moved]) -> list[Answer]:
     """Four findings: motion, range, view, agreement.
 
     Parameters
@@ -151,9 +151,9 @@ def check_place(config: RadarConfig, seen: Sequence[Seen], moved: Sequence[Moved
     return [_motion(config, seen), _range(config, seen), _view(moved), _agreement(seen, moved)]
 
 
-def _motion(config: RadarConfig, seen: Sequence[Seen]) -> Finding:
+def _motion(config: RadarConfig, seen: Sequence[Seen]) -> Answer:
     if not seen:
-        return Finding("motion", False, "No frame of the radar came.")
+        return Answer("motion", False, "No frame of the radar came.")
     level_db = float(np.quantile([one.level_db for one in seen], 1.0 - _MOVING_SHARE))
     least_db = chance_db(config)
     numbers = {"level_db": level_db, "chance_db": least_db}
@@ -166,34 +166,34 @@ def _motion(config: RadarConfig, seen: Sequence[Seen]) -> Finding:
         else f"The radar sees no motion: {sees}, and {chance}. Move in front of it; does it point"
         " at you?"
     )
-    return Finding("motion", passed, words, numbers)
+    return Answer("motion", passed, words, numbers)
 
 
-def _range(config: RadarConfig, seen: Sequence[Seen]) -> Finding:
+def _range(config: RadarConfig, seen: Sequence[Seen]) -> Answer:
     if config.is_continuous:
-        return Finding("range", True, "The radar is a continuous wave, which tells no distances.")
+        return Answer("range", True, "The radar is a continuous wave, which tells no distances.")
     far = np.array([one.distance_m for one in seen])
     far = far[np.isfinite(far)]
     most_m = config.range_max_m
     if not len(far):
-        return Finding("range", False, "The radar sees nothing whose distance could be told.")
+        return Answer("range", False, "The radar sees nothing whose distance could be told.")
     near_m, median_m, far_m = (float(one) for one in np.quantile(far, (0.1, 0.5, 0.9)))
     passed = far_m + config.range_resolution_m <= most_m
     words = f"What moves is {near_m:.1f} to {far_m:.1f} m from the radar, mostly {median_m:.1f} m;"
     reach = f"it reaches {most_m:.1f} m"
     words += f" {reach}." if passed else f" {reach}, and tells what is beyond as near. Step closer."
     numbers = {"near_m": near_m, "median_m": median_m, "far_m": far_m, "range_max_m": most_m}
-    return Finding("range", passed, words, numbers)
+    return Answer("range", passed, words, numbers)
 
 
-def _view(moved: Sequence[Moved]) -> Finding:
+def _view(moved: Sequence[Moved]) -> Answer:
     shown = [one for one in moved if one.pixels >= _LEAST_PIXELS]
     numbers = {"moving_share": len(shown) / max(len(moved), 1)}
     if not moved:
-        return Finding("view", False, "No two pictures of the camera came.", numbers)
+        return Answer("view", False, "No two pictures of the camera came.", numbers)
     if numbers["moving_share"] < _MOVING_SHARE:
         words = f"Nothing moves in {100 * (1 - numbers['moving_share']):.0f} % of the pictures."
-        return Finding("view", False, words + " Move in front of the camera.", numbers)
+        return Answer("view", False, words + " Move in front of the camera.", numbers)
     left = float(np.quantile([one.left for one in shown], 0.1))
     right = float(np.quantile([one.right for one in shown], 0.9))
     half = np.tan(np.radians(0.5 * DEFAULT_FIELD_OF_VIEW_DEG))
@@ -204,16 +204,16 @@ def _view(moved: Sequence[Moved]) -> Finding:
     )
     if left < _EDGE or right > 1.0 - _EDGE:
         words += ", up to its edge. Step back, or turn the camera."
-        return Finding("view", False, words, numbers)
+        return Answer("view", False, words, numbers)
     side = "right" if aside_deg > 0 else "left"
     words += (
         f", {abs(aside_deg):.0f}° to the {side} if the camera sees"
         f" {DEFAULT_FIELD_OF_VIEW_DEG:.0f}° across: point the radar there."
     )
-    return Finding("view", True, words, numbers)
+    return Answer("view", True, words, numbers)
 
 
-def _agreement(seen: Sequence[Seen], moved: Sequence[Moved]) -> Finding:
+def _agreement(seen: Sequence[Seen], moved: Sequence[Moved]) -> Answer:
     likeness, lag_s = _likeness(
         _series([(one.time_s, one.velocity_mps) for one in seen]),
         _series([(one.time_s, one.growth_hz) for one in moved]),
@@ -237,7 +237,7 @@ def _agreement(seen: Sequence[Seen], moved: Sequence[Moved]) -> Finding:
         if abs(lag_s) > _CLOCK_S:
             delay = "camera" if lag_s > 0 else "radar"
             words += f" The {delay}'s delay is probably larger: give it as --{delay}-delay-ms."
-    return Finding("agreement", likeness >= _LIKENESS and abs(lag_s) <= _CLOCK_S, words, numbers)
+    return Answer("agreement", likeness >= _LIKENESS and abs(lag_s) <= _CLOCK_S, words, numbers)
 
 
 def _series(values: list[tuple[float, float]]) -> NDArray[Any]:

@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.appended import AppendedFile
 from sd2core.io.video_writing import VideoEncoder
-from sd2core.live.cameras import Camera, open_camera
+from sd2core.live.cameras import Camera, open_camera, shrunk
+from sd2core.processes import end_beside
 
 VIDEO_NAME = "video.mp4"
 
@@ -35,7 +36,7 @@ _TELL_S = 0.1
 _LOOK_S = 1.0
 _PREVIEW_PX = 320
 _PREVIEW_QUALITY = 70
-_END_S = 20.0
+_END_S = 40.0
 """By then all that waited is encoded, or never will be."""
 
 
@@ -89,6 +90,7 @@ class Film:
         self.delay_s = 0.0
         self.simulated = False
         self._error: Sd2Error | None = None
+        self._reader: threading.Thread | None = None
         self._process = subprocess.Popen(
             [sys.executable, "-m", "sd2core.live.filming"],
             stdin=subprocess.PIPE,
@@ -101,7 +103,7 @@ class Film:
         self._send(json.dumps(settings))
         self._hear()
         if self._error is not None:
-            self._process.wait()
+            self._end()
             raise self._error
         self._reader = threading.Thread(target=self._hear_all, name="sd2-film", daemon=True)
         self._reader.start()
@@ -109,7 +111,7 @@ class Film:
     @property
     def is_over(self) -> bool:
         """True once the camera gives no more, or filming has failed."""
-        return not self._reader.is_alive()
+        return self._reader is None or not self._reader.is_alive()
 
     def next_preview(self) -> str | None:
         """Newest small picture that was not asked for before, as JPEG in base64."""
@@ -123,16 +125,15 @@ class Film:
 
     def stop(self) -> None:
         """Stop, and wait until all pictures are in the video."""
-        assert self._process.stdin is not None
-        self._process.stdin.close()
-        self._reader.join(_END_S)
-        try:
-            self._process.wait(_END_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-        assert self._process.stdout is not None
-        self._process.stdout.close()
+        self._end()
         self.check()
+
+    def _end(self) -> None:
+        assert self._process.stdout is not None
+        end_beside(self._process, _END_S)
+        if self._reader is not None:
+            self._reader.join(_END_S)  # all that was told is heard
+        self._process.stdout.close()
 
     def _send(self, line: str) -> None:
         assert self._process.stdin is not None
@@ -261,9 +262,7 @@ def _small(picture: NDArray[np.uint8]) -> bytes:
     """Preview of a picture, as JPEG."""
     import cv2
 
-    height, width = picture.shape[:2]
-    size = (_PREVIEW_PX, max(round(_PREVIEW_PX * height / width), 1))
-    small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+    small = shrunk(picture, _PREVIEW_PX)
     made = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _PREVIEW_QUALITY])
     return bytes(made[1].data)
 

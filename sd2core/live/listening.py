@@ -11,7 +11,6 @@ import queue
 import threading
 import time
 from collections import deque
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,13 +20,11 @@ from sd2core.denoise.resample_to_model import SAME_RATE
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.chain import ProcessingOptions
 from sd2core.fmcw.live import LiveMap
-from sd2core.io.radar.capture import RadarCapture
 from sd2core.live.counts import Counts
 from sd2core.live.recording import GrowingRecording, wall_clock_s
 from sd2core.live.sources import Frame, Source
 from sd2core.radar_config import CLUTTER, RadarConfig
 from sd2core.sensor import VelocityAxis
-from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
     from sd2core.classify.live import TrainedClassifier
@@ -96,16 +93,9 @@ class Listening:
         self._source, self._recording = source, recording
         self._labeller = None if classifier is None else _Labeller(classifier, head.radar)
         axis = axis or (VelocityAxis() if classifier is None else classifier.card.axis)
-        shape = (1, *head.frame_shape[:3])
-        like = RadarCapture(
-            np.zeros(shape, head.sample_type),
-            head.radar,
-            Timebase([0.0]),
-            full_scale_known=head.full_scale_known,
-        )
         self._head = head
         self._channel = recording.channel
-        self._like = like
+        like = head.as_capture(np.zeros(head.frame_shape, head.word_type))
         self._map = LiveMap(like.channel(*self._channel), axis, ProcessingOptions(CLUTTER))
         size = max(_BUFFER_BYTES // head.frame_bytes, _MIN_FRAMES)
         self._to_store: queue.Queue[tuple[Frame, int]] = queue.Queue(size)
@@ -167,8 +157,8 @@ class Listening:
             if self._error is not None:
                 raise self._error from None
             return None
-        frame_alone = replace(self._like, samples=self._head.as_samples(words))
-        values = self._map.column(frame_alone.channel(*self._channel).samples[0:1])
+        alone = self._head.as_capture(words)
+        values = self._map.column(alone.channel(*self._channel).samples[0:1])
         label = None if self._labeller is None else self._labeller.label(time_s, values)
         self._latencies_s.append(time.monotonic() - frame.received_s)
         return Column(time_s, wall_clock_s(frame.received_s), values, label)

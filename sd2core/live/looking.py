@@ -7,17 +7,14 @@ import queue
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.io.radar.capture import RadarCapture
-from sd2core.live.cameras import Camera
+from sd2core.live.cameras import Camera, shrunk
 from sd2core.live.checking import PICTURE_WIDTH_PX, Moved, Seen, moved_between, seen_in
 from sd2core.live.sources import Frame, Source
-from sd2core.timebase import Timebase
 
 _WAITING = 64
 """Frames that may wait; for the check, some may be left out."""
@@ -72,12 +69,6 @@ def look(
     ]
     seen: list[Seen] = []
     head = source.head(0.0)
-    like = RadarCapture(
-        np.zeros((1, *head.frame_shape[:3]), head.sample_type),
-        head.radar,
-        Timebase([0.0]),
-        full_scale_known=head.full_scale_known,
-    )
     end_s = time.monotonic() + seconds
     while time.monotonic() < end_s and not stop.is_set() and not errors:
         try:
@@ -86,7 +77,7 @@ def look(
             if not any(one.is_alive() for one in watching):
                 break
             continue
-        alone = replace(like, samples=head.as_samples(source.words(frame)))
+        alone = head.as_capture(source.words(frame))
         seen.append(seen_in(alone, frame.received_s - radar_delay_s))
     stop.set()
     for thread in watching:
@@ -115,7 +106,5 @@ def _watch_pictures(
 def _small_grey(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     import cv2
 
-    height, width = picture.shape[:2]
-    size = (PICTURE_WIDTH_PX, max(round(PICTURE_WIDTH_PX * height / width), 1))
-    small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+    small = shrunk(picture, PICTURE_WIDTH_PX)
     return np.asarray(cv2.cvtColor(small, cv2.COLOR_RGB2GRAY), dtype=np.uint8)

@@ -13,7 +13,8 @@ from sd2core.plausibility.findings import Finding
 LARGEST_BODY_M = 10.0
 _SMALLEST_BODY_M = 0.02
 _LIKELY_BODY_M = (0.3, 3.0)
-_AT_ROOT_M = 0.6
+AT_ROOT_M = 0.6
+"""A body whose middle is nearer to the camera is centred on its own root."""
 _FARTHEST_M = 20.0
 _LYING_M, _LYING_SHARE = (1.2, 2.3), 1.5
 
@@ -95,7 +96,7 @@ def judge_place(body: BodyPoints) -> list[Finding]:
     extent_m = np.median(body.extent_m[there], axis=0)
     low, high = _LYING_M
     if depth_m <= 0:
-        return [_behind(depth_m, bool((points_m[..., 2] < 0).all()), far_m < _AT_ROOT_M)]
+        return [_behind(depth_m, bool((points_m[..., 2] < 0).all()), far_m < AT_ROOT_M)]
     if low <= extent_m[2] <= high and extent_m[2] > _LYING_SHARE * extent_m[:2].max():
         return [
             Finding(

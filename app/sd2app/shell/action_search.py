@@ -18,7 +18,7 @@ _SIZE_PX = 640, 480
 
 
 @dataclass(frozen=True)
-class Offer:
+class MenuEntry:
     """Entry of a menu."""
 
     menus: tuple[str, ...]  # those that it stands in, the outermost first
@@ -43,21 +43,21 @@ class Offer:
         return rank
 
 
-def offers_of(bar: QMenuBar) -> list[Offer]:
+def entries_of(bar: QMenuBar) -> list[MenuEntry]:
     """Entries of all menus, in their order, as they stand now."""
-    return list(_offers(bar, ()))
+    return list(_entries(bar, ()))
 
 
-def _offers(menu: QMenuBar | QMenu, menus: tuple[str, ...]) -> Iterator[Offer]:
+def _entries(menu: QMenuBar | QMenu, menus: tuple[str, ...]) -> Iterator[MenuEntry]:
     if isinstance(menu, QMenu):
         menu.aboutToShow.emit()  # what it lists may be others by now
     for entry in menu.actions():
         text = _plain(entry.text())
         inner = QMenu.menuInAction(entry)
         if isinstance(inner, QMenu):
-            yield from _offers(inner, (*menus, text))
+            yield from _entries(inner, (*menus, text))
         elif text and not entry.isSeparator():
-            yield Offer(menus, text, entry.toolTip(), entry)
+            yield MenuEntry(menus, text, entry.toolTip(), entry)
 
 
 def _plain(text: str) -> str:
@@ -65,10 +65,10 @@ def _plain(text: str) -> str:
     return text.split("\t")[0].replace("&&", "\0").replace("&", "").replace("\0", "&")
 
 
-def found(offers: Iterable[Offer], text: str) -> list[Offer]:
-    """Offers that have all words of a search, the best first; what can be done before the rest."""
+def found(entries: Iterable[MenuEntry], text: str) -> list[MenuEntry]:
+    """Entries that have all words of a search, the best first; what can be done before the rest."""
     words = text.casefold().split()
-    ranked = [(rank, one) for one in offers if (rank := one.rank(words)) is not None]
+    ranked = [(rank, one) for one in entries if (rank := one.rank(words)) is not None]
     order = sorted(ranked, key=lambda at: (at[0], bool(words) and not at[1].action.isEnabled()))
     return [one for _, one in order]
 
@@ -79,7 +79,7 @@ class ActionSearch(QDialog):
     def __init__(self, bar: QMenuBar) -> None:
         super().__init__(bar.window())
         self.setWindowTitle("Find an action")
-        self._offers = offers_of(bar)
+        self._entries = entries_of(bar)
         self.chosen: QAction | None = None
         self._line = SearchLine("What do you want to do?", self)
         self._list = QTreeWidget(self)
@@ -103,7 +103,7 @@ class ActionSearch(QDialog):
         self._find("")
 
     def _find(self, text: str) -> None:
-        self._found = found(self._offers, text)
+        self._found = found(self._entries, text)
         grey = self.palette().color(QPalette.ColorGroup.Disabled, QPalette.ColorRole.Text)
         self._list.clear()
         for one in self._found:
@@ -120,7 +120,7 @@ class ActionSearch(QDialog):
         self._explain()
 
     @property
-    def current(self) -> Offer | None:
+    def current(self) -> MenuEntry | None:
         """Entry that Return would do."""
         row = self._list.currentIndex().row()
         return self._found[row] if 0 <= row < len(self._found) else None

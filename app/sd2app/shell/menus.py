@@ -152,6 +152,9 @@ class Menus:
     ) -> None:
         self._window, self._session, self._keys = window, session, keys
         self._rows = {row.id: row for row in actions}
+        # Many actions ask the same.
+        self._questions = {row.enabled for row in self._rows.values()}
+        self._asked_why = {row.why_not for row in self._rows.values() if row.why_not is not None}
         self._actions: dict[str, QAction] = {}
         for row in self._rows.values():
             action = QAction(row.text, window)
@@ -191,11 +194,9 @@ class Menus:
 
     def refresh(self) -> None:
         """Follow the models."""
-        rows = self._rows.values()
-        # Many actions ask the same.
-        enabled = {question: question() for question in {row.enabled for row in rows}}
-        reasons = {question: question() for question in {row.why_not for row in rows} if question}
-        for row in rows:
+        enabled = {question: question() for question in self._questions}
+        reasons = {question: question() for question in self._asked_why}
+        for row in self._rows.values():
             action = self._actions[row.id]
             action.setEnabled(enabled[row.enabled])
             if row.why_not is not None:

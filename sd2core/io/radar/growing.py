@@ -116,6 +116,15 @@ class GrowingHead(BaseModel):
             samples = parts.view(self.sample_type)
         return samples.reshape(-1, radar.channels, radar.chirps_per_frame, radar.samples_per_chirp)
 
+    def as_capture(self, words: NDArray[Any]) -> RadarCapture:
+        """Capture of one frame alone, at time 0, of its stored words."""
+        return RadarCapture(
+            self.as_samples(words),
+            self.radar,
+            Timebase([0.0]),
+            full_scale_known=self.full_scale_known,
+        )
+
 
 def is_growing(path: Path) -> bool:
     """True if a path is the folder of such a capture, or a file of it."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
@@ -275,18 +276,27 @@ class _Array(_Table):
 
     def _rows(self, most: int | None = None) -> NDArray[Any]:
         """Points, (P, columns); rows of zeros fill up frames, and are left out."""
-        if most is not None and self._by_frame:
-            most = -(-most // self._stored.shape[1])
+        if most is None:
+            return self._whole[0]
+        return self._filled(-(-most // self._stored.shape[1]) if self._by_frame else most)[0]
+
+    @cached_property
+    def _whole(self) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        return self._filled(None)
+
+    def _filled(self, most: int | None) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        """Points of the first rows or all, and where they are in the array."""
         values = np.asarray(self._stored.read((slice(0, most),)))
         if values.dtype.names:
             values = np.stack([values[name].astype(np.float64) for name in values.dtype.names], -1)
         values = values.astype(np.float64)
-        self._there = values.any(axis=-1) if self._by_frame else np.ones(len(values), bool)
-        return values[self._there]
+        there = np.ones(len(values), bool)
+        if self._by_frame:
+            there = np.asarray(values.any(axis=-1))
+        return values[there], there
 
     def _frames(self) -> NDArray[np.float64]:
-        self._rows()
-        return np.nonzero(self._there)[0].astype(np.float64)
+        return np.nonzero(self._whole[1])[0].astype(np.float64)
 
     def read(self, places: tuple[int, ...], most: int | None = None) -> list[NDArray[np.float64]]:
         rows = self._rows(most)

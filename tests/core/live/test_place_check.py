@@ -13,7 +13,7 @@ import pytest
 
 from sd2core import PAPER_RADAR, RadarCapture, RadarConfig, Timebase
 from sd2core.live.checking import (
-    Finding,
+    Answer,
     Moved,
     Seen,
     chance_db,
@@ -75,7 +75,7 @@ def camera_sees(
     ]
 
 
-def found(seen: list[Seen], moved: list[Moved], radar: RadarConfig = WIDE) -> dict[str, Finding]:
+def found(seen: list[Seen], moved: list[Moved], radar: RadarConfig = WIDE) -> dict[str, Answer]:
     return {one.name: one for one in check_place(radar, seen, moved)}
 
 

@@ -10,7 +10,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QApplication, QMainWindow
 from window_models import models_of
 
-from sd2app.shell.action_search import ActionSearch, found, offers_of
+from sd2app.shell.action_search import ActionSearch, entries_of, found
 
 
 @pytest.fixture
@@ -38,24 +38,24 @@ def bar(bare_window):
     return menus
 
 
-def texts(offers):
-    return [one.text for one in offers]
+def texts(entries):
+    return [one.text for one in entries]
 
 
 def test_all_entries_of_all_menus_are_there_by_their_plain_texts(bar):
-    offers = offers_of(bar)
-    assert texts(offers) == ["Open…", "Save as…", "Open the palette"]
-    assert [one.menus for one in offers] == [("File",), ("File",), ("View", "Colours")]
+    entries = entries_of(bar)
+    assert texts(entries) == ["Open…", "Save as…", "Open the palette"]
+    assert [one.menus for one in entries] == [("File",), ("File",), ("View", "Colours")]
 
 
 def test_beginnings_go_before_what_is_within_and_that_before_tips(bar):
-    offers = offers_of(bar)
-    assert texts(found(offers, "open")) == ["Open…", "Open the palette"]  # the rest is disabled
-    assert texts(found(offers, "AS")) == ["Save as…"]
-    assert texts(found(offers, "reco")) == ["Open…"]  # "recording", in its tip
-    assert texts(found(offers, "file copy")) == ["Save as…"]
-    assert texts(found(offers, "pale open")) == ["Open the palette"]
-    assert found(offers, "open zebra") == []
+    entries = entries_of(bar)
+    assert texts(found(entries, "open")) == ["Open…", "Open the palette"]  # the rest is disabled
+    assert texts(found(entries, "AS")) == ["Save as…"]
+    assert texts(found(entries, "reco")) == ["Open…"]  # "recording", in its tip
+    assert texts(found(entries, "file copy")) == ["Save as…"]
+    assert texts(found(entries, "pale open")) == ["Open the palette"]
+    assert found(entries, "open zebra") == []
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -66,10 +66,10 @@ def test_beginnings_go_before_what_is_within_and_that_before_tips(bar):
     )
 )
 def test_more_words_never_find_more(bar, words):
-    offers = offers_of(bar)
-    before = set(map(id, offers))
+    entries = entries_of(bar)
+    before = set(map(id, entries))
     for count in range(len(words) + 1):
-        after = set(map(id, found(offers, " ".join(words[:count]))))
+        after = set(map(id, found(entries, " ".join(words[:count]))))
         assert after <= before
         before = after
 
@@ -119,7 +119,7 @@ def test_the_key_opens_it_and_what_is_chosen_is_done(empty_window, qtbot):
 
 
 def test_every_action_of_the_window_can_be_found_by_its_own_text(empty_window):
-    offers = offers_of(empty_window.menuBar())
-    assert len(offers) > 100
-    for one in offers:
-        assert one in found(offers, one.text)
+    entries = entries_of(empty_window.menuBar())
+    assert len(entries) > 100
+    for one in entries:
+        assert one in found(entries, one.text)
