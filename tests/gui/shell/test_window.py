@@ -98,12 +98,13 @@ def test_a_click_in_a_heatmap_seeks_and_a_drag_scrubs(window, qtbot):
 def test_hovering_reads_time_velocity_and_level(window, qtbot):
     synthetic, _ = heatmaps(window)
     pointer = models_of(window).pointer
-    qtbot.mouseMove(synthetic, at(synthetic, 0.5, 1.2))
+    middle_s = 15.5 / 30.0  # at the frame's edge a pixel's rounding would decide
+    qtbot.mouseMove(synthetic, at(synthetic, middle_s, 1.2))
     reading = pointer.reading
     assert reading.frame == 15
     assert reading.velocity_mps == pytest.approx(1.1875)
     assert reading.value == models_of(window).synthetic.map.values[25, 15]
-    qtbot.mouseMove(synthetic, at(synthetic, 0.5, 0.0))
+    qtbot.mouseMove(synthetic, at(synthetic, middle_s, 0.0))
     assert pointer.reading.note == "nulled bin"
 
 
