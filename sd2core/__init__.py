@@ -31,12 +31,13 @@ if TYPE_CHECKING:
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.radar_config import PAPER_RADAR, RadarConfig
     from sd2core.recording.recording import Recording, Span, open_recording, open_sample
-    from sd2core.sensor import VelocityAxis, VirtualSensor
+    from sd2core.sensor import Beam, VelocityAxis, VirtualSensor
     from sd2core.timebase import Timebase
 
 __all__ = [
     "PAPER_RADAR",
     "PRESETS",
+    "Beam",
     "DopplerMap",
     "MeshSequence",
     "RadarCapture",
@@ -65,6 +66,7 @@ __all__ = [
 _HOME = {
     "PAPER_RADAR": "radar_config",
     "PRESETS": "doppler",
+    "Beam": "sensor",
     "DopplerMap": "maps",
     "MeshSequence": "mesh.sequence",
     "RadarCapture": "io.radar",

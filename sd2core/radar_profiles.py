@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from sd2core.plug_ins import Group
 from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS, RadarConfig, Sampling
+from sd2core.sensor import Beam
 
 PAPER = "paper"
 """Name of the paper's radar."""
@@ -129,6 +130,12 @@ Examples
 >>> from sd2core.radar_profiles import RADARS
 >>> round(1e3 * RADARS["wifi-2.4ghz"].wavelength_m), RADARS["wifi-2.4ghz"].is_continuous
 (123, True)
+"""
+
+BEAMS: dict[str, Beam] = {"iwr1443": Beam(56.0, 28.0)}
+"""Beams of the antennas on some radars' boards, where their maker states them.
+
+Texas Instruments, *IWR1443BOOST* user's guide: half power at ±28° across and ±14° in height.
 """
 
 RADAR_PLUG_INS = Group("radars", RadarConfig, RADARS)

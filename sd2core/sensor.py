@@ -1,4 +1,4 @@
-"""Virtual sensor, its placement, and the velocity axis of Doppler maps.
+"""Virtual sensor, its placement and beam, and the velocity axis of Doppler maps.
 
 World frame = camera frame: x right, y down, z forward, metres. Radial velocity
 is positive when approaching the sensor.
@@ -7,9 +7,10 @@ is positive when approaching the sensor.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 from sd2core.errors import Sd2Error
 
@@ -90,6 +91,59 @@ class VelocityAxis:
 
 
 @dataclass(frozen=True)
+class Beam:
+    """Pattern of the sensor's antennas, the same of transmitter and receiver.
+
+    Power one way, by the angle from the boresight to the right and upwards: a normal curve in
+    each plane, exp(-4 ln 2 (angle / width)²), or a table; a direction beside both planes has
+    the product (the pattern of two cuts: Balanis, *Antenna Theory*, 4th ed., section 2.2). An
+    echo passes it twice.
+
+    Parameters
+    ----------
+    azimuth_width_deg, elevation_width_deg : float
+        Full widths at half power, from 1 to 360.
+    cuts : tuple of (angle_deg, azimuth_db, elevation_db)
+        Table, of ascending angles from below to above 0, which the widths were taken from; 0 dB
+        is the most, and beyond its ends the last value stays. Empty: normal curves.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> narrow = sd2.Beam(56.0, 28.0)
+    >>> sd2.VirtualSensor(position_m=(0, 0, 0), azimuth_deg=180, beam=narrow).beam.words
+    '56° × 28°'
+    """
+
+    azimuth_width_deg: float
+    elevation_width_deg: float
+    cuts: tuple[tuple[float, float, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("azimuth_width_deg", "elevation_width_deg"):
+            if not 1 <= getattr(self, name) <= 360:
+                raise Sd2Error(f"The beam's {name} is {getattr(self, name)}", "1 to 360 degrees")
+        cuts = tuple(tuple(map(float, row)) for row in self.cuts)
+        object.__setattr__(self, "cuts", cuts)
+        for row in cuts:
+            if len(row) != 3 or not all(map(math.isfinite, row)):
+                raise Sd2Error(f"A row of the beam is {row}", "angle_deg, azimuth_db, elevation_db")
+        angles = [row[0] for row in cuts]
+        ascending = all(a < b for a, b in pairwise(angles))
+        if cuts and not (ascending and -180 <= angles[0] < 0 < angles[-1] <= 180):
+            raise Sd2Error(
+                f"The beam's angles go from {angles[0]:g} to {angles[-1]:g} degrees",
+                "ascending angles from below 0 to above it, within -180 and 180",
+            )
+
+    @property
+    def words(self) -> str:
+        """Text such as ``56° × 28°``."""
+        table = ", by a table" if self.cuts else ""
+        return f"{self.azimuth_width_deg:.3g}° × {self.elevation_width_deg:.3g}°{table}"
+
+
+@dataclass(frozen=True)
 class VirtualSensor:
     """A radar placed in the camera frame.
 
@@ -100,8 +154,8 @@ class VirtualSensor:
     azimuth_deg, elevation_deg : float
         Direction of the boresight: azimuth to the right of the optical axis,
         elevation above the horizon. (0, 0) looks along +z.
-    field_of_view_deg : float
-        Full opening angle that is drawn; the body is assumed inside it.
+    beam : Beam, optional
+        What the antennas weigh directions by; None: all alike.
 
     Examples
     --------
@@ -114,7 +168,7 @@ class VirtualSensor:
     position_m: Vector = (0.0, 0.0, 0.0)
     azimuth_deg: float = 0.0
     elevation_deg: float = 0.0
-    field_of_view_deg: float = 90.0
+    beam: Beam | None = None
 
     def __post_init__(self) -> None:
         position = tuple(float(value) for value in self.position_m)
@@ -127,10 +181,29 @@ class VirtualSensor:
         for name in ("azimuth_deg", "elevation_deg"):
             if not math.isfinite(getattr(self, name)):
                 raise Sd2Error(f"The sensor's {name} is {getattr(self, name)}", "a finite angle")
-        if not 0 < self.field_of_view_deg < 180:
-            raise Sd2Error(
-                f"The field of view is {self.field_of_view_deg} degrees", "between 0 and 180"
-            )
+
+    @property
+    def words(self) -> str:
+        """Text such as ``at x 0, y 0, z 1 m``, with its beam and direction if it has one."""
+        x, y, z = self.position_m
+        place = f"at x {x:g}, y {y:g}, z {z:g} m"
+        if self.beam is None:
+            return place
+        return (
+            f"{place}, beam {self.beam.words}, looking {self.azimuth_deg:.3g}° to the right and"
+            f" {self.elevation_deg:.3g}° up"
+        )
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> VirtualSensor:
+        """Sensor that :meth:`as_dict` gave; keys that it does not know are left out."""
+        known = {name: values[name] for name in cls.__dataclass_fields__ if name in values}
+        beam = known.pop("beam", None)
+        return cls(**known, beam=None if beam is None else Beam(**beam))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values; the beam is among them where there is one."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
 
     @property
     def boresight(self) -> Vector:

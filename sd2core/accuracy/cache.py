@@ -62,7 +62,7 @@ def scene_fingerprint(
     """
     what: dict[str, Any] = {
         "clip": clip_fingerprint(mesh),
-        "sensor": asdict(sensor),
+        "sensor": sensor.as_dict(),
         "options": asdict(options),
         "family": family,
     }

@@ -196,7 +196,7 @@ def _loader(
         names, classes = labels_and_classes(labels)
         return Source(
             *key,
-            VirtualSensor(**rows[0]["sensor"]),
+            VirtualSensor.from_dict(rows[0]["sensor"]),
             maps,
             label_per_frame(labels.spans, names, first.times_s),
             names,

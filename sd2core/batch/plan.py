@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
@@ -23,7 +24,7 @@ from sd2core.options.kinds import Text
 from sd2core.options.shared import Denoising, Simulating
 from sd2core.options.synthesis import Synthesis
 from sd2core.placements.placements import Placements, placements_from_dict
-from sd2core.sensor import Vector, VirtualSensor
+from sd2core.sensor import Vector, VirtualSensor, aimed_at
 
 FORMAT: Literal["sd2-batch-plan"] = "sd2-batch-plan"
 VERSION: Literal[1] = 1
@@ -131,6 +132,8 @@ class BatchPlan(Section):
             others: Sequence[VirtualSensor] = [VirtualSensor(position_m=one) for one in places]
         else:
             others = places.sensors(target_m)
+        if own.beam is not None:
+            others = [replace(aimed_at(one, target_m), beam=own.beam) for one in others]
         return ({0: own} if with_own else {}) | dict(enumerate(others, start=1))
 
 

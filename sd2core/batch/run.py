@@ -7,7 +7,7 @@ import shutil
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -248,7 +248,7 @@ class _Run:
                         "recording": origin.name,
                         "subject": origin.subject,
                         "placement": planned.placement,
-                        "sensor": asdict(planned.sensor),
+                        "sensor": planned.sensor.as_dict(),
                         "target_m": mesh.target_m,
                         "about": about,
                         "start": start,

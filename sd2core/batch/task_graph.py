@@ -253,7 +253,7 @@ class TaskGraph:
     ) -> Task:
         """Return the task for a stretch of a map; its key hashes ``content``, mesh and sensor."""
         origin, mesh, placement, sensor = where
-        view = {"sensor": asdict(sensor), "stretch": list(stretch)}
+        view = {"sensor": sensor.as_dict(), "stretch": list(stretch)}
         key = key_of(step, {"mesh": mesh.identity, **view, **content})
         out = self.folder.result(kind, key, ".npz")
         arguments |= {"mesh": mesh, "sensor": sensor, "stretch": stretch, "out": out}

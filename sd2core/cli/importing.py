@@ -19,12 +19,11 @@ from sd2core.options.records import (
     ARGUMENT,
     Group,
     OptionError,
-    OptionRecord,
     changed,
     given,
     given_flags,
 )
-from sd2core.options.shared import Channel, Json, MeshReading
+from sd2core.options.shared import Channel, Json, Looking, MeshReading
 
 if TYPE_CHECKING:
     from sd2core.recording.recording import Recording
@@ -89,7 +88,7 @@ class Import(Content, Json):
     copy: bool = False
 
 
-class SensorPlace(OptionRecord):
+class SensorPlace(Looking):
     """Where the radar is put.
 
     Parameters
@@ -310,6 +309,7 @@ def _set(options: Set) -> None:
 
 def _placed(recording: Recording, options: Set) -> VirtualSensor:
     """Sensor of a recording at a place in the room, or about its body, or as it was."""
+    from sd2core.cli.reading import looking
     from sd2core.placements.body_extent import BodyExtent
     from sd2core.sensor import position_from_spherical, spherical_from_position
 
@@ -321,9 +321,12 @@ def _placed(recording: Recording, options: Set) -> VirtualSensor:
         now = spherical_from_position(target_m, recording.sensor.position_m)
         wanted = [about.get(name, value) for name, value in zip(_ABOUT_THE_BODY, now, strict=True)]
         position_m = position_from_spherical(target_m, *wanted)
-    if position_m is None:
-        return recording.sensor
-    return replace(recording.sensor, position_m=position_m)
+    sensor = recording.sensor
+    if position_m is not None:
+        sensor = replace(sensor, position_m=position_m)
+    if options.aim == "body" and recording.mesh is None:
+        raise Sd2Error("--aim body is given without a mesh", "AZ,EL in degrees")
+    return looking(sensor, options, recording.load_mesh)
 
 
 def _relink(options: Relink) -> int:

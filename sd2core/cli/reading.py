@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ from sd2core.options.records import given_flags
 
 if TYPE_CHECKING:
     from sd2core.mesh.sequence import MeshSequence
-    from sd2core.options.shared import Axis, MeshAndSensor, MeshInput, MeshReading
+    from sd2core.options.shared import Axis, Looking, MeshAndSensor, MeshInput, MeshReading
     from sd2core.recording.recording import MeshReading as StoredReading
     from sd2core.recording.recording import Recording
     from sd2core.sensor import VelocityAxis, VirtualSensor
@@ -44,11 +45,32 @@ def load_mesh_from_options(path: Path, options: MeshReading) -> MeshSequence:
 
 
 def mesh_and_sensor(options: MeshAndSensor) -> tuple[MeshSequence, VirtualSensor]:
-    """Mesh, and sensor of the recording or the camera, with ``--sensor`` in its place."""
+    """Mesh, and sensor of the recording or the camera, with what is given in its place."""
     mesh, sensor = mesh_and_its_sensor(options)
     if options.sensor is not None:
         sensor = replace(sensor, position_m=options.sensor)
-    return mesh, sensor
+    return mesh, looking(sensor, options, lambda: mesh)
+
+
+def looking(
+    sensor: VirtualSensor, options: Looking, mesh: Callable[[], MeshSequence]
+) -> VirtualSensor:
+    """Sensor with the direction and the beam that are given; ``mesh`` is what ``body`` is about."""
+    from sd2core.io.beam_files import find_beam
+    from sd2core.placements.body_extent import BodyExtent
+    from sd2core.sensor import aimed_at
+
+    if options.beam is not None:
+        sensor = replace(sensor, beam=find_beam(options.beam))
+    if options.aim == "body":
+        return aimed_at(sensor, BodyExtent.of(mesh()).target_m)
+    if options.aim is not None:
+        try:
+            azimuth_deg, elevation_deg = map(float, options.aim.split(","))
+        except ValueError:
+            raise Sd2Error(f"--aim is {options.aim!r}", "AZ,EL in degrees, or body") from None
+        sensor = replace(sensor, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
+    return sensor
 
 
 def mesh_and_its_sensor(options: MeshInput) -> tuple[MeshSequence, VirtualSensor]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -158,7 +158,7 @@ def entry_of(source: Source, header: Header, fingerprint: str) -> dict[str, Any]
         "labels": list(source.labels),
         "classes": dict(source.classes),
         "units": {kind: source.maps[kind].unit for kind in kinds},
-        "sensor": asdict(source.sensor),
+        "sensor": source.sensor.as_dict(),
         "seen_from": None
         if source.target_m is None
         else {"range_m": range_m, "azimuth_deg": azimuth_deg, "elevation_deg": elevation_deg},

@@ -372,7 +372,7 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
         place = asdict(places_of(recording, making)[key.placement - 1])
     channel = [recording.radar_receiver, recording.radar_transmitter]
     content = {
-        "sensor": asdict(recording.sensor),
+        "sensor": recording.sensor.as_dict(),
         "place": place,
         "radar_offset_s": recording.radar_offset_s,
         **({"radar_channel": channel} if any(channel) else {}),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -194,7 +194,7 @@ class Source:
     def fingerprint(self) -> str:
         """Return a hash of maps, labels and sensor."""
         sums = hashlib.blake2b(digest_size=16)
-        told = [asdict(self.sensor), self.labels, dict(self.classes)]
+        told = [self.sensor.as_dict(), self.labels, dict(self.classes)]
         sums.update(json.dumps(told).encode())
         sums.update(np.ascontiguousarray(self.label, np.int16).data)
         if self.spans != runs_of(self.label, self.times_s):

@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -179,8 +179,7 @@ def _sensor(meta: dict[str, Any]) -> VirtualSensor:
     found = meta.get("sensor")
     if not isinstance(found, dict):
         return VirtualSensor()
-    known = asdict(VirtualSensor())
-    return VirtualSensor(**{name: value for name, value in found.items() if name in known})
+    return VirtualSensor.from_dict(found)
 
 
 # -- Pairs: synthetic Doppler beside a radar's, take by take -------------------------------------

@@ -192,7 +192,7 @@ class _Piece:
         position_m = self._sensor.position_m
         place = counts.prepared.sensor(position_m)
         visibility, limb = self._visibility, known.vertex_limb
-        scatterers, _ = counts.scatterers(block, rows, position_m, visibility, limb)
+        scatterers, _ = counts.scatterers(block, rows, self._sensor, visibility, limb)
         frames, velocity = block.frames.rows(rows), None
         if counts.options.velocity == "vid2doppler":
             velocity = counts.prepared.velocities_vid2doppler(block, rows, place)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,7 @@ from sd2core.doppler.moving import MovingVertices, visible_counts
 from sd2core.doppler.prepared import Block, PreparedMesh
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering.amplitude import range_weight
+from sd2core.sensor import VirtualSensor
 
 
 class FrameCounts:
@@ -37,7 +40,7 @@ class FrameCounts:
         self,
         block: Block,
         rows: slice,
-        position_m: Position,
+        sensor: VirtualSensor,
         visibility: Visibility,
         into: Counts,
         totals: NDArray[np.float64],
@@ -53,8 +56,8 @@ class FrameCounts:
             Of the prepared mesh.
         rows : slice
             Its n frames that are counted; start and stop are given.
-        position_m : tuple of 3 float
-            Place of the sensor in the camera frame.
+        sensor : VirtualSensor
+            Where it stands and looks.
         visibility : {"none", "facing", "depth", "exact", "frozen"}
             What is wished for.
         into : Counts
@@ -66,6 +69,7 @@ class FrameCounts:
         shares : bool
             False if the number of visible vertices may be left out.
         """
+        position_m = sensor.position_m
         prepared, place = self.prepared, self.prepared.sensor(position_m)
         totals[:] = self.totals(block, rows)
         moving = prepared.moving(block, self.counting)
@@ -73,7 +77,7 @@ class FrameCounts:
             moving = None
         if moving is None:
             block = prepared.whole(block)
-        scatterers, quality = self.scatterers(block, rows, position_m, visibility, parts, moving)
+        scatterers, quality = self.scatterers(block, rows, sensor, visibility, parts, moving)
         if moving is None:
             self._count_all(block, rows, position_m, scatterers, into)
         else:
@@ -159,7 +163,7 @@ class FrameCounts:
         self,
         block: Block,
         rows: slice,
-        position_m: Position,
+        sensor: VirtualSensor,
         visibility: Visibility,
         parts: NDArray[np.uint8] | None,
         moving: MovingVertices | None = None,
@@ -172,8 +176,8 @@ class FrameCounts:
             Of the prepared mesh.
         rows : slice
             Its n frames.
-        position_m : tuple of 3 float
-            Place of the sensor in the camera frame.
+        sensor : VirtualSensor
+            Where it stands and looks.
         visibility : {"none", "facing", "depth", "exact", "frozen"}
             What is wished for.
         parts : uint8 ndarray, (V,), or None
@@ -181,9 +185,10 @@ class FrameCounts:
         moving : MovingVertices, optional
             With it normals and areas are those of what moves in all of the block's frames.
         """
-        mask, quality = self.masks.for_rows(block, rows, position_m, visibility)
+        mask, quality = self.masks.for_rows(block, rows, sensor.position_m, visibility)
         facing = mask is None and quality == "facing"
-        return self._scatterers(block, rows, mask, facing, parts, moving), quality
+        found = self._scatterers(block, rows, mask, facing, parts, moving)
+        return replace(found, sensor=sensor), quality
 
     def _scatterers(
         self,

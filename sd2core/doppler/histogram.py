@@ -26,7 +26,9 @@ from sd2core.doppler.kernels import (
 )
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.scattering.amplitude import projected_areas, range_weight
+from sd2core.scattering.beam import beam_tables, two_way_gain
 from sd2core.scattering.visibility import facing_mask
+from sd2core.sensor import VirtualSensor
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +45,7 @@ class Scatterers:
     """Shape (V,): number of vertices that each stands for; None: itself only."""
     parts: NDArray[np.uint8] | None = None
     """Shape (V,): part of the body of each vertex, to count apart; None: all together."""
+    sensor: VirtualSensor | None = None  # its beam weighs them
 
     @property
     def kinds(self) -> tuple[int, int]:
@@ -69,6 +72,7 @@ class Scatterers:
             multiplicity,
             _NO_PARTS if parts is None else parts,
             *self.kinds,
+            tuple(beam_tables(self.sensor)),
         )
 
     def rows(self, rows: slice) -> Scatterers:
@@ -117,6 +121,8 @@ class Scatterers:
             distance = np.linalg.norm(points - sensor[:, None], axis=0)
             law = counting.range_exponent, counting.reference_range_m
             weight = weight * range_weight(distance, *law)
+        if self.sensor is not None:
+            weight = weight * two_way_gain(self.sensor, points, sensor)
         return weight
 
     def multiplicity(self, vertices: int) -> NDArray[np.float64]:

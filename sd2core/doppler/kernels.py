@@ -17,6 +17,7 @@ import numpy as np
 
 from sd2core.numerics.compiled import compiled
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
+from sd2core.scattering.beam import beam_tables, weigh_by_beam
 from sd2core.scattering.visibility import facing_kernel
 
 RUN = 16384
@@ -243,7 +244,7 @@ def multiplicity_seen(seen, multiplicity):  # type: ignore[no-untyped-def]
 @compiled
 def weigh_run(  # type: ignore[no-untyped-def]
     p, q, own, middle, away, numbers, multiplicity, normals, marks, areas, vectors, which,
-    weighting, sensor, distance, exponent, reference, seen, weight, spare,
+    weighting, beam, sensor, distance, exponent, reference, seen, weight, spare,
 ):  # fmt: skip
     """Return the visibility of a run of vertices of a frame and set their weights.
 
@@ -267,6 +268,8 @@ def weigh_run(  # type: ignore[no-untyped-def]
         The frame's row of the mask.
     which, weighting : int
         Which vertices count, and what.
+    beam : tuple
+        :class:`~sd2core.scattering.beam.BeamTables`.
     sensor, distance
         Place (3,), and its :func:`distance_of`.
     exponent, reference : float
@@ -274,7 +277,8 @@ def weigh_run(  # type: ignore[no-untyped-def]
     seen : uint8 (q - p,)
         Ones where all count; otherwise work space, which may be what is returned.
     weight : float32 (q - p,)
-        Ones at first, which stay where each vertex counts 1 and there is no range law; written.
+        Ones at first, which stay where each vertex counts 1 and there are no range law and no beam;
+        written.
     spare : float32 (q - p,)
         Work space.
     """
@@ -293,21 +297,24 @@ def weigh_run(  # type: ignore[no-untyped-def]
     if exponent != 0:
         _squared_ratios(away[p:q], distance, reference, weight)
         raise_to(weight, exponent, spare)
-    if weighting == ONE:
-        return seen
     if weighting == AREA:
         spare[:] = areas[own + p : own + q]
     elif weighting == PROJECTED:
         vector = vectors[3 * own : 3 * (own + count)].reshape((3, count))
         ax, ay, az = vector[0][p:q], vector[1][p:q], vector[2][p:q]
         _projected(x, y, z, ax, ay, az, sx, sy, sz, spare)
-    else:
+    elif weighting == MULTIPLICITY:
         spare[:] = multiplicity[p:q]
-    if exponent != 0:
+    axes, across, up = beam
+    if weighting == ONE and exponent == 0 and across.shape[0] > 0:
+        weight[:] = 1
+    elif weighting != ONE and exponent != 0:
         for i in range(q - p):
             weight[i] *= spare[i]
-    else:
+    elif weighting != ONE:
         weight[:] = spare
+    if across.shape[0] > 0:
+        weigh_by_beam(x, y, z, sx, sy, sz, axes, across, up, weight)
     return seen
 
 
@@ -370,7 +377,7 @@ def count_kernel(  # type: ignore[no-untyped-def]
         Written: number of visible vertices, and of those of them beyond the axis.
     """
     vertex, first, places, centre, before, after, group_frames, vertices = paths
-    normals, mask, areas, vectors, every, part, which, weighting = scatterers
+    normals, mask, areas, vectors, every, part, which, weighting, beam = scatterers
     bins, beyond, exponent, reference = law
     samples, most = scale.shape[1], most_in_a_group(first)
     offset, distance = np.float32(0.5 * bins), distance_of(sensor)
@@ -422,8 +429,8 @@ def count_kernel(  # type: ignore[no-untyped-def]
             away = ranges_at(here, knot, sensor, distance, ranges, held)
             sight = weigh_run(
                 p, q, own, here[3 * knot : 3 * knot + 3], away, numbers, multiplicity, normals,
-                marks, areas, vectors, which, weighting, sensor, distance, exponent, reference,
-                seen[:n], weight[:n], spare[:n],
+                marks, areas, vectors, which, weighting, beam, sensor, distance, exponent,
+                reference, seen[:n], weight[:n], spare[:n],
             )  # fmt: skip
             if grouped:
                 seen_count += multiplicity_seen(sight, multiplicity[p:q])
@@ -499,7 +506,8 @@ def compile_kernels() -> None:
     """Call every kernel of this module once in single and once in double precision."""
     knots, first, numbers = np.zeros((1, 1), np.int64), np.array([0, 4]), np.arange(4, dtype="i4")
     marks, areas = np.zeros((1, 4), np.uint8), np.ones(12, np.float32)
-    scatterers = (np.zeros(12, np.int8), marks, areas, areas, areas[:4], marks[0], ALL, ONE)
+    beam = tuple(beam_tables(None))
+    scatterers = (np.zeros(12, np.int8), marks, areas, areas, areas[:4], marks[0], ALL, ONE, beam)
     for precision in (np.float32, np.float64):
         paths = (numbers, first, np.ones(12, precision), knots[0], knots, knots, 1, 4)
         scale, sensor = np.ones((1, 1), precision), np.zeros(3, precision)

@@ -22,6 +22,7 @@ from sd2core.doppler.kernels import (
     weigh_run,
 )
 from sd2core.numerics.compiled import compiled
+from sd2core.scattering.beam import beam_tables
 
 PARTS = 8
 """Number of parts of the fine axis per bin."""
@@ -68,7 +69,7 @@ def fine_kernel(  # type: ignore[no-untyped-def]
         Number of visible vertices, and of those of them beyond the axis.
     """
     vertex, first, places, centre, before, after, _, _ = paths
-    normals, mask, areas, vectors, multiplicity, _, which, weighting = scatterers
+    normals, mask, areas, vectors, multiplicity, _, which, weighting, beam = scatterers
     bins, beyond, exponent, reference = law
     numbers, here = group_of(vertex, first, places, 0)
     marks = np.empty(0, np.uint8)
@@ -91,8 +92,8 @@ def fine_kernel(  # type: ignore[no-untyped-def]
             away = ranges_at(here, knot, sensor, distance, ranges, held)
             sight = weigh_run(
                 p, q, most * t, here[3 * knot : 3 * knot + 3], away, numbers, multiplicity, normals,
-                marks, areas, vectors, which, weighting, sensor, distance, exponent, reference,
-                seen[:n], weight[:n], spare[:n],
+                marks, areas, vectors, which, weighting, beam, sensor, distance, exponent,
+                reference, seen[:n], weight[:n], spare[:n],
             )  # fmt: skip
             for i in range(n):
                 if sight[i] != 0:
@@ -202,7 +203,8 @@ def compile_kernels() -> None:
     """Call every kernel of this module once in single and once in double precision."""
     knots, first, numbers = np.zeros((1, 1), np.int64), np.array([0, 4]), np.arange(4, dtype="i4")
     marks, areas = np.zeros((1, 4), np.uint8), np.ones(12, np.float32)
-    scatterers = (np.zeros(12, np.int8), marks, areas, areas, areas[:4], marks[0], ALL, ONE)
+    beam = tuple(beam_tables(None))
+    scatterers = (np.zeros(12, np.int8), marks, areas, areas, areas[:4], marks[0], ALL, ONE, beam)
     sigma, part = np.ones((1, 1)), np.zeros(1, np.intp)
     fine, coarse = np.zeros((1, 1, 256, 2)), np.zeros((1, 1, 32))
     for precision in (np.float32, np.float64):

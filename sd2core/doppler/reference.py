@@ -20,6 +20,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.numerics.precision import keeps_shape
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
+from sd2core.scattering.beam import two_way_gain
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.scattering.exact_plain import exact_visibility
 from sd2core.scattering.trajectory import Trajectory
@@ -58,7 +59,7 @@ def reference_stretch(
         weight, total = _weights(mesh, options, points, place)
         if total == 0 or not len(velocities):
             continue
-        weight = weight * _range_law(mesh, options, points, place)
+        weight = weight * _range_law(mesh, options, points, place) * two_way_gain(sensor, points)
         seen = _visible(mesh, points, place, middle)
         weights = np.broadcast_to(weight, velocities.shape)[:, seen]
         sigma = _sigma_bins(mesh, options, points, sensor, start + column)[seen]

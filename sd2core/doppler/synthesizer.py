@@ -320,7 +320,7 @@ class Synthesizer:
             unit=self.unit,
             null_bins=options.null_bins,
             meta={
-                "sensor": asdict(sensor),
+                "sensor": sensor.as_dict(),
                 "options": asdict(options),
                 "count": "expected" if self.prepared.spreads else "plain",
                 "visibility": stretch.quality,
@@ -514,7 +514,7 @@ class Synthesizer:
                         self._frames.count(
                             block,
                             rows,
-                            sensor.position_m,
+                            sensor,
                             visibility,
                             *into,
                             numbers,

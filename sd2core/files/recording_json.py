@@ -62,6 +62,18 @@ class Span(BaseModel):
         return self
 
 
+class BeamEntry(BaseModel):
+    """Fields of :class:`sd2core.sensor.Beam`."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    azimuth_width_deg: FiniteFloat
+    elevation_width_deg: FiniteFloat
+    cuts: Annotated[
+        tuple[tuple[FiniteFloat, FiniteFloat, FiniteFloat], ...], Field(max_length=100_000)
+    ] = ()
+
+
 class SensorEntry(BaseModel):
     """Fields of :class:`sd2core.sensor.VirtualSensor`."""
 
@@ -70,7 +82,7 @@ class SensorEntry(BaseModel):
     position_m: tuple[FiniteFloat, FiniteFloat, FiniteFloat] = (0.0, 0.0, 0.0)
     azimuth_deg: FiniteFloat = 0.0
     elevation_deg: FiniteFloat = 0.0
-    field_of_view_deg: FiniteFloat = 90.0
+    beam: BeamEntry | None = None
 
 
 class MeshReading(BaseModel):

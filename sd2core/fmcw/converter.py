@@ -147,7 +147,7 @@ def simulated_capture(
                 "model": "FMCW beat signal of facets",
                 # The name only: the folder says nothing on another machine.
                 "source": Path(source).name,
-                "sensor": asdict(sensor),
+                "sensor": sensor.as_dict(),
                 **(how or {}),
                 "options": _told(options),
                 "first_frame_s": float(times_s[0]),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sd2core.fmcw.facet import bent_facet_mean, unit_phasor
 from sd2core.numerics.compiled import compiled
+from sd2core.scattering.beam import beam_tables, gain_towards
 
 Floats = NDArray[np.float64]
 
@@ -67,6 +68,22 @@ def _turning(
 
 
 @compiled
+def _along(antenna: Floats, axis: int, x: float, y: float, z: float) -> Any:
+    return x * antenna[axis, 0] + y * antenna[axis, 1] + z * antenna[axis, 2]
+
+
+@compiled
+def _gain(antenna: Floats, x: float, y: float, z: float, across: Any, up: Any) -> Any:
+    return gain_towards(
+        _along(antenna, 1, x, y, z),
+        -_along(antenna, 2, x, y, z),
+        _along(antenna, 3, x, y, z),
+        across,
+        up,
+    )
+
+
+@compiled
 def facet_echoes(
     vertices_m: Floats,
     velocity_mps: Floats,
@@ -77,6 +94,8 @@ def facet_echoes(
     plane: Floats,
     wave_number: float,
     pattern_exponent: float,
+    across: NDArray[np.float32],
+    up: NDArray[np.float32],
     coherent: bool,
     half_s: float,
     index: NDArray[np.int32],
@@ -92,12 +111,14 @@ def facet_echoes(
     faces : (F, 3)
     counts : (F,)
         Facets to look at.
-    transmitter, receiver : (6,)
-        Position and boresight.
+    transmitter, receiver : (4, 3)
+        Position, and axes: right, down, ahead.
     plane : (4,)
         Facets with plane[:3] . p + plane[3] <= 0 are behind a mirror.
     wave_number : float
         4 pi / lambda: phase per metre of range.
+    across, up
+        Tables of the beam's two-way power, :class:`~sd2core.scattering.beam.BeamTables`.
     half_s : float
         Half the duration.
     index, range_m, rate_mps : (F,)
@@ -113,7 +134,7 @@ def facet_echoes(
     """
     same = True
     for k in range(3):
-        same = same and transmitter[k] == receiver[k]
+        same = same and transmitter[0, k] == receiver[0, k]
     found = 0
     out, back, motion = np.empty(9), np.empty(9), np.empty(9)
     corner_m, phase, turn = np.empty(3), np.empty(3), np.empty(3)
@@ -124,8 +145,8 @@ def facet_echoes(
         for c in range(3):
             v = faces[f, c]
             for k in range(3):
-                out[3 * c + k] = vertices_m[v, k] - transmitter[k]
-                back[3 * c + k] = vertices_m[v, k] - receiver[k]
+                out[3 * c + k] = vertices_m[v, k] - transmitter[0, k]
+                back[3 * c + k] = vertices_m[v, k] - receiver[0, k]
         ax, ay, az = out[3] - out[0], out[4] - out[1], out[5] - out[2]
         bx, by, bz = out[6] - out[0], out[7] - out[1], out[8] - out[2]
         # The normal's length is the area.
@@ -146,7 +167,11 @@ def facet_echoes(
         facing_back = -(nx * tx + ny * ty + nz * tz)
         if not facing_back > 0.0:
             continue
-        place_x, place_y, place_z = ox + transmitter[0], oy + transmitter[1], oz + transmitter[2]
+        place_x, place_y, place_z = (
+            ox + transmitter[0, 0],
+            oy + transmitter[0, 1],
+            oz + transmitter[0, 2],
+        )
         if plane[0] * place_x + plane[1] * place_y + plane[2] * place_z + plane[3] <= 0.0:
             continue
         there = math.sqrt(ox * ox + oy * oy + oz * oz)
@@ -154,11 +179,16 @@ def facet_echoes(
         near_there, near_again = max(there, _NEAREST_M), max(again, _NEAREST_M)
         pattern = 1.0
         if pattern_exponent > 0.0:
-            leaving = (ox * transmitter[3] + oy * transmitter[4] + oz * transmitter[5]) / near_there
-            arriving = (tx * receiver[3] + ty * receiver[4] + tz * receiver[5]) / near_again
+            leaving = _along(transmitter, 3, ox, oy, oz) / near_there
+            arriving = _along(receiver, 3, tx, ty, tz) / near_again
             if leaving <= 0.0 or arriving <= 0.0:
                 continue
             pattern = (leaving * arriving) ** (0.5 * pattern_exponent)
+        if across.shape[0] > 0:
+            leaving = _gain(transmitter, ox, oy, oz, across, up)
+            arriving = _gain(receiver, tx, ty, tz, across, up)
+            # Each is the power of two passages.
+            pattern *= (leaving * arriving) ** 0.25
         vx = vy = vz = 0.0
         for c in range(3):
             v = faces[f, c]
@@ -328,11 +358,13 @@ def compile_kernels() -> None:
         np.zeros((3, 3)),
         np.array([[0, 1, 2]], np.int32),
         np.ones(1, np.bool_),
-        np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
-        np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+        np.vstack([np.zeros(3), np.eye(3)]),
+        np.vstack([np.zeros(3), np.eye(3)]),
         np.array([0.0, 0.0, 0.0, 1.0]),
         1.0,
         1.0,
+        beam_tables(None).across,
+        beam_tables(None).up,
         True,
         1.0,
         np.zeros(1, np.int32),

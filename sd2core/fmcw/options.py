@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.link import LinkBudget
 from sd2core.radar_config import RadarConfig
+from sd2core.scattering.beam import sensor_axes
 from sd2core.sensor import Vector, VirtualSensor
 
 Model = Literal["nufft", "direct"]
@@ -87,7 +88,7 @@ class WaveOptions:
     beam_width_deg : float or None
         Full width at half power of every antenna's cos^n power pattern about
         the boresight, n = ln(1/2) / ln(cos(width / 2)); nothing behind it
-        (Balanis, *Antenna Theory*). None: isotropic.
+        (Balanis, *Antenna Theory*). None: the sensor's own beam, or isotropic.
     mirror : Mirror or None
         Two-ray propagation: out and back each directly or by the image
         (Skolnik, *Introduction to Radar Systems*, propagation over a plane).
@@ -168,10 +169,10 @@ class SignalOptions:
 
 @dataclass(frozen=True, eq=False)
 class Antenna:
-    """Antenna, or its image: position and boresight, (3,) each, and amplitude."""
+    """Antenna, or its image: position (3,), axes (3, 3) right, down and ahead, and amplitude."""
 
     position_m: NDArray[np.float64]
-    boresight: NDArray[np.float64]
+    axes: NDArray[np.float64]
     gain: float = 1.0
     image: bool = False
 
@@ -182,7 +183,7 @@ class Antenna:
         above_m = (self.position_m - np.asarray(mirror.point_m)) @ normal
         return Antenna(
             self.position_m - 2.0 * above_m * normal,
-            self.boresight - 2.0 * (self.boresight @ normal) * normal,
+            self.axes - 2.0 * np.outer(self.axes @ normal, normal),
             self.gain * mirror.reflection,
             image=True,
         )
@@ -204,22 +205,14 @@ def paths(
             f"{len(offsets)} receivers are placed, and the radar has {config.receivers}",
             "one offset per receiver",
         )
-    boresight = np.asarray(sensor.boresight)
+    axes = sensor_axes(sensor)
     centre = np.asarray(sensor.position_m)
-    transmitters = _with_image(Antenna(centre, boresight), options.mirror)
+    transmitters = _with_image(Antenna(centre, axes), options.mirror)
     found = []
-    for place in centre + offsets @ sensor_axes(sensor):
-        receivers = _with_image(Antenna(place, boresight), options.mirror)
+    for place in centre + offsets @ axes:
+        receivers = _with_image(Antenna(place, axes), options.mirror)
         found.append([(out, back) for out in transmitters for back in receivers])
     return found
-
-
-def sensor_axes(sensor: VirtualSensor) -> NDArray[np.float64]:
-    """Axes of the sensor in the camera frame, (3, 3): rows right, down and along the boresight."""
-    azimuth = math.radians(sensor.azimuth_deg)
-    right = np.array([math.cos(azimuth), 0.0, -math.sin(azimuth)])
-    forward = np.asarray(sensor.boresight)
-    return np.stack([right, np.cross(forward, right), forward])
 
 
 def _with_image(antenna: Antenna, mirror: Mirror | None) -> list[Antenna]:

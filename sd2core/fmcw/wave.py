@@ -15,6 +15,7 @@ from sd2core.fmcw.scene import NEAREST_M, FacetsSeen, MeshScene
 from sd2core.fmcw.sums import Echoes, direct, nufft
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import RadarConfig
+from sd2core.scattering.beam import angles_deg, beam_tables, one_way
 from sd2core.sensor import VirtualSensor
 
 GoOn = Callable[[], None]
@@ -46,6 +47,14 @@ class WaveScene:
         self.scene = MeshScene(mesh, config, sensor, visibility)
         self.config = config
         self.wave = wave or WaveOptions()
+        if sensor.beam is not None and self.wave.beam_width_deg is not None:
+            raise Sd2Error(
+                f"The sensor has a beam of {sensor.beam.words}, and the wave one of"
+                f" {self.wave.beam_width_deg:g}°",
+                "one of the two",
+            )
+        self._beam = sensor.beam
+        self._tables = beam_tables(sensor)
         self.paths = paths(sensor, config, self.wave)
         faces = mesh.faces
         assert faces is not None  # MeshScene refuses a mesh without
@@ -172,11 +181,13 @@ class WaveScene:
             velocity_mps,
             faces,
             visible,
-            np.concatenate([out.position_m, out.boresight]),
-            np.concatenate([back.position_m, back.boresight]),
+            np.vstack([out.position_m, out.axes]),
+            np.vstack([back.position_m, back.axes]),
             self._plane if out.image or back.image else _NO_PLANE,
             4.0 * np.pi / self.config.wavelength_m,
             self.wave.pattern_exponent,
+            self._tables.across,
+            self._tables.up,
             self.wave.coherent,
             0.5 * self.config.chirps_per_frame * self.config.chirp_repetition_s,
             index,
@@ -201,8 +212,10 @@ class WaveScene:
             near_m = np.maximum(distance_m, NEAREST_M)
             strength /= near_m
             if self.wave.pattern_exponent > 0:
-                cosine = np.maximum(away @ antenna.boresight / near_m, 0.0)
+                cosine = np.maximum(away @ antenna.axes[2] / near_m, 0.0)
                 strength *= cosine ** (0.5 * self.wave.pattern_exponent)
+            if self._beam is not None:
+                strength *= np.sqrt(one_way(self._beam, *angles_deg(antenna.axes, away.T)))
         if out.image or back.image:
             strength *= position @ self._plane[:3] + self._plane[3] > 0
         return Echoes(range_m, np.zeros(len(area)), strength.astype(np.complex128))

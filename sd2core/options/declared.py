@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from sd2core.errors import Sd2Error
+from sd2core.files.recording_json import BeamEntry
 from sd2core.files.texts import faults_in
 from sd2core.options.bounds import (
     COORDINATE_M,
@@ -50,7 +51,7 @@ class SensorMeta(_Record):
     position_m: Annotated[list[Annotated[float, COORDINATE_M]], Field(min_length=3, max_length=3)]
     azimuth_deg: _Number = 0.0
     elevation_deg: _Number = 0.0
-    field_of_view_deg: _Number = 90.0
+    beam: BeamEntry | None = None
 
 
 class _Plan(_Record):

@@ -62,6 +62,24 @@ class Sensor(OptionRecord):
     sensor: Vector | None = None
 
 
+class Looking(OptionRecord):
+    """Where the radar looks, and how wide.
+
+    Parameters
+    ----------
+    aim : AZ,EL
+        direction in degrees, to the right of the camera's axis and above the horizon, or body, at
+        the body's centre (default: the recording's, or ahead); it counts with a beam only
+    beam : BEAM
+        pattern of its antennas: widths at half power as AZ,EL in degrees, a table (.csv) of
+        angle_deg, azimuth_db, elevation_db, iwr1443 (its board's), or none, all directions alike
+        (default: the recording's, or none)
+    """
+
+    aim: str | None = None
+    beam: str | None = None
+
+
 class MeshReading(OptionRecord):
     """What a mesh file may not say about itself.
 
@@ -115,7 +133,7 @@ class MeshInput(MeshReading):
     mesh: Annotated[Path, ARGUMENT]
 
 
-class MeshAndSensor(Sensor, MeshInput):
+class MeshAndSensor(Looking, Sensor, MeshInput):
     """What is looked at, and from where."""
 
 

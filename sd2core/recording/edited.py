@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ def edited_fields(recording: Recording) -> dict[str, Any]:
     """Encode the fields as JSON holds them: equal fields are equal entries."""
     planned = recording.placements
     entry = {name: getattr(recording, name) for name in EDITED} | {
-        "sensor": asdict(recording.sensor),
+        "sensor": recording.sensor.as_dict(),
         "placements": None if planned is None else planned.as_dict(),
         "imu": None if recording.imu is None else str(plain_path(recording.imu)),
     }

@@ -32,6 +32,7 @@ from sd2core.files.recording_json import (
     CameraEntry,
     Document,
     MeshReading,
+    SensorEntry,
     Span,
     read_document,
 )
@@ -62,7 +63,6 @@ if TYPE_CHECKING:
 
 SUFFIX = ".sd2"
 
-_SENSOR = ("position_m", "azimuth_deg", "elevation_deg", "field_of_view_deg")
 _OFFSETS = {
     "radar_offset_s": "radar offset in seconds",
     "imu_offset_s": "inertial sensor's offset in seconds",
@@ -350,8 +350,8 @@ class Recording:
             setattr(document, name, value)
         document.placements = None if self.placements is None else self.placements.as_dict()
         document.spans = () if self._writes_labels else tuple(self.spans)
-        for name in _SENSOR:
-            setattr(document.sensor, name, getattr(self.sensor, name))
+        stated = {"beam": None} | self.sensor.as_dict()
+        document.sensor = SensorEntry.model_validate(document.sensor.model_dump() | stated)
         for role in ROLES:
             path = getattr(self, role)
             setattr(document, role, None if path is None else stored_path(path, self.folder))
@@ -569,7 +569,7 @@ def settings_of(document: Document, folder: Path) -> dict[str, Any]:
         **{name: getattr(document, name) for name in (*_AS_THEY_ARE, *_OFFSETS)},
         **{role: located_path(getattr(document, role), folder) for role in ROLES},
         "imu_places": tuple(dict.fromkeys(document.imu_places)),
-        "sensor": VirtualSensor(**{name: getattr(document.sensor, name) for name in _SENSOR}),
+        "sensor": VirtualSensor.from_dict(document.sensor.model_dump()),
         "placements": None if planned is None else placements_from_dict(planned),
     }
 

@@ -17,14 +17,14 @@ import pytest
 from longer_walk import FRAMES, longer_walk
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
-from timing import best_s
+from timing import best_s, spent_s
 
 from sd2core.body.parts import known_parts
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import warm_up, worker_count
 from sd2core.scattering.exact import exact_visibility_kernel
-from sd2core.sensor import VirtualSensor
+from sd2core.sensor import Beam, VirtualSensor
 
 PAPER = PRESETS["paper"]
 
@@ -43,29 +43,35 @@ def copy_bytes_per_s(size_bytes: int) -> float:
 
 
 @pytest.mark.parametrize("visibility", ["frozen", "facing"])
-def test_limb_maps(
-    benchmark: Any, mesh: MeshSequence, capsys: pytest.CaptureFixture[str], visibility: Any
+@pytest.mark.parametrize(("what", "most"), [("limbs", 2.0), ("beam", 5.0)])
+def test_what_more_than_the_map_costs(
+    benchmark: Any,
+    mesh: MeshSequence,
+    capsys: pytest.CaptureFixture[str],
+    what: str,
+    most: float,
+    visibility: Any,
 ) -> None:
-    """What the split by parts of the body costs beside the map alone."""
-    parts = known_parts(mesh)
+    """The split by parts of the body, and an antenna's beam, beside the map alone."""
+    parts, sensor = known_parts(mesh), VirtualSensor()
+    beamed = replace(sensor, beam=Beam(56.0, 28.0))
     maker = Synthesizer(mesh, PAPER)
     maker.prepare()
-    maker.map(VirtualSensor(), visibility="exact")
+    maker.map(sensor, visibility="exact")
+    more = {
+        "limbs": lambda: maker.limb_maps(sensor, parts, visibility=visibility),
+        "beam": lambda: maker.map(beamed, visibility=visibility),
+    }[what]
 
     def both() -> tuple[float, float]:
-        return tuple(
-            best_s(one, 1)
-            for one in (
-                lambda: maker.map(VirtualSensor(), visibility=visibility),
-                lambda: maker.limb_maps(VirtualSensor(), parts, visibility=visibility),
-            )
-        )  # type: ignore[return-value]
+        alone = spent_s(lambda: maker.map(sensor, visibility=visibility), 1)
+        return alone, spent_s(more, 1)
 
     spent = [both() for _ in range(20)]
-    alone_s, split_s = (min(one) for one in zip(*spent, strict=True))
+    alone_s, more_s = (min(one) for one in zip(*spent, strict=True))
     with capsys.disabled():
-        print(f"\nlimb maps, {visibility}: {split_s / alone_s:.2f} times the map")
-    assert split_s < 1.5 * alone_s
+        print(f"\n{what}, {visibility}: {more_s / alone_s:.2f} times the map")
+    assert more_s < most * alone_s
     benchmark.pedantic(both, rounds=3)
 
 

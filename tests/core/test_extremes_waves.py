@@ -25,6 +25,7 @@ from sd2core.fmcw.simulation import simulate_radar
 from sd2core.fmcw.sums import NUFFT_TOLERANCE, Echoes, direct, nufft, recurrent
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import SPEED_OF_LIGHT_MPS, RadarConfig
+from sd2core.scattering.beam import beam_tables
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
@@ -145,13 +146,14 @@ def echoes_of(
     faces: NDArray[np.int32],
     wavelength_m: float,
 ) -> Found:
-    antenna = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    antenna = np.vstack([np.zeros(3), np.eye(3)])
     plane = np.array([0.0, 0.0, 0.0, 1.0])
     found = Found(len(faces))
     everyone = np.ones(len(faces), np.bool_)
     number = facet_echoes(
         vertices, velocity, faces, everyone, antenna, antenna, plane, 4 * np.pi / wavelength_m,
-        0.0, True, 0.0, found.index, found.range_m, found.rate_mps, found.amplitude,
+        0.0, *beam_tables(None)[1:], True, 0.0, found.index, found.range_m, found.rate_mps,
+        found.amplitude,
     )  # fmt: skip
     found.cut(number)
     return found

@@ -12,7 +12,9 @@ from sd2app.session.session import Session
 from sd2app.widgets.time_axis import clock_text
 from sd2core.doppler.synthesizer import FrameScattering, Synthesizer, Visibility
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.sensor import Vector
+from sd2core.scattering.amplitude import range_weight
+from sd2core.scattering.beam import share_in_beam
+from sd2core.sensor import Vector, VirtualSensor
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,7 @@ class Readout:
     torso_range_m: float
     visible_share: float
     beyond_share: float
+    share_in_beam: float | None  # None without a beam
 
 
 class FrameReader:
@@ -59,10 +62,10 @@ class FrameReader:
 
     def readout(self, frame: FrameScattering | None, v_max_mps: float) -> Readout | None:
         """Numbers beside the sensor, None without a mesh on screen."""
-        torso_m = self.torso_m()
-        if frame is None or torso_m is None:
+        torso_m, index, mesh = self.torso_m(), self.index(), self._document.mesh
+        if frame is None or torso_m is None or index is None or mesh is None:
             return None
-        return self._readout_of(frame, torso_m, self._sensor.sensor.position_m, v_max_mps)
+        return self._readout_of(frame, mesh, index, torso_m, self._sensor.sensor, v_max_mps)
 
 
 def _torso_m(mesh: MeshSequence, frame: int) -> Vector:
@@ -70,12 +73,24 @@ def _torso_m(mesh: MeshSequence, frame: int) -> Vector:
     return float(x), float(y), float(z)
 
 
-def _readout(frame: FrameScattering, torso_m: Vector, place_m: Vector, v_max_mps: float) -> Readout:
+def _readout(
+    frame: FrameScattering,
+    mesh: MeshSequence,
+    index: int,
+    torso_m: Vector,
+    sensor: VirtualSensor,
+    v_max_mps: float,
+) -> Readout:
     seen_mps = np.abs(frame.velocity_mps[frame.visible])
+    within = None
+    if sensor.beam is not None:
+        echo = frame.visible * range_weight(frame.range_m, 4.0, 1.0)
+        within = share_in_beam(sensor, mesh.frame(index).T, echo)
     return Readout(
-        torso_range_m=float(np.linalg.norm(np.subtract(place_m, torso_m))),
+        torso_range_m=float(np.linalg.norm(np.subtract(sensor.position_m, torso_m))),
         visible_share=float(frame.visible.mean()),
         beyond_share=float((seen_mps > v_max_mps).mean()) if seen_mps.size else 0.0,
+        share_in_beam=within,
     )
 
 

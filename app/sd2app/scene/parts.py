@@ -18,8 +18,10 @@ from sd2app.scene import shapes
 from sd2app.scene.body import coarse_faces, is_closed_outward
 from sd2app.scene.colours import SceneColours, fractions, marker_colours, mixed
 from sd2core.figures.colours import rgb
-from sd2core.sensor import VirtualSensor
+from sd2core.scattering.beam import half_power_rim, sensor_axes
+from sd2core.sensor import Beam, VirtualSensor
 
+_ANY_BEAM = Beam(90.0, 90.0)
 _MARKER_M = 0.10
 _MARKER_LEAST_PX = 7.0
 _INERTIAL_M = 0.028
@@ -206,11 +208,11 @@ class Body(Shape):
 
 
 class SensorGlyph:
-    """Sphere, boresight axis, field of view and a plumb line to the floor."""
+    """Sphere, boresight axis, a plumb line to the floor, and the cone of a beam's half power."""
 
     def __init__(self, renderer: vtkRenderer) -> None:
         line = np.array([(0, 1)])
-        points, triangles, wire = shapes.cone(90.0)
+        points, triangles, wire = shapes.cone(half_power_rim(_ANY_BEAM))
         self.cone = Shape(renderer, points, triangles=triangles)
         self.edges = Shape(renderer, points, segments=wire)
         self.axis = Shape(renderer, np.array([(0, 0, 0), (0, 0, 1)]), segments=line, line_px=1.8)
@@ -229,18 +231,21 @@ class SensorGlyph:
         look.SetDiffuse(0.6)
         look.SetSpecular(0.25)
         look.SetSpecularPower(20)
-        self._angle_deg = 90.0
+        self._beam: Beam | None = _ANY_BEAM
+        self._shown = True
 
     def set_sensor(self, sensor: VirtualSensor, floor_m: float, reach_m: float) -> None:
-        """Place it; the field of view is drawn ``reach_m`` long."""
-        if sensor.field_of_view_deg != self._angle_deg:
-            self._angle_deg = sensor.field_of_view_deg
-            points, _, _ = shapes.cone(self._angle_deg)
-            for shape in (self.cone, self.edges):
-                shape.points[:] = points
-                shape.moved()
+        """Place it; the cone is drawn ``reach_m`` long."""
+        if sensor.beam != self._beam:
+            self._beam = sensor.beam
+            if sensor.beam is not None:
+                points, _, _ = shapes.cone(half_power_rim(sensor.beam))
+                for shape in (self.cone, self.edges):
+                    shape.points[:] = points
+                    shape.moved()
+            self.show(self._shown)
         position = np.asarray(sensor.position_m)
-        turn = shapes.rotation_to(sensor.boresight)
+        turn = sensor_axes(sensor).T
         for shape in (self.cone, self.edges):
             shape.place(reach_m * turn, position)
         self.axis.place(1.18 * reach_m * turn, position)
@@ -266,9 +271,12 @@ class SensorGlyph:
 
     def show(self, visible: bool) -> None:
         """Show or hide it (the eye may be inside it)."""
+        self._shown = visible
         self.sphere.SetVisibility(visible)
         for shape in self.shapes:
             shape.show(visible)
+        for shape in (self.cone, self.edges):
+            shape.show(visible and self._beam is not None)
 
 
 class GroundGrid:

@@ -36,27 +36,17 @@ class Ground:
     labels: tuple[MetreLabel, ...]
 
 
-def cone(field_of_view_deg: float, sides: int = 48) -> tuple[NDArray, NDArray, NDArray]:
-    """Points (sides + 1, 3), triangles (sides, 3) and wire segments (sides + 4, 2) of a cone.
+def cone(rim: NDArray[np.floating]) -> tuple[NDArray, NDArray, NDArray]:
+    """Points (n + 1, 3), triangles (n, 3) and wire segments (n + 4, 2) of a cone around +z.
 
-    It is along +z with its apex, point 0, at the origin. Rays at the edge of the field of view
-    have length one, so a wide angle does not make a huge rim. The wire is the rim and four ribs.
+    It has its apex, point 0, at the origin, and a ``rim`` of n unit vectors, so that a wide angle
+    does not make a huge one. The wire is the rim and four ribs.
     """
-    half = math.radians(field_of_view_deg) / 2
-    angle = np.arange(sides) * (2 * math.pi / sides)
-    rim = np.stack(
-        [
-            math.sin(half) * np.cos(angle),
-            math.sin(half) * np.sin(angle),
-            np.full(sides, math.cos(half)),
-        ],
-        axis=1,
-    )
     points = np.concatenate([np.zeros((1, 3)), rim]).astype(np.float32)
-    here = np.arange(sides, dtype=np.int32) + 1
+    here = np.arange(len(rim), dtype=np.int32) + 1
     following = np.roll(here, -1)
     triangles = np.stack([np.zeros_like(here), here, following], axis=1)
-    corners = here[sides // 8 :: sides // 4]
+    corners = here[len(rim) // 8 :: len(rim) // 4]
     ribs = np.stack([np.zeros_like(corners), corners], axis=1)
     rim_segments = np.stack([here, following], axis=1)
     return points, triangles, np.concatenate([rim_segments, ribs])

@@ -90,7 +90,9 @@ class SensorFeature(Feature):
         shell = self._shell
         to_camera, aim = shell.action("sensor_to_camera"), shell.action("aim_sensor")
         align, radar = shell.action("align"), lambda: self.placements.radar
-        sensor = SensorPanel(self._session, self._synthesis, radar, to_camera, aim, align)
+        sensor = SensorPanel(
+            self._session, self._synthesis, radar, to_camera, aim, align, shell.warn
+        )
         placements = PlacementsPage(self.placements, self._accuracy, shell, self._make_batch)
         return {
             "Sensor": paged_panel(

@@ -11,6 +11,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QComboBox, QFormLayout, QGridLayout, QLabel, QWidget
 
 from sd2app.maps.model import SynthesisModel
+from sd2app.sensor.beam import BeamForm
 from sd2app.session.session import Session
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, grid_of, pane, row_of
@@ -52,6 +53,7 @@ class SensorPanel(QWidget):
         to_camera: QAction,
         aim: QAction,
         align: QAction,
+        warn: Callable[[str], None],
     ) -> None:
         super().__init__()
         self.setObjectName("page")
@@ -60,7 +62,7 @@ class SensorPanel(QWidget):
         self._capture = self._capture_part(self._button(align, "Find…"))
         buttons = (self._button(aim, "Aim at body"), self._button(to_camera, "To camera"))
         head = row_of(title("Placement"), STRETCH, *buttons)
-        placement = head, self._placement_form(), self._too_far
+        placement = head, self._placement_form(), self._too_far, BeamForm(session, warn)
         seen = title("What it sees"), self._readout_form()
         parts = *placement, rule(), *seen, self._capture, STRETCH
         self.setLayout(column_of(*parts, spacing_px=5, margins_px=(8, 4, 8, 4)))
@@ -105,16 +107,15 @@ class SensorPanel(QWidget):
         return grid
 
     def _readout_form(self) -> QFormLayout:
-        self._torso, self._visible, self._beyond, field = (
+        self._torso, self._visible, self._beyond, self._within = (
             _value(self, tip)
             for tip in (
                 "Distance from the sensor to the body's median vertex",
                 "Share of the vertices that the sensor sees in this frame",
                 "Share of what the sensor sees in this frame that is faster than the axis",
-                "The cone is drawn for orientation; every direction counts alike",
+                "Share of this frame's echo from within the cone of the beam's half power",
             )
         )
-        field.setText("drawn, not applied")
         self._beyond_name = QLabel(self)
         self._expected = CheckBox(
             "expected map", self,
@@ -125,7 +126,7 @@ class SensorPanel(QWidget):
             ("Range to torso", self._torso),
             ("Visible", self._visible),
             (self._beyond_name, self._beyond),
-            ("Field of view", field),
+            ("In the beam", self._within),
             ("Counting", self._expected),
         )
         return form
@@ -226,6 +227,9 @@ class SensorPanel(QWidget):
         self._beyond_name.setText(f"Beyond ±{self._synthesis.v_max_mps:g} m/s")
         for label, text in zip((self._torso, self._visible, self._beyond), texts, strict=True):
             label.setText(text)
+        share = None if readout is None else readout.share_in_beam
+        self._readouts.setRowVisible(self._within, self._session.sensor.sensor.beam is not None)
+        self._within.setText("–" if share is None else f"{100 * share:.0f} % of the echo")
 
     def _refresh_capture(self) -> None:
         self._refresh_placement()

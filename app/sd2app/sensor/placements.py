@@ -110,8 +110,7 @@ class PlacementsModel(ReportingModel):
         """Put the sensor at one of the places."""
         sensors = self.planned.sensors
         if 0 <= number < len(sensors):
-            view_deg = self._sensor.sensor.field_of_view_deg
-            sensor = replace(sensors[number], field_of_view_deg=view_deg)
+            sensor = replace(sensors[number], beam=self._sensor.sensor.beam)
             self.edits.place_sensor(sensor, "Sensor to placement")
 
     def step(self, by: int) -> None:

@@ -63,8 +63,8 @@ class Edits:
 
     def sensor_to_camera(self) -> None:
         """Put the sensor at the camera, looking along the optical axis."""
-        view = self._sensor.sensor.field_of_view_deg
-        self.place_sensor(VirtualSensor(field_of_view_deg=view), "Sensor to camera")
+        beam = self._sensor.sensor.beam
+        self.place_sensor(VirtualSensor(beam=beam), "Sensor to camera")
 
     def aim_sensor(self, target_m: Vector) -> None:
         """Turn the sensor towards a point."""

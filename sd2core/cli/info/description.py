@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from statistics import fmean
@@ -78,7 +77,7 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
         "title": recording.title + (" (simulated)" if recording.simulated else ""),
         "person": recording.subject,
         "camera": _camera(recording),
-        "sensor": f"at x {x:g}, y {y:g}, z {z:g} m",
+        "sensor": recording.sensor.words,
         "radar offset": f"{recording.radar_offset_s:g} s" if recording.radar else "",
         "radar channel": recording.channel_in_words,
         "inertial sensors": ", ".join(recording.imu_places),
@@ -340,8 +339,10 @@ def bins_in_words(axis: VelocityAxis, bins: tuple[int, ...]) -> str:
 def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
     if provenance.get("visible_share") is None:
         return {}
+    from sd2core.sensor import VirtualSensor
+
     sensor = provenance.get("sensor")
-    x, y, z = sensor["position_m"] if isinstance(sensor, dict) else (math.nan,) * 3
+    words = VirtualSensor.from_dict(sensor).words if isinstance(sensor, dict) else ""
     visible, beyond = provenance["visible_share"], provenance.get("beyond_share") or 0.0
     beyond = beyond if isinstance(beyond, list) else [beyond]
     worst = max(range(len(beyond)), key=beyond.__getitem__)
@@ -352,7 +353,7 @@ def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
         "plan": "" if plan is None else plan["text"],
         # Both are the same map of a mesh that says nothing.
         "count": provenance.get("count", "") if "body_error_l1" in provenance else "",
-        "sensor": "" if math.isnan(x) else f"at x {x:g}, y {y:g}, z {z:g} m",
+        "sensor": words,
         "visibility": f"{provenance.get('visibility') or 'not stated'}:"
         f" {fmean(visible):.1%} visible on average" + shared,
         "beyond axis": f"{fmean(beyond):.1%} of what is visible on average"

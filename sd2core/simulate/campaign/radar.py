@@ -30,6 +30,7 @@ from sd2core.fmcw.sums import Echoes, turns_of
 from sd2core.fmcw.wave import WaveScene
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import CLUTTER, PAPER_RADAR, RadarConfig
+from sd2core.scattering.beam import beam_tables, sensor_axes
 from sd2core.scattering.facets import visible_facets
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
@@ -205,7 +206,8 @@ def _echoes(scene: MeshScene, frame: int) -> tuple[Echoes, NDArray[np.int32]]:
     count = int(np.count_nonzero(visible))
     rows, amplitude = np.empty(count, np.int32), np.empty((1, count), np.complex128)
     range_m, rate_mps = np.empty(count), np.empty(count)
-    antenna = np.array([*scene.sensor.position_m, *scene.sensor.boresight])
+    antenna = np.vstack([scene.sensor.position_m, sensor_axes(scene.sensor)])
+    beam = beam_tables(scene.sensor)
     found = facet_echoes(
         position,
         velocity,
@@ -216,6 +218,8 @@ def _echoes(scene: MeshScene, frame: int) -> tuple[Echoes, NDArray[np.int32]]:
         _NO_PLANE,
         4.0 * np.pi / config.wavelength_m,
         0.0,
+        beam.across,
+        beam.up,
         False,
         0.5 * config.chirps_per_frame * config.chirp_repetition_s,
         rows,

@@ -17,18 +17,19 @@ from sd2app.scene.shapes import (
     rotation_to,
 )
 from sd2core.placements.placements import Place
-from sd2core.sensor import VirtualSensor, direction_from_angles
+from sd2core.scattering.beam import half_power_rim
+from sd2core.sensor import Beam, VirtualSensor, direction_from_angles
 
 TETRAHEDRON = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
 OUTWARD = np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)])
 
 
 @pytest.mark.parametrize("angle_deg", [20.0, 90.0, 150.0])
-def test_the_rim_of_the_cone_is_half_the_field_of_view_off_axis(angle_deg: float) -> None:
-    points, triangles, wire = cone(angle_deg)
+def test_the_rim_of_the_cone_is_half_the_width_of_the_beam_off_axis(angle_deg: float) -> None:
+    points, triangles, wire = cone(half_power_rim(Beam(angle_deg, angle_deg), 4))
     rim = points[1:]
     off_axis = np.degrees(np.arctan2(np.hypot(rim[:, 0], rim[:, 1]), rim[:, 2]))
-    np.testing.assert_allclose(off_axis, angle_deg / 2, atol=1e-4)
+    np.testing.assert_allclose(off_axis, angle_deg / 2, atol=0.06)
     assert triangles.max() == wire.max() == len(points) - 1
 
 

@@ -23,7 +23,7 @@ from sd2app.widgets.text import bytes_text
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.placements import PlacementCloud, PlacementGrid
-from sd2core.sensor import VirtualSensor
+from sd2core.sensor import Beam, VirtualSensor
 from sd2core.timebase import Timebase
 
 
@@ -152,10 +152,10 @@ def test_the_cost_is_that_of_the_plan_in_use_times_the_places(stage, qtbot):
     assert cost_text(stage.cost) == "6 maps in about 150 ms, 8.2 kB"
 
 
-def test_the_sensor_steps_from_place_to_place_and_keeps_its_field_of_view(stage, qtbot):
+def test_the_sensor_steps_from_place_to_place_and_keeps_its_beam(stage, qtbot):
     document, sensor, _, edits = stage.test
     document.open(a_cube(), GRID)
-    sensor.set_sensor(VirtualSensor((9.0, 9.0, 9.0), field_of_view_deg=50.0))
+    sensor.set_sensor(VirtualSensor((9.0, 9.0, 9.0), beam=Beam(50.0, 30.0)))
     settle(qtbot, stage)
     assert stage.current is None
     assert current_text(stage) == "The sensor is elsewhere"
@@ -167,7 +167,7 @@ def test_the_sensor_steps_from_place_to_place_and_keeps_its_field_of_view(stage,
     stage.use(5)
     stage.step(1)
     assert stage.current == 0
-    assert sensor.sensor.field_of_view_deg == 50.0
+    assert sensor.sensor.beam == Beam(50.0, 30.0)
     assert len(edits.steps) == 6
     stage.use(99)
     assert stage.current == 0

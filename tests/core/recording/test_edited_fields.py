@@ -13,7 +13,7 @@ from sd2core.errors import Sd2Error
 from sd2core.placements.placements import PlacementGrid
 from sd2core.recording.edited import decoded_fields, differing, edited_fields
 from sd2core.recording.recording import Recording
-from sd2core.sensor import VirtualSensor
+from sd2core.sensor import Beam, VirtualSensor
 
 metres = st.floats(-50, 50)
 angles = st.floats(-89, 89)
@@ -25,7 +25,13 @@ recordings = st.builds(
         position_m=st.tuples(metres, metres, metres),
         azimuth_deg=angles,
         elevation_deg=angles,
-        field_of_view_deg=st.floats(1, 179),
+        beam=st.none()
+        | st.builds(
+            Beam,
+            st.floats(1, 179),
+            st.floats(1, 179),
+            st.just(()) | st.just(((-90, -9, -7), (0, 0, 0), (90, -9, -7))),
+        ),
     ),
     placements=st.none()
     | st.builds(PlacementGrid, st.lists(st.floats(0.1, 9), min_size=1, max_size=3).map(tuple)),

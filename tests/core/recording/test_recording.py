@@ -29,7 +29,7 @@ from sd2core.recording.recording import (
     is_recording,
     open_recording,
 )
-from sd2core.sensor import VirtualSensor
+from sd2core.sensor import Beam, VirtualSensor
 
 
 @pytest.fixture
@@ -62,7 +62,7 @@ def test_everything_is_read_back(files: Path) -> None:
         files,
         mesh_reading=MeshReading(frames_per_s=25.0, person="2", image_size=(640, 480)),
         radar_offset_s=-0.35,
-        sensor=VirtualSensor((-1.0, 0.5, 2.0), 10.0, -5.0, 60.0),
+        sensor=VirtualSensor((-1.0, 0.5, 2.0), 10.0, -5.0, Beam(60.0, 30.0)),
         spans=(Span(start_s=0.5, end_s=1.25, label="left → right"),),
         title="Wälk",
         simulated=True,
@@ -208,7 +208,11 @@ def test_a_failed_save_leaves_the_old_recording(
         ({"video": 3}, "video is 3"),
         ({"video": ""}, "recording.json: video is ''"),
         ({"mesh": " "}, "recording.json: mesh is ' '"),
-        ({"sensor": {"field_of_view_deg": 500}}, "recording.json.*field of view is 500"),
+        (
+            {"sensor": {"beam": {"azimuth_width_deg": 500, "elevation_width_deg": 9}}},
+            "recording.json.*azimuth_width_deg is 500",
+        ),
+        ({"sensor": {"beam": {"width": 5}}}, "recording.json: sensor.beam"),
         ({"radar_offset_s": 1e13}, "radar_offset_s is 10000"),
         ({"spans": [{"start_s": -1e308, "end_s": 1, "label": "x"}]}, "spans.0.start_s is -1e"),
         ({"camera": {"focal_px": 1e110}}, "camera.focal_px is 1e"),
