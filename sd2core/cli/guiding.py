@@ -16,6 +16,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.paths import remove
 from sd2core.files.tables import capitalised
 from sd2core.labels.spans import Span
+from sd2core.live.consent import Consent
 from sd2core.live.joint import JointRecording
 from sd2core.live.prompting import label_take
 from sd2core.live.protocol import Protocol, Take
@@ -55,8 +56,9 @@ def guide(
         raise Sd2Error(f"The folder {folder.parent} does not exist", "an existing folder")
     folder.mkdir(exist_ok=True)
     there = [path.stem for path in folder.glob(f"*{SUFFIX}") if is_recording(path)]
-    session = Session(protocol, there)
-    telling = _Telling(session, as_json=as_json)
+    consent = Consent(folder, protocol.consent_text)
+    session = Session(protocol, there, consent.agreements)
+    telling = _Telling(session, consent, as_json=as_json)
     telling.begin(folder)
     if protocol.video == "drop":
         takes = [folder / f"{take.name}{SUFFIX}" for take in session.takes if take.name in there]
@@ -66,7 +68,7 @@ def guide(
         pressed_keys() as key,
         contextlib.closing(_Takes(session, folder, open_take, telling)) as recorder,
     ):
-        while session.phase != "over" and not told.is_set() and _press(session, key()):
+        while session.phase != "over" and not told.is_set() and _press(session, consent, key()):
             recorder.leave()
             session.advance(time.monotonic())
             telling.step()
@@ -74,11 +76,16 @@ def guide(
     telling.end()
 
 
-def _press(session: Session, key: str) -> bool:
+def _press(session: Session, consent: Consent, key: str) -> bool:
     """Take a key; False for the one that stops."""
     match key.lower():
         case " " | "\n" | "\r":
             session.go_on()
+        case "y" if session.phase == "consent" and session.take is not None:
+            consent.agree(session.take.person)  # first: nobody is recorded without it
+            session.agree()
+        case "n":
+            session.decline(time.monotonic())
         case "a":
             session.again(time.monotonic())
         case "s":
@@ -188,8 +195,8 @@ def _losses(recording: JointRecording) -> list[str]:
 class _Telling:
     """What is printed."""
 
-    def __init__(self, session: Session, *, as_json: bool) -> None:
-        self._session, self._as_json = session, as_json
+    def __init__(self, session: Session, consent: Consent, *, as_json: bool) -> None:
+        self._session, self._consent, self._as_json = session, consent, as_json
         self._said: tuple[Any, ...] = ()
 
     def begin(self, folder: Path) -> None:
@@ -203,7 +210,7 @@ class _Telling:
                 out=str(folder),
                 takes=len(session.takes),
                 missing=missing,
-                consent=protocol.consent.strip(),
+                consent=protocol.consent_text,
             )
             return
         print(f"{protocol.title}: {missing:,} of {counted(len(session.takes), 'take')} to record")
@@ -250,9 +257,11 @@ class _Telling:
         doing = f"{session.number} of {len(session.takes)}, {take.person}: "
         doing += protocol.gesture(take.gesture).instruction
         match session.phase:
+            case "consent":
+                asks = f"{take.person}: do you agree? y: yes, n: no (none of your takes is made)."
+                return ["", protocol.consent_text, asks]
             case "ready":
-                consent = protocol.consent.strip()
-                return ["", *([consent] if consent else []), f"{take.person}: Space begins."]
+                return ["", f"{take.person}: Space begins."]
             case "pause":
                 return ["", f"Next, in {protocol.pause_s:g} s: {doing}"]
             case "opening":
@@ -282,19 +291,22 @@ class _Telling:
 
     def end(self) -> None:
         """Say what is missing."""
-        missing = self._session.missing
+        missing, agreed = self._session.missing, self._consent.agreements
+        asks = bool(self._session.protocol.consent_text)
         if self._as_json:
-            print_event("missing", takes=[take.name for take in missing])
+            without = {take.person: None for take in missing if asks and take.person not in agreed}
+            print_event("missing", takes=[take.name for take in missing], not_agreed=[*without])
         elif missing:
             rounds: dict[tuple[str, str], list[str]] = {}
             for take in missing:
                 rounds.setdefault((take.person, take.gesture), []).append(str(take.repetition))
             print(f"\n{capitalised(counted(len(missing), 'take'))} missing:")
-            print_rows(
-                [
-                    ("person", "gesture", "round"),
-                    *((*who, ", ".join(numbers)) for who, numbers in rounds.items()),
-                ]
-            )
+            rows = [("person", "gesture", "round", "agreed")]
+            for (person, gesture), numbers in rounds.items():
+                when = (
+                    f"{agreed[person].agreed_at:%Y-%m-%d %H:%M} UTC" if person in agreed else "no"
+                )
+                rows.append((person, gesture, ", ".join(numbers), when))
+            print_rows(rows if asks else [row[:-1] for row in rows])
         else:
             print("\nNothing is missing.")

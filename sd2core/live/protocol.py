@@ -6,7 +6,7 @@ import random
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field
 
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
@@ -15,6 +15,7 @@ from sd2core.labels.colours import OFFERED
 from sd2core.labels.label_set import GESTURES, Label, LabelSet
 from sd2core.options.bounds import SEED, Bounds
 from sd2core.options.kinds import Text
+from sd2core.options.records import OptionError, OptionRecord
 from sd2core.options.toml_files import parsed
 
 PAPER = "paper"
@@ -41,55 +42,82 @@ class Take(NamedTuple):
         return f"{self.person}-{self.gesture}-{self.repetition}"
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+class Gesture(OptionRecord):
+    """One that all people make.
 
-
-class Gesture(_Section):
-    """Section ``[[gestures]]``: one that all people make."""
+    Parameters
+    ----------
+    name
+        label of the recordings
+    instruction
+        sentence that the person reads
+    gesture_class
+        what a classifier learns; empty: as of the paper's label of this name, else the name
+    """
 
     name: _Name
-    """Label of the recordings."""
     instruction: Text
-    """Sentence that the person reads."""
     gesture_class: str = ""
-    """What a classifier learns; empty: as of the paper's label of this name, else the name."""
 
 
-class Protocol(_Section):
-    """What is recorded, of whom, and how it is asked for."""
+class Protocol(OptionRecord):
+    """What is recorded, of whom, and how it is asked for.
+
+    Parameters
+    ----------
+    format
+        `sd2-protocol`
+    version
+        of the format
+    title
+        what the session is about
+    people
+        pseudonyms, in the order in which the people come
+    gestures
+        all of them
+    repetitions
+        rounds, in each of which a person makes every gesture once
+    order
+        of the gestures in a round
+    seed
+        of the random order
+    take_s
+        seconds that a gesture is made for
+    pause_s
+        seconds between two takes of a person
+    countdown_s
+        seconds before a take; recorded: the person stands still
+    reaction_s
+        seconds from the prompt to the first motion of the gesture
+    video
+        what becomes of it; drop: deleted in takes that have a body
+    consent
+        text that a person agrees to before the first take; empty: nobody is asked
+    """
 
     format: Literal["sd2-protocol"]
     version: Literal[1]
     title: Text
     people: Annotated[tuple[_Name, ...], Field(min_length=1)]
-    """Pseudonyms, in the order in which the people come."""
     gestures: Annotated[tuple[Gesture, ...], Field(min_length=1)]
     repetitions: _Times = 1
-    """Rounds, in each of which a person makes every gesture once."""
     order: Literal["fixed", "random"] = "random"
-    """Of the gestures in a round."""
     seed: Annotated[int, SEED] = 1
-    """Of the random order."""
     take_s: _TakeS = 15.0
     pause_s: _WaitS = 5.0
-    """Between two takes of a person."""
     countdown_s: _WaitS = 3.0
-    """Recorded: the person stands still."""
     reaction_s: _ReactionS = 0.3
-    """From the prompt to the first motion of the gesture."""
     video: Literal["keep", "drop"] = "keep"
-    """Drop: it is deleted in takes that have a body, see :func:`sd2core.live.videos.drop_video`."""
     consent: str = ""
-    """Text that a person agrees to before the first take."""
 
-    @model_validator(mode="after")
-    def _names_differ(self) -> Protocol:
+    def __post_init__(self) -> None:
+        super().__post_init__()
         names = [take.name.casefold() for take in self.takes]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
-            raise ValueError(f"two recordings would be called {twice[0]}")
-        return self
+            raise OptionError(
+                f"two recordings would be called {twice[0]}", "names that differ in more"
+            )
 
     @property
     def takes(self) -> tuple[Take, ...]:
@@ -105,6 +133,11 @@ class Protocol(_Section):
                     random.Random(f"{self.seed}/{person}/{repetition}").shuffle(names)
                 takes += [Take(person, name, repetition) for name in names]
         return tuple(takes)
+
+    @property
+    def consent_text(self) -> str:
+        """The text that people agree to, without blank lines around it."""
+        return self.consent.strip()
 
     def gesture(self, name: str) -> Gesture:
         """The gesture of a name, which is one of them."""

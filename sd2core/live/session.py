@@ -12,9 +12,10 @@ from typing import Literal
 
 from sd2core.live.protocol import Protocol, Take
 
-Phase = Literal["ready", "pause", "opening", "countdown", "prompt", "storing", "over"]
-"""ready: a person is to come and to agree; pause: to rest; opening: camera and radar begin;
-countdown: to stand still; prompt: to move; storing: the take is put away."""
+Phase = Literal["consent", "ready", "pause", "opening", "countdown", "prompt", "storing", "over"]
+"""consent: a person is to come, to read and to agree; ready: to come; pause: to rest; opening:
+camera and radar begin; countdown: to stand still; prompt: to move; storing: the take is put
+away."""
 
 
 class Session:
@@ -25,18 +26,23 @@ class Session:
     protocol : Protocol
     done : iterable of str
         Names of the takes that are there already.
+    agreed : iterable of str
+        People who have agreed to the protocol's consent already.
     """
 
-    def __init__(self, protocol: Protocol, done: Iterable[str] = ()) -> None:
+    def __init__(
+        self, protocol: Protocol, done: Iterable[str] = (), agreed: Iterable[str] = ()
+    ) -> None:
         self.protocol = protocol
         self.takes = protocol.takes
         self.prompt_s = math.nan  # when the person was told to begin
         self._done = {*done}.intersection(take.name for take in self.takes)
         self._skipped: set[Take] = set()
+        self._agreed = set(agreed)
         self._last: Take | None = None  # that was stored
         self._until_s = math.inf
         self.take = self._next()
-        self.phase: Phase = "over" if self.take is None else "ready"
+        self.phase: Phase = "over" if self.take is None else self._waiting
 
     @property
     def number(self) -> int:
@@ -81,6 +87,19 @@ class Session:
             self._done.add(self.take.name)
             self._go_to(self._next(), now_s)
 
+    def agree(self) -> None:
+        """Key: the person agrees to be recorded."""
+        if self.phase == "consent" and self.take is not None:
+            self._agreed.add(self.take.person)
+            self._begin("ready")
+
+    def decline(self, now_s: float) -> None:
+        """Key: the person does not agree; their takes are left out."""
+        if self.phase == "consent" and self.take is not None:
+            person = self.take.person
+            self._skipped.update(one for one in self.takes if one.person == person)
+            self._go_to(self._next(), now_s)
+
     def go_on(self) -> None:
         """Key: begin the take, without waiting for the end of the pause."""
         if self.phase in ("ready", "pause"):
@@ -90,7 +109,7 @@ class Session:
         """Key: make the take that is being made, otherwise the last one, once more."""
         if self.phase in ("opening", "countdown", "prompt"):
             self._go_to(self.take, now_s)
-        elif self.phase in ("ready", "pause") and self._last is not None:
+        elif self.phase in ("consent", "ready", "pause") and self._last is not None:
             self._begin("pause", now_s + self.protocol.pause_s)
             self.take = self._last
 
@@ -103,15 +122,22 @@ class Session:
     def _next(self) -> Take | None:
         return next((one for one in self.missing if one not in self._skipped), None)
 
+    @property
+    def _waiting(self) -> Phase:
+        """How a person who comes is waited for."""
+        if self.take is None or self.take.person in self._agreed:
+            return "ready"
+        return "consent" if self.protocol.consent_text else "ready"
+
     def _go_to(self, take: Take | None, now_s: float) -> None:
         """Wait for a take, or, after the last one, whether it is to be made again."""
         stays = take is None or (self.take is not None and take.person == self.take.person)
-        waits = not stays or self.phase == "ready"
+        waits = not stays or self.phase in ("consent", "ready")
         self.take = take
         if take is None and self._last is None:
             self._begin("over")
         elif waits and take is not None:
-            self._begin("ready")
+            self._begin(self._waiting)
         else:
             self._begin("pause", now_s + self.protocol.pause_s)
 

@@ -45,6 +45,7 @@ class GuidedModel(QObject):
         self.step: Step | None = None
         self.title = self.consent = ""
         self.missing: tuple[str, ...] = ()  # names of takes, once it has ended
+        self.not_agreed: tuple[str, ...] = ()  # people of whom takes are missing, likewise
         self.text = ""  # why it failed
 
     @property
@@ -56,11 +57,20 @@ class GuidedModel(QObject):
         """Begin a session, or go on with one."""
         if self.busy:
             return
-        self.request, self.step, self.missing, self.text = request, None, (), ""
+        self.request, self.step, self.text = request, None, ""
+        self.missing = self.not_agreed = ()
         command = [*self._command, *request.words()]
         self._process = LiveProcess(command, self, self._take, self.changed.emit, self._end)
         self._set_state("starting")
         self._process.start()
+
+    def agree(self) -> None:
+        """The person agrees to be recorded."""
+        self._press("y")
+
+    def decline(self) -> None:
+        """The person does not agree to be recorded."""
+        self._press("n")
 
     def go_on(self) -> None:
         """Begin the take without waiting any longer."""
@@ -103,6 +113,7 @@ class GuidedModel(QObject):
                     self.warned.emit(f"{event['take']}: {doubt}")
             case "missing":
                 self.missing = tuple(event["takes"])
+                self.not_agreed = tuple(event["not_agreed"])
 
     def _end(self, code: int, said: str) -> None:
         self._process = None

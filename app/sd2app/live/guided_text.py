@@ -2,11 +2,32 @@
 
 from __future__ import annotations
 
+import re
+
 from sd2app.live.guided import GuidedModel
 from sd2core.files.tables import counted
 
+KEYS_OF_CONSENT = "Y: I agree    N: I do not agree    Esc: stop    F11: full screen"
 KEYS = "Space: go on    A: again    S: skip    Esc: stop    F11: full screen"
 KEYS_AT_END = "Esc: close    F11: full screen"
+
+
+def keys_text(model: GuidedModel) -> str:
+    """Keys that do something now."""
+    if not model.busy:
+        return KEYS_AT_END
+    return KEYS_OF_CONSENT if asks_consent(model) else KEYS
+
+
+def asks_consent(model: GuidedModel) -> bool:
+    """True while a person is to read what they agree to."""
+    return model.state == "running" and model.step is not None and model.step.phase == "consent"
+
+
+def consent_paragraphs(model: GuidedModel) -> str:
+    """Text to agree to: lines that were broken in the file go on, paragraphs stay apart."""
+    blocks = re.split(r"\n\s*\n", model.consent.strip())
+    return "\n\n".join(" ".join(block.split()) for block in blocks)
 
 
 def headline(model: GuidedModel) -> str:
@@ -18,6 +39,8 @@ def headline(model: GuidedModel) -> str:
         return "Thank you" if not model.missing else "Stopped"
     if model.state == "stopping" or step is None:
         return "One moment…"
+    if step.phase == "consent":
+        return f"{step.person}, do you agree?"
     if step.phase == "ready":
         return f"{step.person}, please"
     if not step.instruction:
@@ -38,13 +61,16 @@ def detail(model: GuidedModel) -> str:
     if model.state == "failed":
         return model.text
     if model.state == "ended":
+        if not model.missing:
+            return "Nothing is missing."
         lacking = f"{counted(len(model.missing), 'take')} missing: {', '.join(model.missing)}"
-        return lacking if model.missing else "Nothing is missing."
+        without = f"Not agreed: {', '.join(model.not_agreed)}" if model.not_agreed else ""
+        return "\n".join(filter(None, (lacking, without)))
     if step is None or not model.busy:
         return ""
     match step.phase:
         case "ready":
-            return "\n\n".join(filter(None, (" ".join(model.consent.split()), "Space begins.")))
+            return "Space begins."
         case "pause" if not step.instruction:
             return "A makes it once more."
         case "pause":

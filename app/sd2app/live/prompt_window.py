@@ -16,18 +16,34 @@ from PySide6.QtGui import (
     QPalette,
     QResizeEvent,
 )
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QScrollBar, QWidget
 
 from sd2app.live.gesture_picture import draw_gesture, has_picture, prepare_pictures
 from sd2app.live.guided import GuidedModel
-from sd2app.live.guided_text import KEYS, KEYS_AT_END, count_text, detail, headline, progress_text
+from sd2app.live.guided_text import (
+    asks_consent,
+    consent_paragraphs,
+    count_text,
+    detail,
+    headline,
+    keys_text,
+    progress_text,
+)
 from sd2app.widgets.panel import outlined
 
 _FRAME_MS = 50
-_HEAD, _COUNT, _DETAIL, _SMALL = 0.1, 0.26, 0.075, 0.028
+_HEAD, _COUNT, _DETAIL, _SMALL, _READ = 0.1, 0.26, 0.075, 0.028, 0.036
 """Heights of letters, as shares of the window's height."""
 _MARGIN = 0.05
-_LEAST_PX = 11.0
+_LEAST_PX, _LEAST_READ_PX = 11.0, 15.0
+_CONSENT_TOP, _CONSENT_BOTTOM = 0.26, 0.1
+"""Shares of the window's height above and below the text to agree to."""
+_SCROLLS: dict[int, QScrollBar.SliderAction] = {
+    Qt.Key.Key_Up: QScrollBar.SliderAction.SliderSingleStepSub,
+    Qt.Key.Key_Down: QScrollBar.SliderAction.SliderSingleStepAdd,
+    Qt.Key.Key_PageUp: QScrollBar.SliderAction.SliderPageStepSub,
+    Qt.Key.Key_PageDown: QScrollBar.SliderAction.SliderPageStepAdd,
+}
 _CENTRED = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignVCenter
 _WRAPPED = _CENTRED | Qt.TextFlag.TextWordWrap
 
@@ -43,6 +59,8 @@ class PromptWindow(QWidget):
         self.resize(960, 600)
         self._full = outlined("Full screen", "Full screen, or back (F11)", self._turn_full, self)
         self._full.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # Space is for the session
+        self._consent_text = QLabel()
+        self._consent = _consent_area(self._consent_text, self)
         self._clock = QTimer(self)
         self._clock.setInterval(_FRAME_MS)
         self._clock.timeout.connect(self.update)
@@ -62,10 +80,15 @@ class PromptWindow(QWidget):
         QTimer.singleShot(0, self, prepare_pictures)
 
     def _refresh(self) -> None:
-        words = (progress_text(self._model), headline(self._model), detail(self._model))
-        self.setAccessibleDescription(". ".join(filter(None, (*words, count_text(self._model)))))
+        words = [progress_text(self._model), headline(self._model), detail(self._model)]
         self._animate(self._picture())
         self._full.setVisible(not self._prompts)
+        if shown := asks_consent(self._model):
+            text = consent_paragraphs(self._model)
+            words.append(text)
+            self._consent_text.setText(text)
+        self._consent.setVisible(shown)
+        self.setAccessibleDescription(". ".join(filter(None, (*words, count_text(self._model)))))
         self.update()
 
     @property
@@ -98,6 +121,12 @@ class PromptWindow(QWidget):
                 self._model.again()
             case Qt.Key.Key_S:
                 self._model.skip()
+            case Qt.Key.Key_Y:
+                self._model.agree()
+            case Qt.Key.Key_N:
+                self._model.decline()
+            case key if key in _SCROLLS:
+                self._consent.verticalScrollBar().triggerAction(_SCROLLS[key])
             case Qt.Key.Key_Escape if self._model.busy:
                 self._model.stop()
             case Qt.Key.Key_Escape:
@@ -114,8 +143,16 @@ class PromptWindow(QWidget):
         super().closeEvent(event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Keep the button in its corner."""
+        """Keep the button in its corner, and the text to agree to between head and keys."""
         super().resizeEvent(event)
+        height, width = self.height(), self.width()
+        font = QFont(self.font())
+        font.setPixelSize(round(max(_READ * height, _LEAST_READ_PX)))
+        self._consent_text.setFont(font)
+        top, bottom, side = (
+            round(share * height) for share in (_CONSENT_TOP, _CONSENT_BOTTOM, 2 * _MARGIN)
+        )
+        self._consent.setGeometry(side, top, width - 2 * side, height - top - bottom)
         margin, size = round(_MARGIN * self.height()), self._full.sizeHint()
         corner = QRect(self.rect().bottomRight(), QSize(0, 0))
         self._full.setGeometry(
@@ -143,28 +180,31 @@ class PromptWindow(QWidget):
             self._write(painter, room, progress_text(model), 1.6 * small, left)
             self._write(painter, room, who, 1.6 * small, right)
             low = Qt.AlignmentFlag.AlignBottom | left
-            self._write(painter, room, KEYS if model.busy else KEYS_AT_END, small, low)
+            self._write(painter, room, keys_text(model), small, low)
             middle = room.adjusted(0.0, 2.5 * small, 0.0, -2.5 * small)
             if gesture := self._picture():
                 body = QRectF(middle)
                 body.setWidth(0.36 * room.width())
                 draw_gesture(painter, body, gesture, time.monotonic(), colours.color(figure))
                 middle.setLeft(body.right() + margin)
+            if asks_consent(model):
+                middle.setBottom(_CONSENT_TOP * self.height())
             self._paint_words(painter, middle)
 
     def _paint_words(self, painter: QPainter, room: QRectF) -> None:
         """Headline, count and detail, below each other."""
         count, height = count_text(self._model), self.height()
-        shares = (0.44, 0.36, 0.2) if count else (0.4, 0.0, 0.6)
+        text = detail(self._model)
+        shares = (0.44, 0.36, 0.2) if count else (0.4, 0.0, 0.6) if text else (1.0, 0.0, 0.0)
         top = room.top()
-        for text, share, size in zip(
-            (headline(self._model), count, detail(self._model)),
+        for words, share, size in zip(
+            (headline(self._model), count, text),
             shares,
             (_HEAD, _COUNT, _DETAIL),
             strict=True,
         ):
             part = QRectF(room.left(), top, room.width(), share * room.height())
-            self._write(painter, part, text, size * height, _WRAPPED, bold=size != _DETAIL)
+            self._write(painter, part, words, size * height, _WRAPPED, bold=size != _DETAIL)
             top = part.bottom()
 
     def _write(
@@ -190,3 +230,17 @@ class PromptWindow(QWidget):
             size_px = max(0.9 * size_px, _LEAST_PX)
         painter.setFont(font)
         painter.drawText(room, int(how), text)
+
+
+def _consent_area(text: QLabel, parent: QWidget) -> QScrollArea:
+    """Where a person reads what they agree to; the keys stay those of the window."""
+    area = QScrollArea(parent)
+    text.setWordWrap(True)
+    text.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
+    text.setTextFormat(Qt.TextFormat.PlainText)
+    area.setWidget(text)
+    area.setWidgetResizable(True)
+    area.setFrameShape(QFrame.Shape.NoFrame)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    return area

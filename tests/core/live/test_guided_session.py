@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -11,6 +14,7 @@ from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import GESTURES
+from sd2core.live.consent import FILE_NAME, Consent
 from sd2core.live.protocol import PAPER, Gesture, Protocol, Take, read_protocol
 from sd2core.live.session import Session
 
@@ -43,15 +47,20 @@ PROTOCOLS = st.builds(
     order=st.sampled_from(["fixed", "random"]),
     seed=st.integers(0, 99),
 )
-KEYS = ["go on", "again", "skip", ""]
+KEYS = ["go on", "again", "skip", "agree", "decline", ""]
+_ENDS = {"ready": "go on", "consent": "agree"}
 
 
 def _drive(session: Session, keys: list[str]) -> list[str]:
     """Names of the takes that are stored, second by second, with a key at each; then to its end."""
     stored, now_s = [], 0.0
     while session.phase != "over":
-        key = keys.pop(0) if keys else "go on" if session.phase == "ready" else ""
+        key = keys.pop(0) if keys else _ENDS.get(session.phase, "")
         match key:
+            case "agree":
+                session.agree()
+            case "decline":
+                session.decline(now_s)
             case "go on":
                 session.go_on()
             case "again":
@@ -107,6 +116,66 @@ def test_whatever_keys_are_pressed_what_was_not_stored_is_missing(
     assert stored.total() - len(stored) <= pressed.count("again")
 
 
+@given(PROTOCOLS, st.lists(st.sampled_from(KEYS), max_size=60), st.booleans())
+def test_nobody_is_recorded_who_has_not_agreed(
+    protocol: Protocol, keys: list[str], first_agreed: bool
+) -> None:
+    protocol = replace(protocol, consent="\nYou are filmed.\n")
+    first = protocol.people[0]
+    session = Session(protocol, agreed=[first] if first_agreed else [])
+    agreed, asked = {first} if first_agreed else set(), Counter[str]()
+    was_agreed = Session.agree
+
+    def agree() -> None:
+        if session.phase == "consent":
+            agreed.add(session.take.person)
+            asked[session.take.person] += 1
+        was_agreed(session)
+
+    session.agree = agree  # type: ignore[method-assign]
+    stored = _drive(session, keys)
+    people = {take.person for take in protocol.takes if take.name in stored}
+    assert people <= agreed
+    assert not asked or max(asked.values()) == 1  # nobody is asked twice
+    assert not (first_agreed and asked[first])
+
+
+def test_who_does_not_agree_is_left_out_and_the_next_is_asked() -> None:
+    session = Session(_protocol(["anna", "ben"], ["up", "down"], consent="You are filmed."))
+    for key in (session.go_on, lambda: session.advance(1e6)):
+        key()
+        assert session.phase == "consent"
+    session.decline(0.0)
+    assert (session.phase, session.take.person) == ("consent", "ben")
+    session.agree()
+    assert session.phase == "ready"
+    session.go_on()
+    assert session.phase == "opening"
+    assert [one.person for one in session.missing] == 2 * ["anna"] + 2 * ["ben"]
+
+
+def test_agreements_hold_for_their_text_and_from_one_session_to_the_next(tmp_path: Path) -> None:
+    before = datetime.now(UTC) - timedelta(seconds=1)
+    Consent(tmp_path, "You are filmed.").agree("anna")
+    again = Consent(tmp_path, "You are filmed.")
+    assert [*again.agreements] == ["anna"]
+    assert before <= again.agreements["anna"].agreed_at <= datetime.now(UTC)
+    changed = Consent(tmp_path, "You are filmed and heard.")
+    assert not changed.agreements
+    changed.agree("ben")
+    kept = json.loads((tmp_path / FILE_NAME).read_text(encoding="utf-8"))
+    # Which text it was can be read years later.
+    texts = [kept["texts"][one["text_sha256"]] for one in kept["agreements"]]
+    assert texts == ["You are filmed.", "You are filmed and heard."]
+    assert [*Consent(tmp_path, "You are filmed.").agreements] == ["anna"]
+
+
+def test_agreements_that_cannot_be_read_are_no_agreements(tmp_path: Path) -> None:
+    (tmp_path / FILE_NAME).write_text('{"agreements": [{"person": "anna"}]}', encoding="utf-8")
+    with pytest.raises(Sd2Error, match=r"consent\.json.*agreed_at"):
+        Consent(tmp_path, "You are filmed.")
+
+
 @given(PROTOCOLS, st.integers(0, 36))
 def test_a_session_goes_on_where_it_was_interrupted(protocol: Protocol, made: int) -> None:
     names = [take.name for take in protocol.takes]
@@ -117,7 +186,7 @@ def test_a_session_goes_on_where_it_was_interrupted(protocol: Protocol, made: in
 @given(PROTOCOLS)
 def test_a_persons_order_does_not_depend_on_the_others(protocol: Protocol) -> None:
     last = protocol.people[-1]
-    alone = protocol.model_copy(update={"people": (last,)})
+    alone = replace(protocol, people=(last,))
     assert alone.takes == tuple(one for one in protocol.takes if one.person == last)
 
 

@@ -38,6 +38,7 @@ order = "fixed"
 take_s = 1
 pause_s = 1
 countdown_s = 1
+consent = "You are filmed."
 
 [[gestures]]
 name = "left-to-right"
@@ -127,7 +128,7 @@ def _session(
 @pytest.mark.slow
 def test_a_session_ends_in_recordings_of_the_right_labels(tmp_path: Path) -> None:
     protocol, folder = tmp_path / "try.toml", tmp_path / "session"
-    protocol.write_text(PROTOCOL, encoding="utf-8")
+    protocol.write_text(PROTOCOL.replace('["anna"]', '["anna", "ben"]'), encoding="utf-8")
     pressed: list[str] = []
 
     def keys(event: dict[str, Any]) -> str:
@@ -135,6 +136,8 @@ def test_a_session_ends_in_recordings_of_the_right_labels(tmp_path: Path) -> Non
             return ""
         key = ""
         match event["phase"], event.get("gesture"):
+            case "consent", _:
+                key = " y" if event["person"] == "anna" else " n"  # Space is no agreement
             case "ready", _:
                 key = " "
             case "prompt", "left-to-right" if "a" not in pressed:
@@ -147,8 +150,9 @@ def test_a_session_ends_in_recordings_of_the_right_labels(tmp_path: Path) -> Non
     told = _session(protocol, folder, keys)
     stored = [one for one in told if one["event"] == "stored"]
     assert [one["take"] for one in stored] == ["anna-left-to-right-1"]
-    assert told[-1] == {"event": "missing", "takes": ["anna-wave-1"]}
-    assert [one.name for one in folder.iterdir()] == ["anna-left-to-right-1.sd2"]
+    lacks = ["anna-wave-1", "ben-left-to-right-1", "ben-wave-1"]
+    assert told[-1] == {"event": "missing", "takes": lacks, "not_agreed": ["ben"]}
+    assert {one.name for one in folder.iterdir()} == {"anna-left-to-right-1.sd2", "consent.json"}
 
     # The same command goes on with what is missing; a leftover of a killed one is no take. The
     # last take is made again after it, in its own place.
@@ -157,16 +161,18 @@ def test_a_session_ends_in_recordings_of_the_right_labels(tmp_path: Path) -> Non
 
     def keys_of_the_second(event: dict[str, Any]) -> str:
         after_all = event.get("phase") == "pause" and "gesture" not in event
-        key = "\n" if event.get("phase") == "ready" else ""
+        key = {"ready": "\n", "consent": "n"}.get(event.get("phase", ""), "")
         if after_all and "a" not in pressed:
             key = "a"
         pressed.extend(key)
         return key
 
     told = _session(protocol, folder, keys_of_the_second)
-    assert told[0]["missing"] == 1
+    assert told[0]["missing"] == 3
+    asked = {one["person"] for one in told if one.get("phase") == "consent"}
+    assert asked == {"ben"}  # anna has agreed before
     assert [one["take"] for one in told if one["event"] == "stored"] == 2 * ["anna-wave-1"]
-    assert told[-1] == {"event": "missing", "takes": []}
+    assert told[-1] == {"event": "missing", "takes": lacks[1:], "not_agreed": ["ben"]}
     assert not (folder / "unfinished").exists()
 
     for name, gesture in (("anna-left-to-right-1", "left-to-right"), ("anna-wave-1", "wave")):
@@ -222,7 +228,7 @@ def test_a_video_is_dropped_only_where_wanted_and_a_body_is_there(
     protocol = tmp_path / "try.toml"
     protocol.write_text(f'video = "{kept}"\n{PROTOCOL}', encoding="utf-8")
     told = _session(protocol, folder, lambda _: "")
-    assert told[-1] == {"event": "missing", "takes": []}
+    assert told[-1] == {"event": "missing", "takes": [], "not_agreed": []}
     dropped = [one["takes"] for one in told if one["event"] == "dropped"]
     assert dropped == ([["anna-left-to-right-1"]] if kept == "drop" else [])
     with_body, without = (open_recording(path) for path in sorted(folder.iterdir()))

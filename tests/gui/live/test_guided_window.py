@@ -9,12 +9,12 @@ import pytest
 from answering import once_asked
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QWidget
+from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QScrollArea, QWidget
 
 from sd2app.live.dialog import ListenDialog
 from sd2app.live.gesture_picture import has_picture
 from sd2app.live.guided import GuidedModel, Step
-from sd2app.live.guided_text import count_text, detail, headline, progress_text
+from sd2app.live.guided_text import consent_paragraphs, count_text, detail, headline, progress_text
 from sd2app.live.prompt_window import PromptWindow
 from sd2app.live.setup import ListenRequest, ListenSetup
 from sd2app.settings import Settings
@@ -85,8 +85,12 @@ def test_keys_steer_a_session_that_ends_in_labelled_recordings(
         return model.step
 
     model.start(_request(protocol, folder))
+    assert wait_for("consent").person == "anna"
+    assert "You are filmed." in view.accessibleDescription()
+    QTest.keyClick(view, Qt.Key.Key_Space)  # is no agreement
+    QTest.keyClick(view, Qt.Key.Key_Y)
     assert wait_for("ready").person == "anna"
-    assert model.consent == "You are filmed."
+    assert "You are filmed." not in view.accessibleDescription()
     QTest.keyClick(view, Qt.Key.Key_Space)
     assert wait_for("prompt").gesture == "left-to-right"
     assert "Swipe to your left" in view.accessibleDescription()
@@ -97,11 +101,11 @@ def test_keys_steer_a_session_that_ends_in_labelled_recordings(
     QTest.keyClick(view, Qt.Key.Key_S)
     qtbot.waitUntil(lambda: model.state == "ended", timeout=LIMIT_MS)
     assert model.missing == ("anna-wave-1",)
-    assert [one.name for one in folder.iterdir()] == ["anna-left-to-right-1.sd2"]
+    assert {one.name for one in folder.iterdir()} == {"anna-left-to-right-1.sd2", "consent.json"}
     (span,) = open_recording(folder / "anna-left-to-right-1.sd2").labelled.spans
     assert span.label == "left-to-right"
 
-    # Once more into the same folder; Escape stops, and then closes.
+    # Once more into the same folder, and not asked again; Escape stops, and then closes.
     model.start(_request(protocol, folder))
     assert wait_for("ready").gesture == "wave"
     QTest.keyClick(view, Qt.Key.Key_F11)
@@ -122,10 +126,11 @@ def test_why_a_session_cannot_be_is_read_in_its_window(model, parent, qtbot, tmp
 
 
 def test_what_is_read_at_every_moment(model) -> None:
-    model.state, model.consent = "running", "You are\nfilmed."
+    model.state, model.consent = "running", "You are\nfilmed.\n\nYou can\nstop."
     asked = ("p1", "left-to-right", "Swipe")
     read = []
     for step in (
+        Step("consent", 1, 3, None, *asked),
         Step("ready", 1, 3, None, *asked),
         Step("opening", 1, 3, None, *asked),
         Step("countdown", 1, 3, 2, *asked),
@@ -136,7 +141,8 @@ def test_what_is_read_at_every_moment(model) -> None:
         model.step = step
         read.append((headline(model), count_text(model), detail(model)))
     assert read == [
-        ("p1, please", "", "You are filmed.\n\nSpace begins."),
+        ("p1, do you agree?", "", ""),
+        ("p1, please", "", "Space begins."),
         ("Swipe", "", "Stand still"),
         ("Swipe", "2", "Stand still"),
         ("Swipe", "9", "Now"),
@@ -144,6 +150,29 @@ def test_what_is_read_at_every_moment(model) -> None:
         ("That was the last take", "4", "A makes it once more."),
     ]
     assert progress_text(model) == "Take 3 of 3"
+    assert consent_paragraphs(model) == "You are filmed.\n\nYou can stop."
+    model.state, model.missing, model.not_agreed = "ended", ("p1-wave-1", "p2-wave-1"), ("p2",)
+    assert detail(model) == "2 takes missing: p1-wave-1, p2-wave-1\nNot agreed: p2"
+
+
+def test_a_long_text_to_agree_to_is_scrolled_by_keys_and_declined_by_one(
+    model, parent, qtbot, monkeypatch
+) -> None:
+    view = PromptWindow(model, parent)
+    view.resize(640, 360)
+    view.show()
+    pressed: list[str] = []
+    monkeypatch.setattr(model, "_press", pressed.append)
+    model.state, model.consent = "running", "\n\n".join(["You are filmed."] * 60)
+    model.step = Step("consent", 1, 3, None, "p1", "wave", "Wave")
+    model.changed.emit()
+    bar = view.findChild(QScrollArea).verticalScrollBar()
+    qtbot.waitUntil(bar.isVisible)
+    QTest.keyClick(view, Qt.Key.Key_PageDown)
+    assert bar.value() == bar.pageStep()
+    for key in (Qt.Key.Key_N, Qt.Key.Key_Y):
+        QTest.keyClick(view, key)
+    assert pressed == ["n", "y"]
 
 
 def test_the_window_turns_while_a_person_is_to_move_and_a_body_shows_how(model, parent) -> None:
