@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import sys
+import textwrap
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -28,6 +29,8 @@ from sd2core.runs.control import stop_signals
 UNFINISHED = "unfinished"
 """Folder for the take that is being made."""
 
+_LETTERS = 80
+"""In a line of the text that is agreed to."""
 _WAIT_S = 0.05
 _OPEN_S = 15.0
 """By then, camera and radar have given something."""
@@ -259,7 +262,8 @@ class _Telling:
         match session.phase:
             case "consent":
                 asks = f"{take.person}: do you agree? y: yes, n: no (none of your takes is made)."
-                return ["", protocol.consent_text, asks]
+                paragraphs = protocol.consent_text.splitlines()
+                return ["", *(textwrap.fill(one, _LETTERS) for one in paragraphs), asks]
             case "ready":
                 return ["", f"{take.person}: Space begins."]
             case "pause":

@@ -43,6 +43,8 @@ def section_lines(name: str, table: Mapping[str, Any], folder: Path) -> list[str
 
 def _text(value: str) -> str:
     """Write a basic string of TOML: JSON's, but for one character."""
+    if "\n" in value:
+        return '"""\n' + "\n".join(_text(line)[1:-1] for line in value.split("\n")) + '"""'
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import random
+import re
+from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import Field
+from pydantic import AfterValidator, Field, TypeAdapter
+from pydantic_core import PydanticCustomError
 
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_write_text
 from sd2core.files.resources import resource_path
-from sd2core.files.texts import read_text
+from sd2core.files.texts import faults_in, read_text
+from sd2core.files.toml import toml_lines
 from sd2core.labels.colours import OFFERED
 from sd2core.labels.label_set import GESTURES, Label, LabelSet
 from sd2core.options.bounds import SEED, Bounds
@@ -21,7 +28,14 @@ from sd2core.options.toml_files import parsed
 PAPER = "paper"
 """Name of the protocol that comes with the program."""
 
-_Name = Annotated[str, Field(pattern=r"^\w[\w-]{0,39}$")]
+
+def _name(text: str) -> str:
+    if not re.fullmatch(r"\w[\w-]{0,39}", text):
+        raise PydanticCustomError("name", "up to 40 letters, digits, - and _")
+    return text
+
+
+_Name = Annotated[str, AfterValidator(_name)]
 """Part of a recording's name."""
 _Times = Annotated[int, Bounds(1, 1000, whole=True)]
 _TakeS = Annotated[float, Bounds(0.0, 3600.0, above=True)]
@@ -160,6 +174,30 @@ class Protocol(OptionRecord):
         if background.name not in {one.name for one in labels}:
             labels.append(Label(background.name, background.colour, "0", background.gesture_class))
         return LabelSet(self.title, tuple(labels))
+
+
+def protocol_of(content: Mapping[str, Any]) -> Protocol:
+    """Protocol of plain values, as files have them; Sd2Error names what is not allowed."""
+    with faults_in("The protocol", "a protocol of a guided session"):
+        return TypeAdapter(Protocol).validate_json(json.dumps(content))
+
+
+def content_of(protocol: Protocol) -> dict[str, Any]:
+    """All values of a protocol, for :func:`protocol_of`."""
+    content = {one.name: getattr(protocol, one.name) for one in fields(protocol)}
+    gestures = [dict(vars(one)) for one in protocol.gestures]
+    return content | {"people": [*protocol.people], "gestures": gestures}
+
+
+def write_protocol(path: Path, protocol: Protocol) -> None:
+    """Write a file for :func:`read_protocol`, without what is as by default."""
+    content, folder = content_of(protocol), path.parent
+    gestures = content.pop("gestures")
+    usual = {one.name: one.default for one in fields(protocol)}
+    lines = toml_lines({k: v for k, v in content.items() if v != usual[k]}, folder)
+    for one in gestures:
+        lines += ["", "[[gestures]]", *toml_lines({k: v for k, v in one.items() if v}, folder)]
+    atomic_write_text(path, "\n".join(lines) + "\n")
 
 
 def read_protocol(source: Path | str) -> Protocol:

@@ -6,14 +6,17 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QSignalBlocker
-from PySide6.QtWidgets import QDialog, QLabel, QLineEdit, QToolButton, QWidget
+from PySide6.QtWidgets import QDialog, QLabel, QLineEdit, QMessageBox, QToolButton, QWidget
 
+from sd2app.live.protocol_dialog import TOML, ProtocolDialog
+from sd2app.live.protocol_draft import ProtocolDraft
 from sd2app.live.setup import DCA1000, REPLAY, ListenSetup, ways
 from sd2app.manual.help import with_help
-from sd2app.widgets.dialogs import accepting, ask_file, ask_new
+from sd2app.widgets.dialogs import accepted, accepting, ask_file, ask_new
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence
+from sd2core.errors import Sd2Error
 from sd2core.io.kinds import RADAR_SUFFIXES
 from sd2core.io.readers import RADAR_FILES, suffixes_of
 from sd2core.live.protocol import PAPER
@@ -41,7 +44,6 @@ _PROTOCOLS = {
     PAPER: "the paper's: six people, four gestures",
     "file": "a file…",
 }
-_TOML = "Protocol of a session (*.toml);;All files (*)"
 _NONE = "none chosen"
 
 
@@ -78,13 +80,15 @@ class ListenDialog(QDialog):
         self._file_name, self._address_name = QLabel(self), QLabel("Address", self)
         buttons, self._begin = accepting(self, "Record")
         self._file_button = self._button(self._ask_file)
+        tip = "Make a protocol, the paper's to begin with, or edit the one that is chosen"
+        edit = outlined("Edit…", tip, self._edit_protocol, self)
         form = form_of(
             ("Camera", self._camera),
             ("Radar", self._way),
             (self._file_name, row_of((self._file, 1), self._file_button, spacing_px=8)),
             (self._address_name, self._address),
             ("", self._hint),
-            ("Protocol", self._protocol),
+            ("Protocol", row_of((self._protocol, 1), edit, spacing_px=8)),
             ("Into", row_of((self._folder, 1), self._button(self._ask_folder), spacing_px=8)),
             gaps_px=(16, 12),
         )
@@ -128,9 +132,18 @@ class ListenDialog(QDialog):
 
     def _choose_protocol(self, protocol: str) -> None:
         if protocol == "file":
-            protocol = str(ask_file(self, "Protocol", _TOML, "") or self._setup.protocol)
+            protocol = str(ask_file(self, "Protocol", TOML, "") or self._setup.protocol)
         self._setup.choose("protocol", protocol)
         _show_file(self._protocol, self._setup.protocol)
+
+    def _edit_protocol(self) -> None:
+        try:
+            draft = ProtocolDraft(self._setup.protocol or PAPER, self)
+        except Sd2Error as error:
+            QMessageBox.warning(self, "Protocol", str(error))
+            return
+        if accepted(ProtocolDialog(draft, self)) and draft.path is not None:
+            self._choose_protocol(str(draft.path))
 
     def _ask_file(self) -> None:
         setup = self._setup

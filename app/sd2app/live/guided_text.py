@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import re
-
 from sd2app.live.guided import GuidedModel
 from sd2core.files.tables import counted
 
-KEYS_OF_CONSENT = "Y: I agree    N: I do not agree    Esc: stop    F11: full screen"
+KEYS_OF_CONSENT = "Y: I agree    N: I do not agree    ↑ ↓: read on    Esc: stop    F11: full screen"
 KEYS = "Space: go on    A: again    S: skip    Esc: stop    F11: full screen"
 KEYS_AT_END = "Esc: close    F11: full screen"
 
@@ -22,12 +20,6 @@ def keys_text(model: GuidedModel) -> str:
 def asks_consent(model: GuidedModel) -> bool:
     """True while a person is to read what they agree to."""
     return model.state == "running" and model.step is not None and model.step.phase == "consent"
-
-
-def consent_paragraphs(model: GuidedModel) -> str:
-    """Text to agree to: lines that were broken in the file go on, paragraphs stay apart."""
-    blocks = re.split(r"\n\s*\n", model.consent.strip())
-    return "\n\n".join(" ".join(block.split()) for block in blocks)
 
 
 def headline(model: GuidedModel) -> str:

@@ -22,7 +22,6 @@ from sd2app.live.gesture_picture import draw_gesture, has_picture, prepare_pictu
 from sd2app.live.guided import GuidedModel
 from sd2app.live.guided_text import (
     asks_consent,
-    consent_paragraphs,
     count_text,
     detail,
     headline,
@@ -36,7 +35,7 @@ _HEAD, _COUNT, _DETAIL, _SMALL, _READ = 0.1, 0.26, 0.075, 0.028, 0.036
 """Heights of letters, as shares of the window's height."""
 _MARGIN = 0.05
 _LEAST_PX, _LEAST_READ_PX = 11.0, 15.0
-_CONSENT_TOP, _CONSENT_BOTTOM = 0.26, 0.1
+_CONSENT_TOP, _CONSENT_BOTTOM = 0.28, 0.15
 """Shares of the window's height above and below the text to agree to."""
 _SCROLLS: dict[int, QScrollBar.SliderAction] = {
     Qt.Key.Key_Up: QScrollBar.SliderAction.SliderSingleStepSub,
@@ -84,9 +83,8 @@ class PromptWindow(QWidget):
         self._animate(self._picture())
         self._full.setVisible(not self._prompts)
         if shown := asks_consent(self._model):
-            text = consent_paragraphs(self._model)
-            words.append(text)
-            self._consent_text.setText(text)
+            words.append(self._model.consent)
+            self._consent_text.setText(self._model.consent)
         self._consent.setVisible(shown)
         self.setAccessibleDescription(". ".join(filter(None, (*words, count_text(self._model)))))
         self.update()
@@ -100,8 +98,9 @@ class PromptWindow(QWidget):
     def _picture(self) -> str:
         """Gesture that is shown by a body, empty for none."""
         step = self._model.step
-        shown = step is not None and self._model.state == "running" and step.phase != "ready"
-        return step.gesture if shown and step is not None and has_picture(step.gesture) else ""
+        if step is None or self._model.state != "running" or step.phase in ("consent", "ready"):
+            return ""
+        return step.gesture if has_picture(step.gesture) else ""
 
     def _animate(self, gesture: str) -> None:
         if bool(gesture) != self._clock.isActive():
@@ -188,7 +187,7 @@ class PromptWindow(QWidget):
                 draw_gesture(painter, body, gesture, time.monotonic(), colours.color(figure))
                 middle.setLeft(body.right() + margin)
             if asks_consent(model):
-                middle.setBottom(_CONSENT_TOP * self.height())
+                middle.setBottom((_CONSENT_TOP - 0.03) * self.height())
             self._paint_words(painter, middle)
 
     def _paint_words(self, painter: QPainter, room: QRectF) -> None:

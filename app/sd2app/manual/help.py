@@ -23,6 +23,7 @@ HELP = {
     "Agree": "tutorials/label-fast.md#3-compare-with-a-second-annotator",
     "New from video": "tutorials/video-to-data-set.md#2-fit-a-body",
     "Record": "how-to/record-a-live-radar.md",
+    "Protocol": "how-to/record-a-live-radar.md#a-guided-session",
     "Align automatically": "how-to/align-video-and-radar.md",
     "Compare meshes": "how-to/compare-with-another-mesh.md",
     "Inertial sensor": "imu.md#in-the-window",

@@ -15,7 +15,16 @@ from hypothesis import strategies as st
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import GESTURES
 from sd2core.live.consent import FILE_NAME, Consent
-from sd2core.live.protocol import PAPER, Gesture, Protocol, Take, read_protocol
+from sd2core.live.protocol import (
+    PAPER,
+    Gesture,
+    Protocol,
+    Take,
+    content_of,
+    protocol_of,
+    read_protocol,
+    write_protocol,
+)
 from sd2core.live.session import Session
 
 _NAMES = st.lists(
@@ -257,6 +266,31 @@ def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, text: str, words: s
     with pytest.raises(Sd2Error, match=words) as raised:
         read_protocol(file)
     assert "mine.toml" in str(raised.value)
+
+
+@given(
+    PROTOCOLS,
+    st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\r"), max_size=60),
+    st.floats(0.0, 3600.0),
+)
+def test_what_is_written_is_read_again(
+    tmp_path_factory: pytest.TempPathFactory, protocol: Protocol, text: str, pause_s: float
+) -> None:
+    file = tmp_path_factory.mktemp("protocols") / "mine.toml"
+    protocol = replace(protocol, consent=text, pause_s=pause_s, title=f"{text}.")
+    write_protocol(file, protocol)
+    assert read_protocol(file) == protocol
+    assert protocol_of(content_of(protocol)) == protocol
+
+
+def test_a_text_of_several_lines_is_written_as_such(tmp_path: Path) -> None:
+    text = 'You "are"\n\nfilmed \\n here'
+    write_protocol(tmp_path / "mine.toml", _protocol(["anna"], ["up"], consent=text))
+    lines = (tmp_path / "mine.toml").read_text(encoding="utf-8").splitlines()
+    begin = lines.index('consent = """')
+    assert lines[begin + 1 : begin + 4] == ['You \\"are\\"', "", 'filmed \\\\n here"""']
+    assert "take_s = 2.0" in lines
+    assert "repetitions" not in " ".join(lines)  # as by default
 
 
 def test_two_names_that_run_into_each_other_are_refused(tmp_path: Path) -> None:

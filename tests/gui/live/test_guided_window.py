@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QScrollArea, QWidge
 from sd2app.live.dialog import ListenDialog
 from sd2app.live.gesture_picture import has_picture
 from sd2app.live.guided import GuidedModel, Step
-from sd2app.live.guided_text import consent_paragraphs, count_text, detail, headline, progress_text
+from sd2app.live.guided_text import count_text, detail, headline, progress_text
 from sd2app.live.prompt_window import PromptWindow
 from sd2app.live.setup import ListenRequest, ListenSetup
 from sd2app.settings import Settings
@@ -126,7 +126,7 @@ def test_why_a_session_cannot_be_is_read_in_its_window(model, parent, qtbot, tmp
 
 
 def test_what_is_read_at_every_moment(model) -> None:
-    model.state, model.consent = "running", "You are\nfilmed.\n\nYou can\nstop."
+    model.state, model.consent = "running", "You are filmed."
     asked = ("p1", "left-to-right", "Swipe")
     read = []
     for step in (
@@ -150,7 +150,6 @@ def test_what_is_read_at_every_moment(model) -> None:
         ("That was the last take", "4", "A makes it once more."),
     ]
     assert progress_text(model) == "Take 3 of 3"
-    assert consent_paragraphs(model) == "You are filmed.\n\nYou can stop."
     model.state, model.missing, model.not_agreed = "ended", ("p1-wave-1", "p2-wave-1"), ("p2",)
     assert detail(model) == "2 takes missing: p1-wave-1, p2-wave-1\nNot agreed: p2"
 
