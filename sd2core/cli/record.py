@@ -4,26 +4,30 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 import re
+import time
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import add_command
+from sd2core.cli.keys import pressed_keys
 from sd2core.cli.output import counted, print_event, print_facts, print_json
-from sd2core.options.kinds import Positive
+from sd2core.options.kinds import Around, Positive
 from sd2core.options.records import OptionError, Place
 from sd2core.options.shared import Json
 from sd2core.runs.control import stop_signals
 
 if TYPE_CHECKING:
     from sd2core.live.cameras import Camera
+    from sd2core.live.checking import Answer
     from sd2core.live.clocks import ClockLine
     from sd2core.live.filming import CameraChoice, Film
     from sd2core.live.joint import JointRecording
     from sd2core.live.sources import Source
 
-_CHECK_S = 10.0
+_CHECK_S, _FINDINGS_S = 10.0, 1.0
 _SIZE = re.compile(r"(\d{2,5})x(\d{2,5})")
 
 
@@ -49,6 +53,9 @@ class Record(Json):
     check
         record nothing: say whether radar and camera see the same person move, where, with which
         sign and delay; the exit code is 1 if one of four findings is bad
+    placement : RANGE,AZIMUTH[,ELEVATION]
+        where the radar is as seen from the person, in metres and degrees, as --check finds it: kept
+        as the recording's planned placement
     size : WIDTHxHEIGHT
         of the camera's pictures, where it can (default: as it comes)
     rate : HZ
@@ -63,7 +70,8 @@ class Record(Json):
     seconds : S
         stop after so long (default: never; 10 with --check)
     previews
-        with --json, small pictures of the camera, and every column of the Doppler map
+        with --json, small pictures of the camera, and every column of the Doppler map; with --check
+        what was found so far
     """
 
     camera: str
@@ -72,6 +80,7 @@ class Record(Json):
     out: Annotated[Path | None, Place(one_of="purpose", needed=True)] = None
     protocol: str | None = None
     check: Annotated[bool, Place(one_of="purpose", needed=True)] = False
+    placement: Around | None = None
     size: str | None = None
     rate: Positive | None = None
     exposure: float | None = None
@@ -86,6 +95,8 @@ class Record(Json):
             raise OptionError(
                 "--previews is given without --json", "both, for a program that reads them"
             )
+        if self.placement is not None and self.check:
+            raise OptionError("--placement is given with --check", "what --check finds")
         if self.protocol is not None and (self.seconds or self.previews or self.check):
             raise OptionError(
                 "--protocol is given with --seconds, --previews or --check",
@@ -136,27 +147,62 @@ def _record(options: Record) -> int:
 
 def _check(options: Record, choice: CameraChoice) -> int:
     """Say what radar and camera see; 1 if they cannot be recorded with."""
-    from sd2core.live.checking import check_place
-    from sd2core.live.looking import look
+    from sd2core.live.checking import check_place, found_place
+    from sd2core.live.filming import preview_of
+    from sd2core.live.looking import Looked, look
     from sd2core.live.radars import open_radar
 
     seconds = options.seconds or _CHECK_S
-    with contextlib.ExitStack() as stack, stop_signals() as told:
+    with contextlib.ExitStack() as stack, stop_signals() as told, pressed_keys() as key:
         source = open_radar(options.radar, options.setup)
         stack.callback(source.close)
         camera = choice.open()
         stack.callback(camera.close)
         if not options.json:
             print(f"{camera.about}\n{source.about}\n  {seconds:g} s: walk towards both, and away.")
+        radar, begin_s = source.head(0.0).radar, time.monotonic()
+        shown: Any = None
+        told_findings = 0
+
+        def follow(looked: Looked) -> None:
+            nonlocal shown, told_findings
+            if key().lower() == "q":
+                told.set()
+            if not options.previews:
+                return
+            if looked.picture is not None and looked.picture is not shown:
+                shown = looked.picture
+                print_event("preview", picture=preview_of(looked.picture))
+            passed_s = time.monotonic() - begin_s
+            if passed_s >= (told_findings + 1) * _FINDINGS_S:
+                told_findings += 1
+                left_s = max(math.ceil(seconds - passed_s), 1)
+                findings = check_place(radar, looked.seen, looked.moved)
+                print_event("findings", left_s=left_s, **_found(findings))
+
         delays_s = _delays_s(options, camera, source)
-        seen, moved = look(source, camera, delays_s, seconds, told)
-        findings = check_place(source.head(0.0).radar, seen, moved)
-    if options.json:
-        print_json({"findings": [vars(one) for one in findings]})
+        looked = look(source, camera, delays_s, seconds, told, follow)
+    findings = check_place(radar, looked.seen, looked.moved)
+    if options.previews:
+        print_event("findings", left_s=0, **_found(findings))
+    elif options.json:
+        print_json(_found(findings))
     else:
         for one in findings:
             print(f"  {'ok   ' if one.passed else 'WRONG'}  {one.sentence}")
+        if (place := found_place(findings)) is not None:
+            print(f"  As seen from what moves, a radar beside the camera is at {place.words}.")
+            print(f"  To keep that in recordings: --placement {place.range_m},{place.azimuth_deg}")
     return 0 if all(one.passed for one in findings) else 1
+
+
+def _found(findings: list[Answer]) -> dict[str, Any]:
+    """Findings, and the place that follows from them, for other programs."""
+    from sd2core.live.checking import found_place
+
+    place = found_place(findings)
+    told = {"findings": [vars(one) for one in findings]}
+    return told | {"place": None if place is None else vars(place)}
 
 
 def _guide(options: Record, choice: CameraChoice) -> None:
@@ -201,10 +247,14 @@ def _open(options: Record, choice: CameraChoice, folder: Path) -> JointRecording
     """Camera and radar that the options name, to be recorded into a folder."""
     from sd2core.live.joint import JointRecording
     from sd2core.live.radars import open_radar
+    from sd2core.placements.placements import PlacementGrid
 
     source = open_radar(options.radar, options.setup)
     delays_s = partial(_delays_s, options)
-    return JointRecording(folder, choice, source, delays_s, previews=options.previews)
+    take = JointRecording(folder, choice, source, delays_s, previews=options.previews)
+    if options.placement is not None:
+        take.placements = PlacementGrid(*((number,) for number in options.placement))
+    return take
 
 
 def _delays_s(options: Record, camera: Camera | Film, source: Source) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sd2core.body.camera import DEFAULT_FIELD_OF_VIEW_DEG
 from sd2core.fmcw.chain import Chain, ProcessingOptions
 from sd2core.io.radar.capture import RadarCapture
+from sd2core.placements.placements import Place
 from sd2core.radar_config import CLUTTER, RadarConfig
 
 PICTURE_WIDTH_PX = 160
@@ -149,6 +150,19 @@ def check_place(config: RadarConfig, seen: Sequence[Seen], moved: Sequence[Moved
         In the pictures, in order of time.
     """
     return [_motion(config, seen), _range(config, seen), _view(moved), _agreement(seen, moved)]
+
+
+def found_place(findings: Sequence[Answer]) -> Place | None:
+    """Where a radar beside the camera is, as seen from what moves; None if one is not certain.
+
+    The distance is the radar's, the direction that of the camera: 10° to the right in the picture
+    is what a camera, and a radar, sees that is 10° to its left.
+    """
+    of = {one.name: one for one in findings if one.passed}
+    if "median_m" not in getattr(of.get("range"), "numbers", {}) or "view" not in of:
+        return None
+    azimuth_deg = -of["view"].numbers["azimuth_deg"]
+    return Place(round(of["range"].numbers["median_m"], 2), round(azimuth_deg, 1) + 0.0)
 
 
 def _motion(config: RadarConfig, seen: Sequence[Seen]) -> Answer:

@@ -254,17 +254,17 @@ class _Filming:
     def _tell_progress(self, picture: NDArray[np.uint8] | None) -> None:
         told: dict[str, Any] = asdict(self._filmed)
         if picture is not None:
-            told["picture"] = base64.b64encode(_small(picture)).decode("ascii")
+            told["picture"] = preview_of(picture)
         _tell("filmed", **told)
 
 
-def _small(picture: NDArray[np.uint8]) -> bytes:
-    """Preview of a picture, as JPEG."""
+def preview_of(picture: NDArray[np.uint8]) -> str:
+    """Preview of a picture: JPEG as Base64."""
     import cv2
 
     small = shrunk(picture, _PREVIEW_PX)
     made = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, _PREVIEW_QUALITY])
-    return bytes(made[1].data)
+    return base64.b64encode(made[1].data).decode("ascii")
 
 
 def _tell(event: str, **about: Any) -> None:

@@ -12,6 +12,7 @@ from sd2core.live.clocks import Clocks, correct_drift, link_clocks
 from sd2core.live.filming import VIDEO_NAME, CameraChoice, Film
 from sd2core.live.listening import Listening
 from sd2core.live.recording import GrowingRecording
+from sd2core.placements.placements import Placements
 from sd2core.recording.recording import Recording, open_recording
 
 if TYPE_CHECKING:
@@ -68,6 +69,8 @@ class JointRecording:
         self.delays_s = delays_s(self.film, source)
         self.about = f"{self.film.about}\n{source.about}"
         self.linked = False
+        self.placements: Placements | None = None
+        """Planned placements of the recording, where the radar's place is known."""
 
     def __enter__(self) -> Self:
         return self
@@ -117,6 +120,7 @@ class JointRecording:
         recording = open_recording(self.folder)
         recording.video = self.folder / VIDEO_NAME
         recording.simulated = recording.simulated or self.film.simulated
+        recording.placements = self.placements
         return link_clocks(recording, Clocks(first_s, *self.delays_s))
 
 

@@ -7,6 +7,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +24,23 @@ _PICTURE_S = 0.09
 _WAIT_S, _END_S = 0.05, 5.0
 
 
+@dataclass
+class Looked:
+    """What both have seen so far."""
+
+    seen: list[Seen] = field(default_factory=list)
+    moved: list[Moved] = field(default_factory=list)
+    picture: NDArray[np.uint8] | None = None  # the newest one, RGB
+
+
 def look(
     source: Source,
     camera: Camera,
     delays_s: tuple[float, float],
     seconds: float,
     stop: threading.Event,
-) -> tuple[list[Seen], list[Moved]]:
+    follow: Callable[[Looked], object],
+) -> Looked:
     """Watch both for a while.
 
     Parameters
@@ -42,10 +53,12 @@ def look(
         How long.
     stop : Event
         Set to end earlier; is set at the end.
+    follow : callable
+        Called some twenty times a second with what was seen so far.
     """
     camera_delay_s, radar_delay_s = delays_s
     frames: queue.Queue[Frame] = queue.Queue(_WAITING)
-    moved: list[Moved] = []
+    looked = Looked()
     errors: list[BaseException] = []
 
     def take(frame: Frame) -> None:
@@ -65,12 +78,12 @@ def look(
 
     watching = [
         watched(lambda: source.run(take, stop)),
-        watched(lambda: _watch_pictures(camera, camera_delay_s, moved, stop)),
+        watched(lambda: _watch_pictures(camera, camera_delay_s, looked, stop)),
     ]
-    seen: list[Seen] = []
     head = source.head(0.0)
     end_s = time.monotonic() + seconds
     while time.monotonic() < end_s and not stop.is_set() and not errors:
+        follow(looked)
         try:
             frame = frames.get(timeout=_WAIT_S)
         except queue.Empty:
@@ -78,28 +91,27 @@ def look(
                 break
             continue
         alone = head.as_capture(source.words(frame))
-        seen.append(seen_in(alone, frame.received_s - radar_delay_s))
+        looked.seen.append(seen_in(alone, frame.received_s - radar_delay_s))
     stop.set()
     for thread in watching:
         thread.join(_END_S)
     if errors:
         raise errors[0]
-    return seen, moved
+    return looked
 
 
-def _watch_pictures(
-    camera: Camera, delay_s: float, moved: list[Moved], stop: threading.Event
-) -> None:
+def _watch_pictures(camera: Camera, delay_s: float, looked: Looked, stop: threading.Event) -> None:
     before: NDArray[np.uint8] | None = None
     before_s = 0.0
     while not stop.is_set() and (taken := camera.read()) is not None:
         picture, taken_s = taken
         if taken_s - before_s < _PICTURE_S:
             continue
+        looked.picture = picture
         grey = _small_grey(picture)
         if before is not None:
             middle_s = 0.5 * (before_s + taken_s) - delay_s
-            moved.append(moved_between(before, grey, middle_s, taken_s - before_s))
+            looked.moved.append(moved_between(before, grey, middle_s, taken_s - before_s))
         before, before_s = grey, taken_s
 
 

@@ -10,7 +10,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from sd2core.options.bounds import COUNT, NATURAL, NOT_NEGATIVE, POSITIVE, SHARE, Bounds
+from sd2core.options.bounds import (
+    AZIMUTH_DEG,
+    COUNT,
+    ELEVATION_DEG,
+    NATURAL,
+    NOT_NEGATIVE,
+    POSITIVE,
+    RANGE_M,
+    SHARE,
+    Bounds,
+)
 
 
 @dataclass(frozen=True)
@@ -74,6 +84,17 @@ def span_m(text: str) -> tuple[float, float]:
     if len(values) != 2 or not 0 <= values[0] < values[1]:
         raise ArgumentTypeError(f"{text!r} is not LO,HI in metres, e.g. 0.5,4")
     return values[0], values[1]
+
+
+def around(text: str) -> tuple[float, float, float]:
+    """Read ``RANGE,AZIMUTH`` or ``RANGE,AZIMUTH,ELEVATION`` in metres and degrees."""
+    values = _numbers(text)
+    bounds = (RANGE_M, AZIMUTH_DEG, ELEVATION_DEG)
+    if not 2 <= len(values) <= 3 or any(map(lambda one, within: one not in within, values, bounds)):
+        raise ArgumentTypeError(
+            f"{text!r} is not RANGE,AZIMUTH[,ELEVATION] in metres and degrees, e.g. 2.2,-15"
+        )
+    return values[0], values[1], values[2] if len(values) == 3 else 0.0
 
 
 def name_list(text: str) -> tuple[str, ...]:
@@ -157,6 +178,7 @@ Natural = Annotated[int, NATURAL]
 Positive = Annotated[float, POSITIVE]
 NotNegative = Annotated[float, NOT_NEGATIVE]
 Share = Annotated[float, SHARE, Typed(share)]
+Around = Annotated[tuple[float, float, float], Typed(around, joined)]
 Vector = Annotated[tuple[float, float, float], Typed(vector, joined)]
 SpanM = Annotated[tuple[float, float], Typed(span_m, joined)]
 ImageSize = Annotated[tuple[int, int], Typed(image_size, lambda size: f"{size[0]}x{size[1]}")]

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QDialog, QLabel, QLineEdit, QMessageBox, QToolButton, QWidget
 
+from sd2app.live.check_dialog import CheckDialog
+from sd2app.live.place_check import PlaceCheck
 from sd2app.live.protocol_dialog import TOML, ProtocolDialog
 from sd2app.live.protocol_draft import ProtocolDraft
 from sd2app.live.setup import DCA1000, REPLAY, ListenSetup, ways
@@ -80,6 +83,11 @@ class ListenDialog(QDialog):
         self._file_name, self._address_name = QLabel(self), QLabel("Address", self)
         buttons, self._begin = accepting(self, "Record")
         self._file_button = self._button(self._ask_file)
+        tip = "Say what camera and radar see of somebody who walks, and where the radar is"
+        self._place = ElidedLabel(self)
+        self._check = outlined("Check…", tip, self._check_place, self)
+        forget = partial(setup.choose_place, None)
+        self._forget = outlined("✕", "Forget the place", forget, self, name="Forget", look="")
         tip = "Make a protocol, the paper's to begin with, or edit the one that is chosen"
         edit = outlined("Edit…", tip, self._edit_protocol, self)
         form = form_of(
@@ -88,6 +96,7 @@ class ListenDialog(QDialog):
             (self._file_name, row_of((self._file, 1), self._file_button, spacing_px=8)),
             (self._address_name, self._address),
             ("", self._hint),
+            ("Place", row_of((self._place, 1), self._forget, self._check, spacing_px=8)),
             ("Protocol", row_of((self._protocol, 1), edit, spacing_px=8)),
             ("Into", row_of((self._folder, 1), self._button(self._ask_folder), spacing_px=8)),
             gaps_px=(16, 12),
@@ -115,6 +124,15 @@ class ListenDialog(QDialog):
         for widget in (self._address_name, self._address, self._hint):
             widget.setVisible(is_radar)
         self._folder.setText(str(setup.folder))
+        self._check.setEnabled(bool(setup.camera) and not setup.problem_of_radar)
+        self._forget.setVisible(setup.place is not None and bool(setup.camera))
+        self._place.setText(
+            "is checked with a camera"
+            if not setup.camera
+            else "not checked"
+            if setup.place is None
+            else f"radar at {setup.place.words}, as seen from the person"
+        )
         words, role = setup.problem, "muted"
         if not words and setup.continues and setup.protocol:
             words = f"{setup.folder.name} exists: takes that it lacks are recorded."
@@ -144,6 +162,13 @@ class ListenDialog(QDialog):
             return
         if accepted(ProtocolDialog(draft, self)) and draft.path is not None:
             self._choose_protocol(str(draft.path))
+
+    def _check_place(self) -> None:
+        check = PlaceCheck(self)
+        again = partial(check.start, self._setup.request())
+        again()
+        accepted(CheckDialog(check, again, self._setup.choose_place, self))
+        check.deleteLater()
 
     def _ask_file(self) -> None:
         setup = self._setup

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from itertools import count
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from sd2core.live.radars import A121, LIVE_RADARS
 from sd2core.live.rehearsal import TEST
 from sd2core.live.sources import LOOPBACK
 from sd2core.options.records import words_of
+from sd2core.placements.placements import Place
 from sd2core.recording.recording import FILE_NAME, SUFFIX, folder_named
 
 DCA1000, REPLAY = "dca1000", "replay"
@@ -38,17 +39,19 @@ class ListenRequest:
     radar: str = ""  # by name
     camera: str = ""  # as of `sd2 record`; empty: none
     protocol: str = ""  # of a guided session, likewise
+    place: Place | None = None  # of the radar, as seen from the person
 
     def words(self) -> list[str]:
         """Words of the ``sd2`` command that does it."""
         if self.camera:
             take = Record(
                 camera=self.camera,
-                radar=self.radar or str(self.replay or self.address or LOOPBACK),
+                radar=self._named_radar,
                 setup=self.setup,
                 out=self.folder,
                 json=True,
                 protocol=self.protocol or None,
+                placement=None if self.place is None else astuple(self.place),
                 previews=not self.protocol,
             )
             return words_of("record", take)
@@ -62,6 +65,18 @@ class ListenRequest:
             columns=True,
         )
         return words_of("listen", command)
+
+    def check_words(self, seconds: float) -> list[str]:
+        """Words of the ``sd2`` command that says what radar and camera see of the place."""
+        look = Record(
+            camera=self.camera, radar=self._named_radar, setup=self.setup, check=True,
+            seconds=seconds, json=True, previews=True,
+        )  # fmt: skip
+        return words_of("record", look)
+
+    @property
+    def _named_radar(self) -> str:
+        return self.radar or str(self.replay or self.address or LOOPBACK)
 
 
 def ways() -> tuple[str, ...]:
@@ -79,6 +94,7 @@ class ListenSetup(QObject):
         self._choices = StoredChoices(settings, "listen", _DEFAULTS, {"way": ways()})
         beside = Path(self._choices["beside"] or Path.home())
         beside = beside if beside.is_dir() else Path.home()
+        self.place: Place | None = None
         self._recording, self._session = free_name(beside), free_name(beside, "session", "")
 
     @property
@@ -121,6 +137,11 @@ class ListenSetup(QObject):
         if self._choices.set(name, str(value).strip()):
             self.changed.emit()
 
+    def choose_place(self, place: Place | None) -> None:
+        """Choose the radar's place as seen from the person, for this time."""
+        self.place = place
+        self.changed.emit()
+
     def choose_folder(self, folder: Path) -> None:
         """Choose the folder of the recording or of the session."""
         if self.protocol:
@@ -147,6 +168,11 @@ class ListenSetup(QObject):
                 return str(error)
         elif self.camera and self.folder.exists():
             return f"{self.folder.name} exists: what is filmed is not continued. Choose another."
+        return self.problem_of_radar
+
+    @property
+    def problem_of_radar(self) -> str:
+        """The same, of the radar alone."""
         if self.way == REPLAY:
             if self.replay is None:
                 return "Choose the capture that is replayed."
@@ -163,7 +189,8 @@ class ListenSetup(QObject):
 
     def request(self) -> ListenRequest:
         """What was chosen."""
-        made = ListenRequest(self.folder, camera=self.camera, protocol=self.protocol)
+        place = self.place if self.camera else None
+        made = ListenRequest(self.folder, camera=self.camera, protocol=self.protocol, place=place)
         if self.way == REPLAY:
             return replace(made, replay=self.replay)
         if self.way != DCA1000:

@@ -24,6 +24,7 @@ HELP = {
     "New from video": "tutorials/video-to-data-set.md#2-fit-a-body",
     "Record": "how-to/record-a-live-radar.md",
     "Protocol": "how-to/record-a-live-radar.md#a-guided-session",
+    "Check the place": "how-to/record-a-live-radar.md#check-the-place-first",
     "Align automatically": "how-to/align-video-and-radar.md",
     "Compare meshes": "how-to/compare-with-another-mesh.md",
     "Inertial sensor": "imu.md#in-the-window",

@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 
 from sd2core import PAPER_RADAR, RadarCapture, RadarConfig, Timebase
+from sd2core.body.camera import DEFAULT_FIELD_OF_VIEW_DEG
 from sd2core.live.checking import (
     Answer,
     Moved,
     Seen,
     chance_db,
     check_place,
+    found_place,
     moved_between,
     seen_in,
 )
@@ -172,6 +174,33 @@ def test_somebody_at_the_end_of_the_range(walked: tuple[list[Seen], list[Moved]]
     assert "Step closer" in failures(beyond, walked[1])["range"]
 
 
+@pytest.mark.parametrize("centre", [0.25, 0.5, 0.7])
+def test_a_radar_beside_the_camera_is_found_there(
+    walked: tuple[list[Seen], list[Moved]], centre: float
+) -> None:
+    findings = check_place(WIDE, walked[0], camera_sees(centre=centre))
+    place = found_place(findings)
+    assert place is not None
+    half = np.tan(np.radians(0.5 * DEFAULT_FIELD_OF_VIEW_DEG))
+    aside = np.arctan(half * (2 * centre - 1))
+    far_m = np.median(walk_m(np.arange(0.0, LENGTH_S, 0.01)))
+    body_m = (far_m * np.sin(aside), 0.0, far_m * np.cos(aside))
+    np.testing.assert_allclose(place.sensor(body_m).position_m, np.zeros(3), atol=0.12)
+
+
+def test_no_place_is_found_where_range_or_view_is_in_doubt(
+    walked: tuple[list[Seen], list[Moved]],
+) -> None:
+    assert found_place(check_place(WIDE, walked[0], camera_sees(still=True))) is None
+    assert found_place(check_place(WIDE, radar_sees(echo=0.0), walked[1])) is None
+    assert found_place([]) is None
+    wave = replace(
+        WIDE, end_frequency_hz=WIDE.start_frequency_hz, samples_per_chirp=1, sampling="complex"
+    )
+    assert wave.is_continuous
+    assert found_place(check_place(wave, walked[0], walked[1])) is None
+
+
 def test_movements_that_have_nothing_to_do_with_each_other_rarely_agree() -> None:
     rng = np.random.default_rng(3)
     times_s = np.arange(0.0, LENGTH_S, 0.05)
@@ -197,10 +226,33 @@ def _check(*words: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.slow
 def test_the_command_with_test_sources_records_nothing(tmp_path: Path) -> None:
     done = _check("--camera", "test", "--radar", "test", "--seconds", "8", "--json")
-    findings = json.loads(done.stdout)["findings"]
+    told = json.loads(done.stdout)
+    findings = told["findings"]
     assert [one["name"] for one in findings] == ["motion", "range", "view", "agreement"]
     assert all(one["passed"] for one in findings), findings
     assert done.returncode == 0
+    assert told["place"]["range_m"] == pytest.approx(1.5, abs=0.15)
+    assert abs(told["place"]["azimuth_deg"]) < 3.0
+
+
+def test_what_was_found_is_told_as_it_comes_and_q_ends_it() -> None:
+    words = ["--camera", "test", "--radar", "test", "--seconds", "300", "--json", "--previews"]
+    command = [sys.executable, "-m", "sd2core.cli", "record", "--check", *words]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        told = []
+        for line in process.stdout:
+            told.append(json.loads(line))
+            if told[-1]["event"] == "findings" and told[-1]["left_s"]:
+                process.stdin.write("q")
+                process.stdin.flush()
+    kinds = [one["event"] for one in told]
+    assert kinds.count("findings") >= 2
+    assert "preview" in kinds
+    assert told[-1]["left_s"] == 0
 
 
 def test_the_command_in_front_of_a_still_picture(tmp_path: Path) -> None:

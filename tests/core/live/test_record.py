@@ -22,6 +22,7 @@ from sd2core.io.video import open_video
 from sd2core.live.clocks import Clocks, fit_line
 from sd2core.live.filming import CameraChoice, Film
 from sd2core.live.rehearsal import EVENT_S, FLASH_S, share_of_event
+from sd2core.placements.placements import PlacementGrid
 from sd2core.recording.recording import Recording, open_recording
 from tests.core.io.radar.dca1000_files import TiRecording, cfg_of
 
@@ -203,3 +204,11 @@ def test_a_radar_that_is_silent_leaves_the_video(tmp_path: Path) -> None:
     assert recording.radar is None
     with open_video(recording.video) as video:
         assert len(video) > 10
+
+
+def test_a_place_that_was_found_is_the_recordings_plan(tmp_path: Path) -> None:
+    folder = tmp_path / "take.sd2"
+    words = ["--camera", "test", "--radar", "test", "--seconds", "2", "--placement", "2.2,-15"]
+    command = [sys.executable, "-m", "sd2core.cli", "record", *words, "--out", str(folder)]
+    subprocess.run(command, check=True, capture_output=True)
+    assert open_recording(folder).placements == PlacementGrid((2.2,), (-15.0,), (0.0,))

@@ -1,0 +1,118 @@
+"""The check of a place from the dialog Record, by real clicks; asserted on the models."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from answering import once_asked
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QDialogButtonBox, QLabel, QToolButton, QWidget
+
+from sd2app.live.check_dialog import CheckDialog
+from sd2app.live.dialog import ListenDialog
+from sd2app.live.place_check import PlaceCheck
+from sd2app.live.setup import ListenRequest, ListenSetup
+from sd2app.settings import Settings
+from sd2core.placements.placements import Place
+
+LIMIT_MS = 60_000
+LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def parent(qtbot) -> QWidget:
+    widget = QWidget()
+    qtbot.addWidget(widget)
+    return widget
+
+
+@pytest.fixture
+def check(parent) -> Iterator[PlaceCheck]:
+    made = PlaceCheck(parent)
+    yield made
+    made.close()
+
+
+def _click(dialog: QWidget, text: str) -> None:
+    own = [*dialog.findChildren(QToolButton), *dialog.findChild(QDialogButtonBox).buttons()]
+    (button,) = (one for one in own if one.text() == text and one.isVisible())
+    assert button.isEnabled()
+    QTest.mouseClick(button, LEFT)
+
+
+def test_the_place_that_is_found_goes_with_what_is_recorded(parent, qtbot) -> None:
+    setup = ListenSetup(Settings.forgetful(), parent)
+    setup.choose("way", "test")
+    record = ListenDialog(setup, parent)
+    record.show()
+    (button,) = (one for one in record.findChildren(QToolButton) if one.text() == "Check…")
+    assert not button.isEnabled()  # there is no camera
+    setup.choose("camera", "test")
+    seen: list[int] = []
+
+    def watch(dialog: CheckDialog) -> None:
+        check = dialog._check
+        try:
+            check.pictured.connect(lambda image: seen.append(image.width()))
+            qtbot.waitUntil(lambda: check.place is not None, timeout=LIMIT_MS)
+            assert check.state == "running"
+            assert 0 < check.left_s < 60
+            _click(dialog, "Take over")
+        finally:
+            dialog.done(0)
+
+    once_asked(CheckDialog, watch)
+    _click(record, "Check…")
+    assert seen  # pictures came
+    place = setup.place
+    assert place is not None
+    assert place.range_m == pytest.approx(1.5, abs=0.3)
+    words = setup.request().words()
+    assert words[words.index("--placement") + 1] == f"{place.range_m},{place.azimuth_deg},0.0"
+    assert any(place.words in one.text() for one in record.findChildren(QLabel))
+    _click(record, "✕")
+    assert "--placement" not in setup.request().words()
+
+
+def test_it_ends_when_told_and_begins_again(check, parent, qtbot) -> None:
+    request = ListenRequest(Path("none.sd2"), radar="test", camera="test")
+    dialog = CheckDialog(check, lambda: check.start(request), lambda _: None, parent)
+    dialog.show()
+    check.start(request)
+    qtbot.waitUntil(lambda: bool(check.findings), timeout=LIMIT_MS)
+    _click(dialog, "Stop")
+    qtbot.waitUntil(lambda: check.state == "ended", timeout=LIMIT_MS)
+    assert [one.name for one in check.findings] == ["motion", "range", "view", "agreement"]
+    marks = [one.accessibleName() for one in dialog.findChildren(QLabel)]
+    assert marks.count("good") == sum(one.passed for one in check.findings)
+    _click(dialog, "Again")
+    assert check.state == "running"
+    dialog.close()
+    assert not check.busy  # camera and radar are free for a recording
+
+
+def test_what_is_bad_is_marked_and_no_place_can_be_taken_over(check, parent) -> None:
+    dialog = CheckDialog(check, lambda: None, lambda _: None, parent)
+    dialog.show()
+    bad = {"name": "view", "passed": False, "sentence": "Nothing moves.", "numbers": {}}
+    check._take({"event": "findings", "findings": [bad], "place": None, "left_s": 0})
+    check._end(1, "")
+    assert check.state == "ended"
+    labels = {one.accessibleName(): one for one in dialog.findChildren(QLabel)}
+    assert labels["bad"].text() == "✗"
+    (take,) = (one for one in dialog.findChildren(QToolButton) if one.text() == "Take over")
+    assert not take.isEnabled()
+    check._take({"event": "findings", "findings": [], "place": vars(Place(2.0)), "left_s": 0})
+    check.changed.emit()
+    assert take.isEnabled()
+
+
+def test_why_it_cannot_be_checked_is_said(check, parent, qtbot, tmp_path) -> None:
+    dialog = CheckDialog(check, lambda: None, lambda _: None, parent)
+    dialog.show()
+    check.start(ListenRequest(tmp_path / "a.sd2", radar="test", camera=str(tmp_path / "none.mp4")))
+    qtbot.waitUntil(lambda: check.state == "failed", timeout=LIMIT_MS)
+    assert any("none.mp4" in one.text() for one in dialog.findChildren(QLabel))
