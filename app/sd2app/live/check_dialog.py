@@ -84,7 +84,7 @@ class CheckDialog(QDialog):
     def _refresh(self) -> None:
         check = self._check
         self._stop.setVisible(check.busy)
-        self._stop.setEnabled(check.state == "running")
+        self._stop.setEnabled(check.state != "stopping")
         self._again.setVisible(not check.busy)
         found = {one.name: one for one in check.findings}
         say(self._head, self._words(), "warning" if check.state == "failed" else "title")

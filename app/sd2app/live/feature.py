@@ -11,7 +11,8 @@ from sd2app.feature import Action, Feature, Shell
 from sd2app.live.bar import LiveBar
 from sd2app.live.dialog import ListenDialog
 from sd2app.live.guided import GuidedModel
-from sd2app.live.model import COMMAND, LiveModel
+from sd2app.live.model import LiveModel
+from sd2app.live.process import COMMAND
 from sd2app.live.prompt_window import PromptWindow
 from sd2app.live.setup import ListenRequest, ListenSetup
 from sd2app.session.session import Session

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import sys
 import time
 from collections import deque
 from collections.abc import Sequence
@@ -16,7 +15,7 @@ from PySide6.QtGui import QImage
 
 from sd2app.background.latest import delayed
 from sd2app.live.growing_map import extended
-from sd2app.live.process import LiveProcess, why_it_ended
+from sd2app.live.process import COMMAND, LiveProcess, why_it_ended
 from sd2app.live.setup import ListenRequest
 from sd2app.session.content import Content
 from sd2app.session.session import Session
@@ -26,7 +25,6 @@ from sd2core.maps import DopplerMap
 from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import FILE_NAME, open_recording
 
-COMMAND = (sys.executable, "-m", "sd2core.cli")
 State = Literal["idle", "opening", "starting", "listening", "stopping", "stopped", "failed"]
 
 _TELL_MS = 100

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import json
+import sys
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Literal
 
-from PySide6.QtCore import QObject, QProcess, QProcessEnvironment
+from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, Signal
 
 from sd2core.processes import ONE_THREAD
+
+COMMAND = (sys.executable, "-m", "sd2core.cli")
+State = Literal["idle", "starting", "running", "stopping", "ended", "failed"]
 
 _STOP_MS = 10_000
 """By then, all that waited to be stored is stored, or never will be."""
@@ -89,6 +93,62 @@ class LiveProcess:
             why = self._process.errorString()
             self._process.deleteLater()
             self._ended(1, f"{self._command[0]} cannot be started: {why}")
+
+
+class SteeredCommand(QObject):
+    """A command that records or watches, with its state; a subclass takes its events."""
+
+    changed = Signal()
+    state_changed = Signal()
+
+    def __init__(self, parent: QObject, command: Sequence[str] = COMMAND) -> None:
+        super().__init__(parent)
+        self._command = list(command)
+        self._process: LiveProcess | None = None
+        self.state: State = "idle"
+        self.text = ""  # why it failed
+
+    @property
+    def busy(self) -> bool:
+        """True until it has ended."""
+        return self.state in ("starting", "running", "stopping")
+
+    def press(self, key: str) -> None:
+        """Press a key, as on a terminal."""
+        if self._process is not None and self.state == "running":
+            self._process.press(key)
+
+    def stop(self) -> None:
+        """End it; what is stored is kept."""
+        if self._process is not None and self.state != "stopping":
+            self._process.stop()
+            self._set_state("stopping")
+
+    def close(self) -> None:
+        """End it at once, with what shows it."""
+        if self._process is not None:
+            self._process.close()
+            self._process, self.state = None, "ended"
+
+    def _launch(self, words: Sequence[str]) -> None:
+        self.text = ""
+        command = [*self._command, *words]
+        self._process = LiveProcess(command, self, self._take, self.changed.emit, self._end)
+        self._set_state("starting")
+        self._process.start()
+
+    def _take(self, event: dict[str, Any]) -> None:
+        raise NotImplementedError
+
+    def _end(self, code: int, said: str) -> None:
+        self._process = None
+        self.text = why_it_ended(said) if code else ""
+        self._set_state("failed" if code else "ended")
+
+    def _set_state(self, state: State) -> None:
+        self.state = state
+        self.state_changed.emit()
+        self.changed.emit()
 
 
 def why_it_ended(said: str) -> str:

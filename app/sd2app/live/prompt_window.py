@@ -37,6 +37,16 @@ _MARGIN = 0.05
 _LEAST_PX, _LEAST_READ_PX = 11.0, 15.0
 _CONSENT_TOP, _CONSENT_BOTTOM = 0.28, 0.15
 """Shares of the window's height above and below the text to agree to."""
+_KEYS: dict[int, str] = {
+    Qt.Key.Key_Space: " ",
+    Qt.Key.Key_Return: " ",
+    Qt.Key.Key_Enter: " ",
+    Qt.Key.Key_A: "a",
+    Qt.Key.Key_S: "s",
+    Qt.Key.Key_Y: "y",
+    Qt.Key.Key_N: "n",
+}
+"""Those of ``sd2 record``."""
 _SCROLLS: dict[int, QScrollBar.SliderAction] = {
     Qt.Key.Key_Up: QScrollBar.SliderAction.SliderSingleStepSub,
     Qt.Key.Key_Down: QScrollBar.SliderAction.SliderSingleStepAdd,
@@ -114,16 +124,8 @@ class PromptWindow(QWidget):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Steer the session."""
         match event.key():
-            case Qt.Key.Key_Space | Qt.Key.Key_Return | Qt.Key.Key_Enter:
-                self._model.go_on()
-            case Qt.Key.Key_A:
-                self._model.again()
-            case Qt.Key.Key_S:
-                self._model.skip()
-            case Qt.Key.Key_Y:
-                self._model.agree()
-            case Qt.Key.Key_N:
-                self._model.decline()
+            case key if key in _KEYS:
+                self._model.press(_KEYS[key])
             case key if key in _SCROLLS:
                 self._consent.verticalScrollBar().triggerAction(_SCROLLS[key])
             case Qt.Key.Key_Escape if self._model.busy:

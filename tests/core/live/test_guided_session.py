@@ -31,6 +31,8 @@ _NAMES = st.lists(
     st.sampled_from(["anna", "ben", "cem", "dora"]), min_size=1, max_size=4, unique=True
 )
 _GESTURES = st.lists(st.sampled_from(["up", "down", "left"]), min_size=1, max_size=3, unique=True)
+_LINE = st.text(st.sampled_from('\r\t"\\ a\x7f') | st.characters(exclude_categories=["Cs"]))
+_TEXTS = st.lists(_LINE, max_size=4).map("\n".join)
 _HEAD = 'format = "sd2-protocol"\nversion = 1\ntitle = "Try"\n'
 
 
@@ -270,7 +272,7 @@ def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, text: str, words: s
 
 @given(
     PROTOCOLS,
-    st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\r"), max_size=60),
+    _TEXTS,
     st.floats(0.0, 3600.0),
 )
 def test_what_is_written_is_read_again(

@@ -161,7 +161,7 @@ def test_a_long_text_to_agree_to_is_scrolled_by_keys_and_declined_by_one(
     view.resize(640, 360)
     view.show()
     pressed: list[str] = []
-    monkeypatch.setattr(model, "_press", pressed.append)
+    monkeypatch.setattr(model, "press", pressed.append)
     model.state, model.consent = "running", "\n\n".join(["You are filmed."] * 60)
     model.step = Step("consent", 1, 3, None, "p1", "wave", "Wave")
     model.changed.emit()

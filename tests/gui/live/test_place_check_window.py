@@ -89,7 +89,8 @@ def test_it_ends_when_told_and_begins_again(check, parent, qtbot) -> None:
     marks = [one.accessibleName() for one in dialog.findChildren(QLabel)]
     assert marks.count("good") == sum(one.passed for one in check.findings)
     _click(dialog, "Again")
-    assert check.state == "running"
+    assert check.busy
+    assert not check.findings
     dialog.close()
     assert not check.busy  # camera and radar are free for a recording
 
