@@ -16,7 +16,9 @@ from sd2app.widgets.panel import outlined, say, sentence, title
 from sd2core.placements.placements import Place
 
 _NAMES = {"motion": "Motion", "range": "Range", "view": "View", "agreement": "Agreement"}
-_PICTURE = QSize(400, 225)
+_PICTURE = QSize(416, 234)
+_LINES = 3
+"""Of a sentence, so that nothing moves when it gets another."""
 _WAITS = "Walk towards both and away again, a few times."
 
 
@@ -48,8 +50,9 @@ class CheckDialog(QDialog):
         self._rows = {
             name: (QLabel(self), title(text), sentence("")) for name, text in _NAMES.items()
         }
-        for mark, name, _ in self._rows.values():
-            for label in (mark, name):
+        for mark, name, words in self._rows.values():
+            words.setMinimumHeight(_LINES * words.fontMetrics().lineSpacing())
+            for label in (mark, name, words):
                 label.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
         findings = grid_of(*self._rows.values(), gaps_px=(10, 12), wide=(2,))
         self._place = sentence("")
@@ -69,7 +72,7 @@ class CheckDialog(QDialog):
         check.changed.connect(self._refresh)
         check.pictured.connect(self._picture.show_image)
         self._refresh()
-        self.resize(900, self.sizeHint().height())
+        self.resize(1000, self.sizeHint().height() + _LINES * self.fontMetrics().lineSpacing())
 
     def done(self, result: int) -> None:
         """Let go of radar and camera with it."""

@@ -126,13 +126,8 @@ class ListenDialog(QDialog):
         self._folder.setText(str(setup.folder))
         self._check.setEnabled(bool(setup.camera) and not setup.problem_of_radar)
         self._forget.setVisible(setup.place is not None and bool(setup.camera))
-        self._place.setText(
-            "is checked with a camera"
-            if not setup.camera
-            else "not checked"
-            if setup.place is None
-            else f"radar at {setup.place.words}, as seen from the person"
-        )
+        checked = "not checked" if setup.place is None else setup.place.words
+        self._place.setText(checked if setup.camera else "is checked with a camera")
         words, role = setup.problem, "muted"
         if not words and setup.continues and setup.protocol:
             words = f"{setup.folder.name} exists: takes that it lacks are recorded."
