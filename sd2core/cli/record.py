@@ -49,7 +49,7 @@ class Record(Json):
         the recording to write, or the folder of a session (--protocol), which goes on
     protocol : FILE|paper
         guide people through the takes of this protocol (docs/formats.md): Space goes on, a: again,
-        s: skip, q: stop
+        s: skip, q: stop; y and n answer its text of consent
     check
         record nothing: say whether radar and camera see the same person move, where, with which
         sign and delay; the exit code is 1 if one of four findings is bad
