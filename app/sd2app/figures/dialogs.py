@@ -18,7 +18,7 @@ from sd2app.widgets.dialogs import ExportButtons, ask_figure
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox, option_box
 from sd2app.widgets.layouts import column_of, form_of, row_of
 from sd2app.widgets.mesh_painting import paint_picture
-from sd2app.widgets.panel import side_by_side
+from sd2app.widgets.panel import copy_button, side_by_side
 from sd2core.cli.strip import Strip
 
 _WAYS = {"spread": "spread evenly", "around": "around the cursor", "list": "list or ranges"}
@@ -62,7 +62,7 @@ class FigureDialog(QDialog):
         self._model, self._name = model, name
         self.setWindowTitle(self.TITLE)
         self._buttons = ExportButtons(self, self._ask)
-        foot = with_help("Export figure", self._buttons)
+        foot = with_help("Export figure", self._buttons, *self._more())
         parts = ((FigurePreview(model, palette, self), 1), self._choices(), foot)
         self.setLayout(column_of(*parts, spacing_px=16, margins_px=16))
         model.changed.connect(self._refresh)
@@ -72,6 +72,10 @@ class FigureDialog(QDialog):
 
     def _choices(self) -> QLayout:
         raise NotImplementedError
+
+    def _more(self) -> tuple[QWidget, ...]:
+        """Buttons beside those that end the dialog."""
+        return ()
 
     def _refresh(self) -> None:
         model = self._model
@@ -121,6 +125,9 @@ class StripDialog(FigureDialog):
 
     TITLE = "Export strip of frames"
     USUAL_PX = 1040, 640
+
+    def _more(self) -> tuple[QWidget, ...]:
+        return (copy_button(lambda: self._model.line, self),)
 
     def _choices(self) -> QLayout:
         model = self._model

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import BackgroundModel, Emit, LatestRunner
+from sd2app.background.quoting import quoted
 from sd2app.maps.difference import DifferenceModel
 from sd2app.session.content import UNTITLED, Content
 from sd2app.session.session import Session
+from sd2core.cli.strip import Strip
 from sd2core.errors import Sd2Error
 from sd2core.figures.maps import Levels, MapRow, draw_maps, save_maps
 from sd2core.figures.strip_source import (
@@ -28,6 +30,7 @@ from sd2core.figures.strip_source import (
 from sd2core.files.figure_files import check_figure
 from sd2core.labels.spans import Labels
 from sd2core.options.bounds import STRIP_FRAMES
+from sd2core.options.records import words_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -235,8 +238,28 @@ class StripModel(DrawnFigure):
         super().__init__("strip", StripChoice(options=StripOptions(rows=rows)), parent)
         named = recording.title if recording.folder == UNTITLED else str(recording.folder)
         self.source = StripSource.of(recording, content.video, content.mesh, named)
+        self._folder = recording.folder
         self._cursor = self.source.clock.frame_at(cursor_s)
         self._draw()
+
+    @property
+    def line(self) -> str:
+        """Command for a terminal that draws the strip of the saved recording."""
+        choice, options = self.choice, self.options
+        spread = choice.way == "spread"
+        strip = Strip(
+            paths=(self._folder,),
+            out=Path("strip.png"),
+            frames=None if spread else ",".join(map(str, self.frames())),
+            count=choice.count if spread else None,
+            rows=",".join(options.rows),
+            dots=options.as_dots,
+            colour=options.colour,
+            v_max_mps=options.v_max_mps,
+            whole=options.whole,
+            columns=options.columns,
+        )
+        return quoted(words_of("strip", strip))
 
     @property
     def options(self) -> StripOptions:

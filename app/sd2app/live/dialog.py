@@ -18,7 +18,7 @@ from sd2app.manual.help import with_help
 from sd2app.widgets.dialogs import accepted, accepting, ask_file, ask_new
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
-from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence
+from sd2app.widgets.panel import ElidedLabel, copy_button, outlined, say, sentence
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import RADAR_SUFFIXES
 from sd2core.io.readers import RADAR_FILES, suffixes_of
@@ -101,7 +101,7 @@ class ListenDialog(QDialog):
             ("Into", row_of((self._folder, 1), self._button(self._ask_folder), spacing_px=8)),
             gaps_px=(16, 12),
         )
-        foot = with_help("Record", buttons)
+        foot = with_help("Record", buttons, copy_button(lambda: setup.line, self))
         self.setLayout(column_of(form, STRETCH, self._message, foot, spacing_px=16, margins_px=16))
         setup.changed.connect(self._refresh)
         self._refresh()

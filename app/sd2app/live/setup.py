@@ -8,6 +8,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
+from sd2app.background.quoting import quoted
 from sd2app.settings import Settings, StoredChoices
 from sd2core.cli.listen import Listen
 from sd2core.cli.record import Record
@@ -25,6 +26,7 @@ _DEFAULTS = {
     "way": "dca1000", "setup": "", "address": "", "replay": "", "beside": "", "camera": "",
     "protocol": "",
 }  # fmt: skip
+_FOR_THE_WINDOW = ("--json", "--columns", "--previews")
 _ENDINGS = (".cfg", ".json")
 
 
@@ -186,6 +188,12 @@ class ListenSetup(QObject):
         if self.setup.suffix.lower() not in _ENDINGS:
             return f"{self.setup.name} is no .cfg of the mmWave SDK or .json of mmWave Studio."
         return ""
+
+    @property
+    def line(self) -> str:
+        """Command for a terminal that records the same."""
+        words = self.request().words()
+        return quoted([word for word in words if word not in _FOR_THE_WINDOW])
 
     def request(self) -> ListenRequest:
         """What was chosen."""

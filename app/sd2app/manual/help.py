@@ -55,6 +55,6 @@ def help_button(topic: str | Callable[[], str], parent: QWidget, key: str = "F1"
     return button
 
 
-def with_help(topic: str, buttons: QDialogButtonBox) -> QHBoxLayout:
-    """Last row of a dialog: the button at the left, then those that end it."""
-    return row_of(help_button(topic, buttons), (buttons, 1))
+def with_help(topic: str, buttons: QDialogButtonBox, *others: QWidget) -> QHBoxLayout:
+    """Last row of a dialog: the button and others at the left, then those that end it."""
+    return row_of(help_button(topic, buttons), *others, (buttons, 1), spacing_px=8)

@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 from PySide6.QtCore import Signal
 
 from sd2app.background.latest import BackgroundModel, Emit
+from sd2app.background.quoting import quoted
 from sd2app.session.content import UNTITLED, reference_of
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
+from sd2core.cli.compare_meshes import CompareMeshes
 from sd2core.files.tables import capitalised
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.options.records import words_of
 from sd2core.recording.recording import MeshReading, Recording, is_recording, open_recording
 
 if TYPE_CHECKING:
@@ -72,6 +75,20 @@ class ComparisonModel(BackgroundModel):
         """Difference of the mesh that is not the reference."""
         comparison = self.comparison
         return comparison.differences[1 - comparison.reference] if comparison else None
+
+    @property
+    def line(self) -> str:
+        """Command for a terminal that compares the two meshes."""
+        recording = self._session.document.recording
+        own = recording.mesh if recording and recording.mesh else Path("mesh.zarr")
+        options = CompareMeshes(
+            meshes=(own, self._other),
+            names=self.labels,
+            reference=self.labels[self.reference],
+            sensor=self._session.sensor.sensor.position_m,
+            focal_px=self._session.document.camera.focal_px,
+        )
+        return quoted(words_of("compare-meshes", options))
 
     def mesh(self, number: int) -> MeshSequence | None:
         """One of the two, all of its frames."""

@@ -17,7 +17,7 @@ from sd2app.video.overlay_settings import OverlayModel
 from sd2app.widgets.dialogs import ask_figure
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import column_of, row_of
-from sd2app.widgets.panel import ElidedLabel, fill, outlined, panel, say, splitter
+from sd2app.widgets.panel import ElidedLabel, copy_button, fill, outlined, panel, say, splitter
 
 
 class ComparisonWindow(QWidget):
@@ -72,7 +72,8 @@ class ComparisonWindow(QWidget):
         tip = "Write maps and velocities of both (.png, .svg, .pdf)"
         self._export = outlined("Export figure…", tip, self._ask, self)
         against = QLabel("measured against", self)
-        parts = (against, self._reference, self._export, help_button("Compare meshes", self))
+        copy = copy_button(lambda: self.model.line, self)
+        parts = (against, self._reference, self._export, copy, help_button("Compare meshes", self))
         return row_of((self._summary, 1), *parts, spacing_px=8)
 
     # --- following the model --------------------------------------------------------------

@@ -7,9 +7,12 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import BackgroundModel, LatestRunner
+from sd2app.background.quoting import quoted
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
+from sd2core.cli.align import Align
 from sd2core.doppler.alignment import WITHIN_S, Alignment, align
+from sd2core.options.records import words_of
 
 _SURE = 0.99
 
@@ -32,6 +35,13 @@ class AlignmentModel(BackgroundModel):
         """Offset of the recording."""
         recording = self._session.document.recording
         return recording.radar_offset_s if recording is not None else 0.0
+
+    @property
+    def line(self) -> str:
+        """Command for a terminal that looks for the offset in the saved recording, and keeps it."""
+        recording = self._session.document.recording
+        folders = () if recording is None else (recording.folder,)
+        return quoted(words_of("align", Align(recordings=folders, within=self.within_s, save=True)))
 
     @property
     def why_not(self) -> str:

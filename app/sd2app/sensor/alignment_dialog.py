@@ -11,7 +11,7 @@ from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.dialogs import accepting
 from sd2app.widgets.inputs import option_box
 from sd2app.widgets.layouts import column_of, form_of
-from sd2app.widgets.panel import sentence, show_words, side_by_side
+from sd2app.widgets.panel import copy_button, sentence, show_words, side_by_side
 from sd2app.widgets.plot import Themed
 from sd2core.cli.align import Align
 
@@ -34,7 +34,7 @@ class AlignmentDialog(QDialog):
         self._within.valueChanged.connect(model.search)
         buttons, self._apply = accepting(self, "Apply")
         within = form_of(("Search within ±", side_by_side(self._within)))
-        foot = with_help("Align automatically", buttons)
+        foot = with_help("Align automatically", buttons, copy_button(lambda: model.line, self))
         parts = sentence(_ABOUT), (self._chart, 1), self._result, self._problem, within, foot
         self.setLayout(column_of(*parts, spacing_px=12, margins_px=16))
         self.accepted.connect(model.apply)

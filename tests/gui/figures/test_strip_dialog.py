@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pytest
 from answering import once_asked
-from finding import named
+from copied import copied_record
+from finding import button_of, named
 from PIL import Image
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QPushButton
@@ -41,6 +42,19 @@ def test_frames_as_they_are_chosen(model):
     assert "3," in model.problem
     model.choose(count=0)
     assert model.choice.count == 1
+
+
+def test_the_command_draws_the_same_strip(model, window, qtbot):
+    dialog = StripDialog(model, models_of(window).display.palette, "strip", window)
+    model.choose(count=5)
+    model.set_options(as_dots=True, columns=3)
+    qtbot.mouseClick(button_of(dialog, "Copy command"), Qt.MouseButton.LeftButton)
+    strip = copied_record()
+    assert strip.paths == (models_of(window).document.recording.folder,)
+    assert (strip.count, strip.frames, strip.columns, strip.dots) == (5, None, 3, True)
+    model.choose(way="around", count=2, step=10)
+    qtbot.mouseClick(button_of(dialog, "Copy command"), Qt.MouseButton.LeftButton)
+    assert copied_record().frames == ",".join(map(str, model.frames()))
 
 
 @pytest.mark.slow

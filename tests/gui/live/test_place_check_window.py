@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 from answering import once_asked
+from copied import copied_record
+from finding import button_of
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QDialogButtonBox, QLabel, QToolButton, QWidget
@@ -16,6 +18,8 @@ from sd2app.live.dialog import ListenDialog
 from sd2app.live.place_check import PlaceCheck
 from sd2app.live.setup import ListenRequest, ListenSetup
 from sd2app.settings import Settings
+from sd2core.cli.listen import Listen
+from sd2core.cli.record import Record
 from sd2core.placements.placements import Place
 
 LIMIT_MS = 60_000
@@ -41,6 +45,18 @@ def _click(dialog: QWidget, text: str) -> None:
     (button,) = (one for one in own if one.text() == text and one.isVisible())
     assert button.isEnabled()
     QTest.mouseClick(button, LEFT)
+
+
+def test_the_command_records_the_same(parent, qtbot) -> None:
+    setup = ListenSetup(Settings.forgetful(), parent)
+    setup.choose("way", "test")
+    dialog = ListenDialog(setup, parent)
+    for camera, kind in (("", Listen), ("test", Record)):
+        setup.choose("camera", camera)
+        QTest.mouseClick(button_of(dialog, "Copy command"), LEFT)
+        command = copied_record()
+        assert isinstance(command, kind)
+        assert (command.out, command.radar, command.json) == (setup.folder, "test", False)
 
 
 def test_the_place_that_is_found_goes_with_what_is_recorded(parent, qtbot) -> None:

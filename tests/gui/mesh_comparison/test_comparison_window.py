@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from finding import words_in
+from copied import copied_record
+from finding import button_of, words_in
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QComboBox, QFileDialog, QToolButton
 from window_models import models_of
@@ -89,6 +90,13 @@ def test_a_known_shift_is_what_is_found(compared):
     assert np.abs(velocity).max() > 0.5
     assert model.tracks[0].map.values.max() > 0
     assert model.tracks[0].reference == model.tracks[1].reference
+
+
+def test_the_command_compares_the_same_meshes(compared, meshes, qtbot):
+    qtbot.mouseClick(button_of(compared, "Copy command"), Qt.MouseButton.LeftButton)
+    command = copied_record()
+    assert command.meshes == meshes
+    assert (command.labels, command.reference) == (["own.npz", "aside.npz"], "own.npz")
 
 
 def test_a_click_in_the_table_shows_that_joint(compared, qtbot):

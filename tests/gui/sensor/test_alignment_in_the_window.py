@@ -7,6 +7,8 @@ from functools import partial
 import numpy as np
 import pytest
 from answering import once_asked
+from copied import copied_record
+from finding import button_of
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QPushButton, QToolButton
 from window_models import menu_of, models_of
@@ -16,6 +18,7 @@ from sd2app.sensor.alignment_dialog import AlignmentDialog
 from sd2app.sensor.panel import SensorPanel
 from sd2app.widgets.chart import ChartView
 from sd2app.widgets.inputs import NumberBox
+from sd2core.cli.align import Align
 from sd2core.doppler.alignment import align
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
@@ -76,6 +79,18 @@ def button(dialog: AlignmentDialog, text: str) -> QPushButton:
     return next(
         one for one in dialog.findChildren(QPushButton) if one.text().replace("&", "") == text
     )
+
+
+def test_the_command_looks_as_far_and_keeps_what_it_finds(window, qtbot, motion):
+    motion(1.5, 60.0)
+
+    def copy(dialog: AlignmentDialog) -> None:
+        models_of(window).alignment.search(3.5)
+        qtbot.mouseClick(button_of(dialog, "Copy command"), Qt.MouseButton.LeftButton)
+
+    find(window, qtbot, copy)
+    folder = models_of(window).document.recording.folder
+    assert copied_record() == Align(recordings=(folder,), within=3.5, save=True)
 
 
 def test_the_offset_is_found_shown_applied_and_taken_back(window, qtbot, motion):
