@@ -185,8 +185,8 @@ def test_what_needs_torch_says_how_to_get_it(tmp_path: Path) -> None:
     done = sd2_alone("denoise", map_file, "--out", tmp_path / "denoised.npz")
     assert done.returncode == 1
     assert done.stderr == (
-        "sd2: torch is needed for this, which denoises, classifies or trains."
-        ' Install it: pip install "sd2-core[learn]".\n'
+        "sd2: torch is needed for this, which denoises, classifies or trains, or runs a body model"
+        ' in TorchScript. Install it: pip install "sd2-core[learn]".\n'
     )
 
 

@@ -60,7 +60,8 @@ def explanation(error: Exception) -> Sd2Error:
         return Sd2Error(f"There is not enough memory for this ({error})")
     if isinstance(error, ModuleNotFoundError) and error.name == "torch":
         return Sd2Error(
-            "torch is needed for this, which denoises, classifies or trains",
+            "torch is needed for this, which denoises, classifies or trains, or runs a body"
+            " model in TorchScript",
             remedy='Install it: pip install "sd2-core[learn]"',
         )
     return Sd2Error(

@@ -83,13 +83,7 @@ class BodyModel:
             Called with frames; may raise ``Cancelled``.
         """
         frames, vertices = len(turns), len(self.rest_m)
-        if 12 * frames * vertices > _MOST_BYTES:
-            raise Sd2Error(
-                f"{frames:,} frames of {vertices:,} vertices take"
-                f" {12e-9 * frames * vertices:,.0f} GB",
-                f"at most {_MOST_BYTES / 1e9:.0f} GB",
-                "Cut the motion into parts",
-            )
+        check_frames(frames, vertices)
         one_shape = self.shaped(betas[:1]) if len(betas) == 1 else None
         posed = np.empty((frames, vertices, 3), np.float32)
         step = max(_CHUNK_BYTES // (8 * 12 * vertices), 1)
@@ -125,6 +119,16 @@ class BodyModel:
             places[:, joint] = places[:, parent] + (whole[:, parent] @ bone[..., None])[..., 0]
         shift = places - (whole @ joints_m[..., None])[..., 0]
         return np.concatenate([whole, shift[..., None]], axis=-1)
+
+
+def check_frames(frames: int, vertices: int) -> None:
+    """Raise Sd2Error if so many frames of a body take more memory than one may."""
+    if 12 * frames * vertices > _MOST_BYTES:
+        raise Sd2Error(
+            f"{frames:,} frames of {vertices:,} vertices take {12e-9 * frames * vertices:,.0f} GB",
+            f"at most {_MOST_BYTES / 1e9:.0f} GB",
+            "Cut the motion into parts",
+        )
 
 
 def fitted_to(model: BodyModel, turns: Floats) -> Floats:

@@ -23,6 +23,7 @@ PARAMETER_NAMES = (*_MATRICES, *_VECTORS, *_ROOT, *_BODY, *_SHAPES, *_PLACES)
 
 CAPTURE_RATES = ("mocap_framerate", "mocap_frame_rate")
 _AIST_RATE = 60.0
+_AIST_M = 0.01  # its unit is the centimetre
 _OF_SMPLX = {25, 55}
 _Y_DOWN_OF_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 _Y_DOWN_OF_Y_UP = np.diag([1.0, -1.0, -1.0])
@@ -37,6 +38,7 @@ class BodyParameters:
     places_m: Floats | None  # (T, 3); None: not said
     of_smplx: bool | None = None  # None: its pose is that of any model
     to_camera: Floats | None = None  # turns (3, 3) its world to ours; None: it is the camera's
+    scale: float = 1.0  # size of the body, and unit of its places, in metres
     frames_per_s: float | None = None
 
     def vertices(
@@ -61,7 +63,7 @@ class BodyParameters:
             " (--distance-m) or the radar's place (--sensor)."
         )
         # A turn by quarters swaps axes and signs, and rounds nothing.
-        return posed @ self.to_camera.T.astype(np.float32)
+        return posed @ (self.scale * self.to_camera).T.astype(np.float32)
 
 
 def holds_parameters(entry: Mapping[Any, Any]) -> bool:
@@ -95,19 +97,20 @@ def parameters_of(entry: Mapping[Any, Any], source: str) -> BodyParameters:
     of_smplx = (joints in _OF_SMPLX) if joints in (*FAMILIES, *_OF_SMPLX) else None
     if str(entry.get("surface_model_type", "")).startswith("smplx"):  # of AMASS
         of_smplx = True
-    to_camera, rate = None, None
+    to_camera, rate, scale = None, None, 1.0
     if any(name in entry for name in CAPTURE_RATES):
         to_camera = _Y_DOWN_OF_Z_UP
         rate = float(np.asarray(first_of(entry, CAPTURE_RATES)).reshape(-1)[0])
     elif "smpl_scaling" in entry:
-        to_camera, rate = _Y_DOWN_OF_Y_UP, _AIST_RATE
+        to_camera, rate, scale = _Y_DOWN_OF_Y_UP, _AIST_RATE, _scaling(entry, source)
         if places_m is not None:
-            places_m = places_m / _scaling(entry, source)
-    return BodyParameters(turns, betas, places_m, of_smplx, to_camera, rate)
+            places_m = places_m / scale
+        scale *= _AIST_M
+    return BodyParameters(turns, betas, places_m, of_smplx, to_camera, scale, rate)
 
 
 def _scaling(entry: Mapping[Any, Any], source: str) -> float:
-    """Units of a place in a metre (AIST++)."""
+    """Length in centimetres of what is a metre of the model (AIST++)."""
     scaling = float(np.asarray(entry["smpl_scaling"]).reshape(-1)[0])
     if not (np.isfinite(scaling) and scaling > 0):
         raise Sd2Error(f"{source}: smpl_scaling is {scaling}", "a positive number, about 90")

@@ -22,6 +22,7 @@ from sd2core.io.frame_names import frames_among, numbered_frames
 from sd2core.io.mesh_arrays import FACE_NAMES, VERTEX_NAMES
 from sd2core.io.mesh_clock import is_of_clock
 from sd2core.io.mesh_files import SURFACE_SUFFIXES
+from sd2core.io.momentum_rig import RIG_NAMES, holds_rig
 from sd2core.io.pickles import read_object_arrays, read_pickle, read_torch
 
 Person = dict[Any, Any]
@@ -33,7 +34,7 @@ _FRAMES = ("frame", "frames")
 """What TRAM and PromptHMR call the numbers of a person's frames."""
 CAMERA_NAMES = ("pred_cam_t", "cam_trans", "camera", "pred_cam", "orig_cam", "bboxes")
 FOCAL_NAMES = ("focal_length", "img_focal")
-_KEPT = (*ESTIMATED, *PARAMETER_NAMES, *CAMERA_NAMES, *FOCAL_NAMES)
+_KEPT = (*ESTIMATED, *PARAMETER_NAMES, *RIG_NAMES, *CAMERA_NAMES, *FOCAL_NAMES)
 _SHARED = (*FACE_NAMES, *FOCAL_NAMES, "size")
 _FRAME_NUMBERS = ("frame_number", "frame_idx", "frame_id", "frame")
 _FEWEST_VERTICES = 100
@@ -145,7 +146,7 @@ def _people(content: Person) -> dict[Any, Person]:
 
 
 def _is_person(entry: Mapping[Any, Any]) -> bool:
-    return first_of(entry, ESTIMATED) is not None or holds_parameters(entry)
+    return first_of(entry, ESTIMATED) is not None or holds_parameters(entry) or holds_rig(entry)
 
 
 def _numbered_alike(entry: Mapping[Any, Any]) -> Person:
@@ -189,12 +190,21 @@ def _rows(frames: Iterator[tuple[int, Any]]) -> Iterator[tuple[int, Any, Person]
             for place, one in enumerate(listed):
                 yield number, one.get("person_id", place), _flat(one)
         elif isinstance(smpl := frame.get("smpl"), list):  # PHALP
-            tracks = frame.get("tid", range(len(smpl)))
-            cameras = frame.get("camera", [None] * len(smpl))
-            for track, one, camera in zip(tracks, smpl, cameras, strict=False):
-                yield number, int(track), {**one, "camera": camera, "size": frame.get("size")}
+            yield from _tracked(number, frame, smpl)
         else:
             yield from _split(number, frame)
+
+
+def _tracked(
+    number: int, frame: Mapping[Any, Any], smpl: list[Any]
+) -> Iterator[tuple[int, Any, Person]]:
+    """People of one picture of PHALP, but for those it does not see and keeps as they were last."""
+    absent = [None] * len(smpl)
+    names = ("camera", "size", "tracked_time")
+    columns = [frame.get("tid", range(len(smpl))), *(frame.get(name, absent) for name in names)]
+    for one, track, camera, size, frames_ago in zip(smpl, *columns, strict=False):
+        if not frames_ago:
+            yield number, int(track), {**one, "camera": camera, "size": size}
 
 
 def _flat(one: Mapping[Any, Any]) -> Person:

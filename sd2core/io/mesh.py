@@ -87,7 +87,8 @@ def load_mesh(
         Turns the mesh about an axis of the camera's frame before it is moved, right-handed:
         ``x180`` for one with y up and z backward, ``x90`` for one with z up.
     body_model : path, optional
-        Model of SMPL, SMPL-H or SMPL-X that makes vertices of parameters.
+        Model of SMPL, SMPL-H, SMPL-X, or MHR, that makes vertices of parameters. MHR's is a
+        program in TorchScript, which is run (docs/formats.md).
     progress : callable
         Called while files are read; may raise ``Cancelled``.
 

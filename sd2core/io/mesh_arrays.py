@@ -40,9 +40,9 @@ UNCERTAINTY_NAMES = ("vertex_limb", "limb_velocity_sigma_mps", "limb_velocity_si
 _SMALL_NAMES = (*FACE_NAMES, *UNCERTAINTY_NAMES, "vertex_counts", "present", "limbs")
 
 _PARAMETER = re.compile(
-    r"^(smplx?|smpl_.*|poses?|betas|thetas|(root|global)_orient|body_pose|transl?|pose_body)$"
+    r"^(smplx?|smpl_.*|poses?|betas|thetas|(root|global)_orient|body_pose|transl?|pose_body|mhr_model_params)$"
 )
-"""Names of arrays that describe a body of the SMPL family, among others."""
+"""Names of arrays that describe a body of the SMPL family or of MHR, among others."""
 _CHUNK_BYTES = 2 * 2**20
 _WHOLE_CHECK_BYTES = 128 * 2**20
 """Size of the vertices on disk up to which all are checked when a mesh is opened."""
@@ -82,7 +82,7 @@ def no_vertices(source: str, names: Sequence[str]) -> Sd2Error:
     if any(_PARAMETER.search(name) for name in names):
         return Sd2Error(
             f"{source} holds body parameters and no vertices ({shown}), as AMASS, AIST++, GVHMR,"
-            " 4D-Humans (PHALP) and other SMPL tools write them",
+            " 4D-Humans (PHALP), SAM 3D Body and others write them",
             "vertices, or the model of the body that makes them of the parameters",
             "Give the model file with sd2 import --body-model, or let that tool export one OBJ per"
             " frame and open the folder",

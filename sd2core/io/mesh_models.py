@@ -30,13 +30,19 @@ from sd2core.io.estimator_files import (
 from sd2core.io.frame_names import chosen_person
 from sd2core.io.mesh_arrays import FACE_NAMES, VERTEX_NAMES, RawMesh, no_vertices
 from sd2core.io.mesh_clock import clock_of
+from sd2core.io.momentum_rig import RIG_NAMES, holds_rig, rigged
 from sd2core.io.readers import MeshHints
 from sd2core.plausibility.mesh import AT_ROOT_M
 
 _NO_HINTS = MeshHints()
-_SHIFTS = {"pred_cam_t": None, "cam_trans": 443.4 / 512, "camera": 5000.0}
+_SHIFTS = {"pred_cam_t": None, "cam_trans": 443.4 / 512, "camera": 5000.0 / 256}
 """Names of a body's place before the camera, and the focal length that was taken for it: in the
-file; of the picture's longer side (ROMP); in pixels (4D-Humans)."""
+file (SAM 3D Body); of the picture's longer side (ROMP; 4D-Humans, whose PHALP makes all pictures
+256 pixels large)."""
+_NOWHERE = -1.0
+"""All three coordinates of a body for which ROMP found no place."""
+_VIBE_CROP = 1.1
+"""Side of the picture that VIBE's network sees, of the box in its file."""
 
 
 def is_estimate(path: Path) -> bool:
@@ -47,7 +53,7 @@ def is_estimate(path: Path) -> bool:
     if suffix == ".npz":
         names = _names_in(path)
         return not names & {*VERTEX_NAMES} and bool(
-            names & {*ESTIMATED, *PARAMETER_NAMES, "results"}
+            names & {*ESTIMATED, *PARAMETER_NAMES, *RIG_NAMES, "results"}
         )
     if suffix == ".npy":
         return holds_bodies(path)
@@ -108,9 +114,12 @@ def _person_of(path: Path, hints: MeshHints) -> RawMesh:
     rate = None
     if vertices is None:
         assert hints.body_model is not None
-        model, parameters = read_body_model(hints.body_model), parameters_of(entry, str(path))
-        raw.vertices, raw.faces = parameters.vertices(model, notes, hints.progress), model.faces
-        rate = parameters.frames_per_s
+        if holds_rig(entry):
+            raw.vertices, raw.faces = rigged(entry, hints.body_model, str(path), hints.progress)
+        else:
+            model, parameters = read_body_model(hints.body_model), parameters_of(entry, str(path))
+            raw.vertices, raw.faces = parameters.vertices(model, notes, hints.progress), model.faces
+            rate = parameters.frames_per_s
     else:
         raw.vertices = _stacked(vertices, path)
         raw.faces = _numbers(path, entry, shared, FACE_NAMES)
@@ -143,7 +152,7 @@ def weak_perspective_shift(
     camera : float64 array, shape (T, 3)
         s, t_x, t_y.
     boxes : float64 array, shape (T, 4)
-        c_x, c_y, width and height in pixels; VIBE's are square.
+        c_x, c_y, width and height in pixels of what the network saw; VIBE's are square.
     image_size : (int, int)
         Width and height in pixels.
     focal_px : float
@@ -173,6 +182,8 @@ def _choose(
 def _frames(entry: dict[Any, Any], path: Path) -> int:
     """Number of frames of a person."""
     vertices = first_of(entry, ESTIMATED)
+    if vertices is None and holds_rig(entry):
+        return len(np.atleast_2d(entry[RIG_NAMES[0]]))
     if vertices is None:
         return len(parameters_of(entry, str(path)).turns)
     return len(vertices if isinstance(vertices, list | tuple) else _stacked(vertices, path))
@@ -240,10 +251,10 @@ def _place_in_front(raw: RawMesh, entry: dict[Any, Any], path: Path, hints: Mesh
         return
     if shift_m is not None:
         sampled = shift_m[:: max(len(vertices) // 16, 1)]
-        if np.nanmedian(np.linalg.norm(centres - sampled, axis=1)) < np.nanmedian(
-            np.linalg.norm(centres, axis=1)
-        ):
-            return  # already there
+        near, far = (np.linalg.norm(centres - one, axis=1) for one in (sampled, 0.0))
+        seen = np.isfinite(near)
+        if not seen.any() or np.median(near[seen]) < np.median(far[seen]):
+            return  # already there, or nowhere
     if hints.distance_m is not None:
         raw.notes.append(
             f"The mesh is centred on the body's root and moved {hints.distance_m:g} m forward;"
@@ -266,7 +277,8 @@ def _shift(entry: dict[Any, Any], frames: int, path: Path) -> NDArray[np.float64
     shift = np.asarray(entry[name], np.float64)
     if shift.size != 3 * frames:
         raise Sd2Error(f"{path}: {name} has shape {shift.shape}", f"({frames}, 3)")
-    return shift.reshape(frames, 3)
+    shift = shift.reshape(frames, 3)
+    return np.where((shift == _NOWHERE).all(axis=1, keepdims=True), np.nan, shift)
 
 
 def _with_focal(
@@ -281,7 +293,7 @@ def _with_focal(
     focal = first_of(entry, FOCAL_NAMES)
     if focal is not None:
         taken = float(np.median(np.asarray(focal, np.float64)))
-    elif name == "cam_trans" and taken is not None:
+    elif taken is not None:
         taken = taken * max(size) if size is not None else None
     wanted, how = hints.focal_px, "as given"
     if wanted is None and focal is None and name == "camera" and size is not None:
@@ -291,10 +303,11 @@ def _with_focal(
     placed = shift_m.copy()
     if wanted is not None and taken is not None:
         placed[:, 2] *= wanted / taken
+    found = np.isfinite(shift_m[:, 2])
     said = "" if wanted is None else f", focal length {wanted:.0f} px ({how})"
     raw.notes.append(
-        f"The body is placed by the file's camera{said}, at {np.median(placed[:, 2]):.2f} m. Its"
-        " depth follows the size in the picture and jitters: `sd2 refine` makes it smooth."
+        f"The body is placed by the file's camera{said}, at {np.median(placed[found, 2]):.2f} m."
+        " Its depth follows the size in the picture and jitters: `sd2 refine` makes it smooth."
     )
     return placed
 
@@ -316,7 +329,9 @@ def _weak_perspective(
     """Place (T, 3) by a weak-perspective camera, VIBE's in the box or of the whole picture."""
     frames, size = len(np.asarray(raw.vertices)), _image_size(entry, hints)
     camera, boxes = entry.get("pred_cam"), entry.get("bboxes")
-    if not isinstance(camera, np.ndarray) or not isinstance(boxes, np.ndarray):
+    if isinstance(camera, np.ndarray) and isinstance(boxes, np.ndarray):
+        boxes = boxes * [1.0, 1.0, _VIBE_CROP, _VIBE_CROP] if boxes.shape == (frames, 4) else boxes
+    else:
         camera, boxes = entry.get("orig_cam"), None
     if not isinstance(camera, np.ndarray) or size is None:
         how = "Give its distance (--distance-m)"

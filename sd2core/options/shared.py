@@ -97,15 +97,16 @@ class MeshReading(OptionRecord):
     distance_m : M
         move a mesh that is centred on the body's root this far forward
     turn : AXIS
-        turn the mesh about an axis: x180 where y is up and z backward (OBJ files of 4D-Humans),
-        x90 where z is up
+        turn the mesh about an axis: x180 where y is up and z backward (OBJ and PLY files of
+        4D-Humans, VIBE and SAM 3D Body), x90 where z is up
     image_size : WxH
         size of the video in pixels, to place the output of an estimator (default: that of the
         recording's video)
     focal_px : PX
         focal length of the video in pixels, likewise (default: the file's, or the diagonal)
     body_model : FILE
-        model of SMPL, SMPL-H or SMPL-X (.npz, .pkl), to make vertices of body parameters
+        model of SMPL, SMPL-H, SMPL-X (.npz, .pkl) or MHR (.pt, TorchScript: a program, which is
+        run), to make vertices of body parameters
     """
 
     GROUP = Group("mesh file", "what it may not say about itself")

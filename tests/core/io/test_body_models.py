@@ -198,7 +198,8 @@ def test_aist_motion_is_in_centimetres_and_y_up(tmp_path: Path) -> None:
     (tmp_path / "gBR.pkl").write_bytes(pickle.dumps(motion))
     model = write_model(tmp_path / "SMPL.npz")
     mesh = load_mesh(tmp_path / "gBR.pkl", body_model=model)
-    rest = model_arrays()["v_template"] + [1.0, 2.0, -3.0]
+    rest = model_arrays()["v_template"] * 0.95 + [0.95, 1.90, -2.85]
+    # Its bodies are the model's, scaled: 95 centimetres for each of its metres.
     np.testing.assert_allclose(mesh.frame(0), rest * [1.0, -1.0, -1.0], atol=1e-6)
     np.testing.assert_allclose(np.diff(mesh.times_s), 1 / 60, rtol=1e-9)
 

@@ -218,27 +218,41 @@ def test_prompthmr_with_people_one_level_down(tmp_path: Path, amass_twin: Any) -
 
 
 def test_phalp_with_a_frame_for_each_picture(tmp_path: Path, amass_twin: Any) -> None:
-    """Its camera has a focal length of 5,000 pixels, whatever the video's is."""
+    """Its camera has 5,000 pixels in a picture whose longer side is 256, whatever the video's is.
+
+    People whom it has lost are kept as they were seen last, so many frames ago.
+    """
     known = smpl_parameters(FRAMES)
     turns = matrices(known["vectors"])
-    content: dict[str, Any] = {"outputs/frames/000001.jpg": {"tid": [], "smpl": [], "camera": []}}
+    names = ("tid", "smpl", "camera", "size", "tracked_time", "bbox")
+    content: dict[str, Any] = {
+        f"outputs/_DEMO/walk/img/{frame:06d}.jpg": {"time": frame} | {name: [] for name in names}
+        for frame in range(1, 10)
+    }
     for row, frame in enumerate(FRAMES):
         smpl = {
             "global_orient": turns[row, :1],
             "body_pose": turns[row, 1:],
             "betas": known["betas"][row],
         }
-        far = known["trans"][row] * [1.0, 1.0, 5.0]
-        content[f"outputs/frames/{frame:06d}.jpg"] = {
-            "tid": [7],
-            "smpl": [smpl],
-            "camera": [far],
-            "size": [[720, 1280]],
+        far = known["trans"][row] * [1.0, 1.0, 5000.0 / 256.0 * 1.28]
+        people = 1 + row % 2  # one comes and goes
+        content[f"outputs/_DEMO/walk/img/{frame:06d}.jpg"] |= {
+            "tid": [7, 2][:people],
+            "smpl": [smpl, smpl][:people],
+            "camera": [far, far][:people],
+            "size": [[720, 1280]] * people,
+            "tracked_time": [0, 0][:people],
         }
+    for frame in (6, 7):
+        seen = content["outputs/_DEMO/walk/img/000005.jpg"]
+        lost = seen | {"time": frame, "tracked_time": [frame - 5]}
+        content[f"outputs/_DEMO/walk/img/{frame:06d}.jpg"] = lost
     joblib.dump(content, tmp_path / "demo_phalp.pkl")
     model = write_model(tmp_path / "SMPL.npz")
     mesh = read(tmp_path / "demo_phalp.pkl", body_model=model, focal_px=1000.0)
     there = mesh.presence.there
+    np.testing.assert_allclose(mesh.times_s[there] * 30 + 3, FRAMES, atol=1e-6)
     np.testing.assert_allclose(mesh.read(0, 5)[there], amass_twin(known), atol=1e-5)
     guessed = read(tmp_path / "demo_phalp.pkl", body_model=model)
     assert any("focal length 1469 px (assumed: the image's diagonal)" in n for n in guessed.notes)
@@ -257,6 +271,22 @@ def test_romp_with_people_of_each_picture(tmp_path: Path, size: tuple[int, int] 
     np.savez(tmp_path / "video_results.npz", results=np.array(results))
     options: dict[str, Any] = {} if size is None else {"image_size": size, "focal_px": 886.8}
     check(read(tmp_path / "video_results.npz", person=5, **options))
+
+
+def test_romp_says_by_minus_one_that_it_found_no_place(tmp_path: Path) -> None:
+    results = {}
+    for frame in range(3, 10):
+        where = place(frame) if frame in FRAMES else -np.ones(3)
+        results[f"{frame:08d}.png"] = {
+            "cam": np.array([[0.5, 0.0, 0.1]]),
+            "smpl_thetas": np.zeros((1, 72)),
+            "smpl_betas": np.zeros((1, 10)),
+            "center_preds": np.array([[256, 256]]),
+            "verts": at_root(frame)[None].astype(np.float32),
+            "cam_trans": where[None].astype(np.float32),
+        }
+    np.savez(tmp_path / "video_results.npz", results=results, sequence_results={})
+    check(read(tmp_path / "video_results.npz"))
 
 
 def test_the_camera_of_the_whole_picture_places_vibe(tmp_path: Path) -> None:
