@@ -1,9 +1,10 @@
 """A mesh of another tool made smooth in time, as our own fit is (docs/decisions/0022).
 
 Estimators look at one frame after the other, and what jitters between frames is false Doppler.
-Every coordinate keeps to what was estimated within the jitter that is found in it, and may
-accelerate as much as it was found to do around each moment. Nothing lags: all frames are solved at
-once. The body's middle is smoothed by itself, because it moves more calmly than its limbs.
+Every coordinate keeps to what was estimated within the jitter that is found in it, and its
+acceleration may change as fast as it was found to do around each moment: limbs swing, they are not
+thrown about. Nothing lags: all frames are solved at once. The body's middle is smoothed by itself,
+because it moves more calmly than its limbs.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.parts import body_parts
 from sd2core.body.rotations import Floats
-from sd2core.body.solve import FIRST_TRANSLATION_MPS2, LEAST_TRANSLATION_MPS2, ROUNDS, liveliness
+from sd2core.body.solve import liveliness
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
@@ -30,7 +31,16 @@ _LASTING = 1.3
 recorded motion (CMU subjects 1, 2, 5, 8, 49, 127) with the jitter of estimators."""
 _FAR = 8.0
 """Distance, in standard deviations of the jitter, from where on a place counts less than half."""
-_CUBIC = {-2: -1 / 6, -1: 4 / 6, 1: 4 / 6, 2: -1 / 6}
+_FIRST_HZ = 6.0
+"""Limit of the motion that is looked for at first: less takes fast limbs for jitter, for good."""
+_ROUNDS = 4
+_LIVELY = 1.15
+"""Standard deviation of a jerk over what was found around it, which jitter's removal lessened."""
+_LEAST_MPS3 = 1.0
+"""Limit at rest. These four were chosen on the same motion (tools/motion_capture/refining.py)."""
+_QUICK = 3.0
+"""Jitter over what was found before motion is known: where it turns it looks like a jump."""
+_JUMP_FRAMES = 5
 _GAUSSIAN = 0.6745  # median of the absolute value, over the standard deviation
 _THIRD = 20.0**0.5  # standard deviation of a third difference of white noise of 1
 _MARGIN_S = 5.0
@@ -197,25 +207,23 @@ def smooth_paths(times_s: Floats, paths_m: Floats) -> tuple[Floats, Floats]:
     """Smooth paths (T, N) of coordinates, and the standard deviation of their velocities in m/s.
 
     Each is solved by itself: squared distances from what is given, over the jitter's variance, and
-    squared accelerations, over those that were found around each moment, are least together.
+    squared jerks, over those that were found around each moment, are least together.
     """
+    from scipy.ndimage import median_filter
+
     if len(times_s) < _FEWEST:
         return paths_m, np.zeros(paths_m.shape)
     jitter_m = np.median(np.abs(np.diff(paths_m, 3, axis=0)), axis=0) / (_GAUSSIAN * _THIRD)
     jitter_m = np.maximum(jitter_m, _LEAST_JITTER_M)  # (N,)
-    weights = _second_differences(times_s)
-    sd = np.full((len(times_s) - 2, paths_m.shape[1]), FIRST_TRANSLATION_MPS2)
-    beside = np.zeros(paths_m.shape)  # from the cubic through two frames on each side
-    beside[2:-2] = paths_m[2:-2] - sum(
-        weight * paths_m[2 + k : len(paths_m) - 2 + k] for k, weight in _CUBIC.items()
-    )
-    trust = _trust(beside, 3.0 * jitter_m)  # quick motion looks like a jump here
-    for number in range(ROUNDS):
+    weights = _third_differences(times_s)
+    beside = paths_m - median_filter(paths_m, (_JUMP_FRAMES, 1), mode="nearest")
+    jumps = (1.0 - _trust(beside, _QUICK * jitter_m)) * beside
+    smooth = _below(_FIRST_HZ, times_s, paths_m - jumps, weights)
+    for _ in range(_ROUNDS - 1):
+        trust = _trust(paths_m - smooth, jitter_m)
+        found = sum(weights[k][:, None] * smooth[k : len(smooth) - 3 + k] for k in range(4))
+        sd = liveliness(np.asarray(found), times_s, _LEAST_MPS3, share=_LIVELY)
         smooth = _solved(weights, paths_m, jitter_m / sd, trust)
-        if number < ROUNDS - 1:
-            trust = _trust(paths_m - smooth, jitter_m)
-            found = sum(weights[k][:, None] * smooth[k : len(smooth) - 2 + k] for k in range(3))
-            sd = liveliness(np.asarray(found), times_s, LEAST_TRANSLATION_MPS2)
     return smooth, _velocity_sd(times_s, paths_m - smooth, sd)
 
 
@@ -224,55 +232,66 @@ def _trust(off_m: Floats, jitter_m: Floats) -> Floats:
     return np.asarray(1.0 / (1.0 + np.square(off_m / (_FAR * jitter_m))))
 
 
-def _second_differences(times_s: Floats) -> Floats:
-    """Weights (3, T - 2) of three successive places that give the acceleration between them."""
-    before, after = np.diff(times_s)[:-1], np.diff(times_s)[1:]
-    both = before + after
-    return np.stack([2.0 / (before * both), -2.0 / (before * after), 2.0 / (after * both)])
+def _third_differences(times_s: Floats) -> Floats:
+    """Weights (4, T - 3) of four successive places that give the jerk between them."""
+    near = np.stack([times_s[k : len(times_s) - 3 + k] for k in range(4)])
+    apart = near[:, None] - near
+    apart[range(4), range(4)] = 1.0
+    return np.asarray(6.0 / apart.prod(axis=1))
+
+
+def _below(limit_hz: float, times_s: Floats, paths_m: Floats, weights: Floats) -> Floats:
+    """Paths without what is faster: at the limit, or a quarter of the rate, half of it is left."""
+    from scipy.linalg import solveh_banded
+
+    step_s = float(np.median(np.diff(times_s)))
+    turn = min(np.pi * limit_hz * step_s, np.pi / 4.0)
+    rows = weights * (step_s / (2.0 * np.sin(turn))) ** 3
+    bands = np.zeros((4, len(times_s)))
+    bands[0] = 1.0
+    for k in range(4):
+        for far in range(4 - k):
+            bands[far, k : len(times_s) - 3 + k] += rows[k] * rows[k + far]
+    return np.asarray(solveh_banded(bands, paths_m, lower=True))
 
 
 def _solved(weights: Floats, given: Floats, stiffness: Floats, trust: Floats) -> Floats:
-    """Solution x (T, N) of (W + Dᵀ S² D) x = W given: second differences D, stiffness S, trust W.
+    """Solution x (T, N) of (W + Dᵀ S² D) x = W given: third differences D, stiffness S, trust W.
 
-    The matrix has five diagonals; L D Lᵀ is worked out row after row, for all columns at once.
+    The matrix has seven diagonals; L D Lᵀ is worked out row after row, for all columns at once.
     """
     frames = len(given)
-    rows = weights[:, :, None] * stiffness  # (3, T - 2, N)
-    pivots = trust.copy()
-    next_one, next_two = np.zeros(given.shape), np.zeros(given.shape)
-    for k in range(3):
-        pivots[k : frames - 2 + k] += rows[k] ** 2
-    next_one[: frames - 2] += rows[0] * rows[1]
-    next_one[1 : frames - 1] += rows[1] * rows[2]
-    next_two[: frames - 2] = rows[0] * rows[2]
-    x = trust * given
+    rows = weights[:, :, None] * stiffness  # (4, T - 3, N)
+    bands = np.zeros((4, *given.shape))  # of the matrix: itself and those below its diagonal
+    bands[0] = trust
+    for k in range(4):
+        for far in range(4 - k):
+            bands[far, k : frames - 3 + k] += rows[k] * rows[k + far]
+    pivots, x = bands[0], trust * given
     for t in range(frames):
-        if t > 0:
-            pivots[t] -= next_one[t - 1] ** 2 * pivots[t - 1]
-            x[t] -= next_one[t - 1] * x[t - 1]
-        if t > 1:
-            pivots[t] -= next_two[t - 2] ** 2 * pivots[t - 2]
-            x[t] -= next_two[t - 2] * x[t - 2]
-        if t > 0:
-            next_one[t] -= next_one[t - 1] * next_two[t - 1] * pivots[t - 1]
-        next_one[t] /= pivots[t]
-        next_two[t] /= pivots[t]
+        for far in range(1, min(t, 3) + 1):
+            share = bands[far, t - far]
+            scaled = share * pivots[t - far]
+            pivots[t] -= share * scaled
+            x[t] -= share * x[t - far]
+            for farther in range(far + 1, 4):
+                bands[farther - far, t] -= scaled * bands[farther, t - far]
+        bands[1:, t] /= pivots[t]
     x /= pivots
     for t in range(frames - 2, -1, -1):
-        x[t] -= next_one[t] * x[t + 1]
-        if t < frames - 2:
-            x[t] -= next_two[t] * x[t + 2]
+        for far in range(1, min(frames - 1 - t, 3) + 1):
+            x[t] -= bands[far, t] * x[t + far]
     return x
 
 
-def _velocity_sd(times_s: Floats, removed_m: Floats, sd_mps2: Floats) -> Floats:
+def _velocity_sd(times_s: Floats, removed_m: Floats, sd_mps3: Floats) -> Floats:
     """Standard deviation (T, N) of velocities, by what was taken away around each moment.
 
-    White noise of density n² dt that passes 1 / (1 + (ω / ω₀)⁴), with ω₀² = s / n for accelerations
-    s, leaves a velocity of variance n² dt ω₀³ / √8 uncertain.
+    White noise of density n² dt that passes 1 / (1 + (ω / ω₀)⁶), with ω₀³ = s / n for jerks s,
+    leaves a velocity of variance n² dt ω₀³ / 6 uncertain.
     """
     step_s = float(np.median(np.diff(times_s)))
     jitter_m = liveliness(removed_m, times_s, _LEAST_JITTER_M, share=1.0)
-    edge = np.concatenate([sd_mps2[:1], sd_mps2, sd_mps2[-1:]])
-    cutoff = np.minimum(np.sqrt(edge / jitter_m), np.pi / step_s)
-    return np.asarray(_LASTING * jitter_m * np.sqrt(step_s * cutoff**3 / 8.0**0.5))
+    edge = np.concatenate([sd_mps3[:1], sd_mps3, sd_mps3[-1:], sd_mps3[-1:]])
+    cutoff_cubed = np.minimum(edge / jitter_m, (np.pi / step_s) ** 3)
+    return np.asarray(_LASTING * jitter_m * np.sqrt(step_s * cutoff_cubed / 6.0))
