@@ -113,10 +113,14 @@ def _content(path: Path) -> Person:
         if isinstance(content, Mapping) and isinstance(content.get("results"), Mapping):  # ROMP
             content = content["results"]
     if isinstance(content, Mapping):
-        # A tracker may have left NumPy's numbers as keys.
-        return {k.item() if isinstance(k, np.generic) else k: v for k, v in content.items()}
+        return _plainly_keyed(content)
     of_frames = isinstance(content, list) and any(isinstance(one, list | dict) for one in content)
     return {"frames": content} if of_frames else {"verts": content}
+
+
+def _plainly_keyed(content: Mapping[Any, Any]) -> Person:
+    """The same with Python's numbers as keys, where a tracker left NumPy's."""
+    return {k.item() if isinstance(k, np.generic) else k: v for k, v in content.items()}
 
 
 def _people(content: Person) -> dict[Any, Person]:
@@ -129,7 +133,7 @@ def _people(content: Person) -> dict[Any, Person]:
     if isinstance(content.get("frames"), list):
         return _gathered(_rows(enumerate(content["frames"])))
     if isinstance(content.get("people"), Mapping):  # PromptHMR
-        content = content["people"]
+        content = _plainly_keyed(content["people"])
     people = {
         key: person
         for key, value in content.items()

@@ -186,7 +186,13 @@ def test_gvhmr_in_a_torch_file(tmp_path: Path, amass_twin: Any) -> None:
     }
     world = {**incam, "transl": torch.full((3, 3), 50.0)}
     focal = torch.eye(3).expand(3, 3, 3)
-    content = {"smpl_params_global": world, "smpl_params_incam": incam, "K_fullimg": focal}
+    between = {"model_output": {"static_conf_logits": torch.zeros(1, 3, 6)}, "cam_angvel": None}
+    content = {
+        "smpl_params_global": world,
+        "smpl_params_incam": incam,
+        "K_fullimg": focal,
+        "net_outputs": between,
+    }
     torch.save(content, tmp_path / "hmr4d_results.pt")
     assert kind_of(tmp_path / "hmr4d_results.pt") == "mesh"
     model = write_model(tmp_path / "SMPLX.npz", 55)
@@ -207,7 +213,7 @@ def test_prompthmr_with_people_one_level_down(tmp_path: Path, amass_twin: Any) -
     }
     person = {"frames": np.array(FRAMES), "bboxes": np.ones((4, 4)), "smplx_cam": inner}
     shorter = {"frames": np.array([1]), "smplx_cam": {k: v[:1] for k, v in inner.items()}}
-    content = {"camera": {"img_focal": 900.0}, "people": {1: person, 2: shorter}}
+    content = {"camera": {"img_focal": 900.0}, "people": {np.int64(1): person, 2: shorter}}
     joblib.dump(content, tmp_path / "results.pkl")
     model = write_model(tmp_path / "SMPLX.npz", 55)
     mesh = read(tmp_path / "results.pkl", body_model=model)
