@@ -12,7 +12,7 @@ from sd2app.background.latest import Emit, LatestRunner, ReportingModel
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2core.labels.agreement import Agreement, Disagreement, agreement, disagreements
-from sd2core.labels.formats import read_labels
+from sd2core.labels.formats import LabelReading, read_label_file
 from sd2core.labels.import_labels import Incoming
 from sd2core.labels.spans import Labels
 
@@ -32,6 +32,7 @@ class AgreementModel(ReportingModel):
         self._labels, self._playback, self._span = labels, session.playback, session.span
         self.other = LabelsModel(self)
         self.path: Path | None = None  # of the other person's labels, while they are open
+        self.sentence = ""  # on what was taken of their file, and what was not
         self.left_out = 0  # spans of theirs outside the recording
         self.found: Agreement | None = None  # until it is computed
         self.disagreements: tuple[Disagreement, ...] = ()  # in order
@@ -63,14 +64,14 @@ class AgreementModel(ReportingModel):
     def open(self, path: Path) -> None:
         """Compare with the labels of a file, in the background."""
         base = self._playback.timebase
-        self._reader.submit(lambda emit: (path, Incoming.of(read_labels(path, base), base)))
+        self._reader.submit(lambda emit: (path, read_label_file(path, base)))
 
     def clear(self) -> None:
         """End the comparison."""
         self._reader.cancel()
         self._comparer.cancel()
         if self.active:
-            self.path = None
+            self.path, self.sentence = None, ""
             self.found, self.disagreements = None, ()
             self.other.open(Labels())
             self.changed.emit()
@@ -89,8 +90,10 @@ class AgreementModel(ReportingModel):
 
     # --- inside ---------------------------------------------------------------------------
 
-    def _receive(self, result: tuple[Path, Incoming]) -> None:
-        self.path, incoming = result
+    def _receive(self, result: tuple[Path, LabelReading]) -> None:
+        self.path, reading = result
+        incoming = Incoming.of(reading.labels, self._playback.timebase)
+        self.sentence = reading.sentence
         self.left_out = len(incoming.outside)
         self.found, self.disagreements = None, ()
         # Colours are those of this recording wherever it has the label.

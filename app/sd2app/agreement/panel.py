@@ -12,7 +12,7 @@ from sd2app.agreement.model import AgreementModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.widgets.inputs import action_button
 from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
-from sd2app.widgets.panel import ElidedLabel, FactRows, rule, sentence, title
+from sd2app.widgets.panel import ElidedLabel, FactRows, rule, sentence, show_words, title
 from sd2app.widgets.text import counted
 from sd2core.labels.agreement import kappa_words
 
@@ -37,11 +37,11 @@ class AgreementPanel(QWidget):
         self._verdict, self._where = sentence("", "plain"), sentence("", "plain")
         self._facts = FactRows(_MAX_FACTS, at_the_edge=True, parent=self)
         self._labels = FactRows(_MAX_LABELS, at_the_edge=True, parent=self)
-        self._nothing = sentence(_NOTHING)
+        self._nothing, self._of_file = sentence(_NOTHING), sentence("")
         self._result = self._lay_out_result(action)
         file = "compare_labels", "File…"
         top = _row(self._name, action, file, ("end_comparison", "End"))
-        parts = top, self._nothing, self._result, STRETCH
+        parts = top, self._nothing, self._of_file, self._result, STRETCH
         self.setLayout(column_of(*parts, spacing_px=8, margins_px=(8, 6, 8, 6)))
         model.changed.connect(self._refresh)
         playback.frame_changed.connect(self._follow_cursor)
@@ -61,6 +61,7 @@ class AgreementPanel(QWidget):
         self._name.setText(f"With {model.name}" if model.active else "No comparison")
         self._name.setToolTip(str(model.path or ""))
         self._nothing.setVisible(not model.active)
+        show_words(self._of_file, model.sentence)
         self._result.setVisible(model.active)
         if model.active:
             self._verdict.setText(verdict(model))

@@ -80,3 +80,18 @@ def test_another_recording_is_not_compared(compared, qtbot, recording_copy) -> N
     compared.open_paths([recording_copy])
     qtbot.waitUntil(lambda: compared.settled, timeout=20_000)
     assert not models_of(compared).agreement.active
+
+
+def test_what_their_file_left_out_is_said_below_its_name(window, qtbot, monkeypatch, tmp_path):
+    path = tmp_path / "ida.csv"
+    path.write_text("start_s,end_s,label\n0.2,0.8,there\n1.6,1.1,back\n")
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
+    qtbot.keyClick(window, Qt.Key.Key_K, CONTROL | SHIFT)
+    c, panel = models_of(window), window.findChild(AgreementPanel)
+    qtbot.waitUntil(lambda: c.agreement.found is not None, timeout=10_000)
+    (said,) = [one for one in words_in(panel, "muted") if "taken" in one]
+    assert said.startswith("1 span on 1 track taken")
+    assert "1 left out (" in said
+    end = next(one for one in panel.findChildren(QToolButton) if one.text() == "End")
+    qtbot.mouseClick(end, LEFT)
+    assert not any("taken" in one for one in words_in(panel, "muted"))
