@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel
+
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
 from sd2core.files.recording_json import Document
@@ -16,8 +18,10 @@ from sd2core.recording.recording import Recording, settings_of
 _ALWAYS = ("sensor", "placements", "radar_offset_s")
 _INERTIAL = ("imu", "imu_offset_s", "imu_places")
 _CHANNEL = ("radar_receiver", "radar_transmitter")
-EDITED = (*_ALWAYS, *_INERTIAL, *_CHANNEL)
-"""Names of the fields. Journals of earlier versions end with the third or the sixth."""
+MESH = ("mesh", "faces", "mesh_reading", "camera")
+"""Names of the fields on which the mesh depends."""
+EDITED = (*_ALWAYS, *_INERTIAL, *_CHANNEL, *MESH)
+"""Names of the fields. Journals of earlier versions end with the third, sixth or eighth."""
 
 
 def edited_fields(recording: Recording) -> dict[str, Any]:
@@ -26,9 +30,12 @@ def edited_fields(recording: Recording) -> dict[str, Any]:
     entry = {name: getattr(recording, name) for name in EDITED} | {
         "sensor": recording.sensor.as_dict(),
         "placements": None if planned is None else planned.as_dict(),
-        "imu": None if recording.imu is None else str(plain_path(recording.imu)),
     }
-    return dict(json.loads(json.dumps(entry)))
+    return dict(json.loads(json.dumps(entry, default=_encoded)))
+
+
+def _encoded(value: Path | BaseModel) -> Any:
+    return str(plain_path(value)) if isinstance(value, Path) else value.model_dump(mode="json")
 
 
 def decoded_fields(entry: Mapping[str, Any]) -> dict[str, Any]:

@@ -181,13 +181,8 @@ def load_content(recording: Recording, progress: Progress) -> Content:
     notes = [*recording.notes] if recording.folder != UNTITLED else []
     for part in parts:
         notes.extend(part.notes)
-    clocks = [part.timebase for part in (video, mesh) if part is not None]
-    clocks.extend(
-        radar.timebase.shifted(recording.radar_offset_s)
-        for radar in (capture, recorded)
-        if radar is not None
-    )
-    timebase = common_clock(clocks)
+    radar = capture or (None if recorded is None else recorded.doppler)
+    timebase = clock_of(recording, video, mesh, radar)
     spans_s = [(span.start_s, span.end_s) for span in recording.labelled.spans]
     notes.extend(map(str, judge_spans(spans_s, timebase.start_s, timebase.end_s)))
     return Content(
@@ -207,6 +202,19 @@ def load_content(recording: Recording, progress: Progress) -> Content:
 def offers_of(unlikely: Iterable[Sd2Error | Finding]) -> tuple[Offer, ...]:
     """What can be read another way, of errors and findings."""
     return tuple(Offer(str(one), one.cure) for one in unlikely if one.cure is not None)
+
+
+def clock_of(
+    recording: Recording,
+    video: VideoReader | None,
+    mesh: MeshSequence | None,
+    radar: RadarCapture | DopplerMap | None,
+) -> Timebase:
+    """The one clock of those parts of a recording that are there, at least one."""
+    clocks = [part.timebase for part in (video, mesh) if part is not None]
+    if radar is not None:
+        clocks.append(radar.timebase.shifted(recording.radar_offset_s))
+    return common_clock(clocks)
 
 
 def common_clock(clocks: Sequence[Timebase]) -> Timebase:

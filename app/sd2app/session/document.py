@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,11 +17,12 @@ from sd2app.session.content import (
     UNTITLED,
     Content,
     Offer,
-    common_clock,
+    clock_of,
     load_content,
     offers_of,
     recording_of,
 )
+from sd2app.session.mesh_reading import MeshReader, ReadMesh, mesh_fields
 from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
 from sd2core.errors import Cure, Sd2Error
@@ -30,11 +31,10 @@ from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.options.synthesis import HowCounted
 from sd2core.radar_config import CLUTTER, Clutter
-from sd2core.recording.edited import EDITED
+from sd2core.recording.edited import EDITED, MESH
 from sd2core.recording.recording import Recording
 from sd2core.recording.relinking import Relinked
 from sd2core.sensor import VelocityAxis
-from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
     from sd2core.io.radar import RadarCapture
@@ -69,6 +69,9 @@ class DocumentModel(QObject):
         self._maps = ListedRunner("radar", jobs, self, self._receive_map)
         for runner in (self._runner, self._maps):
             runner.failed.connect(lambda error: self.failed.emit(str(error)))
+        self._meshes = MeshReader(jobs, self)
+        self._meshes.ready.connect(self._exchange_mesh)
+        self._meshes.failed.connect(self.failed)
 
     # --- what is there --------------------------------------------------------------------
 
@@ -178,12 +181,22 @@ class DocumentModel(QObject):
         recording = self.recording
         self._start(replace(recording) if recording is not None else None, list(paths))
 
-    def read_mesh_so(self, cure: Cure) -> None:
-        """Read the mesh again with a setting that puts it right, or open what was refused so."""
-        if self.content is not None and self.offers == self.content.offers:
-            self._start(replace(self.content.recording), [], cure)
-        else:
-            self._start(self._base, self._asked, cure)
+    @property
+    def offers_of_open(self) -> bool:
+        """True where the offers are of what is open, not of a file that was refused."""
+        return self.content is not None and self.offers == self.content.offers
+
+    def open_mesh_so(self, cure: Cure) -> None:
+        """Open what was refused, its mesh read with a setting that puts it right."""
+        self._start(self._base, self._asked, cure)
+
+    def read_mesh(self, fields: Mapping[str, Any], then: Callable[..., object]) -> None:
+        """Read a mesh by other fields of the recording, in the background.
+
+        ``then`` is called with all fields that it depends on, which can be assigned at once.
+        """
+        if self.recording is not None:
+            self._meshes.read(self.recording, fields, then)
 
     def decline_offers(self) -> None:
         """Leave the mesh as it was read."""
@@ -220,7 +233,7 @@ class DocumentModel(QObject):
 
     def grow(self, radar_map: DopplerMap) -> None:
         """Show a longer map of the radar: it was listened to until its end."""
-        self._take_growth(radar_map.timebase, radar_map=radar_map)
+        self._take_growth(radar_map, radar_map=radar_map)
 
     def end_growth(self) -> None:
         """Take over the whole capture; Sd2Error if it cannot be read."""
@@ -228,24 +241,24 @@ class DocumentModel(QObject):
             return
         self.growing = False
         capture = self.content.recording.load_every_channel()
-        self._take_growth(capture.timebase, capture=capture)
+        self._take_growth(capture, capture=capture)
         self.changed.emit()
         if capture.notes:
             self.noted.emit(" ".join(capture.notes))
         self._process_capture()
 
-    def _take_growth(self, radar: Timebase, **parts: Any) -> None:
+    def _take_growth(self, radar: RadarCapture | DopplerMap, **parts: Any) -> None:
         content = self.content
         assert content is not None
-        clocks = [part.timebase for part in (content.video, content.mesh) if part is not None]
-        clocks.append(radar.shifted(content.recording.radar_offset_s))
-        self.content = replace(content, timebase=common_clock(clocks), **parts)
+        timebase = clock_of(content.recording, content.video, content.mesh, radar)
+        self.content = replace(content, timebase=timebase, **parts)
         self.grown.emit()
 
     def close(self) -> None:
         """Stop all work and let go of the files."""
         self._runner.close()
         self._maps.close()
+        self._meshes.close()
         if self.content is not None:
             self.content.close()
             self.content = None
@@ -282,6 +295,9 @@ class DocumentModel(QObject):
         self._process_capture()
 
     def _tell_opened(self, unsaved: bool) -> None:
+        assert self.content is not None
+        fields = mesh_fields(self.content.recording)
+        self._meshes.reset(ReadMesh(fields, self.content.mesh, self.content.offers))
         self.undo_stack.clear()
         if unsaved:
             self.undo_stack.resetClean()
@@ -295,12 +311,28 @@ class DocumentModel(QObject):
         recording = self.recording
         if recording is None or all(getattr(recording, name) == fields[name] for name in fields):
             return
-        channel = _channel(recording)
+        channel, mesh = _channel(recording), mesh_fields(recording)
         for name, value in fields.items():
             setattr(recording, name, value)
+        if mesh_fields(recording) != mesh:
+            self._meshes.follow(recording)
         self.changed.emit()
         if _channel(recording) != channel:
             self._process_capture()
+
+    def _exchange_mesh(self, read: ReadMesh) -> None:
+        """Show another mesh in what is open; the history and all else stay."""
+        content = self.content
+        assert content is not None
+        radar = content.capture or content.radar_map
+        if content.video is None and radar is None and read.mesh is None:
+            return  # there would be nothing to show
+        timebase = clock_of(content.recording, content.video, read.mesh, radar)
+        self.content = replace(content, mesh=read.mesh, timebase=timebase, offers=read.offers)
+        self.same_recording = True
+        self.opened.emit()
+        self.changed.emit()
+        self._offer(read.offers)
 
     def set_clutter(self, clutter: Clutter) -> None:
         """Remove static echoes another way."""
@@ -389,7 +421,7 @@ def _channel(recording: Recording) -> tuple[int | None, int | None]:
 
 def _keep_edits(before: Recording, after: Recording) -> None:
     """Apply edits made while files were read to what was read."""
-    kept = {"labels", "denoiser", "bundled_denoiser", *EDITED}
+    kept = {"labels", "denoiser", "bundled_denoiser", *EDITED} - {*MESH}
     if after.imu not in (None, before.imu):  # one of the files that were read
         kept -= {"imu", "imu_offset_s"}
     if after.radar != before.radar:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from PySide6.QtCore import QObject
 
 from sd2app.session.content import reference_of
@@ -75,11 +76,16 @@ class Session:
         """Put clock, time window, video and sensor on the recording that was opened."""
         content = self.document.content
         assert content is not None
-        self.playback.set_timebase(content.timebase)
-        self.span.set_extent(content.timebase.start_s, content.timebase.end_s)
+        times_s = content.timebase.times_s
+        # With another mesh in it, a recording stays where it is looked at.
+        same_clock = np.array_equal(times_s, self.playback.timebase.times_s)
+        if not (self.document.same_recording and same_clock):
+            self.playback.set_timebase(content.timebase)
+            self.span.set_extent(content.timebase.start_s, content.timebase.end_s)
         if self.document.growing:
             self.span.extend(content.timebase.end_s, GROWING_S)
-        self.video.set_reader(content.video)
+        if content.video is not self.video.reader:
+            self.video.set_reader(content.video)
         self.sensor.set_sensor(content.recording.sensor)
 
     def extend(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,6 +13,7 @@ from PySide6.QtGui import QUndoCommand
 from sd2app.session.denoiser_choice import DenoiserChoice
 from sd2app.session.document import DocumentModel
 from sd2app.session.sensor import SensorModel
+from sd2core.errors import Cure
 from sd2core.options.synthesis import HowCounted
 from sd2core.placements.placements import Placements
 from sd2core.radar_config import Clutter
@@ -145,6 +147,20 @@ class Edits:
     def _inertial_places(self) -> tuple[str, ...]:
         recording = self._document.recording
         return () if recording is None else recording.imu_places
+
+    # --- the mesh -------------------------------------------------------------------------
+
+    def read_mesh(self, text: str, fields: Mapping[str, Any]) -> None:
+        """Read another mesh, or the same one another way; a step once it was read."""
+        self._document.read_mesh(fields, partial(self._change, text))
+
+    def cure_mesh(self, cure: Cure) -> None:
+        """Read the mesh with a setting that puts it right."""
+        recording = self._document.recording
+        if recording is not None:
+            changed = {cure.setting: cure.value}
+            reading = recording.mesh_reading.model_copy(update=changed)
+            self.read_mesh(cure.words, {"mesh_reading": reading})
 
     # --- alignment of what was measured ---------------------------------------------------
 

@@ -96,7 +96,7 @@ class FilesFeature(Feature):
 
     def notices(self) -> Sequence[Notice]:
         """Offer to read the mesh another way."""
-        return (MeshOffer(self._document),)
+        return (MeshOffer(self._document, self._session.edits),)
 
     def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
         """Recordings that were open lately."""

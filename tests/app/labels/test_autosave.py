@@ -21,8 +21,11 @@ from sd2app.labels.marking import LabelMarking, Reaction
 from sd2app.labels.model import LabelsModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
+from sd2app.session.sensor import SensorModel
 from sd2app.session.tasks import TaskList
+from sd2app.session.undo import Edits
 from sd2app.settings import Settings
+from sd2core.errors import Cure
 from sd2core.labels import edits as core_edits
 from sd2core.labels.files import read_labels, write_labels
 from sd2core.labels.recovery import Found, Recoverable, offers_in
@@ -315,6 +318,25 @@ class TestOffers:
         assert at.spans == [crashed[0], ("left-to-right", 50, 60)]
         (offer,) = left(root)
         assert offer.labels == at.labels.labels
+
+    def test_another_way_to_read_the_mesh_comes_back_with_the_mesh(
+        self, qtbot, desk, recording
+    ) -> None:
+        at = desk().open(recording)
+        first_m = at.document.mesh.frame(0)
+        with qtbot.waitSignal(at.document.opened, timeout=10_000):
+            Edits(at.document, SensorModel()).cure_mesh(Cure("turn", "z180", "Turn it"))
+        at.crash()
+        at = desk().open(recording)
+        assert at.session.changed_others(at.session.offer) == ["way to read the mesh"]
+        np.testing.assert_allclose(at.document.mesh.frame(0), first_m)
+        others = Edits(at.document, SensorModel())
+        at.edits.restoring.connect(others.restore)
+        with qtbot.waitSignal(at.document.opened, timeout=10_000):
+            at.edits.restore()
+        np.testing.assert_allclose(at.document.mesh.frame(0), first_m * [-1, -1, 1], atol=1e-6)
+        at.document.undo_stack.undo()
+        np.testing.assert_allclose(at.document.mesh.frame(0), first_m)
 
     def test_declined_is_kept_and_asked_for_comes_back(
         self, desk, root, recording, crashed

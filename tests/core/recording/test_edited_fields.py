@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
+from sd2core.files.recording_json import CameraEntry, MeshReading
 from sd2core.placements.placements import PlacementGrid
 from sd2core.recording.edited import decoded_fields, differing, edited_fields
 from sd2core.recording.recording import Recording
@@ -41,6 +42,16 @@ recordings = st.builds(
     imu_places=st.lists(st.sampled_from(["left-wrist", "head", "4711"]), unique=True).map(tuple),
     radar_receiver=st.none() | st.integers(1, 8),
     radar_transmitter=st.none() | st.integers(1, 8),
+    mesh=st.none() | st.just(Path("body.pkl").absolute()),
+    faces=st.none() | st.just(Path("faces.npy").absolute()),
+    mesh_reading=st.builds(
+        MeshReading,
+        scale=st.none() | st.just(0.001),
+        person=st.none() | st.just("ida"),
+        turn=st.none() | st.just("x180"),
+        image_size=st.none() | st.just((640, 480)),
+    ),
+    camera=st.none() | st.builds(CameraEntry, focal_px=st.floats(100, 2000)),
 )
 
 

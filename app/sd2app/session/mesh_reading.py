@@ -1,0 +1,116 @@
+"""Reading of the open recording's mesh, again where its file or the way to read it changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.background.latest import Emit
+from sd2app.session.content import Offer, offers_of
+from sd2app.session.tasks import ListedRunner, TaskList
+from sd2core.errors import Sd2Error
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.recording.edited import MESH
+from sd2core.recording.recording import Recording
+
+_KEPT = 2
+"""Meshes that are kept: that on screen, and the one that an undo brings back."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReadMesh:
+    """A mesh, or none where it could not be read, and the recording's fields that say which."""
+
+    fields: dict[str, Any]
+    mesh: MeshSequence | None
+    offers: tuple[Offer, ...] = ()
+
+
+def mesh_fields(recording: Recording) -> dict[str, Any]:
+    """Fields of a recording on which its mesh depends."""
+    return {name: getattr(recording, name) for name in MESH}
+
+
+class MeshReader(QObject):
+    """Reads meshes in the background, and keeps the last ones."""
+
+    ready = Signal(object)  # ReadMesh of the fields that were followed
+    failed = Signal(str)
+
+    def __init__(self, jobs: TaskList, parent: QObject) -> None:
+        super().__init__(parent)
+        self._kept: list[ReadMesh] = []  # the newest first
+        self._runner = ListedRunner("mesh", jobs, self, lambda work: work())
+        self._runner.failed.connect(lambda error: self.failed.emit(str(error)))
+
+    def reset(self, read: ReadMesh) -> None:
+        """Begin with the mesh of another recording."""
+        self._runner.cancel()
+        self._kept = [read]
+
+    def read(
+        self, recording: Recording, fields: Mapping[str, Any], then: Callable[..., object]
+    ) -> None:
+        """Read a mesh by other fields, and call ``then`` with all that it depends on.
+
+        It is then kept, so that it is there at once where these fields are followed.
+        """
+        asked = replace(recording, **fields)
+
+        def take(read: ReadMesh) -> None:
+            self._keep(read)
+            then(read.fields)
+
+        self._submit(asked, take, refuse=None)
+
+    def follow(self, recording: Recording) -> None:
+        """Say that the mesh of a recording's fields is ready, at once or once it is read."""
+        fields = mesh_fields(recording)
+        kept = next((one for one in self._kept if one.fields == fields), None)
+        if kept is not None or recording.mesh is None:
+            self._runner.cancel()
+            self._tell(kept or ReadMesh(fields, None))
+            return
+
+        def refuse(error: Sd2Error) -> None:
+            self._tell(ReadMesh(fields, None, offers_of([error])))
+            self.failed.emit(str(error))
+
+        self._submit(replace(recording), self._tell, refuse)
+
+    def close(self) -> None:
+        """Stop reading, for good."""
+        self._runner.close()
+        self._kept = []
+
+    def _submit(
+        self,
+        asked: Recording,
+        take: Callable[[ReadMesh], object],
+        refuse: Callable[[Sd2Error], object] | None,
+    ) -> None:
+        def read(emit: Emit) -> Callable[[], object]:
+            asked.learn_camera()
+            try:
+                mesh = asked.load_mesh(lambda done, total: emit((done, total)))
+            except Sd2Error as error:
+                if refuse is None:
+                    raise
+                refused = error
+                return lambda: refuse(refused)
+            read = ReadMesh(mesh_fields(asked), mesh, offers_of(mesh.findings))
+            return lambda: take(read)
+
+        name = "" if asked.mesh is None else asked.mesh.name
+        self._runner.submit(read, f"Reading {name}")
+
+    def _keep(self, read: ReadMesh) -> None:
+        others = [one for one in self._kept if one.fields != read.fields]
+        self._kept = [read, *others][:_KEPT]
+
+    def _tell(self, read: ReadMesh) -> None:
+        self._keep(read)
+        self.ready.emit(read)
