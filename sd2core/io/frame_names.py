@@ -77,32 +77,19 @@ def numbered_frames(files: Sequence[Path], person: int | str | None, source: str
     Sd2Error
         If there is no such person, or the names are of two kinds.
     """
-    names = [re.split("([0-9]+)", file.name.lower()) for file in files]
-    kinds = {tuple(name[::2]): [] for name in names}  # type: dict[tuple[str, ...], list[int]]
-    for place, name in enumerate(names):
-        kinds[tuple(name[::2])].append(place)
-    if len(kinds) > 1:
-        _refuse_two_kinds(files, list(kinds.values()), source)
-    if len(kinds) != 1 or len(files) < 2:
-        return _without_persons(FrameFiles(list(files)), person, source)
-    (words,) = kinds
-    values = np.array([[int(part) for part in name[1::2]] for name in names])  # (files, columns)
-    changing = np.flatnonzero((values != values[0]).any(axis=0)).tolist()
-    if len(changing) == 1:
+    numbers = _numbers_in(files, source)
+    if numbers is None or len(numbers) < 2:
         found = FrameFiles(list(files))
-        _count(found, values[:, changing[0]], values[:, changing[0]])
+        if numbers is None:
+            found.notes.append(
+                "The names do not tell frame and person: the files are taken as consecutive frames"
+                " of one person."
+            )
+        elif numbers:
+            _count(found, numbers[0], numbers[0])
         return _without_persons(found, person, source)
-    if len(changing) != 2 or words[changing[1]] == ".":
-        found = FrameFiles(list(files))
-        found.notes.append(
-            "The names do not tell frame and person: the files are taken as consecutive frames of"
-            " one person."
-        )
-        return _without_persons(found, person, source)
-    if _person_is_first(words, names, changing, values):
-        changing.reverse()
-    frames, persons = values[:, changing[0]], values[:, changing[1]]
-    counts = {number: int((persons == number).sum()) for number in np.unique(persons).tolist()}
+    frames, persons = numbers
+    counts = _counted(persons)
     notes: list[str] = []
     own = persons == chosen_person(counts, person, source, notes)
     found = FrameFiles([file for file, its in zip(files, own, strict=True) if its], notes=notes)
@@ -110,6 +97,39 @@ def numbered_frames(files: Sequence[Path], person: int | str | None, source: str
     found.files = [found.files[place] for place in order]
     _count(found, frames[own][order], frames)
     return found
+
+
+def persons_among(files: Sequence[Path], source: str) -> dict[int, int]:
+    """Number of files of each person, by the names as :func:`numbered_frames` reads them."""
+    numbers = _numbers_in(files, source)
+    return _counted(numbers[1]) if numbers is not None and len(numbers) == 2 else {}
+
+
+def _counted(persons: NDArray[np.int64]) -> dict[int, int]:
+    return {number: int((persons == number).sum()) for number in np.unique(persons).tolist()}
+
+
+def _numbers_in(files: Sequence[Path], source: str) -> tuple[NDArray[np.int64], ...] | None:
+    """Numbers (files,) of frames, and of persons, as far as the names tell; None: they are unclear.
+
+    Raises Sd2Error where the names are of two kinds.
+    """
+    names = [re.split("([0-9]+)", file.name.lower()) for file in files]
+    kinds = {tuple(name[::2]): [] for name in names}  # type: dict[tuple[str, ...], list[int]]
+    for place, name in enumerate(names):
+        kinds[tuple(name[::2])].append(place)
+    if len(kinds) > 1:
+        _refuse_two_kinds(files, list(kinds.values()), source)
+    if len(kinds) != 1 or len(files) < 2:
+        return ()
+    (words,) = kinds
+    values = np.array([[int(part) for part in name[1::2]] for name in names])  # (files, columns)
+    changing = np.flatnonzero((values != values[0]).any(axis=0)).tolist()
+    if len(changing) > 2 or (len(changing) == 2 and words[changing[1]] == "."):
+        return None
+    if len(changing) == 2 and _person_is_first(words, names, changing, values):
+        changing.reverse()
+    return tuple(values[:, column] for column in changing)
 
 
 def chosen_person(

@@ -50,7 +50,7 @@ def read_mesh_files(
     Of several persons, whose numbers are in the names, one is read.
     """
     notes: list[str] = []
-    found = numbered_frames(_files(path, notes), person, str(path))
+    found = numbered_frames(surface_files(path, notes), person, str(path))
     files = found.files
     frames: list[NDArray[np.float32]] = []
     faces: NDArray[Any] | None = None
@@ -185,8 +185,8 @@ def read_faces(path: Path) -> NDArray[Any]:
     raise Sd2Error(f"{path} holds {held}", "an array 'faces' of shape (faces, 3)")
 
 
-def _files(path: Path, notes: list[str]) -> list[Path]:
-    """Files of frames in natural order."""
+def surface_files(path: Path, notes: list[str]) -> list[Path]:
+    """Files of frames in natural order; notes say what is left out."""
     if path.is_file():
         return [path]
     if path.is_dir():

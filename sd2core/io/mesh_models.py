@@ -173,13 +173,13 @@ def weak_perspective_shift(
 def _choose(
     path: Path, people: dict[Any, Any], person: int | str | None, notes: list[str]
 ) -> dict[Any, Any]:
-    lengths = {key: _frames(value, path) for key, value in people.items()}
+    lengths = {key: frames_of(value, path) for key, value in people.items()}
     key = chosen_person(lengths, person, str(path), notes)
     chosen: dict[Any, Any] = people[key]
     return chosen
 
 
-def _frames(entry: dict[Any, Any], path: Path) -> int:
+def frames_of(entry: dict[Any, Any], path: Path) -> int:
     """Number of frames of a person."""
     vertices = first_of(entry, ESTIMATED)
     if vertices is None and holds_rig(entry):

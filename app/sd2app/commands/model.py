@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.quoting import quoted
 from sd2app.background.run_monitor import CommandRun, History
@@ -20,7 +20,7 @@ from sd2app.training.command_runs import known_commands
 from sd2core.cli import build_parser
 from sd2core.cli.command_parser import Command, commands_of
 from sd2core.errors import Sd2Error
-from sd2core.files.paths import user_data
+from sd2core.files.paths import plain_path, user_data
 from sd2core.files.tables import capitalised
 from sd2core.options.records import Option, OptionRecord, typed_options, words_of
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder, last_output
@@ -68,6 +68,8 @@ class CommandForms(Runs[AnyCommandRun]):
 
     ``command`` runs ``sd2`` commands in a folder. ``folder`` holds the runs.
     """
+
+    ended = Signal(object)  # a run came to its end while it was in view
 
     def __init__(
         self,
@@ -151,6 +153,18 @@ class CommandForms(Runs[AnyCommandRun]):
                 self._typed[option.dest] = shlex.quote(path) if several else path
         self.changed.emit()
 
+    def fill(self, record: OptionRecord) -> None:
+        """Show the form of a command with everything typed that a record says."""
+        named = (name for name, one in self.commands.items() if one.record is type(record))
+        self._chosen = next(named)
+        self.select(None)
+        self._texts[self._chosen] = {
+            option.dest: words[-1]
+            for option in self.options
+            if (words := option.written(option.of(record)))
+        }
+        self.changed.emit()
+
     def set_text(self, option: Option, text: str) -> None:
         """Type something for an option."""
         self._typed[option.dest] = text
@@ -160,12 +174,20 @@ class CommandForms(Runs[AnyCommandRun]):
         """Start the command; Sd2Error if it cannot be, OSError if its folder cannot be made."""
         if self.busy:
             raise Sd2Error(self.busy)
-        words = self.words
+        words, record = self.words, self.record
         if any(one.name == "progress_json" for one in typed_options(self.chosen.record)):
             words.append("--progress-json")
         path = free_folder(self._folder, self.chosen.name, ())
+        paths = {name: getattr(record, name, None) for name in ("mesh", "out")}
         about = {"what": self.chosen.name}
+        about |= {name: str(plain_path(path)) for name, path in paths.items() if path is not None}
         self.follow_new(path, CommandFolder(path).start(words, about, self._command))
+
+    def follow(self, run: AnyCommandRun | None, under_way: bool = False) -> None:
+        """Show a run, and say when it has come to its end."""
+        super().follow(run, under_way)
+        if run is not None:
+            run.ended.connect(lambda: self.ended.emit(run))
 
     def find(self) -> Sequence[KnownRun]:
         """Read the folder of commands."""

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, Qt
+from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPainterPath, QPen
-from PySide6.QtWidgets import QDialog, QLabel, QSizePolicy, QSlider, QWidget
+from PySide6.QtWidgets import QDialog, QLabel, QSizePolicy, QWidget
 
 from sd2app.fit.setup import DEFAULT_STATURE_M, FitSetupModel
 from sd2app.manual.help import with_help
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import accepting, ask_file, ask_new
+from sd2app.widgets.frame_slider import FrameSlider
 from sd2app.widgets.inputs import CheckBox, Choice, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.mesh_painting import paint_picture
 from sd2app.widgets.panel import ElidedLabel, copy_button, outlined, say, sentence, side_by_side
-from sd2app.widgets.time_axis import clock_text
 from sd2core.cli.fit import Fit
 
 VIDEOS = "Video (*.mp4 *.mkv *.mov *.avi *.webm *.m4v *.mpg *.ts *.wmv);;All files (*)"
@@ -156,14 +156,7 @@ class NewFromVideoDialog(QDialog):
 
     def _build_picture(self, palette: Palette) -> None:
         self.picker = PersonPicker(self.setup, palette, self)
-        self._slider = QSlider(Qt.Orientation.Horizontal, self)
-        self._slider.setAccessibleName("Frame")
-        self._slider.valueChanged.connect(self.setup.show_frame)
-        self._where = QLabel(self)
-        self._where.setObjectName("muted")
-        self._where.setMinimumWidth(
-            self._where.fontMetrics().horizontalAdvance("00:00.000 · frame 00000")
-        )
+        self._slider = FrameSlider(self.setup.show_frame, self)
 
     def _build_form(self) -> None:
         setup = self.setup
@@ -212,7 +205,7 @@ class NewFromVideoDialog(QDialog):
             ("Save as", row_of((self._folder, 1), self._other_folder, spacing_px=8)),
             gaps_px=(16, 12),
         )
-        left = column_of((self.picker, 1), row_of((self._slider, 1), self._where))
+        left = column_of((self.picker, 1), self._slider)
         right = column_of(form, STRETCH, self._message)
         columns = row_of((left, 3), (right, 2), spacing_px=24)
         buttons = with_help("New from video", self._buttons)
@@ -226,13 +219,7 @@ class NewFromVideoDialog(QDialog):
         self._video.setText(setup.video.name if setup.video is not None else "none")
         self._folder.setText(str(choices.folder) if choices.folder is not None else "")
         self._other_folder.setEnabled(choices.folder is not None)
-        with QSignalBlocker(self._slider):
-            self._slider.setRange(0, max(setup.frames - 1, 0))
-            self._slider.setValue(setup.frame)
-        self._slider.setEnabled(setup.frames > 1)
-        self._where.setText(
-            f"{clock_text(setup.time_s)} · frame {setup.frame}" if setup.frames else ""
-        )
+        self._slider.show_frame(setup.frame, setup.frames, setup.time_s)
         person = choices.person
         self._person.setText(
             "who is seen best" if person is None else f"in the rectangle in frame {person.frame}"

@@ -8,16 +8,13 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 
-from sd2app.background.latest import BackgroundModel, LatestRunner
 from sd2app.background.quoting import quoted
 from sd2app.fit.request import FitRequest, Person, read_request
+from sd2app.session.video_frames import VideoFrames
 from sd2core.body.camera import DEFAULT_FIELD_OF_VIEW_DEG
 from sd2core.body.shape import DEFAULT_STATURE_M as DEFAULT_STATURE_M
-from sd2core.io.video import VideoReader, open_video
 from sd2core.options.bounds import FIELD_OF_VIEW_DEG, STATURE_M
 from sd2core.options.records import words_of
 from sd2core.recording.recording import FILE_NAME, SUFFIX, Recording
@@ -38,64 +35,22 @@ class FitChoices:
     person: Person | None = None  # rectangle around the person; None: one is chosen
 
 
-class FitSetupModel(BackgroundModel):
-    """Choices for a fit, and the frame of the video on which the person is picked."""
+class FitSetupModel(VideoFrames):
+    """Choices for a fit, and the frame of the video on which the person is picked.
 
-    changed = Signal()  # any choice, or the video's presence
-    picture_changed = Signal()
+    The rectangle around a person belongs to the frame it was drawn on.
+    """
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.choices = FitChoices()
         self.video: Path | None = None
-        self.problem = ""  # why the video cannot be shown
-        self.frame = 0  # the one to look at
-        self.picture: NDArray[np.uint8] | None = None  # RGB, (H, W, 3)
-        self._reader: VideoReader | None = None
-        self._opener = LatestRunner("fit-video", self, self._take_video, self._refuse)
-        self._decoder = LatestRunner("fit-frame", self, self._take_picture, self._refuse)
-
-    # --- the video ------------------------------------------------------------------------
-
-    @property
-    def reading(self) -> bool:
-        """True while the video is being opened."""
-        return self._opener.busy
-
-    @property
-    def frames(self) -> int:
-        """Number of frames, 0 while the video is not open."""
-        return len(self._reader) if self._reader else 0
-
-    @property
-    def size(self) -> tuple[int, int] | None:
-        """Width and height of the upright picture."""
-        return (self._reader.width, self._reader.height) if self._reader else None
-
-    @property
-    def time_s(self) -> float:
-        """Time of the frame to look at."""
-        return self._reader.timebase.time_of(self.frame) if self._reader else 0.0
 
     def choose_video(self, path: Path, open_now: Recording | None = None) -> None:
         """Choose another video; the open recording of it, if saved, gets the mesh."""
-        self._let_go()
-        self.video, self.problem, self.frame = path, "", 0
-        folder = folder_for(path, open_now)
-        self.choices = replace(self.choices, folder=folder, person=None)
-        self._opener.submit(lambda emit: open_video(path, lambda *_: emit(None)))
-        self.changed.emit()
-        self.picture_changed.emit()
-
-    def show_frame(self, frame: int) -> None:
-        """Look at another frame; the rectangle belongs to the one it was drawn on."""
-        frame = min(max(frame, 0), self.frames - 1)
-        if self._reader is None or (frame == self.frame and self.picture is not None):
-            return
-        self.frame = frame
-        reader = self._reader
-        self._decoder.submit(lambda emit: reader.read(frame))
-        self.changed.emit()
+        self.video = path
+        self.choices = replace(self.choices, folder=folder_for(path, open_now), person=None)
+        self.open_video(path)
 
     # --- the choices ----------------------------------------------------------------------
 
@@ -127,7 +82,7 @@ class FitSetupModel(BackgroundModel):
     @property
     def ready(self) -> bool:
         """True if the fit can begin."""
-        return self._reader is not None and self.choices.folder is not None and not self.problem
+        return self.reader is not None and self.choices.folder is not None and not self.problem
 
     def change(self, **changes: Any) -> None:
         """Change some of the :attr:`choices`; height and field of view are held in bounds."""
@@ -177,38 +132,17 @@ class FitSetupModel(BackgroundModel):
         name = f"{request.folder.name.removesuffix(SUFFIX)}.zarr"
         return quoted(words_of("fit", request.command(request.folder.with_name(name))))
 
-    def close(self) -> None:
-        """Stop reading, let go of the file."""
-        super().close()
-        self._let_go()
-
     # --- inside ---------------------------------------------------------------------------
 
-    def _take_video(self, reader: Any) -> None:
-        self._reader = reader
+    def first_frame(self) -> int:
+        """The frame of the person who was chosen before, else the one in the middle."""
         if (kept := self.kept) is not None:
             self.change(stature_m=kept.stature_m, person=kept.person, camera="file")
             if kept.focal_px is not None:
                 self.change(camera="focal")
                 self.set_focal(kept.focal_px)
         person = self.choices.person
-        # The middle: at both ends people walk in and out.
-        self.show_frame(len(reader) // 2 if person is None else person.frame)
-        self.changed.emit()
-
-    def _take_picture(self, picture: Any) -> None:
-        self.picture = picture
-        self.picture_changed.emit()
-
-    def _refuse(self, error: Exception) -> None:
-        self.problem = str(error)
-        self.changed.emit()
-
-    def _let_go(self) -> None:
-        self._decoder.cancel()
-        if self._reader is not None:
-            self._reader.close()
-        self._reader = self.picture = None
+        return super().first_frame() if person is None else person.frame
 
 
 def folder_for(video: Path, open_now: Recording | None = None) -> Path:

@@ -22,6 +22,7 @@ HELP = {
     "Label set": "how-to/use-your-own-label-set.md",
     "Agree": "tutorials/label-fast.md#3-compare-with-a-second-annotator",
     "New from video": "tutorials/video-to-data-set.md#2-fit-a-body",
+    "Mesh over the video": "how-to/compare-with-another-mesh.md#see-it-over-the-video",
     "Record": "how-to/record-a-live-radar.md",
     "Protocol": "how-to/record-a-live-radar.md#a-guided-session",
     "Check the place": "how-to/record-a-live-radar.md#check-the-place-first",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sd2core.body.camera import PinholeCamera
 from sd2core.errors import Cure, Sd2Error
 from sd2core.files.resources import is_bundled
 from sd2core.io.kinds import Kind, kind_of
@@ -202,6 +203,16 @@ def load_content(recording: Recording, progress: Progress) -> Content:
 def offers_of(unlikely: Iterable[Sd2Error | Finding]) -> tuple[Offer, ...]:
     """What can be read another way, of errors and findings."""
     return tuple(Offer(str(one), one.cure) for one in unlikely if one.cure is not None)
+
+
+def camera_of(recording: Recording, video: VideoReader | None) -> PinholeCamera:
+    """The camera that took a video, by default one with the usual field of view."""
+    if video is None:
+        return PinholeCamera()
+    focal_px = recording.focal_px(video.width, video.height)
+    if focal_px is None:
+        return PinholeCamera.default(video.width, video.height)
+    return PinholeCamera(video.width, video.height, focal_px)
 
 
 def clock_of(

@@ -17,6 +17,7 @@ from sd2app.session.content import (
     UNTITLED,
     Content,
     Offer,
+    camera_of,
     clock_of,
     load_content,
     offers_of,
@@ -39,6 +40,10 @@ from sd2core.sensor import VelocityAxis
 if TYPE_CHECKING:
     from sd2core.io.radar import RadarCapture
     from sd2core.io.video import VideoReader
+
+
+_AS_IT_SAYS: Mapping[str, Any] = {}
+"""No fields: a mesh is read as its file, or the recording, says."""
 
 
 class DocumentModel(QObject):
@@ -139,13 +144,8 @@ class DocumentModel(QObject):
     @property
     def camera(self) -> PinholeCamera:
         """The camera that took the video, by default one with the usual field of view."""
-        if self.content is None or self.content.video is None:
-            return PinholeCamera()
-        width, height = self.content.video.width, self.content.video.height
-        focal_px = self.content.recording.focal_px(width, height)
-        if focal_px is None:
-            return PinholeCamera.default(width, height)
-        return PinholeCamera(width, height, focal_px)
+        content = self.content
+        return PinholeCamera() if content is None else camera_of(content.recording, content.video)
 
     @property
     def modified(self) -> bool:
@@ -172,14 +172,17 @@ class DocumentModel(QObject):
             return ""
         return f"Reading the {PARTS[min(len(PARTS) * job.done // job.total, len(PARTS) - 1)]}"
 
-    def open(self, paths: Sequence[Path]) -> None:
-        """Open a recording, or files that make up one, in the background."""
-        self._start(None, list(paths))
+    def open(self, paths: Sequence[Path], mesh: Mapping[str, Any] = _AS_IT_SAYS) -> None:
+        """Open a recording, or files that make up one, in the background.
 
-    def add(self, paths: Sequence[Path]) -> None:
-        """Add files to the recording that is open, or open them."""
+        ``mesh`` holds fields of the recording that say how its mesh is read.
+        """
+        self._start(None, list(paths), mesh)
+
+    def add(self, paths: Sequence[Path], mesh: Mapping[str, Any] = _AS_IT_SAYS) -> None:
+        """Add files to the recording that is open, or open them; ``mesh`` as for :meth:`open`."""
         recording = self.recording
-        self._start(replace(recording) if recording is not None else None, list(paths))
+        self._start(replace(recording) if recording is not None else None, list(paths), mesh)
 
     @property
     def offers_of_open(self) -> bool:
@@ -188,7 +191,11 @@ class DocumentModel(QObject):
 
     def open_mesh_so(self, cure: Cure) -> None:
         """Open what was refused, its mesh read with a setting that puts it right."""
-        self._start(self._base, self._asked, cure)
+        self._start(self._base, self._asked, cure=cure)
+
+    def keep_mesh(self, read: ReadMesh) -> None:
+        """Have a mesh ready that was read elsewhere, for its fields to be assigned."""
+        self._meshes.keep(read)
 
     def read_mesh(self, fields: Mapping[str, Any], then: Callable[..., object]) -> None:
         """Read a mesh by other fields of the recording, in the background.
@@ -263,13 +270,21 @@ class DocumentModel(QObject):
             self.content.close()
             self.content = None
 
-    def _start(self, base: Recording | None, paths: list[Path], cure: Cure | None = None) -> None:
+    def _start(
+        self,
+        base: Recording | None,
+        paths: list[Path],
+        mesh: Mapping[str, Any] = _AS_IT_SAYS,
+        cure: Cure | None = None,
+    ) -> None:
         self._asked, self._cured = paths, cure is not None
         name = paths[0].name if paths else (base.title if base else "")
         self._base = base
 
         def read(emit: Emit) -> Content:
             recording = recording_of(paths, base) if paths or base is None else base
+            for field, value in mesh.items():
+                setattr(recording, field, value)
             if cure is not None:
                 changed = {cure.setting: cure.value}
                 recording.mesh_reading = recording.mesh_reading.model_copy(update=changed)

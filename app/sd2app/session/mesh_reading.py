@@ -51,6 +51,11 @@ class MeshReader(QObject):
         self._runner.cancel()
         self._kept = [read]
 
+    def keep(self, read: ReadMesh) -> None:
+        """Have a mesh ready, the last but one no more."""
+        others = [one for one in self._kept if one.fields != read.fields]
+        self._kept = [read, *others][:_KEPT]
+
     def read(
         self, recording: Recording, fields: Mapping[str, Any], then: Callable[..., object]
     ) -> None:
@@ -61,7 +66,7 @@ class MeshReader(QObject):
         asked = replace(recording, **fields)
 
         def take(read: ReadMesh) -> None:
-            self._keep(read)
+            self.keep(read)
             then(read.fields)
 
         self._submit(asked, take, refuse=None)
@@ -107,10 +112,6 @@ class MeshReader(QObject):
         name = "" if asked.mesh is None else asked.mesh.name
         self._runner.submit(read, f"Reading {name}")
 
-    def _keep(self, read: ReadMesh) -> None:
-        others = [one for one in self._kept if one.fields != read.fields]
-        self._kept = [read, *others][:_KEPT]
-
     def _tell(self, read: ReadMesh) -> None:
-        self._keep(read)
+        self.keep(read)
         self.ready.emit(read)

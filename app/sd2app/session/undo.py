@@ -12,6 +12,7 @@ from PySide6.QtGui import QUndoCommand
 
 from sd2app.session.denoiser_choice import DenoiserChoice
 from sd2app.session.document import DocumentModel
+from sd2app.session.mesh_reading import ReadMesh
 from sd2app.session.sensor import SensorModel
 from sd2core.errors import Cure
 from sd2core.options.synthesis import HowCounted
@@ -153,6 +154,11 @@ class Edits:
     def read_mesh(self, text: str, fields: Mapping[str, Any]) -> None:
         """Read another mesh, or the same one another way; a step once it was read."""
         self._document.read_mesh(fields, partial(self._change, text))
+
+    def take_mesh(self, text: str, read: ReadMesh) -> None:
+        """Show a mesh that was read already, as one step."""
+        self._document.keep_mesh(read)
+        self._change(text, read.fields)
 
     def cure_mesh(self, cure: Cure) -> None:
         """Read the mesh with a setting that puts it right."""

@@ -12,8 +12,10 @@ from PySide6.QtWidgets import QMenu, QMessageBox, QPushButton, QWidget
 from sd2app.feature import Action, Drop, Feature, Shell, report
 from sd2app.fit.model import FitModel
 from sd2app.fit.request import read_request
+from sd2app.foreign_mesh.model import is_foreign
 from sd2app.labels.edits import LabelEdits
-from sd2app.session.content import recording_of
+from sd2app.session.content import UNTITLED, recording_of
+from sd2app.session.mesh_reading import ReadMesh
 from sd2app.session.session import Session
 from sd2app.shell.mesh_offer import MeshOffer
 from sd2app.shell.open_dialog import ask_to_open
@@ -21,10 +23,11 @@ from sd2app.widgets.dialogs import Answer, ask_folder, ask_new, confirmed
 from sd2app.widgets.notices import Notice
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
+from sd2core.files.recording_json import MeshReading
 from sd2core.files.resources import resource_path
 from sd2core.io.imu_columns import holds_inertial_signals
 from sd2core.recording.divergence import Divergence
-from sd2core.recording.recording import GoneError, SavedElsewhereError
+from sd2core.recording.recording import GoneError, Recording, SavedElsewhereError
 from sd2core.recording.relinking import Role, role_words
 
 Kept = Literal["mine", "theirs", "merge"]
@@ -40,6 +43,7 @@ class FilesFeature(Feature):
     """The recording as files; a folder in which a ``fit`` was stopped is taken up.
 
     ``add_inertial`` adds an inertial sensor's samples, for which nothing else is read again.
+    ``see_mesh`` shows a recording's mesh over its video, before it is taken.
     """
 
     def __init__(
@@ -49,9 +53,10 @@ class FilesFeature(Feature):
         fit: FitModel,
         labels: LabelEdits,
         add_inertial: Callable[[Path], object],
+        see_mesh: Callable[[Recording], ReadMesh | None],
     ) -> None:
         self._session, self._shell, self._fit, self._labels = session, shell, fit, labels
-        self._add_inertial = add_inertial
+        self._add_inertial, self._see_mesh = add_inertial, see_mesh
         self._document = session.document
         self._document.opened.connect(self._remember)
         self._document.saved.connect(self._remember)
@@ -130,8 +135,13 @@ class FilesFeature(Feature):
         self._document.open(paths)
 
     def _replace(self, paths: Sequence[Path]) -> None:
-        if self.may_discard():
-            self.open(paths)
+        """Open files in place of what is open, a foreign mesh once it was seen over the video."""
+        mesh = self._foreign(paths, None)
+        if mesh is None:
+            if self.may_discard():
+                self.open(paths)
+        elif (seen := self._see_mesh(mesh)) and self.may_discard():
+            self._document.open(paths, seen.fields)
 
     def open_sample(self) -> None:
         """Open the recording that comes with the program."""
@@ -149,10 +159,29 @@ class FilesFeature(Feature):
             self._add(paths)
 
     def _add(self, paths: Sequence[Path]) -> None:
+        mesh = self._foreign(paths, self._document.recording)
         if _is_inertial(paths):
             self._add_inertial(paths[0])
-        else:
+        elif mesh is None:
             self._document.add(paths)
+        elif seen := self._see_mesh(mesh):
+            if len(paths) == 1 and self._document.recording is not None:
+                self._session.edits.take_mesh("Take mesh", seen)
+            else:
+                self._document.add(paths, seen.fields)
+
+    def _foreign(self, paths: Sequence[Path], base: Recording | None) -> Recording | None:
+        """The recording that these files would make, where they bring a foreign mesh to a video."""
+        try:
+            made = recording_of(paths, None if base is None else replace(base))
+        except (Sd2Error, OSError):
+            return None  # opening it says why
+        if made.folder != UNTITLED and base is None:
+            return None  # it says how its mesh is read
+        known = None if base is None else base.mesh
+        if made.video is None or made.mesh in (None, known) or not is_foreign(made.mesh):
+            return None
+        return replace(made, faces=None, mesh_reading=MeshReading(), camera=None)
 
     def _ask(self, title: str) -> list[Path]:
         recent = self._session.settings.recent

@@ -19,7 +19,8 @@ _FILLED, _SUBMENU = "@", ">"
 
 LAYOUT: Mapping[str, tuple[str, ...]] = {
     "File": (
-        "new_from_video", "listen", "open", "@recent", "add", "compare", "relink", "-", "save",
+        "new_from_video", "listen", "open", "@recent", "add", "read_mesh",
+        "refine_mesh", "compare", "relink", "-", "save",
         "save_as", "export_map", "export_denoised", "export_maps", "export_inertial",
         "export_strip", "export_dataset", "-", "batch", "any_command", "-",
         "recover_labels", "-", "quit",

@@ -21,6 +21,7 @@ from sd2app.denoise.validity import MapValidity
 from sd2app.feature import Feature, Shell
 from sd2app.figures.feature import FiguresFeature
 from sd2app.fit.feature import FitFeature
+from sd2app.foreign_mesh.feature import ForeignMeshFeature
 from sd2app.imu.feature import ImuFeature
 from sd2app.labels.feature import LabelsFeature
 from sd2app.live.feature import LiveFeature
@@ -62,6 +63,7 @@ class Features:
         denoisers = parts.denoisers or core_denoisers(process)
         self.denoise = denoise = DenoiseFeature(session, shell, maps.synthesis, denoisers, parent)
         self.fit = FitFeature(session, shell, parts.fit_command, parent)
+        self.foreign_mesh = ForeignMeshFeature(session, shell)
         self.video = VideoFeature(
             session,
             shell,
@@ -132,7 +134,12 @@ class Features:
         self.program = ProgramFeature(session, shell, labels, manual)
         self.imu = ImuFeature(session, shell, parent)
         self.files = FilesFeature(
-            session, shell, self.fit.model, labels.edits, self.imu.model.add_file
+            session,
+            shell,
+            self.fit.model,
+            labels.edits,
+            self.imu.model.add_file,
+            self.foreign_mesh.ask,
         )
         self.scene = SceneFeature(
             session,
@@ -143,7 +150,7 @@ class Features:
             labels.offer_frame,
         )
         self._in_order: tuple[Feature, ...] = (
-            self.mesh_comparison, self.sensor, self.suggestions, self.agreement,
+            self.mesh_comparison, self.foreign_mesh, self.sensor, self.suggestions, self.agreement,
             self.dataset_export, self.fit, self.batch, self.commands, self.training, self.study,
             self.classify, self.denoise, self.maps, self.accuracy, self.video, self.labels,
             self.figures, self.live, self.playback, self.program, self.imu, self.files, self.scene,

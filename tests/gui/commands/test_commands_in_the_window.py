@@ -12,7 +12,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QCheckBox, QComboBox, QLineEdit, QToolButton, QWidget
 
 from sd2app.commands.model import CommandForms
+from sd2app.commands.refining import MeshRefining
 from sd2app.commands.window import CommandWindow
+from sd2app.session.session import build_session
 from sd2app.settings import Settings
 from sd2app.widgets.panel import Fold
 
@@ -33,7 +35,8 @@ def window(qtbot, qapp, tmp_path: Path) -> Iterator[tuple[CommandForms, CommandW
     parent = QWidget()
     qtbot.addWidget(parent)
     forms.choose("synth")
-    window = CommandWindow(forms, Surroundings(parent), parent)  # type: ignore[arg-type]
+    refining = MeshRefining(build_session(parent, forms._settings), forms)
+    window = CommandWindow(forms, refining, Surroundings(parent), parent)  # type: ignore[arg-type]
     window.show()
     qtbot.waitExposed(window)
     yield forms, window

@@ -1,0 +1,1 @@
+"""A mesh of another program: seen over the video before it is taken."""

@@ -1,0 +1,134 @@
+"""A mesh of another program as it is read by what the user says of it, before it is taken."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QObject
+
+from sd2app.background.latest import Emit, LatestRunner
+from sd2app.session.content import Offer, camera_of, offers_of
+from sd2app.session.mesh_reading import ReadMesh, mesh_fields
+from sd2app.session.video_frames import VideoFrames
+from sd2core.body.camera import PinholeCamera
+from sd2core.errors import Cure, Sd2Error
+from sd2core.files.recording_json import MeshReading
+from sd2core.io.fitted import fitted_camera
+from sd2core.io.persons import persons_in
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.recording.recording import Recording
+
+
+def is_foreign(mesh: Path) -> bool:
+    """True for a mesh that ``sd2 fit`` has not made."""
+    return fitted_camera(mesh) is None
+
+
+class MeshPreview(VideoFrames):
+    """The mesh of a recording that is not open yet, and one frame of its video.
+
+    Its ``mesh_reading`` and ``camera`` are tried out here; the recording stays as it is.
+    """
+
+    def __init__(self, recording: Recording, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.recording = replace(recording)
+        self.persons: dict[str, int] = {}  # with their numbers of frames; empty while unknown
+        self.mesh: MeshSequence | None = None  # as it is read now; None while it cannot be
+        self.mesh_problem = ""
+        self.offers: tuple[Offer, ...] = ()
+        self._lister = LatestRunner("persons", self, self._take_persons)
+        self._loader = LatestRunner("mesh to look at", self, self._take_mesh, self._refuse_mesh)
+        path = recording.mesh
+        assert path is not None
+        self._lister.submit(lambda emit: persons_in(path))
+        self._read()
+        if recording.video is not None:
+            self.open_video(recording.video)
+
+    # --- what is known --------------------------------------------------------------------
+
+    @property
+    def read_as(self) -> MeshReading:
+        """How the mesh is read."""
+        return self.recording.mesh_reading
+
+    @property
+    def loading(self) -> bool:
+        """True while the mesh is being read."""
+        return self._loader.busy
+
+    @property
+    def camera(self) -> PinholeCamera:
+        """The camera by which the mesh is laid over the picture."""
+        return camera_of(self.recording, self.reader)
+
+    @property
+    def notes(self) -> str:
+        """What was assumed or repaired, and found unlikely without a remedy."""
+        offered = {one.text for one in self.offers}
+        notes = () if self.mesh is None else self.mesh.notes
+        return "\n\n".join(note for note in notes if note not in offered)
+
+    @property
+    def someone(self) -> bool:
+        """True if a person is in the frame."""
+        return self.mesh is not None and self.mesh.person_at(self.time_s) is not None
+
+    @property
+    def taken(self) -> ReadMesh | None:
+        """The mesh as it would be taken; None while there is none."""
+        if self.mesh is None or self.loading:
+            return None
+        return ReadMesh(mesh_fields(self.recording), self.mesh, self.offers)
+
+    # --- what is said of it ---------------------------------------------------------------
+
+    def change(self, **settings: Any) -> None:
+        """Read it another way: fields of :class:`MeshReading`, None as the file says."""
+        reading = self.read_as.model_copy(update=settings)
+        if reading == self.read_as:
+            return
+        self.recording.mesh_reading = reading
+        if "focal_px" in settings:  # which a camera that is known would hide
+            self.recording.camera = None
+        self._read()
+
+    def set_faces(self, path: Path) -> None:
+        """Take the triangles of another file."""
+        self.recording.faces = path
+        self._read()
+
+    def accept(self, cure: Cure) -> None:
+        """Read it with a setting that puts it right."""
+        self.change(**{cure.setting: cure.value})
+
+    # --- inside ---------------------------------------------------------------------------
+
+    def _read(self) -> None:
+        asked = replace(self.recording)
+
+        def read(emit: Emit) -> tuple[Recording, MeshSequence]:
+            asked.learn_camera()
+            return asked, asked.load_mesh(lambda *_: emit(None))
+
+        self._loader.submit(read)
+        self.changed.emit()
+
+    def _take_persons(self, persons: dict[str, int]) -> None:
+        self.persons = persons
+        self.changed.emit()
+
+    def _take_mesh(self, read: tuple[Recording, MeshSequence]) -> None:
+        self.recording, self.mesh = read
+        self._tell("", offers_of(self.mesh.findings))
+
+    def _refuse_mesh(self, error: Exception) -> None:
+        self.mesh = None
+        self._tell(str(error), offers_of([error]) if isinstance(error, Sd2Error) else ())
+
+    def _tell(self, problem: str, offers: tuple[Offer, ...]) -> None:
+        self.mesh_problem, self.offers = problem, offers
+        self.changed.emit()

@@ -1,0 +1,96 @@
+"""One frame of a video file to look at, apart from the recording that is open."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Signal
+
+from sd2app.background.latest import BackgroundModel, LatestRunner
+from sd2core.io.video import VideoReader, open_video
+
+
+class VideoFrames(BackgroundModel):
+    """Opens a video and decodes the frame that is asked for, both in the background."""
+
+    changed = Signal()  # the frame, or the video's presence
+    picture_changed = Signal()
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.problem = ""  # why the video cannot be shown
+        self.frame = 0  # the one to look at
+        self.picture: NDArray[np.uint8] | None = None  # RGB, (H, W, 3)
+        self.reader: VideoReader | None = None
+        self._opener = LatestRunner("video to look at", self, self._take_video, self._refuse)
+        self._decoder = LatestRunner("frame to look at", self, self._take_picture, self._refuse)
+
+    @property
+    def reading(self) -> bool:
+        """True while the video is being opened."""
+        return self._opener.busy
+
+    @property
+    def frames(self) -> int:
+        """Number of frames, 0 while the video is not open."""
+        return len(self.reader) if self.reader else 0
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """Width and height of the upright picture."""
+        return (self.reader.width, self.reader.height) if self.reader else None
+
+    @property
+    def time_s(self) -> float:
+        """Time of the frame to look at."""
+        return self.reader.timebase.time_of(self.frame) if self.reader else 0.0
+
+    def open_video(self, path: Path) -> None:
+        """Look at another video."""
+        self.let_go()
+        self.problem, self.frame = "", 0
+        self._opener.submit(lambda emit: open_video(path, lambda *_: emit(None)))
+        self.changed.emit()
+        self.picture_changed.emit()
+
+    def show_frame(self, frame: int) -> None:
+        """Look at another frame."""
+        frame = min(max(frame, 0), self.frames - 1)
+        if self.reader is None or (frame == self.frame and self.picture is not None):
+            return
+        self.frame = frame
+        reader = self.reader
+        self._decoder.submit(lambda emit: reader.read(frame))
+        self.changed.emit()
+
+    def first_frame(self) -> int:
+        """The frame to begin with: in the middle, since at both ends people walk in and out."""
+        return self.frames // 2
+
+    def close(self) -> None:
+        """Stop reading, let go of the file."""
+        super().close()
+        self.let_go()
+
+    def let_go(self) -> None:
+        """Close the file."""
+        self._decoder.cancel()
+        if self.reader is not None:
+            self.reader.close()
+        self.reader = self.picture = None
+
+    def _take_video(self, reader: Any) -> None:
+        self.reader = reader
+        self.show_frame(self.first_frame())
+        self.changed.emit()
+
+    def _take_picture(self, picture: Any) -> None:
+        self.picture = picture
+        self.picture_changed.emit()
+
+    def _refuse(self, error: Exception) -> None:
+        self.problem = str(error)
+        self.changed.emit()

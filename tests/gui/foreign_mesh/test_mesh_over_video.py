@@ -1,0 +1,203 @@
+"""A mesh of another program seen over the video before it is taken, by real mouse and keys."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from answering import once_asked
+from finding import words_in
+from grey_video import FRAMES, RATE, write_video
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QImage
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QCheckBox, QComboBox, QPushButton, QToolButton, QWidget
+from window_models import models_of
+
+from sd2app.foreign_mesh.dialog import MeshDialog
+from sd2app.foreign_mesh.model import MeshPreview, is_foreign
+from sd2app.palette import palette_for
+from sd2app.widgets.inputs import NumberBox
+from sd2core.recording.recording import Recording
+
+LEFT = Qt.MouseButton.LeftButton
+SHORT = 20
+"""Frames of the second person."""
+
+
+def ball(x_m: float, frames: int) -> np.ndarray:
+    """Points on a ball of 0.3 m, 2 m before the camera and to its side; y up, z backward."""
+    directions = np.random.default_rng(0).normal(size=(400, 3))
+    points = 0.3 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    swing = 0.05 * np.sin(2 * np.pi * np.arange(frames) / RATE)
+    still = (points + np.array([x_m, 0, 2.0]))[None] + swing[:, None, None] * [0, 0, 1]
+    return (still * [1, -1, -1]).astype(np.float32)
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> tuple[Path, Path]:
+    """A video, and what an estimator made of it: two people, y up, in all frames and in some."""
+    write_video(tmp_path / "walk.mp4")
+    people = {
+        3: {"verts": ball(0.0, FRAMES), "frame_ids": np.arange(FRAMES)},
+        8: {"verts": ball(0.4, SHORT), "frame_ids": np.arange(SHORT)},
+    }
+    (tmp_path / "wham.pkl").write_bytes(pickle.dumps(people))
+    return tmp_path / "walk.mp4", tmp_path / "wham.pkl"
+
+
+@pytest.fixture
+def dialog(qtbot, qapp, compiled_kernels, files):
+    parent = QWidget()
+    qtbot.addWidget(parent)
+    video, mesh = files
+    preview = MeshPreview(Recording(Path(), video=video, mesh=mesh), parent)
+    dialog = MeshDialog(preview, palette_for(dark=False), parent)
+    dialog.show()
+    qtbot.waitExposed(dialog)
+    settle(qtbot, preview)
+    yield dialog
+    dialog.close()
+    preview.close()
+
+
+def settle(qtbot, preview: MeshPreview) -> None:
+    ready = lambda: not preview.busy and preview.picture is not None  # noqa: E731
+    qtbot.waitUntil(ready, timeout=20_000)
+
+
+def named(dialog: QWidget, kind: type, name: str):
+    return next(one for one in dialog.findChildren(kind) if one.accessibleName() == name)
+
+
+def choose(qtbot, dialog: MeshDialog, name: str, down: int) -> None:
+    """Go down in a list by keys."""
+    box = named(dialog, QComboBox, name)
+    box.setFocus()
+    for _ in range(down):
+        QTest.keyClick(box, Qt.Key.Key_Down)
+    settle(qtbot, dialog.preview)
+
+
+def tick(qtbot, dialog: MeshDialog, box: NumberBox) -> None:
+    (known,) = (
+        one for one in dialog.findChildren(QCheckBox) if abs(one.y() - box.y()) < one.height()
+    )
+    qtbot.mouseClick(known, LEFT, pos=QPoint(8, known.height() // 2))
+    settle(qtbot, dialog.preview)
+
+
+def width_px(dialog: MeshDialog) -> int:
+    """Width of what is drawn over the grey picture."""
+    image = dialog.picture.grab().toImage().convertToFormat(QImage.Format.Format_RGB888)
+    rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
+    pixels = rows[:, : 3 * image.width()].reshape(image.height(), image.width(), 3).astype(int)
+    columns = np.flatnonzero((np.ptp(pixels, axis=2) > 40).any(axis=0))
+    return 0 if columns.size == 0 else int(np.ptp(columns))
+
+
+def test_people_are_listed_and_chosen_and_frames_stepped_through(qtbot, dialog) -> None:
+    preview, people = dialog.preview, named(dialog, QComboBox, "Person")
+    assert [people.itemText(place) for place in range(people.count())] == [
+        "the one seen longest", "3: 60 frames", "8: 20 frames",
+    ]  # fmt: skip
+    choose(qtbot, dialog, "Person", 2)
+    assert preview.read_as.person == "8"
+    assert preview.frame == FRAMES // 2
+    assert not preview.someone
+    assert "The mesh has nobody in this frame." in words_in(dialog, "warning") or preview.offers
+    dialog._slider.slider.setFocus()
+    for _ in range(FRAMES // 2 - SHORT + 1):
+        QTest.keyClick(dialog._slider.slider, Qt.Key.Key_Left)
+    settle(qtbot, preview)
+    assert preview.frame == SHORT - 1
+    assert preview.someone
+
+
+def test_what_is_turned_and_its_focal_length_are_seen_at_once(qtbot, dialog) -> None:
+    preview = dialog.preview
+    assert width_px(dialog) == 0  # behind the camera
+    cure = next(one for one in dialog.findChildren(QToolButton) if "front" in one.text())
+    qtbot.mouseClick(cure, LEFT)
+    settle(qtbot, preview)
+    assert preview.read_as.turn == "x180"
+    assert not cure.isVisible()
+    width, focal_px = width_px(dialog), preview.camera.focal_px
+    box = next(one for one in dialog.findChildren(NumberBox) if one.suffix() == " px")
+    tick(qtbot, dialog, box)
+    assert preview.read_as.focal_px == round(focal_px)
+    box.setFocus()
+    box.selectAll()
+    QTest.keyClicks(box, "260")
+    QTest.keyClick(box, Qt.Key.Key_Return)
+    settle(qtbot, preview)
+    assert preview.camera.focal_px == 260.0
+    assert width_px(dialog) / width == pytest.approx(260 / focal_px, rel=0.1)
+
+
+def test_what_cannot_be_read_so_cannot_be_taken(qtbot, dialog) -> None:
+    preview, take = dialog.preview, dialog._take
+    assert take.isEnabled()
+    preview.set_faces(preview.recording.video)
+    settle(qtbot, preview)
+    assert not take.isEnabled()
+    assert any("walk.mp4" in one for one in words_in(dialog, "warning"))
+
+
+def test_taken_in_the_window_it_is_made_smooth_and_undone(labelled, qtbot, files, monkeypatch):
+    window, c = labelled, models_of(labelled)
+    _, mesh = files
+    before = c.document.mesh
+    monkeypatch.setattr("sd2app.shell.files.ask_to_open", lambda *_: [mesh])
+
+    def leave(dialog: MeshDialog) -> None:
+        cancel = next(b for b in dialog.findChildren(QPushButton) if "Cancel" in b.text())
+        qtbot.mouseClick(cancel, LEFT)
+
+    once_asked(MeshDialog, leave)
+    window.action("add").trigger()
+    assert c.document.mesh is before
+
+    def take(dialog: MeshDialog) -> None:
+        settle(qtbot, dialog.preview)
+        choose(qtbot, dialog, "How the mesh is turned", 1)
+        qtbot.mouseClick(dialog._take, LEFT)
+
+    once_asked(MeshDialog, take)
+    window.action("add").trigger()
+    assert c.document.recording.mesh == mesh
+    assert c.document.recording.mesh_reading.turn == "x180"
+    assert c.document.undo_stack.undoText() == "Take mesh"
+    taken = c.document.mesh
+    # The form of `sd2 refine` is filled in; it is started by a click and followed.
+    window.action("refine_mesh").trigger()
+    commands = window.features.commands
+    record = commands.forms.record
+    assert (record.mesh, record.turn, record.video) == (mesh, "x180", c.document.recording.video)
+    start = next(one for one in commands._window.findChildren(QToolButton) if one.text() == "Start")
+    qtbot.mouseClick(start, LEFT)
+    qtbot.waitUntil(lambda: c.document.mesh not in (taken, before), timeout=120_000)
+    assert c.document.undo_stack.undoText() == "Make mesh smooth"
+    assert c.document.recording.mesh == record.out
+    assert c.document.mesh.uncertainty is not None
+    assert not window.action("refine_mesh").isEnabled()
+    commands._window.close()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert c.document.mesh is taken
+    qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    qtbot.waitUntil(lambda: c.document.recording.mesh != mesh, timeout=20_000)
+    qtbot.waitUntil(lambda: c.document.mesh.vertex_count == before.vertex_count, timeout=20_000)
+    assert not c.document.modified
+
+
+def test_what_our_own_fit_made_is_not_foreign(tmp_path) -> None:
+    fit = json.dumps({"camera": {"focal_px": 600.0, "width": 640, "height": 480}})
+    np.savez(tmp_path / "ours.npz", vertices=ball(0.0, 2), fit=fit)
+    np.savez(tmp_path / "theirs.npz", vertices=ball(0.0, 2))
+    assert not is_foreign(tmp_path / "ours.npz")
+    assert is_foreign(tmp_path / "theirs.npz")
