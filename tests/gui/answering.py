@@ -8,7 +8,7 @@ from typing import Any
 from PySide6.QtCore import QPoint, Qt, QTimer
 from PySide6.QtGui import QContextMenuEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QDialog, QMenu, QMessageBox, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QMenu, QMessageBox, QPushButton, QWidget
 
 
 def once_asked(kind: type[QDialog], work: Callable[[Any], object]) -> None:
@@ -34,6 +34,20 @@ def answer(qtbot, text: str, asked: list[str] | None = None) -> None:
         qtbot.mouseClick(found, Qt.MouseButton.LeftButton)
 
     once_asked(QMessageBox, click)
+
+
+def press_when_ready(kind: type[QDialog], text: str) -> None:
+    """Have the next dialog of this kind ended by a button, as soon as it can be pressed."""
+
+    def press(dialog: QDialog) -> None:
+        named = (one for one in dialog.findChildren(QPushButton) if one.text() == text)
+        button = next(named)
+        if button.isEnabled():
+            QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+        else:
+            QTimer.singleShot(20, lambda: press(dialog))
+
+    once_asked(kind, press)
 
 
 def menu_at(view: QWidget, place: QPoint) -> QMenu:

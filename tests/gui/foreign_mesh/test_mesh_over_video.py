@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from answering import once_asked
+from answering import once_asked, press_when_ready
 from finding import words_in
 from grey_video import FRAMES, RATE, write_video
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QCheckBox, QComboBox, QPushButton, QToolButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QComboBox, QToolButton, QWidget
 from window_models import models_of
 
 from sd2app.foreign_mesh.dialog import MeshDialog
@@ -153,11 +153,7 @@ def test_taken_in_the_window_it_is_made_smooth_and_undone(labelled, qtbot, files
     before = c.document.mesh
     monkeypatch.setattr("sd2app.shell.files.ask_to_open", lambda *_: [mesh])
 
-    def leave(dialog: MeshDialog) -> None:
-        cancel = next(b for b in dialog.findChildren(QPushButton) if "Cancel" in b.text())
-        qtbot.mouseClick(cancel, LEFT)
-
-    once_asked(MeshDialog, leave)
+    press_when_ready(MeshDialog, "Cancel")
     window.action("add").trigger()
     assert c.document.mesh is before
 

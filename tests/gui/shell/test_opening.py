@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from answering import once_asked
+from answering import answer, once_asked, press_when_ready
 from dropping import drop, hover
 from PySide6.QtCore import QDir, QSettings, Qt, QTimer
 from PySide6.QtGui import QDragLeaveEvent
@@ -15,6 +15,7 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QListView, Q
 from window_models import menu_of, models_of
 
 from sd2app.fit.request import FitRequest
+from sd2app.foreign_mesh.dialog import MeshDialog
 from sd2app.settings import Settings
 from sd2app.shell.open_dialog import OpenDialog, can_be_opened
 
@@ -33,31 +34,31 @@ def begun_fit(small_recording, tmp_path) -> FitRequest:
 def type_name(path: Path):
     """Answer to the dialog: type a path and press Return."""
 
-    def answer(dialog: OpenDialog) -> None:
+    def type_it(dialog: OpenDialog) -> None:
         line = dialog.findChild(QLineEdit, "fileNameEdit")
         line.setText(str(path))  # what is typed is completed in a popup
         QTest.keyClick(line, Qt.Key.Key_Return)
 
-    return answer
+    return type_it
 
 
 def double_click(name: str):
     """Answer to the dialog: double click an entry, as soon as it is listed."""
 
-    def answer(dialog: OpenDialog) -> None:
+    def click(dialog: OpenDialog) -> None:
         view = dialog.findChild(QListView, "listView")
         model, root = view.model(), view.rootIndex()
         rows = [model.index(row, 0, root) for row in range(model.rowCount(root))]
         found = [one for one in rows if one.data() == name]
         if not found:
-            QTimer.singleShot(20, lambda: answer(dialog))
+            QTimer.singleShot(20, lambda: click(dialog))
             return
         view.scrollTo(found[0])
         at = view.visualRect(found[0]).center()
         QTest.mouseClick(view.viewport(), Qt.MouseButton.LeftButton, pos=at)
         QTest.mouseDClick(view.viewport(), Qt.MouseButton.LeftButton, pos=at)
 
-    return answer
+    return click
 
 
 def press(window, qtbot, key, modifiers=CONTROL) -> None:
@@ -137,6 +138,7 @@ def test_whatever_is_opened_or_saved_is_recent(empty_window, qtbot, recording_co
     # What was opened together is opened together again.
     entry = recent_menu(empty_window).actions()[1]
     assert entry.text().replace("&", "") == f"{video} + mesh.npz"
+    press_when_ready(MeshDialog, "Take")
     with qtbot.waitSignal(c.document.opened, timeout=20_000):
         entry.trigger()
     assert c.document.paths == (video, mesh)
@@ -202,10 +204,12 @@ def test_hovering_says_what_a_drop_would_do(empty_window, qtbot, small_recording
             paths = [Path(shutil.copy(video, tmp_path / "other.mp4"))]
             words = ["Replace the video of “video”", words[1]]
         assert [one.text for one in hover(empty_window, *paths).drops] == words
+    press_when_ready(MeshDialog, "Take")
     with qtbot.waitSignal(c.document.opened, timeout=20_000):
         drop(empty_window, mesh, on=0)
     assert c.document.video is not None
     assert c.document.mesh is not None
+    answer(qtbot, "Discard")
     with qtbot.waitSignal(c.document.opened, timeout=20_000):
         drop(empty_window, small_recording / "radar", on=1)
     assert c.document.mesh is None
