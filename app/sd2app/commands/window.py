@@ -37,6 +37,7 @@ class CommandRunView(RunView[AnyCommandRun]):
         self._printed.setAccessibleName("What the command printed")
         self._printed.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
         self.column.addWidget(self._printed, 1)
+        refining.document.changed.connect(self.refresh)
         self.refresh()
 
     def shown(self, run: AnyCommandRun) -> Collection[str]:

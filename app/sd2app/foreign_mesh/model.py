@@ -34,7 +34,7 @@ class MeshPreview(VideoFrames):
 
     def __init__(self, recording: Recording, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self.recording = replace(recording)
+        self.recording, self._camera = replace(recording), recording.camera
         self.persons: dict[str, int] = {}  # with their numbers of frames; empty while unknown
         self.mesh: MeshSequence | None = None  # as it is read now; None while it cannot be
         self.mesh_problem = ""
@@ -92,8 +92,8 @@ class MeshPreview(VideoFrames):
         if reading == self.read_as:
             return
         self.recording.mesh_reading = reading
-        if "focal_px" in settings:  # which a camera that is known would hide
-            self.recording.camera = None
+        # A camera that is known would hide the focal length that is typed.
+        self.recording.camera = self._camera if reading.focal_px is None else None
         self._read()
 
     def set_faces(self, path: Path) -> None:

@@ -42,10 +42,6 @@ if TYPE_CHECKING:
     from sd2core.io.video import VideoReader
 
 
-_AS_IT_SAYS: Mapping[str, Any] = {}
-"""No fields: a mesh is read as its file, or the recording, says."""
-
-
 class DocumentModel(QObject):
     """One recording, its parts, and the history of its edits."""
 
@@ -172,14 +168,14 @@ class DocumentModel(QObject):
             return ""
         return f"Reading the {PARTS[min(len(PARTS) * job.done // job.total, len(PARTS) - 1)]}"
 
-    def open(self, paths: Sequence[Path], mesh: Mapping[str, Any] = _AS_IT_SAYS) -> None:
+    def open(self, paths: Sequence[Path], mesh: Mapping[str, Any] | None = None) -> None:
         """Open a recording, or files that make up one, in the background.
 
-        ``mesh`` holds fields of the recording that say how its mesh is read.
+        ``mesh`` holds fields of the recording that say how its mesh is read, where it does not.
         """
         self._start(None, list(paths), mesh)
 
-    def add(self, paths: Sequence[Path], mesh: Mapping[str, Any] = _AS_IT_SAYS) -> None:
+    def add(self, paths: Sequence[Path], mesh: Mapping[str, Any] | None = None) -> None:
         """Add files to the recording that is open, or open them; ``mesh`` as for :meth:`open`."""
         recording = self.recording
         self._start(replace(recording) if recording is not None else None, list(paths), mesh)
@@ -274,7 +270,7 @@ class DocumentModel(QObject):
         self,
         base: Recording | None,
         paths: list[Path],
-        mesh: Mapping[str, Any] = _AS_IT_SAYS,
+        mesh: Mapping[str, Any] | None = None,
         cure: Cure | None = None,
     ) -> None:
         self._asked, self._cured = paths, cure is not None
@@ -283,7 +279,7 @@ class DocumentModel(QObject):
 
         def read(emit: Emit) -> Content:
             recording = recording_of(paths, base) if paths or base is None else base
-            for field, value in mesh.items():
+            for field, value in (mesh or {}).items():
                 setattr(recording, field, value)
             if cure is not None:
                 changed = {cure.setting: cure.value}

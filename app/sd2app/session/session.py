@@ -76,15 +76,14 @@ class Session:
         """Put clock, time window, video and sensor on the recording that was opened."""
         content = self.document.content
         assert content is not None
-        times_s = content.timebase.times_s
         # With another mesh in it, a recording stays where it is looked at.
-        same_clock = np.array_equal(times_s, self.playback.timebase.times_s)
-        if not (self.document.same_recording and same_clock):
-            self.playback.set_timebase(content.timebase)
-            self.span.set_extent(content.timebase.start_s, content.timebase.end_s)
+        same, timebase = self.document.same_recording, content.timebase
+        if not (same and np.array_equal(timebase.times_s, self.playback.timebase.times_s)):
+            self.playback.set_timebase(timebase)
+            self.span.set_extent(timebase.start_s, timebase.end_s)
         if self.document.growing:
             self.span.extend(content.timebase.end_s, GROWING_S)
-        if content.video is not self.video.reader:
+        if not (same and content.video is self.video.reader):
             self.video.set_reader(content.video)
         self.sensor.set_sensor(content.recording.sensor)
 

@@ -136,11 +136,12 @@ class FilesFeature(Feature):
 
     def _replace(self, paths: Sequence[Path]) -> None:
         """Open files in place of what is open, a foreign mesh once it was seen over the video."""
+        if not self.may_discard():
+            return
         mesh = self._foreign(paths, None)
         if mesh is None:
-            if self.may_discard():
-                self.open(paths)
-        elif (seen := self._see_mesh(mesh)) and self.may_discard():
+            self.open(paths)
+        elif seen := self._see_mesh(mesh):
             self._document.open(paths, seen.fields)
 
     def open_sample(self) -> None:

@@ -180,6 +180,14 @@ def test_taken_in_the_window_it_is_made_smooth_and_undone(labelled, qtbot, files
     assert c.document.recording.mesh == record.out
     assert c.document.mesh.uncertainty is not None
     assert not window.action("refine_mesh").isEnabled()
+    again = next(
+        one for one in commands._window.findChildren(QToolButton) if one.text() == "Take the mesh"
+    )
+    assert not again.isVisible()
+    c.document.undo_stack.undo()
+    assert again.isVisible()
+    qtbot.mouseClick(again, LEFT)
+    qtbot.waitUntil(lambda: c.document.recording.mesh == record.out, timeout=20_000)
     commands._window.close()
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow)
