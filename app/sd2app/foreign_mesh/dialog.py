@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import get_args
 
-import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPainter
 from PySide6.QtWidgets import QDialog, QLayout, QScrollArea, QWidget
@@ -18,15 +17,13 @@ from sd2app.widgets.dialogs import accepting, ask_file
 from sd2app.widgets.frame_slider import FrameSlider
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox, option_box
 from sd2app.widgets.layouts import column_of, form_of, row_of
-from sd2app.widgets.mesh_painting import draw_mesh, paint_picture
+from sd2app.widgets.mesh_painting import paint_mesh_over
 from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence, side_by_side
 from sd2app.widgets.text import counted
 from sd2core.files.turns import Turn
 from sd2core.options.shared import MeshReading
 
 _OPACITY = 0.65
-_GREY = 56
-"""Grey value of the ground without a video."""
 _AXES = {"x180": "y was up", "x90": "z was up"}
 _TURNS = {None: "not turned"} | {
     turn: f"{turn[0]} by {turn[1:]}°" + (f": {_AXES[turn]}" if turn in _AXES else "")
@@ -61,15 +58,11 @@ class MeshOverPicture(Canvas):
             text = preview.problem or "Reading the video…"
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, text)
             return
-        camera, colour = preview.camera, QColor(colours.overlay)
-        if picture is None:
-            picture = np.full((camera.height, camera.width, 3), _GREY, np.uint8)
-        box = paint_picture(painter, self.rect(), picture)
-        painter.setClipRect(box)
-        mesh = preview.mesh
+        mesh, colour = preview.mesh, QColor(colours.overlay)
         # Dots cover little: they have to be stronger to be seen at all.
         opacity = 1.0 if mesh is not None and mesh.faces is None else _OPACITY
-        draw_mesh(painter, box, mesh, preview.time_s, camera, colour, opacity)
+        camera, time_s = preview.camera, preview.time_s
+        paint_mesh_over(painter, self.rect(), picture, mesh, time_s, camera, colour, opacity)
 
 
 class MeshDialog(QDialog):

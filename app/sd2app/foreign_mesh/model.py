@@ -13,7 +13,7 @@ from sd2app.session.content import Offer, camera_of, offers_of
 from sd2app.session.mesh_reading import ReadMesh, mesh_fields
 from sd2app.session.video_frames import VideoFrames
 from sd2core.body.camera import PinholeCamera
-from sd2core.errors import Cure, Sd2Error
+from sd2core.errors import Cure
 from sd2core.files.recording_json import MeshReading
 from sd2core.io.fitted import fitted_camera
 from sd2core.io.persons import persons_in
@@ -127,7 +127,7 @@ class MeshPreview(VideoFrames):
 
     def _refuse_mesh(self, error: Exception) -> None:
         self.mesh = None
-        self._tell(str(error), offers_of([error]) if isinstance(error, Sd2Error) else ())
+        self._tell(str(error), offers_of([error]))
 
     def _tell(self, problem: str, offers: tuple[Offer, ...]) -> None:
         self.mesh_problem, self.offers = problem, offers

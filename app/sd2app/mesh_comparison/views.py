@@ -15,14 +15,12 @@ from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
 from sd2app.video.overlay_settings import OverlayModel
 from sd2app.widgets.canvas import AT_RIGHT, Canvas
-from sd2app.widgets.mesh_painting import draw_mesh, paint_picture
+from sd2app.widgets.mesh_painting import paint_mesh_over
 from sd2app.widgets.plot import paint_axes
 from sd2app.widgets.time_axis import paint_title, signed_text, ticks
 from sd2core.mesh.presence import runs
 
 _TITLE_PX = 24
-_GREY = 56
-"""Grey value of the ground without a video."""
 _MIN_OPACITY = 0.2
 """Lowest opacity, so that the compared meshes stay visible."""
 _MIN_MPS = 0.2
@@ -73,11 +71,9 @@ class ComparedPicture(Canvas):
         time_s = s.playback.time_s
         if reader is not None and picture is not None:
             time_s = reader.timebase.time_of(s.video.shown_frame)
-        else:
-            picture = np.full((camera.height, camera.width, 3), _GREY, np.uint8)
-        box = paint_picture(painter, ground, picture)
         opacity = max(self._overlay.style.opacity, _MIN_OPACITY)
-        draw_mesh(painter, box, comparison.mesh(self._number), time_s, camera, colour, opacity)
+        mesh = comparison.mesh(self._number)
+        paint_mesh_over(painter, ground, picture, mesh, time_s, camera, colour, opacity)
 
 
 class JointCurves(SeekingPlot):

@@ -200,9 +200,10 @@ def load_content(recording: Recording, progress: Progress) -> Content:
     )
 
 
-def offers_of(unlikely: Iterable[Sd2Error | Finding]) -> tuple[Offer, ...]:
+def offers_of(unlikely: Iterable[Exception | Finding]) -> tuple[Offer, ...]:
     """What can be read another way, of errors and findings."""
-    return tuple(Offer(str(one), one.cure) for one in unlikely if one.cure is not None)
+    cured = ((str(one), getattr(one, "cure", None)) for one in unlikely)
+    return tuple(Offer(text, cure) for text, cure in cured if cure is not None)
 
 
 def camera_of(recording: Recording, video: VideoReader | None) -> PinholeCamera:

@@ -26,7 +26,7 @@ from sd2app.session.content import (
 from sd2app.session.mesh_reading import MeshReader, ReadMesh, mesh_fields
 from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
-from sd2core.errors import Cure, Sd2Error
+from sd2core.errors import Cure
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
@@ -210,9 +210,9 @@ class DocumentModel(QObject):
             self.offers = offers
             self.offered.emit()
 
-    def _offer_instead(self, error: object) -> None:
-        if isinstance(error, Sd2Error) and error.cure is not None:
-            self._offer(offers_of([error]))
+    def _offer_instead(self, error: Exception) -> None:
+        if offers := offers_of([error]):
+            self._offer(offers)
 
     def follow(self, content: Content) -> None:
         """Show a recording that a radar's frames are added to, from now on by :meth:`grow`.

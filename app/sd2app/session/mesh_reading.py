@@ -11,7 +11,6 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.background.latest import Emit
 from sd2app.session.content import Offer, offers_of
 from sd2app.session.tasks import ListedRunner, TaskList
-from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.edited import MESH
 from sd2core.recording.recording import Recording
@@ -43,8 +42,15 @@ class MeshReader(QObject):
     def __init__(self, jobs: TaskList, parent: QObject) -> None:
         super().__init__(parent)
         self._kept: list[ReadMesh] = []  # the newest first
-        self._runner = ListedRunner("mesh", jobs, self, lambda work: work())
-        self._runner.failed.connect(lambda error: self.failed.emit(str(error)))
+        self._take: Callable[[ReadMesh], object] = self._tell  # what is done with the next one
+        self._refuse: Callable[[Exception], object] = self._say
+        self._runner = ListedRunner(
+            "mesh",
+            jobs,
+            self,
+            lambda read: self._take(read),
+            lambda error: self._refuse(error),
+        )
 
     def reset(self, read: ReadMesh) -> None:
         """Begin with the mesh of another recording."""
@@ -63,13 +69,13 @@ class MeshReader(QObject):
 
         It is then kept, so that it is there at once where these fields are followed.
         """
-        asked = replace(recording, **fields)
 
         def take(read: ReadMesh) -> None:
             self.keep(read)
             then(read.fields)
 
-        self._submit(asked, take, refuse=None)
+        self._take, self._refuse = take, self._say
+        self._submit(replace(recording, **fields))
 
     def follow(self, recording: Recording) -> None:
         """Say that the mesh of a recording's fields is ready, at once or once it is read."""
@@ -80,37 +86,29 @@ class MeshReader(QObject):
             self._tell(kept or ReadMesh(fields, None))
             return
 
-        def refuse(error: Sd2Error) -> None:
+        def refuse(error: Exception) -> None:
             self._tell(ReadMesh(fields, None, offers_of([error])))
-            self.failed.emit(str(error))
+            self._say(error)
 
-        self._submit(replace(recording), self._tell, refuse)
+        self._take, self._refuse = self._tell, refuse
+        self._submit(replace(recording))
 
     def close(self) -> None:
         """Stop reading, for good."""
         self._runner.close()
         self._kept = []
 
-    def _submit(
-        self,
-        asked: Recording,
-        take: Callable[[ReadMesh], object],
-        refuse: Callable[[Sd2Error], object] | None,
-    ) -> None:
-        def read(emit: Emit) -> Callable[[], object]:
+    def _submit(self, asked: Recording) -> None:
+        def read(emit: Emit) -> ReadMesh:
             asked.learn_camera()
-            try:
-                mesh = asked.load_mesh(lambda done, total: emit((done, total)))
-            except Sd2Error as error:
-                if refuse is None:
-                    raise
-                refused = error
-                return lambda: refuse(refused)
-            read = ReadMesh(mesh_fields(asked), mesh, offers_of(mesh.findings))
-            return lambda: take(read)
+            mesh = asked.load_mesh(lambda done, total: emit((done, total)))
+            return ReadMesh(mesh_fields(asked), mesh, offers_of(mesh.findings))
 
         name = "" if asked.mesh is None else asked.mesh.name
         self._runner.submit(read, f"Reading {name}")
+
+    def _say(self, error: Exception) -> None:
+        self.failed.emit(str(error))
 
     def _tell(self, read: ReadMesh) -> None:
         self.keep(read)

@@ -12,6 +12,9 @@ from sd2core.figures.surface import Frame, shade_mesh
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import kernels_ready
 
+_GREY = 56
+"""Grey value of the ground without a picture."""
+
 
 def paint_picture(
     painter: QPainter, room: QRect, picture: NDArray[np.uint8], *, enlarge: bool = True
@@ -30,6 +33,41 @@ def paint_picture(
     painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
     painter.drawImage(box, QImage(pixels.data, width, height, channels * width, form))
     return box
+
+
+def paint_mesh_over(
+    painter: QPainter,
+    room: QRect,
+    picture: NDArray[np.uint8] | None,
+    mesh: MeshSequence | None,
+    time_s: float,
+    camera: PinholeCamera,
+    colour: QColor,
+    opacity: float,
+) -> None:
+    """Paint a picture, and the mesh of its moment over it.
+
+    Parameters
+    ----------
+    painter : QPainter
+    room : QRect
+        The picture is as large as fits, in the middle.
+    picture : uint8 array, shape (H, W, 3), or None
+        RGB; a grey ground without one.
+    mesh : MeshSequence or None
+    time_s : float
+        Of the picture.
+    camera : PinholeCamera
+        That took the picture.
+    colour : QColor
+    opacity : float
+        From 0 to 1.
+    """
+    if picture is None:
+        picture = np.full((camera.height, camera.width, 3), _GREY, np.uint8)
+    box = paint_picture(painter, room, picture)
+    painter.setClipRect(box)
+    draw_mesh(painter, box, mesh, time_s, camera, colour, opacity)
 
 
 def draw_mesh(
