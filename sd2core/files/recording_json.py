@@ -16,9 +16,9 @@ from pydantic import (
     model_validator,
 )
 
-from sd2core.errors import Sd2Error
+from sd2core.errors import Cure, Sd2Error
 from sd2core.files.texts import check_version, faults_in, read_json
-from sd2core.files.turns import Turn
+from sd2core.files.turns import Turn, turned_further
 
 FILE_NAME = "recording.json"
 FORMAT: Literal["sd2-recording"] = "sd2-recording"
@@ -103,6 +103,13 @@ class MeshReading(BaseModel):
         """Arguments for ``load_mesh``: those that are given."""
         values = {name: getattr(self, name) for name in type(self).model_fields}
         return {name: value for name, value in values.items() if value is not None}
+
+    def cured(self, cure: Cure) -> MeshReading:
+        """Options with a setting that puts right what was read with these."""
+        value: float | str | None = cure.value
+        if cure.setting == "turn":
+            value = turned_further(self.turn, str(cure.value))
+        return self.model_copy(update={cure.setting: value})
 
 
 class CameraEntry(BaseModel):

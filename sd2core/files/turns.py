@@ -32,3 +32,17 @@ def rotation_of(turn: str) -> NDArray[np.float64]:
     quarter[axis, axis] = quarter[third, second] = 1.0
     quarter[second, third] = -1.0
     return np.linalg.matrix_power(quarter, int(turn[1:]) // 90)
+
+
+def turned_further(turn: str | None, more: str) -> str | None:
+    """One turn after another about its axis; ``more`` alone where the axes differ.
+
+    Examples
+    --------
+    >>> turned_further("x90", "x180"), turned_further("x180", "x180"), turned_further(None, "x90")
+    ('x270', None, 'x90')
+    """
+    if turn is None or turn[0] != more[0]:
+        return more
+    angle = (int(turn[1:]) + int(more[1:])) % 360
+    return f"{turn[0]}{angle}" if angle else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import get_args
 
 from PySide6.QtCore import Qt
@@ -21,6 +22,7 @@ from sd2app.widgets.mesh_painting import paint_mesh_over
 from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence, side_by_side
 from sd2app.widgets.text import counted
 from sd2core.files.turns import Turn
+from sd2core.options.records import option_named
 from sd2core.options.shared import MeshReading
 
 _OPACITY = 0.65
@@ -34,6 +36,7 @@ _DISTANCE_M = 3.0
 """Shown where it is not known yet."""
 _TICK_PX, _BOX_PX = 68, 140
 _FACES = "Triangles (*.npy *.npz *.obj *.ply *.glb);;All files (*)"
+_MODELS = "SMPL, SMPL-H, SMPL-X (*.npz *.pkl);;All files (*)"
 
 
 class MeshOverPicture(Canvas):
@@ -102,9 +105,8 @@ class MeshDialog(QDialog):
         distance.setValue(_DISTANCE_M)
         for box in (self._focal, self._rate, distance):
             box.setFixedWidth(_BOX_PX)
-        self._faces = ElidedLabel(self)
-        tip = "Triangles for a mesh that has none of its own (.npy, .npz, .obj)"
-        choose = outlined("Choose…", tip, self._ask_faces, self, name="Choose the faces")
+        faces = self._file_row("faces", _FACES, self.preview.set_faces)
+        model = self._file_row("body_model", _MODELS, lambda path: change(body_model=str(path)))
         form = form_of(
             ("Person", self._person),
             ("Turn", turn),
@@ -112,7 +114,8 @@ class MeshDialog(QDialog):
             ("Frame rate", self._known("frames_per_s", self._rate)),
             ("Unit", self._unit),
             ("Moved forward", self._known("distance_m", distance, "by:")),
-            ("Faces", row_of((self._faces, 1), choose, spacing_px=8)),
+            ("Faces", faces),
+            ("Body model", model),
         )
         self._notes.setAlignment(Qt.AlignmentFlag.AlignTop)
         area = QScrollArea()
@@ -146,6 +149,23 @@ class MeshDialog(QDialog):
         self._refreshers.append(refresh)
         return side_by_side(known, box)
 
+    def _file_row(self, name: str, kinds: str, take: Callable[[Path], object]) -> QLayout:
+        """A file that the mesh may need beside it, and a button to choose it."""
+        shown, tip = ElidedLabel(self), option_named(MeshReading, name).sentence
+
+        def ask() -> None:
+            if path := ask_file(self, tip, kinds):
+                take(path)
+
+        def refresh() -> None:
+            recording = self.preview.recording
+            path = getattr(recording, name, None) or getattr(recording.mesh_reading, name, None)
+            shown.setText("none given" if path is None else Path(path).name)
+
+        self._refreshers.append(refresh)
+        choose = outlined("Choose…", tip, ask, self, name=tip)
+        return row_of((shown, 1), choose, spacing_px=8)
+
     # --- following the model --------------------------------------------------------------
 
     def _refresh(self) -> None:
@@ -166,8 +186,6 @@ class MeshDialog(QDialog):
             self._focal.show_value(preview.camera.focal_px)
         if preview.read_as.frames_per_s is None and preview.reader is not None:
             self._rate.show_value(preview.reader.timebase.frames_per_s)
-        faces = preview.recording.faces
-        self._faces.setText("of the file, if it has any" if faces is None else faces.name)
         self._say_state()
         self._notes.setText(preview.notes)
         self._take.setEnabled(preview.taken is not None)
@@ -192,10 +210,6 @@ class MeshDialog(QDialog):
         self._cure.setVisible(bool(preview.offers))
         if preview.offers:
             self._cure.setText(preview.offers[0].cure.words)
-
-    def _ask_faces(self) -> None:
-        if path := ask_file(self, "Faces of the mesh", _FACES):
-            self.preview.set_faces(path)
 
     def _accept_cure(self) -> None:
         if self.preview.offers:

@@ -88,24 +88,26 @@ class MeshPreview(VideoFrames):
 
     def change(self, **settings: Any) -> None:
         """Read it another way: fields of :class:`MeshReading`, None as the file says."""
-        reading = self.read_as.model_copy(update=settings)
-        if reading == self.read_as:
-            return
-        self.recording.mesh_reading = reading
-        # A camera that is known would hide the focal length that is typed.
-        self.recording.camera = self._camera if reading.focal_px is None else None
-        self._read()
+        self._read_as(self.read_as.model_copy(update=settings))
+
+    def accept(self, cure: Cure) -> None:
+        """Read it with a setting that puts it right."""
+        self._read_as(self.read_as.cured(cure))
 
     def set_faces(self, path: Path) -> None:
         """Take the triangles of another file."""
         self.recording.faces = path
         self._read()
 
-    def accept(self, cure: Cure) -> None:
-        """Read it with a setting that puts it right."""
-        self.change(**{cure.setting: cure.value})
-
     # --- inside ---------------------------------------------------------------------------
+
+    def _read_as(self, reading: MeshReading) -> None:
+        if reading == self.read_as:
+            return
+        self.recording.mesh_reading = reading
+        # A camera that is known would hide the focal length that is typed.
+        self.recording.camera = self._camera if reading.focal_px is None else None
+        self._read()
 
     def _read(self) -> None:
         asked = replace(self.recording)

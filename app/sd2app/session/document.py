@@ -282,8 +282,7 @@ class DocumentModel(QObject):
             for field, value in (mesh or {}).items():
                 setattr(recording, field, value)
             if cure is not None:
-                changed = {cure.setting: cure.value}
-                recording.mesh_reading = recording.mesh_reading.model_copy(update=changed)
+                recording.mesh_reading = recording.mesh_reading.cured(cure)
             return load_content(recording, lambda done, total: emit((done, total)))
 
         self._runner.submit(read, f"Opening {name}")

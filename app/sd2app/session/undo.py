@@ -164,9 +164,7 @@ class Edits:
         """Read the mesh with a setting that puts it right."""
         recording = self._document.recording
         if recording is not None:
-            changed = {cure.setting: cure.value}
-            reading = recording.mesh_reading.model_copy(update=changed)
-            self.read_mesh(cure.words, {"mesh_reading": reading})
+            self.read_mesh(cure.words, {"mesh_reading": recording.mesh_reading.cured(cure)})
 
     # --- alignment of what was measured ---------------------------------------------------
 

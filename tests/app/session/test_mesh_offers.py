@@ -57,6 +57,19 @@ def test_a_mesh_behind_the_camera_is_turned_and_back_by_the_history(document, qt
     assert open_recording(folder).mesh_reading.turn == "x180"
 
 
+def test_a_turn_too_many_is_taken_back(document, qtbot, tmp_path):
+    np.savez(tmp_path / "m.npz", vertices=BODY, times_s=TIMES_S)
+    reading = MeshReading(turn="x180")
+    folder = Recording.create(
+        tmp_path / "walk.sd2", mesh=tmp_path / "m.npz", mesh_reading=reading
+    ).folder
+    opened(document, folder, qtbot)
+    with qtbot.waitSignal(document.opened, timeout=10_000):
+        Edits(document, SensorModel()).cure_mesh(document.offers[0].cure)
+    assert document.recording.mesh_reading.turn is None
+    np.testing.assert_allclose(document.mesh.read(0, 20), BODY)
+
+
 def test_steps_far_back_are_read_again(document, qtbot, tmp_path):
     np.savez(tmp_path / "m.npz", vertices=BODY, times_s=TIMES_S)
     opened(document, tmp_path / "m.npz", qtbot)

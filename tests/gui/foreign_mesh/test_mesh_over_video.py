@@ -14,7 +14,7 @@ from grey_video import FRAMES, RATE, write_video
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QCheckBox, QComboBox, QToolButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QComboBox, QFileDialog, QToolButton, QWidget
 from window_models import models_of
 
 from sd2app.foreign_mesh.dialog import MeshDialog
@@ -22,6 +22,7 @@ from sd2app.foreign_mesh.model import MeshPreview, is_foreign
 from sd2app.palette import palette_for
 from sd2app.widgets.inputs import NumberBox
 from sd2core.recording.recording import Recording
+from tests.core.io.body_models import model_arrays, write_model
 
 LEFT = Qt.MouseButton.LeftButton
 SHORT = 20
@@ -145,6 +146,32 @@ def test_what_cannot_be_read_so_cannot_be_taken(qtbot, dialog) -> None:
     settle(qtbot, preview)
     assert not take.isEnabled()
     assert any("walk.mp4" in one for one in words_in(dialog, "warning"))
+
+
+def test_parameters_become_a_body_by_the_model_that_is_chosen(
+    qtbot, compiled_kernels, files, monkeypatch, tmp_path
+) -> None:
+    poses, places = np.zeros((FRAMES, 72)), np.tile([0.0, 0.0, 4.0], (FRAMES, 1))
+    np.savez(tmp_path / "posed.npz", poses=poses, trans=places)
+    parent = QWidget()
+    qtbot.addWidget(parent)
+    video, mesh = files[0], tmp_path / "posed.npz"
+    preview = MeshPreview(Recording(Path(), video=video, mesh=mesh), parent)
+    dialog = MeshDialog(preview, palette_for(dark=False), parent)
+    dialog.show()
+    settle(qtbot, preview)
+    assert preview.taken is None
+    assert any("body" in one for one in words_in(dialog, "warning"))
+    model = write_model(tmp_path / "model.npz")
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(model), ""))
+    button = next(one for one in dialog.findChildren(QToolButton) if "SMPL" in one.toolTip())
+    qtbot.mouseClick(button, LEFT)
+    settle(qtbot, preview)
+    assert preview.taken.fields["mesh_reading"].body_model == str(model)
+    rest_m = model_arrays()["v_template"]
+    np.testing.assert_allclose(preview.taken.mesh.frame(0), rest_m + places[0], atol=1e-5)
+    dialog.close()
+    preview.close()
 
 
 def test_taken_in_the_window_it_is_made_smooth_and_undone(labelled, qtbot, files, monkeypatch):
