@@ -36,7 +36,7 @@ _DISTANCE_M = 3.0
 """Shown where it is not known yet."""
 _TICK_PX, _BOX_PX = 68, 140
 _FACES = "Triangles (*.npy *.npz *.obj *.ply *.glb);;All files (*)"
-_MODELS = "SMPL, SMPL-H, SMPL-X (*.npz *.pkl);;All files (*)"
+_MODELS = "SMPL, SMPL-H, SMPL-X, MHR (*.npz *.pkl *.pt);;All files (*)"
 
 
 class MeshOverPicture(Canvas):
