@@ -391,10 +391,12 @@ def test_the_video_places_a_mesh_that_is_centred_on_its_root(
     video = shared_data / "video" / "help.mkv"
     made = Recording.create(tmp_path / "a.sd2", video=video, mesh=tmp_path / "vibe.pkl")
     made.mesh_reading = MeshReading(focal_px=600.0)
-    # Half the box, 120 pixels, is 1 m at a focal length of 600 pixels: 5 m away.
-    assert made.load_mesh().frame(0).mean(axis=0) == pytest.approx([0, 0, 5.0], abs=1e-5)
+    # Half the crop, 1.1 times 120 pixels, is 1 m at a focal length of 600 pixels.
+    away_m = 5.0 / 1.1
+    assert made.load_mesh().frame(0).mean(axis=0) == pytest.approx([0, 0, away_m], abs=1e-5)
     made.mesh_reading = MeshReading(focal_px=600.0, image_size=(400, 480))
-    assert made.load_mesh().frame(0).mean(axis=0) == pytest.approx([1.0, 0, 5.0], abs=1e-5)
+    aside = [away_m * 120 / 600, 0, away_m]
+    assert made.load_mesh().frame(0).mean(axis=0) == pytest.approx(aside, abs=1e-5)
 
 
 class TestPattern:
