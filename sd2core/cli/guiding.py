@@ -51,7 +51,7 @@ def guide(
     folder : Path
         Is made where only its parent exists.
     open_take : callable
-        Opens camera and radar, to be recorded into a folder.
+        Begins to record camera and radar into a folder.
     as_json : bool
         True if events are printed, for other programs.
     """

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sd2core.live.checking import Answer
     from sd2core.live.clocks import ClockLine
     from sd2core.live.filming import CameraChoice, Film
-    from sd2core.live.joint import JointRecording
+    from sd2core.live.joint import JointRecording, Station
     from sd2core.live.sources import Source
 
 _CHECK_S, _FINDINGS_S = 10.0, 1.0
@@ -211,14 +211,15 @@ def _guide(options: Record, choice: CameraChoice) -> None:
 
     assert options.out is not None
     protocol = read_protocol(options.protocol or "")
-    guide(protocol, options.out, partial(_open, options, choice), as_json=options.json)
+    with _station(options, choice) as station:
+        guide(protocol, options.out, station.begin, as_json=options.json)
 
 
 def _take(options: Record, choice: CameraChoice) -> None:
     from sd2core.cli.listen import Status, follow
 
     assert options.out is not None
-    with _open(options, choice, options.out) as take:
+    with _station(options, choice) as station, station.begin(options.out) as take:
         listening = take.listening
         status = Status(listening, take.source, as_json=options.json, columns=options.previews)
         status.more, status.each_time = take.progress, partial(_follow, take)
@@ -243,18 +244,20 @@ def _follow(take: JointRecording) -> None:
         print_event("preview", picture=preview, **take.progress())
 
 
-def _open(options: Record, choice: CameraChoice, folder: Path) -> JointRecording:
-    """Camera and radar that the options name, to be recorded into a folder."""
-    from sd2core.live.joint import JointRecording
+def _station(options: Record, choice: CameraChoice) -> Station:
+    """Camera and radar that the options name."""
+    from sd2core.live.joint import Station
     from sd2core.live.radars import open_radar
     from sd2core.placements.placements import PlacementGrid
 
-    source = open_radar(options.radar, options.setup)
-    delays_s = partial(_delays_s, options)
-    take = JointRecording(folder, choice, source, delays_s, previews=options.previews)
-    if options.placement is not None:
-        take.placements = PlacementGrid(*((number,) for number in options.placement))
-    return take
+    place = options.placement
+    return Station(
+        choice,
+        partial(open_radar, options.radar, options.setup),
+        partial(_delays_s, options),
+        placements=None if place is None else PlacementGrid(*((number,) for number in place)),
+        previews=options.previews,
+    )
 
 
 def _delays_s(options: Record, camera: Camera | Film, source: Source) -> tuple[float, float]:

@@ -59,9 +59,14 @@ def open_camera(
     """
     if name == TEST:
         return TestCamera(size_px or (640, 360), rate_hz or TEST_RATE_HZ)
-    if not name.isdecimal() and "://" not in name:
+    if is_video_file(name):
         return PlayedVideo(Path(name))
     return OpenCvCamera(int(name) if name.isdecimal() else name, size_px, rate_hz, exposure)
+
+
+def is_video_file(name: str) -> bool:
+    """True if :func:`open_camera` plays a file of this name."""
+    return not (name == TEST or name.isdecimal() or "://" in name)
 
 
 def shrunk(picture: NDArray[np.uint8], width_px: int) -> NDArray[np.uint8]:

@@ -42,7 +42,9 @@ class ClockLine:
         return 1e6 * (self.rate - 1.0)
 
 
-def fit_line(times_s: NDArray[np.float64], arrivals_s: NDArray[np.float64]) -> ClockLine:
+def fit_line(
+    times_s: NDArray[np.float64], arrivals_s: NDArray[np.float64], rate: float | None = None
+) -> ClockLine:
     """Fit a source's clock to the arrivals of its frames.
 
     The slope is that of Theil and Sen (H. Theil, "A rank-invariant method of linear and
@@ -55,6 +57,8 @@ def fit_line(times_s: NDArray[np.float64], arrivals_s: NDArray[np.float64]) -> C
         By the source's clock.
     arrivals_s : float64 array, shape (frames,)
         By the monotonic clock of this computer.
+    rate : float, optional
+        Of the line, where it is known from more frames than these.
 
     Raises
     ------
@@ -63,8 +67,8 @@ def fit_line(times_s: NDArray[np.float64], arrivals_s: NDArray[np.float64]) -> C
     """
     if not len(times_s):
         raise Sd2Error("No frame has arrived", "one at least")
-    rate = 1.0
-    if times_s[-1] - times_s[0] >= _DRIFT_FROM_S:
+    is_known, rate = rate is not None, rate or 1.0
+    if not is_known and times_s[-1] - times_s[0] >= _DRIFT_FROM_S:
         from scipy.stats import theilslopes
 
         some = np.unique(np.linspace(0, len(times_s) - 1, _COMPARED).astype(int))
@@ -122,13 +126,13 @@ class Clocks:
         return self.recording_s(radar.start_s - self.radar_delay_s)
 
 
-def link_clocks(recording: Recording, clocks: Clocks) -> ClockLine:
+def link_clocks(recording: Recording, clocks: Clocks, rate: float | None = None) -> ClockLine:
     """Align video and radar of a recording by the arrivals so far, and save it.
 
-    Sd2Error if the radar's arrivals are not there.
+    ``rate`` is as of :func:`fit_line`. Sd2Error if the radar's arrivals are not there.
     """
     assert recording.radar is not None
-    line = arrival_line(recording.radar)
+    line = arrival_line(recording.radar, rate)
     recording.radar_offset_s = clocks.offset_s(line)
     recording.save()
     clocks.write(
@@ -154,11 +158,14 @@ def correct_drift(radar: Path, line: ClockLine) -> None:
     atomic_write_text(radar / HEAD_NAME, told.model_dump_json(indent=2) + "\n")
 
 
-def arrival_line(radar: Path) -> ClockLine:
-    """Clock of a growing capture, by the arrivals that were kept; Sd2Error if none were."""
+def arrival_line(radar: Path, rate: float | None = None) -> ClockLine:
+    """Clock of a growing capture, by the arrivals that were kept; Sd2Error if none were.
+
+    ``rate`` is as of :func:`fit_line`.
+    """
     path = radar / ARRIVALS_NAME
     if not path.is_file():
         raise Sd2Error(f"There is no file {path}", "a recording of `sd2 record`")
     arrivals_s = np.fromfile(path, np.float64)
     frames = min(frame_count(radar, read_head(radar)), len(arrivals_s))
-    return fit_line(np.array(read_entries(radar, frames)["time_s"]), arrivals_s[:frames])
+    return fit_line(np.array(read_entries(radar, frames)["time_s"]), arrivals_s[:frames], rate)

@@ -1,13 +1,15 @@
-"""A camera's pictures into a video, in a process of its own.
+"""A camera's pictures into videos, in a process of its own.
 
-``python -m sd2core.live.filming`` reads its settings as one line of JSON, and films until its
-input ends. It says on its output, line by line, what it has: the times are those of the monotonic
-clock, which all processes of a computer share.
+``python -m sd2core.live.filming`` reads its settings as one line of JSON, then on each line the
+video to film into, ``null`` to end it; the camera stays open until the input ends. It says on its
+output, line by line, what it has: the times are those of the monotonic clock, which all processes
+of a computer share.
 """
 
 from __future__ import annotations
 
 import base64
+import contextlib
 import json
 import queue
 import subprocess
@@ -16,7 +18,7 @@ import threading
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +26,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.appended import AppendedFile
 from sd2core.io.video_writing import VideoEncoder
-from sd2core.live.cameras import Camera, open_camera, shrunk
+from sd2core.live.cameras import Camera, is_video_file, open_camera, shrunk
 from sd2core.processes import end_beside
 
 VIDEO_NAME = "video.mp4"
@@ -49,6 +51,11 @@ class CameraChoice:
     rate_hz: float | None = None
     exposure: float | None = None
 
+    @property
+    def is_played(self) -> bool:
+        """True for a video file, which each recording begins anew."""
+        return is_video_file(self.name)
+
     def open(self) -> Camera:
         """Open it."""
         size_px = None if self.size_px is None else (self.size_px[0], self.size_px[1])
@@ -57,7 +64,7 @@ class CameraChoice:
 
 @dataclass
 class Filmed:
-    """What a camera has given so far."""
+    """What a camera has given of a video so far."""
 
     recorded: int = 0
     dropped: int = 0  # the encoder was too slow
@@ -67,13 +74,11 @@ class Filmed:
 
 
 class Film:
-    """A camera that is filmed in a process of its own.
+    """A camera that is open in a process of its own, and films into one video after the other.
 
     Parameters
     ----------
     choice : CameraChoice
-    video : path
-        File to write, in a folder that exists.
     previews : bool
         True if small pictures are wanted, too.
 
@@ -83,12 +88,13 @@ class Film:
         If the camera cannot be opened.
     """
 
-    def __init__(self, choice: CameraChoice, video: Path, *, previews: bool = False) -> None:
+    def __init__(self, choice: CameraChoice, *, previews: bool = False) -> None:
         self.filmed = Filmed()
         self._preview: str | None = None
         self.about = ""
         self.delay_s = 0.0
         self.simulated = False
+        self._has_ended = threading.Event()  # the video that was filmed into
         self._error: Sd2Error | None = None
         self._reader: threading.Thread | None = None
         self._process = subprocess.Popen(
@@ -99,11 +105,10 @@ class Film:
             encoding="utf-8",
             start_new_session=True,  # Ctrl-C is for the one that films, who ends it
         )
-        settings = {"camera": asdict(choice), "video": str(video), "previews": previews}
-        self._send(json.dumps(settings))
+        self._send({"camera": asdict(choice), "previews": previews})
         self._hear()
         if self._error is not None:
-            self._end()
+            self.close()
             raise self._error
         self._reader = threading.Thread(target=self._hear_all, name="sd2-film", daemon=True)
         self._reader.start()
@@ -123,25 +128,34 @@ class Film:
         if self._error is not None:
             raise self._error
 
-    def stop(self) -> None:
-        """Stop, and wait until all pictures are in the video."""
-        self._end()
+    def begin(self, video: Path) -> None:
+        """Film into a file, in a folder that exists, from the next picture on."""
+        self.filmed = Filmed()
+        self._has_ended.clear()
+        self._send(str(video.absolute()))
+
+    def end(self) -> None:
+        """End the video, and wait until all its pictures are in it; the camera stays open."""
+        self._send(None)
+        end_s = time.monotonic() + _END_S
+        while not (self._has_ended.wait(_TELL_S) or self.is_over or time.monotonic() > end_s):
+            pass
         self.check()
 
-    def _end(self) -> None:
+    def close(self) -> None:
+        """Let go of the camera."""
         assert self._process.stdout is not None
         end_beside(self._process, _END_S)
         if self._reader is not None:
             self._reader.join(_END_S)  # all that was told is heard
         self._process.stdout.close()
 
-    def _send(self, line: str) -> None:
+    def _send(self, told: Any) -> None:
         assert self._process.stdin is not None
-        try:
-            self._process.stdin.write(line + "\n")
+        # Where the process has ended, what it told before says whether that was right.
+        with contextlib.suppress(OSError, ValueError):
+            self._process.stdin.write(json.dumps(told) + "\n")
             self._process.stdin.flush()
-        except OSError:
-            self._error = self._error or Sd2Error("The process that films has ended")
 
     def _hear(self) -> bool:
         """Take one line; False at the end."""
@@ -160,6 +174,8 @@ class Film:
                 picture = told.pop("picture", None)
                 self.filmed = Filmed(**told)
                 self._preview = picture or self._preview
+            case "ended":
+                self._has_ended.set()
             case "failed":
                 self._error = Sd2Error(**told)
         return True
@@ -170,7 +186,7 @@ class Film:
 
 
 def main() -> int:
-    """Film as the first line of the input says, until the input ends."""
+    """Film as the lines of the input say, until it ends."""
     settings = json.loads(sys.stdin.readline())
     try:
         camera = CameraChoice(**settings["camera"]).open()
@@ -178,7 +194,7 @@ def main() -> int:
         return _failed(error)
     _tell("camera", about=camera.about, delay_s=camera.delay_s, simulated=camera.simulated)
     try:
-        _Filming(camera, Path(settings["video"]), previews=settings["previews"]).run()
+        _Filming(camera, previews=settings["previews"]).run()
     except (Sd2Error, OSError) as error:
         return _failed(error)
     return 0
@@ -190,53 +206,91 @@ def _failed(error: Sd2Error | OSError) -> int:
     return 1
 
 
+_Taken = tuple[NDArray[np.uint8], float]
+"""Picture (height, width, 3), and when it was there."""
+
+
 class _Filming:
     """Pictures on their way from the camera, in a thread of its own, to the encoder."""
 
-    def __init__(self, camera: Camera, video: Path, *, previews: bool) -> None:
+    def __init__(self, camera: Camera, *, previews: bool) -> None:
         self._camera, self._previews = camera, previews
-        self._file = AppendedFile(video)
-        self._encoder = VideoEncoder(
-            self._file, camera.rate_hz, camera.size_px, crf=_CRF, preset=_PRESET, grows=True
-        )
-        self._pictures: queue.Queue[tuple[NDArray[np.uint8], float] | None]
+        # Pictures with their times; the video that those behind it go into, or None; the end.
+        self._waiting: queue.SimpleQueue[_Taken | Path | Literal["end"] | None]
+        self._waiting = queue.SimpleQueue()
         width, height = camera.size_px
-        self._pictures = queue.Queue(max(_WAITING_BYTES // (3 * width * height), 2))
+        self._most_waiting = max(_WAITING_BYTES // (3 * width * height), 2)
+        self._lock = threading.Lock()
+        self._is_filming = False
         self._stop = threading.Event()
-        self._filmed = Filmed()
-        self._told_s = self._looked_s = 0.0
+        self._video: _Video | None = None
+        self._dropped = 0  # of this video
 
     def run(self) -> None:
         """Film until the input ends or the camera does."""
-        for target in (self._wait_for_end, self._take_pictures):
-            threading.Thread(target=target, daemon=True).start()
-        while (taken := self._pictures.get()) is not None:
-            self._encode(*taken)
-        self._encoder.close()
-        self._look()
-        self._file.close()
+        threading.Thread(target=self._take_orders, daemon=True).start()
+        while (taken := self._waiting.get()) != "end":
+            if isinstance(taken, tuple):
+                if self._video is not None:
+                    self._video.add(*taken, self._dropped)
+            else:
+                self._end_video()
+                self._video = None if taken is None else _Video(self._camera, taken, self._previews)
+        self._end_video()
         self._camera.close()
-        self._tell_progress(None)
 
-    def _wait_for_end(self) -> None:
-        sys.stdin.read()
+    def _take_orders(self) -> None:
+        reading = threading.Thread(target=self._take_pictures, daemon=True)
+        for line in sys.stdin:
+            told = json.loads(line)
+            with self._lock:
+                self._is_filming = told is not None
+                self._dropped = 0 if self._is_filming else self._dropped
+                self._waiting.put(None if told is None else Path(told))
+            if reading.ident is None:  # a file is played from here on
+                reading.start()
         self._stop.set()
+        if reading.ident is None:
+            self._waiting.put("end")
 
     def _take_pictures(self) -> None:
         while not self._stop.is_set() and (taken := self._camera.read()) is not None:
-            try:
-                self._pictures.put_nowait(taken)
-            except queue.Full:
-                self._filmed.dropped += 1
-        self._pictures.put(None)
+            with self._lock:
+                if not self._is_filming:
+                    continue
+                if self._waiting.qsize() < self._most_waiting:
+                    self._waiting.put(taken)
+                else:
+                    self._dropped += 1
+        self._waiting.put("end")
 
-    def _encode(self, picture: NDArray[np.uint8], taken_s: float) -> None:
+    def _end_video(self) -> None:
+        if self._video is not None:
+            self._video.close(self._dropped)
+            self._video = None
+            _tell("ended")
+
+
+class _Video:
+    """Video that is filmed into."""
+
+    def __init__(self, camera: Camera, path: Path, previews: bool) -> None:
+        self._previews = previews
+        self._file = AppendedFile(path)
+        self._encoder = VideoEncoder(
+            self._file, camera.rate_hz, camera.size_px, crf=_CRF, preset=_PRESET, grows=True
+        )
+        self._filmed = Filmed()
+        self._told_s = self._looked_s = 0.0
+
+    def add(self, picture: NDArray[np.uint8], taken_s: float, dropped: int) -> None:
+        """Encode a picture, and tell now and then what there is."""
         filmed = self._filmed
         if filmed.first_s is None:
             filmed.first_s = taken_s
         self._encoder.add(picture, taken_s - filmed.first_s)
         filmed.recorded += 1
-        filmed.last_s = taken_s
+        filmed.last_s, filmed.dropped = taken_s, dropped
         now_s = time.monotonic()
         if now_s > self._looked_s + _LOOK_S:
             self._looked_s = now_s
@@ -244,6 +298,14 @@ class _Filming:
         if now_s > self._told_s + _TELL_S:
             self._told_s = now_s
             self._tell_progress(picture if self._previews else None)
+
+    def close(self, dropped: int) -> None:
+        """Encode what is left."""
+        self._encoder.close()
+        self._look()
+        self._file.close()
+        self._filmed.dropped = dropped
+        self._tell_progress(None)
 
     def _look(self) -> None:
         """Put the video back if somebody has deleted it."""

@@ -21,6 +21,7 @@ from sd2core.errors import Sd2Error
 from sd2core.fmcw.chain import ProcessingOptions
 from sd2core.fmcw.live import LiveMap
 from sd2core.live.counts import Counts
+from sd2core.live.reception import Reception
 from sd2core.live.recording import GrowingRecording, wall_clock_s
 from sd2core.live.sources import Frame, Source
 from sd2core.radar_config import CLUTTER, RadarConfig
@@ -65,7 +66,8 @@ class Listening:
 
     Parameters
     ----------
-    source : Source
+    source : Source or Reception
+        A source is closed at the end, a reception goes on.
     recording : GrowingRecording
         Is closed at the end.
     axis : VelocityAxis
@@ -81,12 +83,15 @@ class Listening:
 
     def __init__(
         self,
-        source: Source,
+        source: Source | Reception,
         recording: GrowingRecording,
         *,
         axis: VelocityAxis | None = None,
         classifier: TrainedClassifier | None = None,
     ) -> None:
+        self._run = source.run
+        self._goes_on = isinstance(source, Reception)
+        source = source.source if isinstance(source, Reception) else source
         head = source.head(0.0)
         recording.check(head)
         self.counts = Counts()
@@ -164,7 +169,7 @@ class Listening:
         return Column(time_s, wall_clock_s(frame.received_s), values, label)
 
     def stop(self) -> None:
-        """Stop, store what was received, and close source and recording.
+        """Stop, store what was received, and close recording and source.
 
         Raises what kept a frame from being stored.
         """
@@ -172,14 +177,15 @@ class Listening:
         for thread in self._threads:
             if thread.is_alive():
                 thread.join()
-        self._source.close()
+        if not self._goes_on:
+            self._source.close()
         self._recording.close(self._dropped)
         if self._error is not None:
             raise self._error
 
     def _receive(self) -> None:
         try:
-            self._source.run(self._take, self._stop)
+            self._run(self._take, self._stop)
         except BaseException as error:  # raised again where it is seen
             self._error = self._error or error
 

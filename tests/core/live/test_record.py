@@ -158,12 +158,14 @@ def _children(pid: int) -> list[int]:
 def test_a_video_that_is_deleted_is_put_back(tmp_path: Path) -> None:
     folder = tmp_path / "take"
     folder.mkdir()
-    film = Film(CameraChoice("test"), folder / "video.mp4")
+    film = Film(CameraChoice("test"))
+    film.begin(folder / "video.mp4")
     _wait_for(lambda: film.filmed.recorded > 20)
     folder.rename(tmp_path / "gone")
     shutil.rmtree(tmp_path / "gone")
     _wait_for(lambda: film.filmed.put_back > 0)
-    film.stop()
+    film.end()
+    film.close()
     with open_video(folder / "video.mp4") as video:
         assert len(video) == film.filmed.recorded
 
