@@ -75,8 +75,12 @@ class Timebase:
     @property
     def words(self) -> str:
         """Number, length and rate of the frames: ``450 frames, 15.000 s, 30.00 frames/s``."""
-        rate = f"{self.duration_s:.3f} s, {self.frames_per_s:.2f} frames/s"
-        return f"{len(self)} frames, {rate}"
+        return f"{len(self)} frames, {self.pace}"
+
+    @property
+    def pace(self) -> str:
+        """Length and rate of the frames in words."""
+        return f"{self.duration_s:.3f} s, {self.frames_per_s:.2f} frames/s"
 
     def __len__(self) -> int:
         return len(self.times_s)

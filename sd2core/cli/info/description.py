@@ -259,6 +259,7 @@ def describe_capture(path: Path, capture: RadarCapture) -> Description:
         **picked(config, "chirps_per_frame", "samples_per_chirp"),
         **limits(config),
         **_clock_data(capture.timebase),
+        "frames_missing": capture.frames_missing,
         "start_unix_s": capture.start_unix_s,
         "notes": list(capture.notes),
     }
@@ -267,7 +268,7 @@ def describe_capture(path: Path, capture: RadarCapture) -> Description:
         "samples": f"{config.samples_per_chirp} {'' if config.sampling == 'real' else 'complex '}"
         f"per chirp, {config.chirps_per_frame} chirps per frame, receivers: {config.receivers}"
         + (f", transmitters: {config.transmitters}" if config.transmitters > 1 else ""),
-        "time": capture.timebase.words,
+        "time": capture.words,
         **limit_facts(config),
     }
     return Description(f"Radar capture {path}", data, facts, tuple(capture.notes))

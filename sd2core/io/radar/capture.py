@@ -94,6 +94,8 @@ class RadarCapture:
         The recording's own description; holds the truth of a simulated one.
     full_scale_known : bool
         False where samples are in a unit of their own, so that nothing is known of clipping.
+    frames_missing : int
+        Frames that were sent while it was recorded, and are not in it.
 
     Examples
     --------
@@ -117,6 +119,7 @@ class RadarCapture:
     notes: tuple[str, ...] = ()
     meta: dict[str, Any] = field(default_factory=dict)
     full_scale_known: bool = True
+    frames_missing: int = 0
 
     def __post_init__(self) -> None:
         _check_samples(self.samples, self.config, self.source)
@@ -131,13 +134,21 @@ class RadarCapture:
     def __repr__(self) -> str:
         radar = self.config.name or "a radar without a name"
         kind = "simulated" if self.simulated else "real"
-        said = [f"{kind}, {radar}", self.timebase.words, *([self.source] if self.source else [])]
+        said = [f"{kind}, {radar}", self.words, *([self.source] if self.source else [])]
         return f"<RadarCapture {' · '.join(said)}>"
 
     @property
     def frame_count(self) -> int:
         """Number of frames."""
         return int(self.samples.shape[0])
+
+    @property
+    def words(self) -> str:
+        """Number, length and rate of the frames, such as ``47 of 50 frames, …`` where some miss."""
+        if not self.frames_missing:
+            return self.timebase.words
+        sent = self.frame_count + self.frames_missing
+        return f"{self.frame_count} of {sent} frames, {self.timebase.pace}"
 
     @property
     def present(self) -> NDArray[np.bool_] | None:

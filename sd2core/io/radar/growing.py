@@ -185,6 +185,8 @@ def load_growing(path: Path) -> RadarCapture:
     entries = read_entries(folder, frames)
     with errors_in(folder / INDEX_NAME):
         timebase = Timebase(entries["time_s"])
+    lost = int(entries["lost"].sum(dtype=np.int64))
+    dropped = int(entries["dropped"].sum(dtype=np.int64)) + head.dropped_at_ends
     samples = folder / SAMPLES_NAME
     words = head.frame_bytes // head.word_type.itemsize
 
@@ -205,17 +207,16 @@ def load_growing(path: Path) -> RadarCapture:
         start_unix_s=None if head.replayed else head.start_unix_s,
         simulated=head.simulated,
         source=str(samples),
-        notes=(*head.notes, *_notes(head, entries)),
+        notes=(*head.notes, *_notes(entries, lost, dropped)),
         meta={"format": "sd2-live", "source": head.source, "replayed": head.replayed},
         full_scale_known=head.full_scale_known,
+        frames_missing=lost + dropped,
     )
 
 
-def _notes(head: GrowingHead, entries: NDArray[Any]) -> list[str]:
-    """What is missing of a capture, in words."""
+def _notes(entries: NDArray[Any], lost: int, dropped: int) -> list[str]:
+    """What is missing of a capture, and why, in words."""
     notes = []
-    dropped = int(entries["dropped"].sum(dtype=np.int64)) + head.dropped_at_ends
-    lost = int(entries["lost"].sum(dtype=np.int64))
     damaged = int(np.count_nonzero(entries["missing_bytes"]))
     sessions = len(np.unique(entries["session"]))
     if dropped:

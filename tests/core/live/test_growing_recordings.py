@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from sd2core.cli.info.description import describe_capture
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import kind_of
 from sd2core.io.radar import load_capture
@@ -144,7 +145,14 @@ def test_losses_are_told_and_kept(tmp_path: Path) -> None:
     recording.append(_frame(2), HEAD, time_s=1.1, missing_bytes=24)
     recording.close(dropped=5)
     _filled(recording.folder, 1)
-    notes = " ".join(load_capture(recording.radar).notes)
+    capture = load_capture(recording.radar)
+    # 4 are there; 4 and 5 were dropped, 2 lost: what is damaged is there.
+    assert capture.frames_missing == 11
+    described = describe_capture(recording.radar, capture)
+    assert described.facts["time"].startswith("4 of 15 frames, ")
+    assert (described.data["frames"], described.data["frames_missing"]) == (4, 11)
+    assert "4 of 15 frames" in repr(capture)
+    notes = " ".join(capture.notes)
     assert "too slow: 9." in notes
     assert "never received, a gap in time: 2." in notes
     assert "zeros in place of lost packets: 1, 24 bytes in all" in notes
