@@ -162,10 +162,10 @@ class GrowingRecording:
             self._streams[1].write(entry.tobytes())
             for arrivals in self._streams[2:]:
                 arrivals.write(np.float64(received_s).tobytes())
-        self.frames += 1
-        self._last_s = at_s
-        if self.frames == 1:
+        if not self.frames:
             self._make_recording()
+        self.frames += 1  # last, as others open the recording once it has frames
+        self._last_s = at_s
         if time.monotonic() > self._looked_s + _LOOK_S:
             self._look()
 

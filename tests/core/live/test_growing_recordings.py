@@ -138,6 +138,23 @@ def test_continuing_goes_on_by_the_wall_clock(tmp_path: Path) -> None:
     assert capture.notes == ("Listening was stopped and continued 2 times.",)
 
 
+def test_what_says_that_it_has_a_frame_can_be_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = GrowingRecording(tmp_path / "walk.sd2")
+    frames_before: list[int] = []
+    make = recording._make_recording
+
+    def slowly() -> None:
+        frames_before.append(recording.frames)
+        make()
+
+    monkeypatch.setattr(recording, "_make_recording", slowly)
+    recording.append(_frame(0), HEAD, time_s=0.0)
+    assert (frames_before, recording.frames) == ([0], 1)
+    recording.close()
+
+
 def test_losses_are_told_and_kept(tmp_path: Path) -> None:
     recording = GrowingRecording(tmp_path / "walk.sd2")
     recording.append(_frame(0), HEAD, time_s=0.0)
