@@ -9,7 +9,7 @@ import textwrap
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from sd2core.cli.keys import pressed_keys
 from sd2core.cli.output import counted, print_event, print_rows
@@ -22,8 +22,8 @@ from sd2core.live.joint import JointRecording
 from sd2core.live.prompting import label_take
 from sd2core.live.protocol import Protocol, Take
 from sd2core.live.session import Session
-from sd2core.live.videos import drop_video
-from sd2core.recording.recording import SUFFIX, is_recording
+from sd2core.live.videos import hide_person
+from sd2core.recording.recording import SUFFIX, is_recording, open_recording
 from sd2core.runs.control import stop_signals
 
 UNFINISHED = "unfinished"
@@ -63,9 +63,9 @@ def guide(
     session = Session(protocol, there, consent.agreements)
     telling = _Telling(session, consent, as_json=as_json)
     telling.begin(folder)
-    if protocol.video == "drop":
+    if protocol.video != "keep":
         takes = [folder / f"{take.name}{SUFFIX}" for take in session.takes if take.name in there]
-        telling.dropped([take.stem for take in takes if drop_video(take)])
+        telling.hidden(protocol.video, [one.stem for one in takes if _hides(one, protocol.video)])
     with (
         stop_signals() as told,
         pressed_keys() as key,
@@ -77,6 +77,18 @@ def guide(
             telling.step()
             recorder.follow()
     telling.end()
+
+
+def _hides(take: Path, how: Literal["blur", "drop"]) -> bool:
+    """Hide the person of a take that has a body; False where there is none, or that was done."""
+    recording = open_recording(take)
+    if recording.mesh is None or "mesh" in recording.missing():
+        return False
+    try:
+        return hide_person(take, how)
+    except Sd2Error as error:  # of one take: the others go on
+        print(f"sd2: {take.name}: {error}", file=sys.stderr, flush=True)
+        return False
 
 
 def _press(session: Session, consent: Consent, key: str) -> bool:
@@ -219,12 +231,13 @@ class _Telling:
         print(f"{protocol.title}: {missing:,} of {counted(len(session.takes), 'take')} to record")
         print(f"  into {folder}. Space or Enter: go on, a: again, s: skip, q: stop.", flush=True)
 
-    def dropped(self, names: list[str]) -> None:
-        """Say whose videos were deleted."""
+    def hidden(self, how: Literal["blur", "drop"], names: list[str]) -> None:
+        """Say in whose videos the head was covered, or whose were deleted."""
         if self._as_json:
-            print_event("dropped", takes=names)
+            print_event("dropped" if how == "drop" else "blurred", takes=names)
         elif names:
-            print(f"The video was deleted, since there is a body: {', '.join(names)}", flush=True)
+            done = "The video was deleted" if how == "drop" else "The head was covered in the video"
+            print(f"{done}, since there is a body: {', '.join(names)}", flush=True)
 
     def step(self) -> None:
         """Say what is to be done, where that has changed or another second has passed."""

@@ -8,7 +8,7 @@ import sys
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_json, progress_bar
@@ -120,10 +120,14 @@ class Set(Content, SensorPlace, Json):
         a recording (.sd2)
     without : LIST
         take out what is named, some of video, mesh, radar, imu, denoiser, receiver, transmitter
+    anonymise : HOW
+        after a fit, in the recording's own video: cover the head (blur), or delete it (drop); what
+        is covered or deleted is gone
     """
 
     recording: Annotated[Path, ARGUMENT]
     without: Names = ()
+    anonymise: Literal["blur", "drop"] | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -271,6 +275,7 @@ def _set(options: Set) -> None:
       sd2 set walk.sd2 --range-m 3 --azimuth-deg 30
       sd2 set walk.sd2 --mesh better.zarr --radar-offset-s 0.35
       sd2 set walk.sd2 --without receiver,denoiser
+      sd2 set walk.sd2 --anonymise blur
     """
     from sd2core.cli.info.description import describe_parts, describe_recording, show
     from sd2core.cli.reading import mesh_reading, refuse_unused_mesh_options
@@ -301,10 +306,25 @@ def _set(options: Set) -> None:
         recording.learn_camera()
     if options.body_model is not None:
         _keep_vertices(recording, recording.folder)
-    parts = describe_parts(recording)
     recording.sensor = _placed(recording, options)
-    recording.save()
+    if options.anonymise is None:
+        parts = describe_parts(recording)
+        recording.save()
+    else:
+        recording.save()
+        _anonymise(recording.folder, options.anonymise)
+        recording = open_recording(recording.folder)
+        parts = describe_parts(recording)
     show(describe_recording(recording, parts), as_json=options.json)
+
+
+def _anonymise(folder: Path, how: Literal["blur", "drop"]) -> None:
+    from sd2core.live.videos import hide_person
+
+    with progress_bar("Covering the head", unit="frame") as progress:
+        done = hide_person(folder, how, progress)
+    if not done:
+        print("note: that was done before, or there is no video", file=sys.stderr)
 
 
 def _placed(recording: Recording, options: Set) -> VirtualSensor:

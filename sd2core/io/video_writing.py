@@ -15,6 +15,9 @@ from sd2core.errors import Sd2Error
 _TICKS_PER_S = 90_000
 """Clock of videos with explicit times: 11 microseconds, which every player knows."""
 
+HEADS_COVERED = "SD2 Studio: heads are covered"
+"""Comment in the file of a video in which they are."""
+
 
 def write_video(
     path: Path,
@@ -25,6 +28,7 @@ def write_video(
     times_s: NDArray[np.float64] | None = None,
     crf: int = 21,
     preset: str = "slow",
+    comment: str = "",
 ) -> None:
     """Encode sRGB pictures as H.264 in MP4.
 
@@ -43,6 +47,8 @@ def write_video(
         Constant rate factor of x264: lower is better; 18 is hard to tell from the source.
     preset : str
         Of x264: a slower one makes a smaller file.
+    comment : str
+        What the file says of itself.
 
     Raises
     ------
@@ -50,7 +56,9 @@ def write_video(
         If this build of PyAV has no H.264 encoder.
     """
     ticks = frames_per_s if times_s is None else _TICKS_PER_S
-    encoder = VideoEncoder(path, frames_per_s, size, crf=crf, preset=preset, ticks_per_s=ticks)
+    encoder = VideoEncoder(
+        path, frames_per_s, size, crf=crf, preset=preset, ticks_per_s=ticks, comment=comment
+    )
     with encoder:
         for number, picture in enumerate(frames):
             time_s = number / frames_per_s if times_s is None else float(times_s[number])
@@ -76,6 +84,8 @@ class VideoEncoder:
         Times are rounded to these.
     grows : bool
         True for a file that can be read up to the last second however writing ends.
+    comment : str
+        As of :func:`write_video`.
 
     Raises
     ------
@@ -93,6 +103,7 @@ class VideoEncoder:
         preset: str = "slow",
         ticks_per_s: int = _TICKS_PER_S,
         grows: bool = False,
+        comment: str = "",
     ) -> None:
         import av
 
@@ -109,6 +120,8 @@ class VideoEncoder:
         self._container = av.open(
             str(file) if isinstance(file, Path) else file, "w", format="mp4", options=options
         )
+        if comment:
+            self._container.metadata["comment"] = comment
         rate = Fraction(frames_per_s).limit_denominator(1001)
         self._stream = self._container.add_stream("libx264", rate=rate)
         self._stream.width, self._stream.height = size

@@ -104,7 +104,7 @@ class Protocol(OptionRecord):
     reaction_s
         seconds from the prompt to the first motion of the gesture
     video
-        what becomes of it; drop: deleted in takes that have a body
+        what becomes of it in takes that have a body; blur: the head is covered, drop: deleted
     consent
         text that a person agrees to before the first take; empty: nobody is asked
     """
@@ -121,7 +121,7 @@ class Protocol(OptionRecord):
     pause_s: _WaitS = 5.0
     countdown_s: _WaitS = 3.0
     reaction_s: _ReactionS = 0.3
-    video: Literal["keep", "drop"] = "keep"
+    video: Literal["keep", "blur", "drop"] = "keep"
     consent: str = ""
 
     def __post_init__(self) -> None:

@@ -37,6 +37,7 @@ _CHOICES = {
     "fixed": "as listed",
     "random": "at random",
     "keep": "kept",
+    "blur": "head covered once a body was fitted",
     "drop": "deleted once a body was fitted",
 }
 """Words of the values of options; others are shown as they are."""

@@ -116,14 +116,20 @@ def describe_parts(recording: Recording) -> list[Description]:
 
 def describe_video(path: Path, video: VideoReader) -> Description:
     """Describe a video."""
+    from sd2core.io.video_writing import HEADS_COVERED
+
     data = {
         "kind": "video",
         "path": str(path),
         **picked(video, "width", "height"),
         **_clock_data(video.timebase),
+        "heads_covered": (covered := video.metadata.get("comment") == HEADS_COVERED),
         "notes": list(video.notes),
     }
-    facts = {"picture": f"{video.width} x {video.height} pixels", "time": video.timebase.words}
+    facts = {
+        "picture": f"{video.width} x {video.height} pixels" + (", heads covered" * covered),
+        "time": video.timebase.words,
+    }
     return Description(f"Video {path}", data, facts, video.notes)
 
 

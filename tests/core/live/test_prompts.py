@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from sd2core.datasets.reading import open_dataset
 from sd2core.files.resources import resource_path
+from sd2core.io.video_writing import HEADS_COVERED
 from sd2core.live.clocks import Clocks
 from sd2core.live.prompting import NO_MOTION, prompted_span
 from sd2core.maps import DopplerMap
@@ -213,8 +214,8 @@ def test_what_cannot_be_is_refused_before_anything_is_made(tmp_path: Path) -> No
     assert not (tmp_path / "some").exists()
 
 
-@pytest.mark.parametrize("kept", ["keep", "drop"])
-def test_a_video_is_dropped_only_where_wanted_and_a_body_is_there(
+@pytest.mark.parametrize("kept", ["keep", "drop", "blur"])
+def test_a_person_is_hidden_only_where_wanted_and_a_body_is_there(
     tmp_path: Path, kept: str
 ) -> None:
     folder, sample = tmp_path / "session", resource_path("swipes.sd2")
@@ -229,12 +230,20 @@ def test_a_video_is_dropped_only_where_wanted_and_a_body_is_there(
     protocol.write_text(f'video = "{kept}"\n{PROTOCOL}', encoding="utf-8")
     told = _session(protocol, folder, lambda _: "")
     assert told[-1] == {"event": "missing", "takes": [], "not_agreed": []}
-    dropped = [one["takes"] for one in told if one["event"] == "dropped"]
-    assert dropped == ([["anna-left-to-right-1"]] if kept == "drop" else [])
+    hidden = {one["event"]: one["takes"] for one in told if one["event"] in ("dropped", "blurred")}
+    event = {"drop": "dropped", "blur": "blurred"}.get(kept)
+    assert hidden == ({event: ["anna-left-to-right-1"]} if event else {})
+    if kept == "blur":
+        again = _session(protocol, folder, lambda _: "")
+        assert [one["takes"] for one in again if one["event"] == "blurred"] == [[]]
     with_body, without = (open_recording(path) for path in sorted(folder.iterdir()))
     assert without.video is not None
     assert without.video.is_file()
-    assert (folder / "anna-left-to-right-1.sd2" / "video.mp4").exists() == (kept == "keep")
+    assert (folder / "anna-left-to-right-1.sd2" / "video.mp4").exists() == (kept != "drop")
     assert (with_body.video is None) == (kept == "drop")
     assert with_body.missing() == {}
+    if with_body.video is not None:
+        with with_body.open_video() as reader:
+            assert (reader.metadata.get("comment") == HEADS_COVERED) == (kept == "blur")
+            np.testing.assert_allclose(reader.timebase.times_s, times_s, atol=2e-5)
     np.testing.assert_allclose(with_body.load_mesh().timebase.times_s, times_s, atol=1e-6)
