@@ -45,10 +45,11 @@ class Listen(Json):
         a capture, or the one of a recording, at its own rate
     radar : SOURCE
         `test`, a simulated radar (`test:20`: with 20 frames/s); `a121`, Acconeer's sensor
-        (`a121:PLACE`: at a serial port or IP address); or a plug-in's, NAME[:PLACE]
+        (`a121:PLACE`: at a serial port or IP address); `ti`, a board of TI's that is set up and
+        started (`ti:PLACE`: at a serial port); or a plug-in's, NAME[:PLACE]
     setup : FILE
-        what the radar runs with: a .cfg or .json of TI's with --dca1000, a session of Acconeer's
-        tool with `a121`
+        what the radar runs with: a .cfg or .json of TI's with --dca1000, a .cfg with `ti`, a
+        session of Acconeer's tool with `a121`
     out : NAME.sd2
         the recording to write
     classifier : FILE

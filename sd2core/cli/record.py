@@ -41,10 +41,12 @@ class Record(Json):
         its rate, or `test`
     radar : SOURCE
         `test` (`test:20`: with 20 frames/s); `a121`, Acconeer's sensor (`a121:PLACE`: at a serial
-        port or IP address); a plug-in's, NAME[:PLACE]; a capture or recording, replayed at its own
+        port or IP address); `ti`, a board of TI's that is set up and started (`ti:PLACE`: at a
+        serial port); a plug-in's, NAME[:PLACE]; a capture or recording, replayed at its own
         rate; or with --setup the address of this computer that a DCA1000 sends to, ADDRESS[:PORT]
     setup : FILE
-        what the radar runs with: a .cfg or .json of TI's, a session of Acconeer's tool with `a121`
+        what the radar runs with: a .cfg or .json of TI's (with `ti` a .cfg), a session of
+        Acconeer's tool with `a121`
     out : NAME.sd2|FOLDER
         the recording to write, or the folder of a session (--protocol), which goes on
     protocol : FILE|paper

@@ -13,6 +13,8 @@ from sd2core.plug_ins import Group
 
 A121 = "a121"
 """Name of Acconeer's sensor."""
+TI = "ti"
+"""Name of TI's boards with a DCA1000 that are set up and started here."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class LiveRadar:
             raise Sd2Error(f"The way to open a radar is {self.open!r}", "a function")
 
 
-LIVE_RADARS = Group("live_radars", LiveRadar, (TEST, A121))
+LIVE_RADARS = Group("live_radars", LiveRadar, (TEST, A121, TI))
 """Radars to listen to of other packages."""
 
 
@@ -43,8 +45,8 @@ def open_radar(name: str, setup: Path | None = None) -> Source:
     Parameters
     ----------
     name : str
-        ``test`` or ``test:RATE``, ``a121`` or ``a121:PLACE``, the same of a plug-in; with a set-up
-        ``ADDRESS[:PORT]``; or a file.
+        ``test`` or ``test:RATE``, ``a121``, ``ti`` or a plug-in's, each with ``:PLACE`` behind it
+        or not; with a set-up ``ADDRESS[:PORT]``; or a file.
     setup : path, optional
         What the radar runs with.
 
@@ -60,13 +62,17 @@ def open_radar(name: str, setup: Path | None = None) -> Source:
         from sd2core.live.a121 import A121Source
 
         return A121Source(place, setup)
+    if word == TI:
+        from sd2core.live.ti import TiSource
+
+        return TiSource(place, setup)
     if (plug_in := LIVE_RADARS.find(word)) is not None:
         source: Source = plug_in.use(lambda radar: radar.open(place, setup), Source)
         return source
     if setup is not None:
         return dca1000(name, setup)
     if not Path(name).exists():
-        known = ", ".join((TEST, A121, *LIVE_RADARS.names()))
+        known = ", ".join((TEST, A121, TI, *LIVE_RADARS.names()))
         raise Sd2Error(
             f"{name} is no radar, and no file",
             f"{known}; or a capture or recording to replay",

@@ -28,7 +28,7 @@ LOOPBACK = "127.0.0.1"
 DATA_PORT = 4098
 """Port that the card sends samples to."""
 
-_SOCKET_BYTES = 8 << 20
+SOCKET_BYTES = 8 << 20
 """Asked of the system for packets that wait; it may give less."""
 _PAUSE_S = 0.2
 """After so long without a packet, none is on its way any more."""
@@ -151,6 +151,8 @@ class Dca1000Source:
         Configuration that the radar runs with, as for files (:mod:`sd2core.io.radar.ti_setup`).
     address, port
         Of this computer, to which the card sends. Port 0 is any free one.
+    opened : socket, optional
+        Instead, a socket that it sends to.
 
     Raises
     ------
@@ -158,7 +160,14 @@ class Dca1000Source:
         When the configuration is damaged, or the address cannot be listened on.
     """
 
-    def __init__(self, setup: Path, address: str = LOOPBACK, port: int = DATA_PORT) -> None:
+    def __init__(
+        self,
+        setup: Path,
+        address: str = LOOPBACK,
+        port: int = DATA_PORT,
+        *,
+        opened: socket.socket | None = None,
+    ) -> None:
         self._setup_path = setup
         self._setup = read_setup(setup)
         self._decoder = FrameDecoder(self._setup, str(setup))
@@ -172,7 +181,7 @@ class Dca1000Source:
         self._sent: tuple[int, float, int] | None = None  # restarts, time and place judged from
         self._rate_doubt: str | None = None
         self._is_judged = False
-        self._socket = _listening_socket(address, port)
+        self._socket = _listening_socket(address, port) if opened is None else opened
         self.address, self.port = self._socket.getsockname()[:2]
         radar = self._setup.config
         self.delay_s = 0.5 * radar.chirps_per_frame * radar.chirp_repetition_s
@@ -244,11 +253,11 @@ class Dca1000Source:
             )
         if at_end and counts.lost:
             doubts.append(f"Packets lost: {counts.lost:,}.")
-        if self.waiting_bytes < _SOCKET_BYTES and (counts.lost or not at_end):
+        if self.waiting_bytes < SOCKET_BYTES and (counts.lost or not at_end):
             doubts.append(
                 f"The system keeps only {self.waiting_bytes / 1e3:,.0f} kB of packets that wait,"
                 " and may lose some; on Linux,"
-                f" `sysctl -w net.core.rmem_max={_SOCKET_BYTES}` allows more."
+                f" `sysctl -w net.core.rmem_max={SOCKET_BYTES}` allows more."
             )
         if self._rate_doubt is not None:
             doubts.append(self._rate_doubt)
@@ -320,7 +329,7 @@ def _listening_socket(address: str, port: int) -> socket.socket:
     """UDP socket on an address; Sd2Error if it is not to be had."""
     found = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
-        found.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _SOCKET_BYTES)
+        found.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SOCKET_BYTES)
         found.bind((address, port))
     except (OSError, OverflowError, TypeError, ValueError) as error:  # the last two for odd names
         found.close()

@@ -23,14 +23,15 @@ from sd2core.errors import Sd2Error
 from sd2core.io.kinds import RADAR_SUFFIXES
 from sd2core.io.readers import RADAR_FILES, suffixes_of
 from sd2core.live.protocol import PAPER
-from sd2core.live.radars import A121
+from sd2core.live.radars import A121, TI
 from sd2core.live.rehearsal import TEST
 
 _SETUPS = "Configuration of the radar (*.cfg *.json);;All files (*)"
 _CAPTURES = "Radar captures and recordings ({} radar.npy recording.json live.json);;All files (*)"
 _VIDEOS = "Videos (*.mp4 *.mov *.mkv *.avi *.webm);;All files (*)"
 _WAYS = {
-    DCA1000: "a TI radar with a DCA1000",
+    DCA1000: "a TI radar with a DCA1000 that runs",
+    TI: "a TI board with a DCA1000, started from here",
     REPLAY: "a capture, replayed at its own rate",
     TEST: "a test radar (simulated)",
     A121: "an Acconeer A121",
@@ -117,9 +118,9 @@ class ListenDialog(QDialog):
         _show_file(self._camera, setup.camera)
         _show_file(self._protocol, setup.protocol)
         for part in (self._file_name, self._file, self._file_button):
-            part.setVisible(setup.way in (DCA1000, REPLAY))
-        self._file_name.setText("Configuration" if is_radar else "Capture")
-        chosen = setup.setup if is_radar else setup.replay
+            part.setVisible(setup.needs_setup or setup.way == REPLAY)
+        self._file_name.setText("Configuration" if setup.needs_setup else "Capture")
+        chosen = setup.setup if setup.needs_setup else setup.replay
         self._file.setText(str(chosen) if chosen is not None else _NONE)
         for widget in (self._address_name, self._address, self._hint):
             widget.setVisible(is_radar)
@@ -167,7 +168,7 @@ class ListenDialog(QDialog):
 
     def _ask_file(self) -> None:
         setup = self._setup
-        if setup.way == DCA1000:
+        if setup.needs_setup:
             start = str(setup.setup or "")
             if path := ask_file(self, "Configuration that the radar runs with", _SETUPS, start):
                 setup.choose("setup", path)

@@ -14,7 +14,7 @@ from sd2core.cli.listen import Listen
 from sd2core.cli.record import Record
 from sd2core.errors import Sd2Error
 from sd2core.live.protocol import read_protocol
-from sd2core.live.radars import A121, LIVE_RADARS
+from sd2core.live.radars import A121, LIVE_RADARS, TI
 from sd2core.live.rehearsal import TEST
 from sd2core.live.sources import LOOPBACK
 from sd2core.options.records import words_of
@@ -27,7 +27,8 @@ _DEFAULTS = {
     "protocol": "",
 }  # fmt: skip
 _FOR_THE_WINDOW = ("--json", "--columns", "--previews")
-_ENDINGS = (".cfg", ".json")
+_ENDINGS = {DCA1000: (".cfg", ".json"), TI: (".cfg",)}
+"""Configurations of the radars that need one."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class ListenRequest:
 
 def ways() -> tuple[str, ...]:
     """Kinds of sources: a DCA1000, a replay, and radars by name."""
-    return DCA1000, REPLAY, TEST, A121, *LIVE_RADARS.names()
+    return DCA1000, TI, REPLAY, TEST, A121, *LIVE_RADARS.names()
 
 
 class ListenSetup(QObject):
@@ -113,6 +114,11 @@ class ListenSetup(QObject):
     def setup(self) -> Path | None:
         """Configuration that the radar runs with."""
         return Path(self._choices["setup"]) if self._choices["setup"] else None
+
+    @property
+    def needs_setup(self) -> bool:
+        """True for a radar that runs with a configuration."""
+        return self.way in _ENDINGS
 
     @property
     def replay(self) -> Path | None:
@@ -179,14 +185,15 @@ class ListenSetup(QObject):
             if self.replay is None:
                 return "Choose the capture that is replayed."
             return "" if self.replay.exists() else f"{self.replay} does not exist."
-        if self.way != DCA1000:
+        if not self.needs_setup:
             return ""
         if self.setup is None:
             return "Choose the .cfg or .json that the radar runs with: samples do not say it."
         if not self.setup.is_file():
             return f"{self.setup} does not exist."
-        if self.setup.suffix.lower() not in _ENDINGS:
-            return f"{self.setup.name} is no .cfg of the mmWave SDK or .json of mmWave Studio."
+        if self.setup.suffix.lower() not in _ENDINGS[self.way]:
+            known = " or .json of mmWave Studio" if self.way == DCA1000 else ""
+            return f"{self.setup.name} is no .cfg of the mmWave SDK{known}."
         return ""
 
     @property
@@ -201,6 +208,8 @@ class ListenSetup(QObject):
         made = ListenRequest(self.folder, camera=self.camera, protocol=self.protocol, place=place)
         if self.way == REPLAY:
             return replace(made, replay=self.replay)
+        if self.way == TI:
+            return replace(made, radar=TI, setup=self.setup)
         if self.way != DCA1000:
             return replace(made, radar=self.way)
         return replace(made, setup=self.setup, address=self.address)

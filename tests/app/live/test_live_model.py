@@ -303,6 +303,20 @@ def test_edits_made_while_filming_are_not_lost(session, tmp_path, qtbot):
     assert session.sensor.sensor.position_m[0] == 0.5
 
 
+def test_a_board_that_is_started_from_here_needs_a_cfg(tmp_path):
+    setup = ListenSetup(Settings.forgetful())
+    setup.choose("way", "ti")
+    setup.choose_folder(tmp_path / "take")
+    assert "Choose the .cfg" in setup.problem
+    for name, problem in (("walk.mmwave.json", "is no .cfg of the mmWave SDK."), ("walk.cfg", "")):
+        (tmp_path / name).touch()
+        setup.choose("setup", tmp_path / name)
+        assert setup.problem.endswith(problem)
+    assert setup.problem == ""
+    words = setup.request().words()
+    assert words[:5] == ["listen", "--radar", "ti", "--setup", str(tmp_path / "walk.cfg")]
+
+
 def test_a_camera_makes_it_another_command(tmp_path):
     setup = ListenSetup(Settings.forgetful())
     setup.choose("way", "test")
