@@ -84,7 +84,7 @@ class ListenRequest:
 
 def ways() -> tuple[str, ...]:
     """Kinds of sources: a DCA1000, a replay, and radars by name."""
-    return DCA1000, TI, REPLAY, TEST, A121, *LIVE_RADARS.names()
+    return DCA1000, REPLAY, TEST, A121, TI, *LIVE_RADARS.names()
 
 
 class ListenSetup(QObject):

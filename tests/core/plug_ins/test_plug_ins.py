@@ -98,7 +98,7 @@ class TestEach:
         )
         from sd2core.live.radars import open_radar
 
-        assert "test, a121, tea-cup; or a capture" in refusal(open_radar, "coffee-cup")
+        assert "test, a121, ti, tea-cup; or a capture" in refusal(open_radar, "coffee-cup")
         assert "(live_radars) of the package sd2-sample failed (ValueError" in refusal(
             open_radar, "tea-cup:hot"
         )
