@@ -257,7 +257,7 @@ def test_the_papers_protocol_is_the_papers() -> None:
         ('people = ["a/b"]', r"line 4: people\.0 is 'a/b'"),
         ('people = ["anna"]\ntake_s = 0', r"line 5: take_s is 0"),
         ('people = ["anna"]\nkeys = 1', r"line 5: keys is not known"),
-        ('people = ["anna"]\nvideo = "burn"', r"line 5: video is 'burn'.*'keep' or 'drop'"),
+        ('people = ["anna"]\nvideo = "burn"', r"line 5: video is 'burn'.*'keep', 'blur' or 'drop'"),
         ('people = ["anna", "Anna"]', r"two recordings would be called anna-up-1"),
     ],
 )
