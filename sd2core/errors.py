@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 Value = TypeVar("Value")
 _LONGEST = 60
 
 
-@dataclass(frozen=True)
-class Cure:
+class Cure(NamedTuple):
     """Setting that puts right how a mesh is read, and the words for its button."""
 
     setting: str  # field of sd2core.files.recording_json.MeshReading

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
-import socket
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -40,6 +38,8 @@ def silent_displays(platform: str, environment: Mapping[str, str]) -> tuple[str,
 
 
 def _x11_answers(environment: Mapping[str, str]) -> bool:
+    import ctypes  # here because most commands ask no display
+
     try:
         xcb = ctypes.CDLL("libxcb.so.1")
     except OSError:  # it is missing, which is said elsewhere
@@ -54,6 +54,8 @@ def _x11_answers(environment: Mapping[str, str]) -> bool:
 
 
 def _wayland_answers(environment: Mapping[str, str]) -> bool:
+    import socket
+
     folder = Path(environment.get("XDG_RUNTIME_DIR") or "/nonexistent")
     place = folder / (environment.get("WAYLAND_DISPLAY") or "wayland-0")
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:

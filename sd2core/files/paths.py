@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import glob
 import os
-import shutil
 from itertools import chain, count, takewhile
 from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
 
@@ -149,6 +148,8 @@ def make_folder(path: Path) -> list[Path]:
 def remove(path: Path) -> None:
     """Delete a file or folder, or nothing where there is none."""
     if path.is_dir():
+        import shutil  # here because it loads every compression, and starting should be short
+
         shutil.rmtree(path, ignore_errors=True)
     else:
         path.unlink(missing_ok=True)

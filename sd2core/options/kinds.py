@@ -6,9 +6,8 @@ import math
 import re
 from argparse import ArgumentTypeError
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from sd2core.options.bounds import (
     AZIMUTH_DEG,
@@ -23,15 +22,13 @@ from sd2core.options.bounds import (
 )
 
 
-@dataclass(frozen=True)
-class Typed:
+class Typed(NamedTuple):
     """How a value is read from what was typed, and written as it would be typed."""
 
     read: Callable[[str], Any]
     write: Callable[[Any], str] = str
 
 
-@dataclass(frozen=True)
 class Filled:
     """Of a text or path in a plan: it is not blank."""
 

@@ -23,6 +23,7 @@ from typing import (
     Any,
     ClassVar,
     Literal,
+    NamedTuple,
     NoReturn,
     TypeVar,
     Union,
@@ -44,8 +45,8 @@ class OptionError(Sd2Error, ValueError):
     """Options that cannot be; a plan that is read says where in it they stand."""
 
 
-@dataclass(frozen=True)
-class Place:
+# Named tuples, which are made in a third of the time of a dataclass.
+class Place(NamedTuple):
     """How a field is typed where it is not an option of its own name with one value.
 
     Parameters
@@ -84,15 +85,13 @@ NOT_TYPED = Place(typed=False)
 """Of a field for files and programs."""
 
 
-@dataclass(frozen=True)
-class Section:
+class Section(NamedTuple):
     """Marks a mapping of those options of another record that are given."""
 
     kind: type
 
 
-@dataclass(frozen=True)
-class Group:
+class Group(NamedTuple):
     """Heading that the options of a record stand under, and a sentence below it."""
 
     title: str
