@@ -118,7 +118,8 @@ class Feature:
     """
 
     changing: Sequence[SignalInstance] = ()
-    """Signals after which an action may be possible that was not, or the reverse."""
+    """Signals after which an action of the feature may be possible that was not, or the reverse;
+    what is open, and whether its labels can be edited, is followed for all."""
     closing: Sequence[Any] = ()
     """Models with a method ``close``, closed with the window in this order."""
     working: Sequence[Any] = ()

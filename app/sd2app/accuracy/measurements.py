@@ -90,7 +90,7 @@ class MeasuredModel(ReportingModel):
         """Read the stored measurement for this sensor, once per place."""
         if self._scene is None or sensor == self._place:
             return
-        self._place = sensor
+        first, self._place = self._place is None, sensor
         mesh, options = self._scene
         self._known = {
             family: replace(measurement, stale=True) for family, measurement in self._known.items()
@@ -101,7 +101,8 @@ class MeasuredModel(ReportingModel):
                 library().cached_measurement(mesh, sensor, options, family) for family in FAMILIES
             ]
         )
-        self.changed.emit()
+        if first or self._known:  # what is known is stale now
+            self.changed.emit()
 
     def set_family(self, family: Family) -> None:
         """Show the plans of another family."""
@@ -143,8 +144,10 @@ class MeasuredModel(ReportingModel):
         self.changed.emit()
 
     def _receive_remembered(self, found: list[Measurement | None]) -> None:
-        self._known |= {known.family: known for known in found if known is not None}
-        self.changed.emit()
+        stored = {known.family: known for known in found if known is not None}
+        self._known |= stored
+        if stored:
+            self.changed.emit()
 
 
 def serves_at_rest(result: PlanResult) -> bool:

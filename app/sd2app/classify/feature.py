@@ -64,7 +64,8 @@ class ClassifyFeature(Feature):
         )
         self.model.failed.connect(shell.warn)
         report(shell, self.training)
-        self.changing = (self.model.changed,)
+        came = (track.came_or_went for track in session.maps.all)
+        self.changing = *self.model.signals, *came
         self.closing = (self.training, self.model)  # runs go on
         self.working, self.running = (self.model,), (self.training,)
 

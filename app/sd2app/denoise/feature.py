@@ -47,7 +47,7 @@ class DenoiseFeature(Feature):
         self.model = DenoiseModel(session, synthesis, library, parent)
         report(shell, self.model)
         self.live = LiveDenoiseModel(session, self.model, parent)
-        self.changing = (self.model.changed, self.live.changed)
+        self.changing = self.model.changed, self.live.changed, *synthesis.completeness
         self.closing, self.working = (self.live, self.model), (self.model,)
 
     def actions(self) -> Sequence[Action]:

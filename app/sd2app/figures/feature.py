@@ -31,6 +31,7 @@ class FiguresFeature(Feature):
     ) -> None:
         self._session, self._shell, self._difference = session, shell, difference
         self._labels, self._denoiser = labels, denoiser
+        self.changing = tuple(track.came_or_went for track in session.maps.all)
 
     def actions(self) -> Sequence[Action]:
         """Figure of the maps, strip of frames."""

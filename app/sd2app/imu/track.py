@@ -104,10 +104,11 @@ class InertialTrack(TrackMouse):
     # --- painting -------------------------------------------------------------------------
 
     def paint(self, painter: QPainter) -> None:
-        """Header, lanes and labels; over what is kept of them, the cursors."""
+        """Header and lanes, then labels, both kept, and the cursors over them."""
         self.paint_kept(painter, self._paint_track)
         if self._model.folded:
             return
+        self.paint_kept(painter, self._paint_overlays)
         plot, scale = self.plot_rect(), self.scale
         with clipped(painter, plot):
             self.paint_cursors(painter, plot, QColor(self._display.palette.muted))
@@ -127,8 +128,6 @@ class InertialTrack(TrackMouse):
         shown = list(self._curves())
         for number, lane in enumerate(LANES):
             self._paint_lane(painter, self.lane_rect(number), lane, shown)
-        for overlay in self._overlays:
-            overlay.paint(painter, self.plot_rect(), self.scale)
 
     def _paint_header(self, painter: QPainter) -> None:
         colours = self._display.palette

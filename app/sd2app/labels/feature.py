@@ -66,7 +66,8 @@ class LabelsFeature(Feature):
         report(shell, self.autosave, self.cut_out)
         session.document.changed.connect(self._follow_capture)
         shown = labels.changed, labels.selection_changed, labels.marks_changed
-        self.changing = self.autosave.changed, *shown, self.dragging.changed, self.loop.changed
+        cancelled = self.dragging.changed, self.loop.changed, session.placing.changed
+        self.changing = *shown, *cancelled
         self.closing = (self.cut_out, self.autosave)
 
     # --- menus ----------------------------------------------------------------------------
@@ -115,7 +116,7 @@ class LabelsFeature(Feature):
             Action(
                 "merge_spans", "Labels", "Merge selected spans", ("G",),
                 "One span from the first start to the last end (Ctrl+click selects several)",
-                edits.merge, lambda: len(labels.selected) > 1,
+                edits.merge, lambda: len(labels.selected_ids) > 1,
             ),
             Action(
                 "delete_spans", "Labels", "Delete selected spans", ("Backspace", "Del"),
@@ -130,7 +131,7 @@ class LabelsFeature(Feature):
             Action(
                 "meet_spans", "Labels", "Let two selected spans meet here", ("J",),
                 "The first ends and the second begins with the frame on screen",
-                edits.meet, lambda: len(labels.selected) == 2,
+                edits.meet, lambda: len(labels.selected_ids) == 2,
             ),
             Action(
                 "fill_gaps", "Labels", "Fill gaps of the track with background", ("Shift+F",),
@@ -273,10 +274,10 @@ class LabelsFeature(Feature):
         return bool(self.model.marks)
 
     def _some_selected(self) -> bool:
-        return bool(self.model.selected)
+        return bool(self.model.selected_ids)
 
     def _one_selected(self) -> bool:
-        return len(self.model.selected) == 1
+        return len(self.model.selected_ids) == 1
 
     def _has_track(self) -> bool:
         return bool(self.model.track)
@@ -290,7 +291,7 @@ class LabelsFeature(Feature):
     def _can_cancel(self) -> bool:
         placing = self._session.placing.active
         at_work = self.dragging.dragging or placing or self.loop.span is not None
-        return at_work or bool(self.model.marks or self.model.selected)
+        return at_work or bool(self.model.marks or self.model.selected_ids)
 
     def _cancel(self) -> None:
         if self.dragging.dragging:

@@ -42,11 +42,8 @@ class MapsFeature(Feature):
         self.synthesis.failed.connect(shell.warn)
         self.uncertainty.failed.connect(shell.warn)
         self.limbs.failed.connect(shell.warn)
-        self.changing = (
-            self.synthesis.completed,
-            self.uncertainty.changed,
-            self.difference.state_changed,
-        )
+        shown = self.uncertainty.changed, self.difference.state_changed
+        self.changing = *self.synthesis.completeness, *shown
         self.closing, self.working = (self.uncertainty, self.synthesis), (self.synthesis,)
 
     def actions(self) -> Sequence[Action]:

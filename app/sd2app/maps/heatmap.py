@@ -157,11 +157,12 @@ class HeatmapView(TrackMouse, MapWidget):
     # --- painting -------------------------------------------------------------------------
 
     def paint(self, painter: QPainter) -> None:
-        """Header, map, marked bins, axis, labels; over what is kept of them, the cursors."""
+        """Header, map, marked bins, axis, then labels, both kept, and the cursors over them."""
         if self._button_px != self._room_px:
-            self._kept = None
+            self._kept.clear()
         self.paint_kept(painter, self._paint_map)
         if self.track.map is not None and not self.folded:
+            self.paint_kept(painter, self._paint_overlays)
             self._paint_cursors(painter, self.plot_rect())
 
     def _paint_map(self, painter: QPainter) -> None:
@@ -181,11 +182,9 @@ class HeatmapView(TrackMouse, MapWidget):
             painter.setPen(muted)
             painter.drawText(plot, centre, "This map is being made…")
             return
-        self.paint_map(painter, plot, self._span.start_s, self._span.end_s)
+        self.paint_map(painter, plot, *self._span.span_s)
         self._paint_marked_bins(painter, plot)
         self.paint_gaps(painter, plot, self.scale)
-        for overlay in self._overlays:
-            overlay.paint(painter, plot, self.scale)
         self._paint_axis(painter, plot)
 
     def _paint_header(self, painter: QPainter) -> None:

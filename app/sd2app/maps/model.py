@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, Signal, SignalInstance
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.background.latest import Emit, delayed
@@ -59,6 +59,7 @@ class SynthesisModel(QObject):
     readout_changed = Signal()  # the numbers of it
     moving_changed = Signal()
     completed = Signal()
+    refining = Signal()  # the map at rest is not complete yet
     painted = Signal(object)  # Part that came onto the map
     failed = Signal(str)
 
@@ -112,6 +113,11 @@ class SynthesisModel(QObject):
     def complete(self) -> bool:
         """True once every frame has its final quality for the current sensor."""
         return self._partial.final and self.shows_sensor
+
+    @property
+    def completeness(self) -> tuple[SignalInstance, ...]:
+        """Signals after which the map may be complete, or no longer."""
+        return self.completed, self.moving_changed, self.refining
 
     @property
     def split(self) -> bool:
@@ -341,6 +347,7 @@ class SynthesisModel(QObject):
                 self.completed.emit()
             self._go_on()
             return
+        self.refining.emit()
         view, rough, vertices = self.frames_in_view(), self._preview_quality(), self._vertices
         # Much of a long clip can wait until it is known how it is to be done.
         long = not is_swept_whole(vertices, len(quality))

@@ -38,14 +38,23 @@ class TimePlot(Canvas):
         self._display = session.display
         self._grab: tuple[str, float] | None = None  # what is dragged, and from which pixel
         self.follow(self._playback.frame_changed)
-        drawn = [signal for overlay in overlays for signal in overlay.changed]
-        for signal in (self._display.theme_changed, *drawn):
-            signal.connect(self.redraw)
+        self._display.theme_changed.connect(self.redraw)
+        for overlay in self._overlays:
+            for signal in overlay.changed:
+                signal.connect(self._redraw_overlays)
+
+    def _redraw_overlays(self) -> None:
+        self._kept.pop(self._paint_overlays, None)
+        self.update()
+
+    def _paint_overlays(self, painter: QPainter) -> None:
+        for overlay in self._overlays:
+            overlay.paint(painter, self.plot_rect(), self.scale)
 
     @property
     def scale(self) -> TimeScale:
         """Time axis of this widget."""
-        return TimeScale(self._span.start_s, self._span.end_s, self.width())
+        return TimeScale(*self._span.span_s, self.width())
 
     def plot_rect(self) -> QRectF:
         """Rectangle of the plot, in pixels."""

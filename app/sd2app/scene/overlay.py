@@ -95,7 +95,7 @@ class Overlay(Canvas):
         )
         if state != self._state:
             self._state = state
-            self._kept = None
+            self._kept.clear()
         self.paint_kept(painter, self._paint_all)
         if self.reading:
             area, colours = QRectF(self.rect()), self._theme.palette

@@ -36,7 +36,8 @@ class SensorFeature(Feature):
         self._synthesis, self._make_batch = synthesis, make_batch
         self.placements = PlacementsModel(session, accuracy, parent)
         self.placements.failed.connect(shell.warn)
-        self.changing = (self.placements.changed,)
+        came = session.maps.real.came_or_went
+        self.changing = self.placements.changed, came, *synthesis.completeness
         self.alignment = AlignmentModel(session, synthesis, parent)
         self.closing = self.working = (self.placements, self.alignment)
 

@@ -43,11 +43,7 @@ class DisplayModel(QObject):
         self.mesh_colour: MeshColour = "velocity"  # quantity that the colour of the mesh shows
         self.as_dots = False  # vertices are drawn instead of the surface
         self.dark = False
-
-    @property
-    def palette(self) -> Palette:
-        """Colours of the theme that is on."""
-        return palette_for(self.dark)
+        self.palette: Palette = palette_for(False)  # colours of the theme that is on
 
     def set_levels(self, **changes: object) -> None:
         """Change some of the levels."""
@@ -77,5 +73,5 @@ class DisplayModel(QObject):
     def set_dark(self, dark: bool) -> None:
         """Choose the theme."""
         if dark != self.dark:
-            self.dark = dark
+            self.dark, self.palette = dark, palette_for(dark)
             self.theme_changed.emit()

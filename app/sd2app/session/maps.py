@@ -60,6 +60,7 @@ class MapModel(QObject):
     """
 
     changed = Signal()
+    came_or_went = Signal()  # there is a map where there was none, or the reverse
     status_changed = Signal()
 
     def __init__(self, title: str, parent: QObject | None = None) -> None:
@@ -128,6 +129,7 @@ class MapModel(QObject):
         key: Hashable = None,
     ) -> None:
         """Show another map, or none."""
+        came_or_went = (self.map is None) != (doppler_map is None)
         self.revision += 1
         self.map = doppler_map
         self.covered = covered
@@ -137,6 +139,8 @@ class MapModel(QObject):
         self._gaps = () if present is None else runs(~present)
         self._strongest = None
         self.changed.emit()
+        if came_or_went:
+            self.came_or_went.emit()
 
     def set_awaited(self, awaited: bool) -> None:
         """Say if the map is going to be made."""

@@ -17,27 +17,27 @@ class TimeWindow(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.extent_s = (0.0, 1.0)  # start and end of everything there is
-        self._span = (0.0, 1.0)
+        self.span_s = (0.0, 1.0)  # start and end of the part in view
 
     @property
     def start_s(self) -> float:
         """Left edge of the tracks."""
-        return self._span[0]
+        return self.span_s[0]
 
     @property
     def end_s(self) -> float:
         """Right edge of the tracks."""
-        return self._span[1]
+        return self.span_s[1]
 
     @property
     def duration_s(self) -> float:
         """Length of the time window, in seconds."""
-        return self._span[1] - self._span[0]
+        return self.span_s[1] - self.span_s[0]
 
     def set_extent(self, start_s: float, end_s: float) -> None:
         """Take over another recording and show all of it."""
         self.extent_s = (start_s, max(end_s, start_s + _SHORTEST_S))
-        self._span = self.extent_s
+        self.span_s = self.extent_s
         self.changed.emit()
 
     def extend(self, end_s: float, room_s: float = 0.0) -> None:
@@ -46,20 +46,20 @@ class TimeWindow(QObject):
         All of a short recording stays in view; ``room_s`` is the least length of the extent.
         """
         first, last = self.extent_s
-        shows_all, at_end = self._span == self.extent_s, self.end_s >= last
+        shows_all, at_end = self.span_s == self.extent_s, self.end_s >= last
         self.extent_s = (first, max(end_s, first + max(_SHORTEST_S, room_s)))
         duration = self.duration_s
         if shows_all and duration < GROWING_S:
             duration = min(self.extent_s[1] - first, max(GROWING_S, duration))
         start = self.extent_s[1] - duration if at_end else self.start_s
-        self._span = self._held(start, start + duration)
+        self.span_s = self._held(start, start + duration)
         self.changed.emit()
 
     def set_span(self, start_s: float, end_s: float) -> None:
         """Show a stretch, held inside the extent and not shorter than 0.2 s."""
         span = self._held(start_s, end_s)
-        if span != self._span:
-            self._span = span
+        if span != self.span_s:
+            self.span_s = span
             self.changed.emit()
 
     def _held(self, start_s: float, end_s: float) -> tuple[float, float]:

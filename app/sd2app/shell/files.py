@@ -61,7 +61,6 @@ class FilesFeature(Feature):
         self._document.opened.connect(self._remember)
         self._document.saved.connect(self._remember)
         report(shell, self._document)
-        self.changing = (self._document.changed,)
         self.closing = (self._document,)
 
     def actions(self) -> Sequence[Action]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from functools import partial
 
 from PySide6.QtGui import QAction, QKeySequence
@@ -153,9 +153,6 @@ class Menus:
     ) -> None:
         self._window, self._session, self._keys = window, session, keys
         self._rows = {row.id: row for row in actions}
-        # Many actions ask the same.
-        self._questions = {row.enabled for row in self._rows.values()}
-        self._asked_why = {row.why_not for row in self._rows.values() if row.why_not is not None}
         self._actions: dict[str, QAction] = {}
         for row in self._rows.values():
             action = QAction(row.text, window)
@@ -177,6 +174,7 @@ class Menus:
         for menu in menus_in(bar):
             # Again when it is opened: what it lists may be others by then.
             menu.aboutToShow.connect(partial(give_mnemonics, menu))
+            menu.aboutToShow.connect(self.refresh)
             give_mnemonics(menu)
 
     def _fill(
@@ -193,13 +191,14 @@ class Menus:
             else:
                 menu.addAction(self._actions[entry])
 
-    def refresh(self) -> None:
-        """Follow the models."""
-        enabled = {question: question() for question in self._questions}
-        reasons = {question: question() for question in self._asked_why}
-        for row in self._rows.values():
+    def refresh(self, rows: Collection[Action] | None = None) -> None:
+        """Follow the models, with all actions or some."""
+        rows = self._rows.values() if rows is None else rows
+        enabled = {question: question() for question in {row.enabled for row in rows}}
+        reasons = {question: question() for question in {row.why_not for row in rows} if question}
+        for row in rows:
             action = self._actions[row.id]
-            action.setEnabled(enabled[row.enabled])
+            action.setEnabled(enabled[row.enabled])  # which many actions ask alike
             if row.why_not is not None:
                 action.setToolTip(reasons[row.why_not] or self._tips[row.id])
             if row.checked is not None:

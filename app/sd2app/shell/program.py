@@ -56,7 +56,8 @@ class ProgramFeature(Feature):
         self.manual = manual
         self.closing = (manual,)
         stack = session.document.undo_stack
-        self.changing = (stack.indexChanged, stack.cleanChanged, session.display.theme_changed)
+        history = stack.indexChanged, stack.cleanChanged, labels.dragging.changed
+        self.changing = *history, session.display.theme_changed
 
     def actions(self) -> Sequence[Action]:
         """Undo, theme, messages, side panel, manual, keys, about, quit."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -38,6 +39,7 @@ from sd2app.widgets.theme import apply_theme
 from sd2core.processes import return_free_memory
 
 if TYPE_CHECKING:
+    from sd2app.feature import Feature
     from sd2app.maps.stack import MapStack
     from sd2app.session.session import Session
     from sd2app.shell.keys.bindings import KeyBindings
@@ -69,7 +71,8 @@ class MainWindow(QMainWindow):
         super().__init__()
         self._settings = settings
         self._parts = parts or Parts()
-        self.ready = self._behind = False  # true once the views stand and a recording can be shown
+        self.ready = False  # true once the views stand and a recording can be shown
+        self._behind: set[Feature] = set()  # whose actions do not follow their models yet
         self._tabbed: QWidget | None = None  # control that Tab has reached last
         self.setWindowTitle("SD² Studio")
         self.setAcceptDrops(True)
@@ -129,7 +132,8 @@ class MainWindow(QMainWindow):
         self.session = s = build_session(self, self._settings)
         s.display.set_dark(is_dark(self._settings))
         self.features = Features(s, self, self._parts, self)
-        actions = in_order(action for feature in self.features for action in feature.actions())
+        self._offered = {feature: feature.actions() for feature in self.features}
+        actions = in_order(chain.from_iterable(self._offered.values()))
         self.keys = KeyBindings(actions, self.features.labels.model, self._settings, self)
         self._menus = Menus(self, s, actions, self.keys)
         self._menus.fill_menu_bar(
@@ -193,10 +197,12 @@ class MainWindow(QMainWindow):
         s, features = self.session, self.features
         for feature in features:
             for signal in feature.changing:
-                signal.connect(self._refresh)
+                signal.connect(lambda *_, one=feature: self._refresh([one]))
         features.program.manual.answer()
-        self.keys.changed.connect(self._refresh)
-        self.side.folded_changed.connect(self._refresh)
+        # What is open, and if it can be edited, concerns all.
+        everybody = s.document.changed, features.labels.autosave.changed, self.keys.changed
+        for signal in (*everybody, self.side.folded_changed):
+            signal.connect(lambda *_: self._refresh())
         s.document.opened.connect(self._show_document)
         for signal in (s.document.changed, s.video.frame_changed):
             signal.connect(self._show_or_hide_video)
@@ -229,8 +235,9 @@ class MainWindow(QMainWindow):
     def _follow_actions(self) -> None:
         """Enable and check the actions, and name the window, as the models stand now."""
         if self._behind:
-            self._behind = False
-            self._menus.refresh()
+            rows = [row for feature in self._behind for row in self._offered[feature]]
+            self._behind.clear()
+            self._menus.refresh(rows)
             self._name_window()
 
     def _name_window(self) -> None:
@@ -241,9 +248,9 @@ class MainWindow(QMainWindow):
         self.setWindowFilePath(document.file_name(""))  # names what is saved of it
         self.setWindowTitle(f"{name}SD² Studio")
 
-    def _refresh(self) -> None:
-        # An edit changes several models; a hundred actions follow them once, before they are used.
-        self._behind = True
+    def _refresh(self, features: Iterable[Feature] | None = None) -> None:
+        # An edit changes several models; actions follow them once, before they are used.
+        self._behind.update(self.features if features is None else features)
         self._soon.start()
 
     def _restyle(self) -> None:

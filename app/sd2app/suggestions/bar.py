@@ -69,6 +69,8 @@ class SuggestionBar(QWidget):
     def _refresh(self) -> None:
         model = self._model
         self.setVisible(model.active)
+        if not model.active:
+            return
         self._text.setText(model.text)
         self._as.setText(f"accepted as {model.accepted_as}" if model.accepted_as else "")
         self._as.setToolTip(

@@ -28,9 +28,10 @@ class SuggestionsFeature(Feature):
         parent: QObject,
     ) -> None:
         self._shell, self._edits, maps = shell, edits, session.maps
-        finders = (MotionFinder((maps.synthetic, maps.denoised, maps.real)), *others)
+        searched = maps.synthetic, maps.denoised, maps.real
+        finders = (MotionFinder(searched), *others)
         self.model = SuggestionsModel(edits, finders, parent)
-        self.changing = (self.model.changed,)
+        self.changing = self.model.changed, *(track.came_or_went for track in searched)
         self.closing = (self.model,)
 
     def actions(self) -> Sequence[Action]:

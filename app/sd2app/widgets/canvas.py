@@ -43,14 +43,14 @@ def image_of(
 
 
 class Canvas(QWidget):
-    """Widget that paints itself; a subclass may keep a picture of what rarely changes."""
+    """Widget that paints itself; a subclass may keep pictures of what rarely changes."""
 
     USUAL_PX: ClassVar[tuple[int, int]] = (-1, -1)
     """Width and height where there is a choice; negative ones leave them to the layout."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._kept: QPixmap | None = None
+        self._kept: dict[Callable[[QPainter], None], QPixmap] = {}  # by what draws them
         self.menu_parts: Sequence[MenuPart] = ()
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
@@ -71,7 +71,7 @@ class Canvas(QWidget):
 
     def redraw(self) -> None:
         """Paint again, what is kept included."""
-        self._kept = None
+        self._kept.clear()
         self.update()
 
     def paint(self, painter: QPainter) -> None:
@@ -82,14 +82,15 @@ class Canvas(QWidget):
         """Paint the picture that is kept; ``draw`` makes a missing one, or one of another size."""
         ratio = self.devicePixelRatioF()
         size = self.size() * ratio
-        if self._kept is None or self._kept.size() != size:
-            self._kept = QPixmap(size)
-            self._kept.setDevicePixelRatio(ratio)
-            self._kept.fill(Qt.GlobalColor.transparent)
-            with QPainter(self._kept) as own:
+        kept = self._kept.get(draw)
+        if kept is None or kept.size() != size:
+            kept = self._kept[draw] = QPixmap(size)
+            kept.setDevicePixelRatio(ratio)
+            kept.fill(Qt.GlobalColor.transparent)
+            with QPainter(kept) as own:
                 own.setFont(self.font())
                 draw(own)
-        painter.drawPixmap(0, 0, self._kept)
+        painter.drawPixmap(0, 0, kept)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Paint everything."""
