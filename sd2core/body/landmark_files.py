@@ -21,8 +21,8 @@ from sd2core.body.person_selection import Rectangle
 from sd2core.body.raw_track import RawTrack
 from sd2core.body.refining import Stretch
 from sd2core.body.track import PER_FRAME, Landmarks, LandmarkTrack, parts
-from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
+from sd2core.files.texts import check_meta
 from sd2core.io.video import VideoReader
 from sd2core.timebase import Timebase
 
@@ -76,11 +76,7 @@ def load_track(path: Path | str) -> LandmarkTrack:
     """Read a file of :func:`save_track`; Sd2Error if it is missing, damaged or newer."""
     path = Path(path)
     arrays, meta = read_arrays(path)
-    if meta.get("format") != FORMAT or not 1 <= meta.get("version", 0) <= VERSION:
-        raise Sd2Error(
-            f"{path} is of format {meta.get('format')!r} version {meta.get('version')}",
-            f"{FORMAT!r} up to version {VERSION}",
-        )
+    check_meta(meta, path, FORMAT, VERSION, oldest=1)
     try:
         frames = len(arrays["times_s"])
         track = LandmarkTrack(

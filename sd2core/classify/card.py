@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,41 +10,35 @@ from numpy.typing import NDArray
 
 from sd2core.classify.defaults import DELAYS_S
 from sd2core.classify.features import Features
+from sd2core.denoise.network_card import CardKind, NetworkCard, axis_json, axis_of
 from sd2core.errors import Sd2Error
-from sd2core.files.texts import damage_in
 from sd2core.labels.label_set import check_name
-from sd2core.options.bounds import FRAME_RATE_HZ
 from sd2core.sensor import VelocityAxis
 
 FORMAT = "sd2-classifier"
-VERSION = 2
 
 BACKGROUND = "background"
 """The class of frames in which there is none of the gestures."""
 
 
 @dataclass(frozen=True)
-class ClassifierCard:
-    """Description of a trained classifier, without its weights."""
+class ClassifierCard(NetworkCard):
+    """Description of a trained classifier, without its weights.
 
-    model: str  # a name of sd2core.classify.defaults.MODELS
-    options: Mapping[str, Any]  # of the network
+    ``model`` is a name of :data:`sd2core.classify.defaults.MODELS`.
+    """
+
+    KIND = CardKind(
+        FORMAT, 2, "classifier", "a classifier", "a classifier written by `sd2 classify train`"
+    )
+
     features: Features  # its input, and the maps that it is computed from
     classes: tuple[str, ...]  # in the order of its answers; at least two
     trained_on: tuple[str, ...]  # sd2core.maps.MapKind
     delay_frames: int = 0  # number of frames seen after one before it is answered
-    title: str = ""  # shown in lists; the file's name where it is empty
-    about: Mapping[str, Any] = field(default_factory=dict)
-    """``data``, ``command``, ``metrics`` and what else fits into JSON."""
-    parameters: int = 0  # number of weights; known when the card comes from a file
-    package: str = ""  # Of the plug-in that has the network; empty: this program has it.
-    path: Path | None = None
 
     def __post_init__(self) -> None:
-        if self.frame_rate_hz not in FRAME_RATE_HZ:
-            raise Sd2Error(
-                f"The classifier's frame rate is {self.frame_rate_hz}", FRAME_RATE_HZ.words
-            )
+        self.check_frame_rate(self.frame_rate_hz)
         if len(self.classes) < 2 or len(set(self.classes)) < len(self.classes):
             raise Sd2Error(
                 f"The classes are {', '.join(self.classes) or 'none'}", "two or more, each once"
@@ -57,11 +49,6 @@ class ClassifierCard:
             raise Sd2Error(
                 f"The classifier answers {self.delay_s:g} s late", f"0 to {DELAYS_S.high:g} s"
             )
-
-    @property
-    def name(self) -> str:
-        """Name of the file, without its ending; the kind of model before there is a file."""
-        return self.path.stem if self.path is not None else self.model
 
     @property
     def axis(self) -> VelocityAxis:
@@ -99,56 +86,31 @@ class ClassifierCard:
             found[self.background] = 1.0
         return found
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the header of a model file."""
+    def told(self) -> dict[str, Any]:
+        """Return what only classifiers have, as JSON can hold it."""
         return {
-            "format": FORMAT,
-            "version": VERSION,
-            "model": self.model,
-            "options": dict(self.options),
             "features": self.features.kind,
-            "axis": {"bins": self.axis.bins, "v_max_mps": self.axis.v_max_mps},
+            "axis": axis_json(self.axis),
             "null_bins": list(self.null_bins),
             "frame_rate_hz": self.frame_rate_hz,
             "classes": list(self.classes),
             "trained_on": list(self.trained_on),
             "delay_frames": self.delay_frames,
-            "title": self.title,
-            "about": dict(self.about),
-            "parameters": self.parameters,
-            **({"package": self.package} if self.package else {}),
         }
 
     @classmethod
-    def from_json(cls, content: dict[str, Any], path: Path | None = None) -> ClassifierCard:
-        """Parse the header of a model file."""
-        where = "The classifier" if path is None else str(path)
-        with damage_in(where, "a classifier written by `sd2 classify train`"):
-            if content["format"] != FORMAT or not isinstance(content["version"], int):
-                raise ValueError(f"format {content['format']!r}")
-            if content["version"] > VERSION:
-                raise Sd2Error(
-                    f"{where} is of version {content['version']}",
-                    f"a classifier up to version {VERSION}",
-                    "Use the version of SD² Studio that made it, or a newer one",
-                )
-            # Those of version 1 are of 16 units where they do not say, and answer at once.
-            before = {"width": 16} if content["version"] < 2 else {}
-            return cls(
-                model=str(content["model"]),
-                options={**before, **content["options"]},
-                features=Features(
-                    content["features"],
-                    VelocityAxis(int(content["axis"]["bins"]), float(content["axis"]["v_max_mps"])),
-                    tuple(map(int, content["null_bins"])),
-                    float(content["frame_rate_hz"]),
-                ),
-                classes=tuple(map(str, content["classes"])),
-                trained_on=tuple(map(str, content["trained_on"])),
-                delay_frames=int(content.get("delay_frames", 0)),
-                title=str(content["title"]),
-                about=dict(content["about"]),
-                parameters=int(content["parameters"]),
-                package=str(content.get("package", "")),
-                path=path,
-            )
+    def parsed(cls, content: dict[str, Any]) -> dict[str, Any]:
+        """Parse :meth:`told`; those of version 1 are of 16 units where they do not say."""
+        before = {"width": 16} if content["version"] < 2 else {}
+        return {
+            "options": {**before, **content["options"]},
+            "features": Features(
+                content["features"],
+                axis_of(content["axis"]),
+                tuple(map(int, content["null_bins"])),
+                float(content["frame_rate_hz"]),
+            ),
+            "classes": tuple(map(str, content["classes"])),
+            "trained_on": tuple(map(str, content["trained_on"])),
+            "delay_frames": int(content.get("delay_frames", 0)),  # version 1 answers at once
+        }

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.defaults import CLASSIFIERS
-from sd2core.denoise.files import readable, user_models_folder
-from sd2core.denoise.weights import SUFFIX, Shapes, read_header, read_network, write_weights
+from sd2core.denoise.files import readable, save_network, user_models_folder
+from sd2core.denoise.weights import SUFFIX, Shapes, read_header, read_network
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -25,17 +24,8 @@ def save_classifier(path: Path, trained: TrainedClassifier) -> ClassifierCard:
     Raises Sd2Error if the name does not end in ``.safetensors``, or the card holds what
     JSON cannot.
     """
-    from sd2core.denoise.model import parameter_count
-
-    path = Path(path)
-    card = replace(
-        trained.card,
-        path=path,
-        parameters=parameter_count(trained.network),
-        package=CLASSIFIERS.package_of(trained.card.model),
-    )
-    write_weights(path, trained.network, card.to_json())
-    return card
+    card = trained.card
+    return save_network(Path(path), trained.network, card, CLASSIFIERS.package_of(card.model))
 
 
 def describe_classifier(path: Path) -> ClassifierCard:

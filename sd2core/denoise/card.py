@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
 
 from sd2core.denoise.known import KnownMovements
+from sd2core.denoise.network_card import CardKind, NetworkCard, axis_json, axis_of
 from sd2core.denoise.registry import options_of_version_1
 from sd2core.denoise.scaling import Scaling, null_columns
 from sd2core.denoise.texture import Texture
 from sd2core.errors import Sd2Error
-from sd2core.files.texts import damage_in
 from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, PARTS, QUANTITIES
-from sd2core.options.bounds import FRAME_RATE_HZ
 from sd2core.sensor import VelocityAxis
 
-FORMAT = "sd2-denoiser"
 VERSION = 2
 
 DENOISER_PARTS = ("trunk", "upper_arm", "forearm", "thigh", "lower_leg")
@@ -48,11 +45,16 @@ TrainedOn = Literal["simulated", "real"]
 
 
 @dataclass(frozen=True)
-class ModelCard:
-    """Description of a trained denoiser, without its weights."""
+class ModelCard(NetworkCard):
+    """Description of a trained denoiser, without its weights.
 
-    model: str  # A name of :data:`sd2core.denoise.registry.MODELS` or ``FILTERS``.
-    options: Mapping[str, Any]  # Options of the network.
+    ``model`` is a name of :data:`sd2core.denoise.registry.MODELS` or ``FILTERS``.
+    """
+
+    KIND = CardKind(
+        "sd2-denoiser", VERSION, "model", "a denoiser", "a model file written by `sd2 train`"
+    )
+
     scaling: Scaling
     axis: VelocityAxis
     null_bins: tuple[int, ...]  # Bins that are zero on purpose, in the input and in the result.
@@ -64,16 +66,9 @@ class ModelCard:
     the map and how joints move."""
     texture: Texture | None = None  # Of the radar's maps about the answers; None: not known.
     known: KnownMovements | None = None  # What it learnt from; None: files of before do not say.
-    title: str = ""  # Name in lists; the file's name if it is empty.
-    # ``data``, ``command``, ``metrics``, ``limits`` and other content for JSON.
-    about: Mapping[str, Any] = field(default_factory=dict)
-    parameters: int = 0  # Number of learned parameters; known when the card comes from a file.
-    package: str = ""  # Of the plug-in that has the network; empty: this program has it.
-    path: Path | None = None  # File that holds the card.
 
     def __post_init__(self) -> None:
-        if self.frame_rate_hz not in FRAME_RATE_HZ:
-            raise Sd2Error(f"The model's frame rate is {self.frame_rate_hz}", FRAME_RATE_HZ.words)
+        self.check_frame_rate(self.frame_rate_hz)
         if self.trained_on not in get_args(TrainedOn):
             raise Sd2Error(
                 f"The model was trained on {self.trained_on!r}", f"one of {get_args(TrainedOn)}"
@@ -107,11 +102,6 @@ class ModelCard:
         """Numbers of the input that are zero on purpose."""
         return null_columns(self.null_bins, self.axis.bins, self.maps)
 
-    @property
-    def name(self) -> str:
-        """Name of the file, without its suffix; the kind of model before there is a file."""
-        return self.path.stem if self.path is not None else self.model
-
     def needed_texture(self) -> Texture:
         """Texture of the radar's maps; Sd2Error if the model does not know it."""
         if self.texture is None:
@@ -122,15 +112,11 @@ class ModelCard:
             )
         return self.texture
 
-    def to_json(self) -> dict[str, Any]:
-        """Content of the header of a model file."""
+    def told(self) -> dict[str, Any]:
+        """Return what only denoisers have, as JSON can hold it."""
         return {
-            "format": FORMAT,
-            "version": VERSION,
-            "model": self.model,
-            "options": dict(self.options),
             "scaling": self.scaling.to_json(),
-            "axis": {"bins": self.axis.bins, "v_max_mps": self.axis.v_max_mps},
+            "axis": axis_json(self.axis),
             "null_bins": list(self.null_bins),
             "frame_rate_hz": self.frame_rate_hz,
             "trained_on": self.trained_on,
@@ -138,48 +124,22 @@ class ModelCard:
             "parts": list(self.parts),
             "known": None if self.known is None else asdict(self.known),
             "texture": None if self.texture is None else asdict(self.texture),
-            "title": self.title,
-            "about": dict(self.about),
-            "parameters": self.parameters,
-            **({"package": self.package} if self.package else {}),
         }
 
     @classmethod
-    def from_json(cls, content: dict[str, Any], path: Path | None = None) -> ModelCard:
-        """Card from the content of :meth:`to_json`.
-
-        Raises Sd2Error for other content, or a newer version.
-        """
-        where = "The model" if path is None else str(path)
-        with damage_in(where, "a model file written by `sd2 train`"):
-            if content["format"] != FORMAT or not isinstance(content["version"], int):
-                raise ValueError(f"format {content['format']!r}")
-            if content["version"] > VERSION:
-                raise Sd2Error(
-                    f"{where} is of version {content['version']}",
-                    f"a denoiser up to version {VERSION}",
-                    "Use the version of SD² Studio that made it, or a newer one",
-                )
-            name, chosen = str(content["model"]), dict(content["options"])
-            if content["version"] < VERSION:
-                chosen = options_of_version_1(name, chosen)
-            return cls(
-                model=name,
-                options=chosen,
-                scaling=Scaling.from_json(content["scaling"]),
-                axis=VelocityAxis(
-                    int(content["axis"]["bins"]), float(content["axis"]["v_max_mps"])
-                ),
-                null_bins=tuple(content["null_bins"]),
-                frame_rate_hz=float(content["frame_rate_hz"]),
-                trained_on=content["trained_on"],
-                unit=str(content["unit"]),
-                parts=tuple(str(part) for part in content.get("parts", ())),
-                known=KnownMovements.from_json(content.get("known")),
-                texture=Texture.from_json(content.get("texture")),
-                title=str(content["title"]),
-                about=dict(content["about"]),
-                parameters=int(content["parameters"]),
-                package=str(content.get("package", "")),
-                path=path,
-            )
+    def parsed(cls, content: dict[str, Any]) -> dict[str, Any]:
+        """Parse :meth:`told`, and the options of version 1."""
+        before = {}
+        if content["version"] < VERSION:
+            before["options"] = options_of_version_1(str(content["model"]), content["options"])
+        return before | {
+            "scaling": Scaling.from_json(content["scaling"]),
+            "axis": axis_of(content["axis"]),
+            "null_bins": tuple(content["null_bins"]),
+            "frame_rate_hz": float(content["frame_rate_hz"]),
+            "trained_on": content["trained_on"],
+            "unit": str(content["unit"]),
+            "parts": tuple(str(part) for part in content.get("parts", ())),
+            "known": KnownMovements.from_json(content.get("known")),
+            "texture": Texture.from_json(content.get("texture")),
+        }

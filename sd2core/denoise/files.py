@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from sd2core.denoise.card import ModelCard
+from sd2core.denoise.network_card import Card
 from sd2core.denoise.registry import DENOISERS
 from sd2core.denoise.weights import SUFFIX, Shapes, read_header, read_network, write_weights
 from sd2core.errors import Sd2Error
@@ -16,10 +17,10 @@ from sd2core.files.paths import as_path, user_data
 from sd2core.files.resources import bundled_files
 
 if TYPE_CHECKING:
+    from torch import nn
+
     from sd2core.denoise.live import TrainedDenoiser
     from sd2core.denoise.model import Denoiser
-
-Card = TypeVar("Card")
 
 MAP_MODEL, LIMBS_MODEL = "denoiser", "denoiser-limbs"
 """Names of the bundled models, of which :func:`default_name` chooses."""
@@ -41,16 +42,16 @@ def save_model(path: Path, trained: TrainedDenoiser) -> ModelCard:
     Raises Sd2Error when the name does not end in ``.safetensors``, or the card holds what JSON
     cannot.
     """
+    card = trained.card
+    return save_network(Path(path), trained.network, card, DENOISERS.package_of(card.model))
+
+
+def save_network(path: Path, network: nn.Module, card: Card, package: str) -> Card:
+    """Write a network of a plug-in's ``package`` or, if that is empty, of this program's."""
     from sd2core.denoise.model import parameter_count
 
-    path = Path(path)
-    card = replace(
-        trained.card,
-        path=path,
-        parameters=parameter_count(trained.network),
-        package=DENOISERS.package_of(trained.card.model),
-    )
-    write_weights(path, trained.network, card.to_json())
+    card = replace(card, path=path, parameters=parameter_count(network), package=package)
+    write_weights(path, network, card.to_json())
     return card
 
 

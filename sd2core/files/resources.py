@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.errors import Sd2Error
+from sd2core.files.texts import OPEN_WITH_WRITER, check_meta
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -81,12 +82,7 @@ def open_bundled_arrays(
 
     with open_npz_file(path, what, f"a file written by `{command}`") as data:
         meta = json.loads(str(data["meta"]))
-        if meta.get("format") != kind or meta.get("version", 0) > version:
-            raise Sd2Error(
-                f"{path} is of format {meta.get('format')!r} version {meta.get('version')}",
-                f"{kind!r} up to version {version}",
-                "Open it with the version of SD² Studio that wrote it",
-            )
+        check_meta(meta, path, kind, version, remedy=OPEN_WITH_WRITER)
         if meta.get("version", 0) < oldest:
             raise Sd2Error(
                 f"{path} is of format {kind!r} version {meta.get('version')}",

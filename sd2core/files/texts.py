@@ -7,7 +7,7 @@ import json
 import os
 import re
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -30,6 +30,7 @@ _LONG_NUMBER = re.compile(r"[0-9](?:[0-9_]{300,}|x[0-9a-fA-F_]{250,})")
 """A whole number that no float holds."""
 _LONGEST_FOUND = 60
 _LONGEST_LINE_BYTES = 1 << 20
+OPEN_WITH_WRITER = "Open it with the version of SD² Studio that wrote it"
 _REMEDY = "Correct it with a text editor, or copy it again"
 
 _MARKS = (
@@ -228,6 +229,37 @@ def check_version(content: Any, file: Path, form: str, newest: int) -> None:
             f"{file} is of version {version!r}",
             f"a version from 1 to {newest}",
             "Open it with the version of SD² Studio that wrote it, or a later one",
+        )
+
+
+def check_meta(
+    meta: Mapping[str, Any],
+    place: str | Path,
+    form: str,
+    newest: int,
+    *,
+    oldest: int = 0,
+    remedy: str = "",
+) -> None:
+    """Refuse metadata of another format, or of a version that is not read.
+
+    Parameters
+    ----------
+    meta : Mapping
+        With ``format`` and ``version``; 0 where it has none.
+    place, remedy
+        For the error.
+    form : str
+        Wanted format.
+    newest, oldest : int
+        Versions that are read.
+    """
+    version = meta.get("version", 0)
+    if meta.get("format") != form or not oldest <= version <= newest:
+        raise Sd2Error(
+            f"{place} is of format {meta.get('format')!r} version {meta.get('version')}",
+            f"{form!r} up to version {newest}",
+            remedy,
         )
 
 

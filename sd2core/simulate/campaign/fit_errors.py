@@ -30,7 +30,7 @@ from sd2core.body.shape import BodyShape
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.resources import resource_path
-from sd2core.files.texts import read_json
+from sd2core.files.texts import check_meta, read_json
 from sd2core.simulate.campaign.posture import Group, all_groups, change_posture, posture
 
 FORMAT = "sd2-fit-errors"
@@ -109,11 +109,7 @@ class FitErrors:
         path = resource_path(RESOURCE) if path is None else Path(path)
         try:
             said = read_json(path, _EXPECTED)
-            if said["format"] != FORMAT or said["version"] > VERSION:
-                raise Sd2Error(
-                    f"{path} is of format {said['format']!r} version {said['version']}",
-                    f"{FORMAT!r} up to version {VERSION}",
-                )
+            check_meta(said, path, FORMAT, VERSION)
             groups: dict[Group, GroupErrors] = {
                 name: GroupErrors(
                     **{key: np.array(one[key], np.float64) for key in ("gain", "bias", "spread")},
