@@ -145,7 +145,7 @@ def rows_of(folder: BatchFolder) -> Iterator[list[Row]]:
 def _sources(folder: BatchFolder, export: Exporting) -> Iterator[LazySource]:
     from sd2core.datasets.source import LazySource, SourceKey
 
-    opened, felt = lru_cache(maxsize=1)(_opened), lru_cache(maxsize=1)(_felt)
+    opened, imu_signals = lru_cache(maxsize=1)(_opened), lru_cache(maxsize=1)(_imu_signals)
     for rows in rows_of(folder):
         parts = _parts(rows[-1]["stop"], export)
         for number, (start, stop) in enumerate(parts):
@@ -153,7 +153,7 @@ def _sources(folder: BatchFolder, export: Exporting) -> Iterator[LazySource]:
             if len(parts) > 1:
                 name = f"{name} part {number + 1} of {len(parts)}"
             key = SourceKey(rows[0]["subject"], name, rows[0]["placement"])
-            imu = partial(felt, rows[0]["source"], rows[0]["mesh"], export.imu)
+            imu = partial(imu_signals, rows[0]["source"], rows[0]["mesh"], export.imu)
             load = _loader(folder, rows, key, (start, stop), opened, imu)
             told = json.dumps([rows, start, stop], sort_keys=True)
             fingerprint = hashlib.sha256(told.encode()).hexdigest()[:32]
@@ -240,7 +240,7 @@ def _opened(path: Path) -> tuple[Any, Callable[[VelocityAxis], DopplerMap]]:
     return recording, cache(partial(radar_map, recording))
 
 
-def _felt(source: str, mesh: str, places: tuple[str, ...]) -> dict[str, InertialSignals]:
+def _imu_signals(source: str, mesh: str, places: tuple[str, ...]) -> dict[str, InertialSignals]:
     """Inertial sensors at the frames of a mesh, the same from every placement."""
     if not places:
         return {}

@@ -181,7 +181,7 @@ class Trail:
         """True unless a square is so far away that it shows somebody else."""
         return self.away(roi, time_s) < _AWAY + _AWAY_PER_S * (time_s - self.time_s)
 
-    def goes_on(self, roi: Roi, time_s: float) -> bool:
+    def continues(self, roi: Roi, time_s: float) -> bool:
         """True if a square is where somebody is who has not changed their way."""
         limit = _STEADY + _STEADY_PER_S * min(time_s - self.time_s, 1.0)
         return self._sideways(roi, time_s) < limit and self.growth(roi) < _STEADY

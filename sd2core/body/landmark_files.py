@@ -19,7 +19,7 @@ from sd2core.body.array_store import ArrayStore, read_arrays, unreadable
 from sd2core.body.landmark_repair import repair_landmarks
 from sd2core.body.person_selection import Rectangle
 from sd2core.body.raw_track import RawTrack
-from sd2core.body.refining import Stretch
+from sd2core.body.refining import RefinedFrames
 from sd2core.body.track import PER_FRAME, Landmarks, LandmarkTrack, parts
 from sd2core.files.atomic import atomic_write
 from sd2core.files.texts import check_meta
@@ -219,7 +219,7 @@ class RefinedStretches:
         self.confidence = np.zeros(len(video), np.float32)
         self._masks: list[tuple[NDArray[np.intp], NDArray[np.uint8]]] = []
 
-    def add(self, start: int, stretch: Stretch) -> None:
+    def add(self, start: int, stretch: RefinedFrames) -> None:
         """Keep a stretch that has been looked at."""
         self._store.write(self._name(start), vars(stretch))
         self._count(start, stretch)
@@ -228,7 +228,7 @@ class RefinedStretches:
         """True if the stretch that begins with a frame is in the store already."""
         arrays = self._store.read(self._name(start))
         if arrays is not None:
-            self._count(start, Stretch(**arrays))
+            self._count(start, RefinedFrames(**arrays))
         return arrays is not None
 
     def silhouettes(self) -> tuple[NDArray[np.intp], NDArray[np.uint8]]:
@@ -252,7 +252,7 @@ class RefinedStretches:
             **{name: _joined(stretches, name)[cut] for name in _PLACES},
         )
 
-    def _count(self, start: int, stretch: Stretch) -> None:
+    def _count(self, start: int, stretch: RefinedFrames) -> None:
         """Note what has to be known of the whole clip."""
         self.confidence[start : start + len(stretch.confidence)] = stretch.confidence
         self._masks.append((stretch.silhouette_frames, stretch.silhouettes))

@@ -207,7 +207,7 @@ def repair_landmarks(
         Frames in which whoever is there may be another person; None: in none.
     """
     swapped = find_side_swaps(read, len(seen))
-    tally = _Tally(swapped)
+    counts = _Counts(swapped)
     for start, stop in parts(len(times_s)):
         first, last = _around(start, stop, times_s, seen, max_gap_s)
         found = read(first, last)
@@ -215,9 +215,9 @@ def repair_landmarks(
             found = swap_sides(found, part, frames[first:last])
         found, replaced = replace_outliers(found)
         found = bridge_gaps(found, max_gap_s).part(start - first, stop - first)
-        tally.add(found, replaced[start - first : stop - first])
+        counts.add(found, replaced[start - first : stop - first])
         write(found)
-    return tally.sentences(max_gap_s, np.zeros(len(seen), bool) if unclear is None else unclear)
+    return counts.sentences(max_gap_s, np.zeros(len(seen), bool) if unclear is None else unclear)
 
 
 def _around(
@@ -246,7 +246,7 @@ def _around(
 
 
 @dataclass
-class _Tally:
+class _Counts:
     """What was repaired."""
 
     swapped: dict[str, NDArray[np.bool_]]  # frames of each part of the body

@@ -25,7 +25,7 @@ from sd2core.progress import Progress, silent
 
 _FEWEST = 8
 """Frames of a stretch below which jitter cannot be told from motion."""
-_LEAST_JITTER_M = 1e-5
+_MIN_JITTER_M = 1e-5
 _LASTING = 1.3
 """Uncertainty over that of white jitter: what errs for several frames is not taken away. Chosen on
 recorded motion (CMU subjects 1, 2, 5, 8, 49, 127) with the jitter of estimators."""
@@ -214,7 +214,7 @@ def smooth_paths(times_s: Floats, paths_m: Floats) -> tuple[Floats, Floats]:
     if len(times_s) < _FEWEST:
         return paths_m, np.zeros(paths_m.shape)
     jitter_m = np.median(np.abs(np.diff(paths_m, 3, axis=0)), axis=0) / (_GAUSSIAN * _THIRD)
-    jitter_m = np.maximum(jitter_m, _LEAST_JITTER_M)  # (N,)
+    jitter_m = np.maximum(jitter_m, _MIN_JITTER_M)  # (N,)
     weights = _third_differences(times_s)
     beside = paths_m - median_filter(paths_m, (_JUMP_FRAMES, 1), mode="nearest")
     jumps = (1.0 - _trust(beside, _QUICK * jitter_m)) * beside
@@ -291,7 +291,7 @@ def _velocity_sd(times_s: Floats, removed_m: Floats, sd_mps3: Floats) -> Floats:
     leaves a velocity of variance n² dt ω₀³ / 6 uncertain.
     """
     step_s = float(np.median(np.diff(times_s)))
-    jitter_m = liveliness(removed_m, times_s, _LEAST_JITTER_M, share=1.0)
+    jitter_m = liveliness(removed_m, times_s, _MIN_JITTER_M, share=1.0)
     edge = np.concatenate([sd_mps3[:1], sd_mps3, sd_mps3[-1:], sd_mps3[-1:]])
     cutoff_cubed = np.minimum(edge / jitter_m, (np.pi / step_s) ** 3)
     return np.asarray(_LASTING * jitter_m * np.sqrt(step_s * cutoff_cubed / 6.0))

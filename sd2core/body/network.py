@@ -35,24 +35,24 @@ class Network:
         """Receptive field: frames to either side that can matter."""
         return sum(self.dilations)
 
-    def __call__(self, told: Singles) -> Singles:
+    def __call__(self, features: Singles) -> Singles:
         """Outputs (T, M) of features (T, C), computed in windows."""
         parts = []
-        for start in range(0, len(told), _WINDOW_FRAMES):
-            stop = min(start + _WINDOW_FRAMES, len(told))
-            first, last = max(start - self.reach, 0), min(stop + self.reach, len(told))
-            parts.append(self.whole(told[first:last])[start - first : stop - first])
+        for start in range(0, len(features), _WINDOW_FRAMES):
+            stop = min(start + _WINDOW_FRAMES, len(features))
+            first, last = max(start - self.reach, 0), min(stop + self.reach, len(features))
+            parts.append(self.whole(features[first:last])[start - first : stop - first])
         return np.concatenate(parts)
 
-    def whole(self, told: Singles) -> Singles:
+    def whole(self, features: Singles) -> Singles:
         """Outputs of features, computed in one piece."""
         a = self.arrays
-        x = np.clip((told - a["mean"]) / a["spread"], -_FAR, _FAR)
+        x = np.clip((features - a["mean"]) / a["spread"], -_FAR, _FAR)
         state = x @ a["enter"] + a["enter_bias"]
         for n, dilation in enumerate(self.dilations):
-            inner = _convolved(_bent(_normed(state, a["gain"][n])), a["wide"][n], dilation)
-            state = state + _bent(inner + a["wide_bias"][n]) @ a["flat"][n] + a["flat_bias"][n]
-        result: Singles = _bent(_normed(state, a["last_gain"])) @ a["leave"] + a["leave_bias"]
+            inner = _convolved(_silu(_rms_norm(state, a["gain"][n])), a["wide"][n], dilation)
+            state = state + _silu(inner + a["wide_bias"][n]) @ a["flat"][n] + a["flat_bias"][n]
+        result: Singles = _silu(_rms_norm(state, a["last_gain"])) @ a["leave"] + a["leave_bias"]
         return result
 
 
@@ -71,12 +71,12 @@ def _convolved(x: Singles, kernel: Singles, dilation: int) -> Singles:
     return result
 
 
-def _normed(x: Singles, gain: Singles) -> Singles:
+def _rms_norm(x: Singles, gain: Singles) -> Singles:
     """Root-mean-square norm of every frame, times a gain per channel."""
     power = np.mean(x * x, axis=1, keepdims=True)
     return np.asarray(x * (gain / np.sqrt(power + np.float32(1e-5))))
 
 
-def _bent(x: Singles) -> Singles:
+def _silu(x: Singles) -> Singles:
     """SiLU: every value times its logistic function."""
     return np.asarray(x * (np.float32(0.5) + np.float32(0.5) * np.tanh(np.float32(0.5) * x)))

@@ -145,7 +145,7 @@ class PersonTracker:
             self.hopes = []
         same = self.own.may_be(looks, THE_SAME)
         self.hopes = [*self.hopes, (Trail(roi, time_s, time_s), pose)] if same else []
-        here = self.trail.goes_on(roi, time_s)
+        here = self.trail.continues(roi, time_s)
         least_s = _SURE_HERE_S if here else _SURE_S
         sure = same and time_s - self.hopes[0][0].time_s > least_s - 1e-9
         self.unclear = not (sure and here)
@@ -172,7 +172,7 @@ class PersonTracker:
         if (
             self.trail.reaches(roi, time_s, any_size=any_size)
             and theirs <= mine + 0.05
-            and (not near or not followed or self.trail.goes_on(roi, time_s))
+            and (not near or not followed or self.trail.continues(roi, time_s))
             and ((followed and not near) or self.own.may_be(looks, least))
             and not any(self._may_be(twin, roi, time_s, followed) for twin in twins)
         ):
@@ -192,7 +192,7 @@ class PersonTracker:
         about = self.trail.time_s - twin.trail.time_s < _GONE_S
         if followed or not about or unseen_s < _JUST_NOW_S:
             return False
-        return not self.trail.goes_on(roi, time_s)
+        return not self.trail.continues(roi, time_s)
 
     def _likeness(self, looks: Signature) -> tuple[float, float]:
         assert self.own is not None

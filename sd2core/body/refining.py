@@ -39,7 +39,7 @@ _AHEAD_BYTES = 128 * 2**20
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class RefinedFrames:
     """Results of the second pass for N successive frames."""
 
     image_px: Singles  # (N, 33, 2); NaN, as the next two, where the person was not found
@@ -74,7 +74,7 @@ class Refiner:
         rois: Sequence[Roi | None],
         kept: frozenset[int],
         seen: Callable[[int, Pose | None], None],
-    ) -> Stretch:
+    ) -> RefinedFrames:
         """Landmarks of successive frames.
 
         Parameters
@@ -96,7 +96,7 @@ class Refiner:
         first = np.zeros(frames, bool)
         first[looked_at(times_s, _STEP_S)] = True
         first[[frame - start for frame in kept if start <= frame < start + frames]] = True
-        found = Stretch(
+        found = RefinedFrames(
             image_px=np.full((frames, 33, 2), np.nan, np.float32),
             depth_px=np.full((frames, 33), np.nan, np.float32),
             world_m=np.full((frames, 33, 3), np.nan, np.float32),
@@ -137,14 +137,14 @@ class Refiner:
         self._fill(found, times_s, first, rois, between)
         if not masks:
             return found
-        return Stretch(
+        return RefinedFrames(
             **vars(found)
             | {"silhouette_frames": np.array(numbers, np.intp), "silhouettes": np.stack(masks)}
         )
 
     def _fill(
         self,
-        found: Stretch,
+        found: RefinedFrames,
         times_s: NDArray[np.float64],
         first: NDArray[np.bool_],
         rois: Sequence[Roi | None],
@@ -191,7 +191,7 @@ class Refiner:
         return pose if pose.confidence >= FOUND and stayed else None
 
 
-def _write(found: Stretch, number: int, pose: Pose) -> None:
+def _write(found: RefinedFrames, number: int, pose: Pose) -> None:
     found.image_px[number] = pose.image_px[:33]
     found.depth_px[number] = pose.depth_px
     found.world_m[number] = pose.world_m

@@ -157,9 +157,9 @@ def _export(options: Export) -> int:
         keep_pace(making.pace_kind, time.monotonic() - begun_s, written.segments)
     sheet = write_preview(options.out)
     if options.progress_json:
-        print_event("done", **_said(written, sheet))
+        print_event("done", **_content(written, sheet))
     elif options.json:
-        print_json(_said(written, sheet))
+        print_json(_content(written, sheet))
     else:
         _print(written, sheet)
     return 1 if written.failed else 0
@@ -244,7 +244,7 @@ def _forecast_facts(forecast: Forecast) -> dict[str, str]:
     }
 
 
-def _said(written: Written, sheet: Path) -> dict[str, Any]:
+def _content(written: Written, sheet: Path) -> dict[str, Any]:
     from sd2core.datasets.card import card_paths
     from sd2core.files.texts import read_json
 
@@ -261,22 +261,22 @@ def _said(written: Written, sheet: Path) -> dict[str, Any]:
 
 
 def _print(written: Written, sheet: Path) -> None:
-    said = _said(written, sheet)
+    content = _content(written, sheet)
     before = written.sources - written.added
     print_facts(
         str(written.path),
         {
             "segments": f"{written.segments:,} of {counted(written.sources, 'source')}"
             + (f", of which {before:,} were there already" if before else ""),
-            "card": said["card"],
-            "sheet": said["sheet"],
+            "card": content["card"],
+            "sheet": content["sheet"],
         },
     )
-    if said["frames_damaged"]:
+    if content["frames_damaged"]:
         from sd2core.datasets.card import damage_text
 
-        print(f"sd2: {damage_text(said['frames_damaged'])}", file=sys.stderr)
-    _complain(said["failed"])
+        print(f"sd2: {damage_text(content['frames_damaged'])}", file=sys.stderr)
+    _complain(content["failed"])
 
 
 def _complain(failed: tuple[str, ...] | list[str]) -> None:

@@ -118,7 +118,7 @@ def _fit(options: Fit) -> None:
     from sd2core.runs.pace import fit_kind, keep_pace
 
     check_fit_output(options.out)
-    goes_on = options.out.with_name(options.out.name + PARTIAL).exists() and not options.restart
+    continues = options.out.with_name(options.out.name + PARTIAL).exists() and not options.restart
     begun_s, begun_core_s = time.perf_counter(), time.process_time()
     with ExitStack() as stack:
         report = _lines(options) if options.progress_json else _bars(stack)
@@ -132,7 +132,7 @@ def _fit(options: Fit) -> None:
             restart=options.restart,
         )
     seconds = time.perf_counter() - begun_s
-    if not goes_on:
+    if not continues:
         core_s = time.process_time() - begun_core_s
         keep_pace(fit_kind(options.resolution), core_s, made.frames)
     if options.progress_json:

@@ -11,7 +11,7 @@ from sd2core.cli.output import print_json, progress_bar
 from sd2core.options.kinds import Count
 from sd2core.options.records import OptionError, given
 from sd2core.options.shared import Figure, Json, MeshAndSensor, Method
-from sd2core.options.synthesis import Counting, Weight, Wish
+from sd2core.options.synthesis import Counting, Request, Weight
 
 if TYPE_CHECKING:
     from sd2core.accuracy import Choice, Measurement
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _TOLERANCE = 0.02
 
 
-class UsualWish(Wish):
+class UsualRequest(Request):
     """Error or time that is allowed, of what cannot do without.
 
     Parameters
@@ -32,7 +32,7 @@ class UsualWish(Wish):
     """
 
 
-class Ladder(MeshAndSensor, UsualWish, Method, Counting, Figure, Json):
+class Ladder(MeshAndSensor, UsualRequest, Method, Counting, Figure, Json):
     """Options of ``sd2 ladder``.
 
     Parameters
@@ -125,7 +125,7 @@ def chosen(
     mesh: MeshSequence,
     sensor: VirtualSensor,
     synthesis: SynthesisOptions,
-    options: Wish,
+    options: Request,
     *,
     dragging: bool = True,
 ) -> Choice:
@@ -137,7 +137,7 @@ def chosen(
         The scene.
     synthesis : SynthesisOptions
         For what a plan does not choose.
-    options : Wish
+    options : Request
         Tolerance or budget; without either the tolerance is 2 %.
     dragging : bool
         True if a budget also considers plans that keep a mask while the sensor moves.

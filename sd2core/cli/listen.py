@@ -192,9 +192,9 @@ class Status:
                 v_max_mps=self._listening.axis.v_max_mps,
             )
         else:
-            goes_on = " (continued)" if continued else ""
+            words = " (continued)" if continued else ""
             stop = "Ctrl-C or q stops." if self._is_line else "Ctrl-C stops."
-            print(f"{about}\n  into {folder}{goes_on}. {stop}", flush=True)
+            print(f"{about}\n  into {folder}{words}. {stop}", flush=True)
         self._warn_of_doubts()
 
     def show(self, column: Column | None) -> None:

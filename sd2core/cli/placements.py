@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.ladder import UsualWish
+from sd2core.cli.ladder import UsualRequest
 from sd2core.cli.output import (
     counted,
     duration,
@@ -38,7 +38,7 @@ _LIMITS = (
 )
 
 
-class Placing(MeshInput, UsualWish, Overwrite, Json):
+class Placing(MeshInput, UsualRequest, Overwrite, Json):
     """Options of ``sd2 placements``.
 
     Parameters

@@ -11,7 +11,7 @@ from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.records import OptionError, changed_flags, options_of
 from sd2core.options.shared import Json, MapOutput, MeshAndSensor, Method, RadarChoice
-from sd2core.options.synthesis import Synthesis, Wish
+from sd2core.options.synthesis import Request, Synthesis
 
 if TYPE_CHECKING:
     from sd2core.doppler import SynthesisOptions, Synthesizer
@@ -25,7 +25,7 @@ _HISTOGRAM_ONLY = {one.name for one in options_of(Synthesis)} - {
 } | {"budget_ms", "uncertainty"}
 
 
-class Synth(MeshAndSensor, MapOutput, Method, RadarChoice, Wish, Synthesis, Json):
+class Synth(MeshAndSensor, MapOutput, Method, RadarChoice, Request, Synthesis, Json):
     """Options of ``sd2 synth``.
 
     Parameters
@@ -87,10 +87,10 @@ def _synth(options: Synth) -> None:
     from sd2core.doppler.options import chosen_options
     from sd2core.mesh.decimation import decimate
 
-    wish = options.tolerance is not None or options.budget_ms is not None
+    request = options.tolerance is not None or options.budget_ms is not None
     synthesis = chosen_options(options)
     mesh, sensor = mesh_and_sensor(options)
-    if not wish:
+    if not request:
         mesh = decimate(mesh, options.vertices_kept or 1.0)
     if options.uncertainty and mesh.uncertainty is None:
         raise Sd2Error(
@@ -100,7 +100,7 @@ def _synth(options: Synth) -> None:
         )
     if options.method == "fmcw":
         doppler = _by_fmcw(options, mesh, sensor)
-    elif wish:
+    elif request:
         doppler = _as_chosen(options, mesh, sensor, synthesis)
     else:
         doppler = _counted(options, Synthesizer(mesh, synthesis), sensor)

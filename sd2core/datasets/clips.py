@@ -86,13 +86,13 @@ def _runs(
     """Yield the rows of each clip (one number in ``belongs``), and where its segments begin."""
     apart = np.diff(first_frame)
     steps = np.rint(apart)
-    goes_on = (
+    continues = (
         (np.diff(belongs) == 0)
         & (np.abs(apart - steps) <= _SLACK_FRAMES)
         & (steps > 0)
         & (steps <= length)
     )
-    edges = np.concatenate([[0], np.flatnonzero(~goes_on) + 1, [len(belongs)]])
+    edges = np.concatenate([[0], np.flatnonzero(~continues) + 1, [len(belongs)]])
     for begun, ended in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         starts = np.concatenate([[0], np.cumsum(steps[begun : ended - 1])]).astype(np.int64)
         yield slice(begun, ended), starts

@@ -206,8 +206,8 @@ def cut_source(
             assert limbs.kinematics is not None
             moving = _values(limbs.kinematics, source.times_s, clip, (), length)
         if options.imu:
-            felt = np.stack([source.imu[name].channels for name in options.imu], axis=2)
-            channels = _values(felt.transpose(2, 1, 0), source.times_s, clip, (), length)
+            imu_signals = np.stack([source.imu[name].channels for name in options.imu], axis=2)
+            channels = _values(imu_signals.transpose(2, 1, 0), source.times_s, clip, (), length)
         for begun in range(0, len(clip.starts), _BLOCK):
             starts = clip.starts[begun : begun + _BLOCK]
             places = starts[:, None] + np.arange(length)  # (segments, length)

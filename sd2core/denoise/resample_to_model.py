@@ -49,7 +49,7 @@ class DenoiserCard(Card, Protocol):
         """Parts of the body whose limb maps are the input; none: the map is."""
 
 
-Stretch = NDArray[np.float32]
+Energies = NDArray[np.float32]
 """Energies without a gap, (frames, bins)."""
 
 SAME_RATE = 0.02
@@ -83,7 +83,7 @@ def check_map(doppler: DopplerMap, card: DenoiserCard) -> None:
     check_bins(doppler, card)
 
 
-def input_of(doppler: DopplerMap, parts: Sequence[str] = ()) -> Stretch:
+def input_of(doppler: DopplerMap, parts: Sequence[str] = ()) -> Energies:
     """Energies that a model takes, (frames, bins), or (frames, parts · bins) of these parts."""
     if not parts:
         return np.ascontiguousarray(doppler.values.T)
@@ -154,11 +154,11 @@ def is_regular(times_s: NDArray[np.float64], frame_rate_hz: float) -> bool:
 
 
 def apply_to_stretches(
-    work: Callable[[Stretch, Progress], Stretch],
+    work: Callable[[Energies, Progress], Energies],
     doppler: DopplerMap,
-    energies: Stretch,
+    energies: Energies,
     frame_rate_hz: float,
-    result: Stretch,
+    result: Energies,
     progress: Progress,
 ) -> bool:
     """Apply ``work`` to every stretch of a map, at the model's rate.
@@ -186,7 +186,7 @@ def apply_to_stretches(
     total, resampled = len(energies), False
     for start, stop in stretches(doppler, frame_rate_hz):
 
-        def own(values: Stretch, start: int = start) -> Stretch:
+        def own(values: Energies, start: int = start) -> Energies:
             return work(values, lambda frames, _: progress(start + frames, total))
 
         values, times_s = energies[start:stop], doppler.times_s[start:stop]
@@ -200,11 +200,11 @@ def apply_to_stretches(
 
 
 def at_rate(
-    work: Callable[[Stretch], Stretch],
-    values: Stretch,
+    work: Callable[[Energies], Energies],
+    values: Energies,
     times_s: NDArray[np.float64],
     frame_rate_hz: float,
-) -> Stretch:
+) -> Energies:
     """Apply ``work`` at an even frame rate, with linear interpolation there and back.
 
     Parameters
@@ -230,8 +230,8 @@ def even_times(times_s: NDArray[np.float64], frame_rate_hz: float) -> NDArray[np
 
 
 def interpolated(
-    values: Stretch, times_s: NDArray[np.float64], wanted_s: NDArray[np.float64]
-) -> Stretch:
+    values: Energies, times_s: NDArray[np.float64], wanted_s: NDArray[np.float64]
+) -> Energies:
     """Interpolate linearly between frames, constant beyond both ends."""
     if len(times_s) == 1:
         return np.repeat(values, len(wanted_s), axis=0)

@@ -24,8 +24,8 @@ from sd2core.files.lock import FileLock, is_locked
 from sd2core.files.texts import read_json
 from sd2core.processes import ProcessId
 
-BEAT_EVERY_S = 60.0
-"""Time after which the holder touches its note: :meth:`EditLock.beat`."""
+HEARTBEAT_EVERY_S = 60.0
+"""Time after which the holder touches its note: :meth:`EditLock.heartbeat`."""
 GONE_AFTER_S = 600.0
 """Age of a note whose process, on another machine, is taken to have ended."""
 
@@ -81,7 +81,7 @@ class EditLock:
             self._mine = self._noted_anew()
         return True
 
-    def beat(self) -> None:
+    def heartbeat(self) -> None:
         """Tell other machines that the holder is still there."""
         if self.held and self._noted() == self._mine:
             with suppress(OSError):

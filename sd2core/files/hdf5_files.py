@@ -25,7 +25,7 @@ _FILTERS = {_DEFLATE, 2, 3, 32000}
 """Known to h5py everywhere: deflate, shuffle, fletcher32, lzf."""
 _TEXT_PART = 64
 """Part of the limit on memory that a text may have."""
-_DEFLATE_MOST = 1032
+_DEFLATE_MAX = 1032
 """Bytes that deflate can make of one."""
 
 
@@ -139,7 +139,7 @@ def _check_array(array: Any, path: Path, name: str) -> None:
     def look(chunk: Any) -> None:
         nonlocal count
         count += 1
-        if chunk.size * _DEFLATE_MOST > limit:
+        if chunk.size * _DEFLATE_MAX > limit:
             suspects.append(chunk.chunk_offset)
 
     array.id.chunk_iter(look)

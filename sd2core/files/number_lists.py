@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from sd2core.errors import Sd2Error
 
-_MOST = 10_000
+_MAX = 10_000
 _AS_RANGE = 3
 """Count of evenly spaced numbers from which a range is shorter."""
 
@@ -59,11 +59,11 @@ def format_numbers(numbers: Sequence[float]) -> str:
 
 def _range(part: str, first: float, last: float, step: float) -> list[float]:
     length = (last - first) / step if step else math.inf
-    steps = round(length) if abs(length) < _MOST else -1
+    steps = round(length) if abs(length) < _MAX else -1
     if steps < 0 or abs(length - steps) > 1e-6:
         raise Sd2Error(
             f"{part.strip()!r} does not come to its end",
-            f"a step that leads from {first:g} to {last:g}, in at most {_MOST} steps",
+            f"a step that leads from {first:g} to {last:g}, in at most {_MAX} steps",
         )
     # Without the digits that only rounding brings in.
     return [round(first + number * step, 9) for number in range(steps)] + [last]

@@ -31,7 +31,7 @@ _NAMES = ("v_template", "shapedirs", "posedirs", "J_regressor", "kintree_table",
 _EXPECTED = f"a model of SMPL, SMPL-H or SMPL-X (.npz or .pkl) with {', '.join(_NAMES)}"
 _REMEDY = "Get the model where its licence is given (smpl.is.tue.mpg.de, smpl-x.is.tue.mpg.de)"
 _CHUNK_BYTES = 32 * 2**20
-_MOST_BYTES = 8 * 10**9
+_MAX_BYTES = 8 * 10**9
 _HANDS_OF_SMPLX = slice(25, 55)
 
 
@@ -123,10 +123,10 @@ class BodyModel:
 
 def check_frames(frames: int, vertices: int) -> None:
     """Raise Sd2Error if so many frames of a body take more memory than one may."""
-    if 12 * frames * vertices > _MOST_BYTES:
+    if 12 * frames * vertices > _MAX_BYTES:
         raise Sd2Error(
             f"{frames:,} frames of {vertices:,} vertices take {12e-9 * frames * vertices:,.0f} GB",
-            f"at most {_MOST_BYTES / 1e9:.0f} GB",
+            f"at most {_MAX_BYTES / 1e9:.0f} GB",
             "Cut the motion into parts",
         )
 

@@ -17,24 +17,24 @@ from sd2core.files.stores import read_attributes
 def fitted_camera(mesh: Path) -> CameraEntry | None:
     """Camera that a body was fitted with; None for a mesh that is not from ``sd2 fit``."""
     try:
-        return CameraEntry.model_validate(_said(mesh).get("camera"))
+        return CameraEntry.model_validate(_content(mesh).get("camera"))
     except ValidationError:
         return None
 
 
 def fitted_doubts(mesh: Path) -> tuple[str, ...]:
     """Sentences on what of a fitted body is not to be believed; none for other meshes."""
-    doubts = _said(mesh).get("doubts")
+    doubts = _content(mesh).get("doubts")
     return tuple(map(str, doubts)) if isinstance(doubts, list) else ()
 
 
-def _said(mesh: Path) -> dict[str, Any]:
+def _content(mesh: Path) -> dict[str, Any]:
     """What the fit wrote into a mesh; nothing if it is another one, or damaged."""
     try:
-        said = _read(mesh)
+        content = _read(mesh)
     except Exception:  # a damaged archive fails in many ways
         return {}
-    return said if isinstance(said, dict) else {}
+    return content if isinstance(content, dict) else {}
 
 
 def _read(mesh: Path) -> Any:

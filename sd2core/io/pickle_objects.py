@@ -180,7 +180,7 @@ def tensor_array(storage: Any, offset: Any, shape: Any, steps: Any, *_: Any) -> 
     if not all(isinstance(one, int) and one >= 0 for one in numbers):
         raise Refused("holds a torch tensor with an impossible shape")
     # Repeated values, such as one shape for all frames, take memory only where they are copied.
-    _size(shape, storage.dtype, max(storage.size_bytes, _MOST_REPEATED_BYTES))
+    _size(shape, storage.dtype, max(storage.size_bytes, _MAX_REPEATED_BYTES))
     last = offset + sum((length - 1) * step for length, step in zip(shape, steps, strict=True))
     if math.prod(shape) and last >= storage.count:
         raise Refused("holds a torch tensor beyond its numbers")
@@ -204,7 +204,7 @@ def _reconstructed(kind: Any, base: Any = None, state: Any = None) -> Any:
     return kind()
 
 
-_MOST_REPEATED_BYTES = 64 * 2**20
+_MAX_REPEATED_BYTES = 64 * 2**20
 
 
 class _Name:

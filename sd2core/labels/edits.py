@@ -29,7 +29,7 @@ from typing import Literal
 from sd2core.errors import Sd2Error
 from sd2core.labels.free_time import (
     Frames,
-    Stretch,
+    TimeRange,
     clip_to_free,
     free_parts,
     limits_of,
@@ -374,7 +374,7 @@ def overwrite(
 
 
 def _moved_by(
-    by_s: float, chosen: Sequence[Span], limits: Sequence[Stretch], frames: Frames
+    by_s: float, chosen: Sequence[Span], limits: Sequence[TimeRange], frames: Frames
 ) -> list[Span]:
     """Several spans moved by a time, as far as all of them can go, each edge to the nearest."""
     pairs = list(zip(chosen, limits, strict=True))

@@ -15,7 +15,7 @@ from sd2core.errors import Sd2Error
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
 
-Stretch = tuple[float, float]
+TimeRange = tuple[float, float]
 """Half-open ``[start_s, end_s)``."""
 
 
@@ -32,7 +32,7 @@ class Frames:
         return cls(timebase.times_s, timebase.edges_s)
 
     @property
-    def whole(self) -> Stretch:
+    def whole(self) -> TimeRange:
         """Start and end of the recording."""
         return float(self.edges_s[0]), float(self.edges_s[-1])
 
@@ -67,7 +67,7 @@ class Frames:
         """Count the frames that begin in ``[start_s, end_s)``."""
         return max(self.last_before(end_s) - self.first_from(start_s) + 1, 0)
 
-    def stretch(self, one_s: float, other_s: float) -> Stretch:
+    def stretch(self, one_s: float, other_s: float) -> TimeRange:
         """From edge to edge between two times in any order, at least a frame."""
         start_s, end_s = (self.nearest(time_s) for time_s in sorted((one_s, other_s)))
         if start_s < end_s:
@@ -77,7 +77,7 @@ class Frames:
         first = min(max(shown, 0), len(self.times_s) - 1)
         return float(self.edges_s[first]), float(self.edges_s[first + 1])
 
-    def placed(self, start_s: float, duration_s: float, room: Stretch) -> Stretch | None:
+    def placed(self, start_s: float, duration_s: float, room: TimeRange) -> TimeRange | None:
         """Place a stretch of a given start and duration inside limits.
 
         It keeps its duration where frames and limits allow it. None where the limits hold no frame.
@@ -97,7 +97,7 @@ class Frames:
         return float(start_s), float(end_s)
 
 
-def limits_of(labels: Labels, moved: Sequence[Span], frames: Frames) -> list[Stretch]:
+def limits_of(labels: Labels, moved: Sequence[Span], frames: Frames) -> list[TimeRange]:
     """Return the times between which each of some spans can be moved.
 
     On an exclusive track these are its neighbours that are not moved as well.
@@ -120,7 +120,7 @@ def limits_of(labels: Labels, moved: Sequence[Span], frames: Frames) -> list[Str
     return limits
 
 
-def steps_free(frames: Frames, span: Span, room: Stretch, count: int) -> int:
+def steps_free(frames: Frames, span: Span, room: TimeRange, count: int) -> int:
     """Limit a move by ``count`` frames to those that a span can make inside its limits.
 
     Parameters
@@ -147,7 +147,7 @@ def steps_free(frames: Frames, span: Span, room: Stretch, count: int) -> int:
     return min(count, max(wall - here, 0))
 
 
-def free_parts(labels: Labels, track: str, wanted: Stretch) -> list[Stretch]:
+def free_parts(labels: Labels, track: str, wanted: TimeRange) -> list[TimeRange]:
     """Return the parts of a stretch that no span of a track covers, in order."""
     parts = []
     low_s, high_s = wanted
@@ -163,7 +163,7 @@ def free_parts(labels: Labels, track: str, wanted: Stretch) -> list[Stretch]:
     return parts
 
 
-def clip_to_free(labels: Labels, track: str, wanted: Stretch, frames: Frames) -> Stretch:
+def clip_to_free(labels: Labels, track: str, wanted: TimeRange, frames: Frames) -> TimeRange:
     """Return the longest free part of a stretch; all of it where spans may overlap.
 
     Parameters

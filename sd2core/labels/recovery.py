@@ -204,10 +204,10 @@ class RecoveryPlace:
             self._beside.release()
         return False
 
-    def beat(self) -> None:
+    def heartbeat(self) -> None:
         """Tell others that the locks are still held."""
         for lock in self._locks:
-            lock.beat()
+            lock.heartbeat()
 
     def release(self) -> None:
         """Release the locks. Close the journal first."""

@@ -23,10 +23,10 @@ _CHANCE = 0.01
 _MOVING_SHARE = 0.25
 """Of the frames, in which a person who walks to and fro is seen at the least."""
 _GREATEST_DB = 120.0
-_NOISE_SIGMAS, _LEAST_STEP = 5.0, 2.0
+_NOISE_SIGMAS, _MIN_STEP = 5.0, 2.0
 """Change of a pixel that is none of the camera's noise: five standard deviations, two grey levels
 where it has none. Of 14,400 pixels chance gives 0.01."""
-_LEAST_PIXELS = 10
+_MIN_PIXELS = 10
 _EDGE = 0.03
 _SMOOTHED_S, _STEP_S = 0.5, 0.02
 _LAG_S = 0.5
@@ -123,9 +123,9 @@ def moved_between(
     change = after.astype(np.float32) - before
     change -= np.median(change)  # a lamp, or the camera's exposure
     size = np.abs(change)
-    moving = size > max(_NOISE_SIGMAS * 1.4826 * float(np.median(size)), _LEAST_STEP)
+    moving = size > max(_NOISE_SIGMAS * 1.4826 * float(np.median(size)), _MIN_STEP)
     pixels = int(moving.sum())
-    if pixels < _LEAST_PIXELS:
+    if pixels < _MIN_PIXELS:
         return Moved(time_s, pixels)
     flow = cv2.calcOpticalFlowFarneback(before, after, None, 0.5, 3, 15, 3, 5, 1.1, 0)
     rows, columns = np.nonzero(moving)
@@ -201,7 +201,7 @@ def _range(config: RadarConfig, seen: Sequence[Seen]) -> Answer:
 
 
 def _view(moved: Sequence[Moved]) -> Answer:
-    shown = [one for one in moved if one.pixels >= _LEAST_PIXELS]
+    shown = [one for one in moved if one.pixels >= _MIN_PIXELS]
     numbers = {"moving_share": len(shown) / max(len(moved), 1)}
     if not moved:
         return Answer("view", False, "No two pictures of the camera came.", numbers)

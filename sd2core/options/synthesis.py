@@ -41,7 +41,7 @@ class Tolerance(OptionRecord):
     tolerance: Annotated[Share | None, Place(one_of="wish")] = None
 
 
-class Wish(Tolerance):
+class Request(Tolerance):
     """Error or time that is allowed.
 
     Parameters
@@ -139,10 +139,10 @@ class Synthesis(Counting, Axis, Tolerance, Limbs):
                     "it with the preset paper: the other has nothing that it can choose",
                 )
 
-    def refuse_chosen(self, wish: str) -> None:
+    def refuse_chosen(self, request: str) -> None:
         """Refuse options that a plan sets where one is chosen by this wish."""
         for name in given_flags(self, CHOSEN):
             raise OptionError(
-                f"{name} is given with {flag(wish)}",
-                f"one of them: with {flag(wish)} the plan chooses how",
+                f"{name} is given with {flag(request)}",
+                f"one of them: with {flag(request)} the plan chooses how",
             )

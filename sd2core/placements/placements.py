@@ -26,7 +26,7 @@ from sd2core.sensor import Vector, VirtualSensor, position_from_spherical
 FORMAT = "sd2-placements"
 VERSION = 1
 
-MOST = 10_000
+MAX_PLACEMENTS = 10_000
 """More than that around one body are hardly told apart, and take days."""
 
 _DIGITS = 6
@@ -116,8 +116,10 @@ class PlacementGrid(_Spec):
             if not values:
                 raise Sd2Error(f"The placements have no {name}", "one number or more")
         count = len(self.ranges_m) * len(self.azimuths_deg) * len(self.elevations_deg)
-        if count > MOST:
-            raise Sd2Error(f"There are {count} placements", f"at most {MOST} around one body")
+        if count > MAX_PLACEMENTS:
+            raise Sd2Error(
+                f"There are {count} placements", f"at most {MAX_PLACEMENTS} around one body"
+            )
 
     def places(self) -> tuple[Place, ...]:
         """Distinct places by range, then azimuth, then elevation, in the given order."""
@@ -158,7 +160,7 @@ class PlacementCloud(_Spec):
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, least, most in (("count", 1, MOST), ("seed", 0, 2**63 - 1)):
+        for name, least, most in (("count", 1, MAX_PLACEMENTS), ("seed", 0, 2**63 - 1)):
             value = getattr(self, name)
             if type(value) is not int or not least <= value <= most:
                 raise Sd2Error(

@@ -1,7 +1,7 @@
 """Progress of a run as JSON lines: written by its process, read by all who follow it.
 
 ``docs/formats.md`` says what the lines mean. Lines are only ever appended, so that
-a reader misses none; a run that is resumed says from where, and :func:`standing` drops what
+a reader misses none; a run that is resumed says from where, and :func:`effective` drops what
 that makes void.
 """
 
@@ -72,7 +72,7 @@ def read_events(path: Path) -> list[Event]:
     return ProgressTail(path).new()
 
 
-def standing(events: Iterable[Event]) -> list[Event]:
+def effective(events: Iterable[Event]) -> list[Event]:
     """Lines that count: those of steps that a resumed run did again are dropped.
 
     A kill loses the steps since the last checkpoint. They are done again, with the same

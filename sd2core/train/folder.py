@@ -14,7 +14,7 @@ from pydantic.dataclasses import dataclass
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import make_folder
 from sd2core.runs.folder import LIVE, RunFolder, State
-from sd2core.runs.progress import Event, last_of, read_events, standing
+from sd2core.runs.progress import Event, effective, last_of, read_events
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class TrainingFolder(RunFolder):
         """
         state, about = self.state_and_about()
         with self.refusing_damage():
-            return _status(self, state, about, standing(read_events(self.progress)))
+            return _status(self, state, about, effective(read_events(self.progress)))
 
     def discard(self) -> None:
         """Delete what the run made, and the folder when nothing else is in it."""

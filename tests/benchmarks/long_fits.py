@@ -37,7 +37,7 @@ from sd2core.body.fit_video import LANDMARKS, MARKER, PARTIAL, FitChoices, FitRe
 from sd2core.body.landmark_files import RefinedStretches, search_store
 from sd2core.body.landmark_models import DEFAULT_MODEL, landmark_models
 from sd2core.body.landmarks import DEFAULT_SILHOUETTES, SIGHTINGS, find_landmarks
-from sd2core.body.refining import Stretch
+from sd2core.body.refining import RefinedFrames
 from sd2core.body.roi import Sightings
 from sd2core.body.track import LandmarkTrack
 from sd2core.files.resources import resource_path
@@ -186,7 +186,7 @@ def _fill(store: ArrayStore, video: VideoReader, track: LandmarkTrack) -> None:
         part = rows[start : start + _STRETCH_FRAMES]
         refined.add(
             start,
-            Stretch(
+            RefinedFrames(
                 image_px=track.image_px[part],
                 depth_px=track.depth_px[part],
                 world_m=track.world_m[part],

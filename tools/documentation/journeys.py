@@ -19,7 +19,7 @@ from sd2core.files.figure_files import save_figure
 from tools.documentation.places import IMAGES, REPOSITORY
 
 HOUSE = IMAGES / "house"
-MOST_STATIONS = 12
+MAX_STATIONS = 12
 _INK, _GREY = "#222222", "#767676"
 _FACES = ("#e3ecf7", "#fdeccd", "#e6f2e4", "#f3e4e1")
 _WIDTH_IN, _ROW_IN, _BOX_IN = 9.6, 0.66, (2.3, 0.46)

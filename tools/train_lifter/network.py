@@ -62,10 +62,10 @@ class TemporalNetwork(nn.Module):
         x = ((told - self.mean) / self.spread).clamp(-_FAR, _FAR)
         state = self.enter(x)
         for n, (wide, flat) in enumerate(zip(self.wide, self.flat, strict=True)):
-            inner = nn.functional.silu(_normed(state, self.gain[n]))
+            inner = nn.functional.silu(_rms_norm(state, self.gain[n]))
             inner = _convolved(inner, cast(nn.Conv1d, wide), self.dilations[n])
             state = state + flat(self.dropout(nn.functional.silu(inner)))
-        last = nn.functional.silu(_normed(state, self.last_gain))
+        last = nn.functional.silu(_rms_norm(state, self.last_gain))
         return cast(torch.Tensor, self.leave(last))
 
     @classmethod
@@ -127,7 +127,7 @@ def _convolved(x: torch.Tensor, layer: nn.Conv1d, dilation: int) -> torch.Tensor
     return nn.functional.linear(three, kernel, layer.bias)
 
 
-def _normed(x: torch.Tensor, gain: torch.Tensor) -> torch.Tensor:
+def _rms_norm(x: torch.Tensor, gain: torch.Tensor) -> torch.Tensor:
     return x * (gain * torch.rsqrt((x * x).mean(dim=-1, keepdim=True) + _EPSILON))
 
 

@@ -28,7 +28,7 @@ PRESETS = (0.005, 0.01, 0.02, 0.05, 0.1)
 """Offered tolerances."""
 
 
-class _Wish(NamedTuple):
+class _Request(NamedTuple):
     """Request for a plan; without a tolerance the clicked plan stays in use at rest."""
 
     tolerance: float | None
@@ -46,7 +46,7 @@ class AccuracyModel(ReportingModel):
 
     plan_changed = Signal()  # the plan at rest or that for dragging, also when it becomes known
     decided = Signal()  # a choice ended: the same plan, another one, or an error
-    wished = Signal()  # another tolerance; the receiver asks for a choice if the sensor rests
+    requested = Signal()  # another tolerance; the receiver asks for a choice if the sensor rests
     changed = Signal()
     noted = Signal(str)
 
@@ -70,8 +70,8 @@ class AccuracyModel(ReportingModel):
     def _forget(self) -> None:
         self.choice: Choice | None = None  # newest by tolerance; its place may be the one before
         self._dragging: Choice | None = None
-        self._decided_for: _Wish | None = None
-        self._asking: _Wish | None = None
+        self._decided_for: _Request | None = None
+        self._asking: _Request | None = None
         self._survey: Survey | None = None  # the last, which later ones of this clip build on
         self._clicked: PlanResult | None = None
         self._clicked_elsewhere = False
@@ -136,10 +136,10 @@ class AccuracyModel(ReportingModel):
 
     def is_decided(self, sensor: VirtualSensor, budget_ms: float) -> bool:
         """True if the plans were chosen for this sensor, budget and tolerance."""
-        return self._decided_for == self._wish(sensor, budget_ms)
+        return self._decided_for == self._request(sensor, budget_ms)
 
-    def _wish(self, sensor: VirtualSensor, budget_ms: float) -> _Wish:
-        return _Wish(None if self._clicked else self.tolerance, budget_ms, sensor)
+    def _request(self, sensor: VirtualSensor, budget_ms: float) -> _Request:
+        return _Request(None if self._clicked else self.tolerance, budget_ms, sensor)
 
     # --- requests -------------------------------------------------------------------------
 
@@ -154,15 +154,15 @@ class AccuracyModel(ReportingModel):
 
     def choose(self, sensor: VirtualSensor, budget_ms: float) -> None:
         """Choose for the sensor at rest, and for a drag from there at ``budget_ms`` per frame."""
-        wish = self._wish(sensor, budget_ms)
-        if self._scene is None or wish == self._decided_for:
+        request = self._request(sensor, budget_ms)
+        if self._scene is None or request == self._decided_for:
             return
-        if self.choosing and wish == self._asking:
+        if self.choosing and request == self._asking:
             return
-        self._asking = wish
+        self._asking = request
         mesh, options = self._scene
         self._runner.submit(
-            lambda emit: self._compute(mesh, options, wish, emit),
+            lambda emit: self._compute(mesh, options, request, emit),
             "Choosing what the scene requires",
         )
 
@@ -192,7 +192,7 @@ class AccuracyModel(ReportingModel):
         if self._clicked is not None:
             self._clicked = None
             self.plan_changed.emit()
-        self.wished.emit()
+        self.requested.emit()
         self.changed.emit()
 
     def use(self, result: PlanResult) -> None:
@@ -219,7 +219,7 @@ class AccuracyModel(ReportingModel):
     # --- choosing -------------------------------------------------------------------------
 
     def _compute(
-        self, mesh: MeshSequence, options: SynthesisOptions, wish: _Wish, emit: Emit
+        self, mesh: MeshSequence, options: SynthesisOptions, request: _Request, emit: Emit
     ) -> Choice:
         """In the background: the choices for a wish, that at rest first; a place is surveyed once.
 
@@ -233,21 +233,21 @@ class AccuracyModel(ReportingModel):
         survey = self._survey
         if survey is not None and (survey.trial.mesh, survey.trial.options) != (mesh, options):
             survey = None
-        if survey is None or survey.trial.sensor != wish.sensor:
-            trial = survey.trial.at(wish.sensor) if survey is not None else None
-            survey = library.survey_scene(mesh, wish.sensor, options, progress, trial=trial)
+        if survey is None or survey.trial.sensor != request.sensor:
+            trial = survey.trial.at(request.sensor) if survey is not None else None
+            survey = library.survey_scene(mesh, request.sensor, options, progress, trial=trial)
             self._survey = survey
 
         def within(**limit: float) -> Choice:
             choice: Choice = library.choose(
-                mesh, wish.sensor, options=options, survey=survey, progress=progress, **limit
+                mesh, request.sensor, options=options, survey=survey, progress=progress, **limit
             )
             survey.trial.forget()  # frames that were prepared for it
             return choice
 
-        if wish.tolerance is not None:
-            emit(within(tolerance=wish.tolerance))
-        return within(budget_ms=wish.budget_ms)
+        if request.tolerance is not None:
+            emit(within(tolerance=request.tolerance))
+        return within(budget_ms=request.budget_ms)
 
     def _receive(self, result: Any) -> None:
         if not isinstance(result, tuple):  # how far it is

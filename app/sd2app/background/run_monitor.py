@@ -138,7 +138,7 @@ class RunMonitor(QObject, Generic[F]):
         self.loaded = False  # true once the folder has been read
         self.text = ""  # why it failed
         self._has_begun = False
-        self._wish: Command | None = None
+        self._request: Command | None = None
         self._cancelled_s: float | None = None
         self._stopped_s: float | None = None
         self._looker = LatestRunner("run", self, self._take, self._fail)
@@ -168,13 +168,13 @@ class RunMonitor(QObject, Generic[F]):
     @property
     def phase(self) -> Phase:
         """Current phase; an order that was just given counts at once."""
-        if self._phase not in UNDER_WAY or self._wish is None:
+        if self._phase not in UNDER_WAY or self._request is None:
             return self._phase
-        if self._wish == "cancel":
+        if self._request == "cancel":
             return "cancelling"
-        if self._wish == "stop":
+        if self._request == "stop":
             return "stopping"
-        if self._wish == "pause":
+        if self._request == "pause":
             return self._phase if self._phase == "paused" else "pausing"
         return "resuming" if self._phase in ("paused", "pausing") else self._phase
 
@@ -187,11 +187,11 @@ class RunMonitor(QObject, Generic[F]):
 
     def tell(self, word: Command) -> None:
         """Give the process an order, or raise OSError; only a cancel may follow a stop."""
-        if not self.under_way or (self._wish in ("stop", "cancel") and word != "cancel"):
+        if not self.under_way or (self._request in ("stop", "cancel") and word != "cancel"):
             return
         if word == "stop" and self.history.saving:
             return
-        self._wish = word
+        self._request = word
         if word == "cancel" and self._cancelled_s is None:
             self._cancelled_s = self._clock_s()
         elif word == "stop":
@@ -277,13 +277,13 @@ class RunMonitor(QObject, Generic[F]):
         if found.launching and not (self._has_begun and ended):
             # It is taking its folder while one looks, or about to exit.
             return self._phase if self._has_begun else "starting"
-        if self._wish == "cancel":
+        if self._request == "cancel":
             # It may have ended before it could clear up.
             self.folder.discard()
             return "gone"
         if not self._has_begun:
             # Refused, or told to stop, before it had its folder.
-            return "stopped" if self._wish == "stop" else "failed"
+            return "stopped" if self._request == "stop" else "failed"
         if not found.exists or found.state == "cancelled":
             return "gone"
         state = found.state
@@ -306,16 +306,16 @@ class RunMonitor(QObject, Generic[F]):
 
     def _obey(self, found: _Found) -> None:
         """Repeat an order that the process may not have heard; forget one that it has obeyed."""
-        if self._wish is None or not self.under_way:
+        if self._request is None or not self.under_way:
             return
-        if found.live and found.word != self._wish:
+        if found.live and found.word != self._request:
             # It had no folder when the order was given, and may have cleared up meanwhile.
             with suppress(FileNotFoundError):
-                write_control(self.folder.control, self._wish)
-        elif not found.live and self._wish in ("stop", "cancel") and self._launched is not None:
+                write_control(self.folder.control, self._request)
+        elif not found.live and self._request in ("stop", "cancel") and self._launched is not None:
             self._launched.terminate()
-        if self._phase == {"run": "running", "pause": "paused"}.get(self._wish):
-            self._wish = None
+        if self._phase == {"run": "running", "pause": "paused"}.get(self._request):
+            self._request = None
         process = found.process if found.live else self._launched
         if self._stopped_s is not None and self.stop_patience_s is not None:
             waited_s = self._clock_s() - self._stopped_s
@@ -333,7 +333,7 @@ class RunMonitor(QObject, Generic[F]):
         self._timer.setInterval(SLOW_POLL_MS if rests else self.poll_ms or POLL_MS)
         if under_way:
             return
-        self._wish = None
+        self._request = None
         output = self.folder.output
         lines = [line for line in last_output(output).splitlines() if not line.startswith("{")]
         said = "\n".join(lines)

@@ -48,7 +48,7 @@ class ClassifyFeature(Feature):
         self,
         session: Session,
         shell: Shell,
-        standing: MapValidity,
+        validity: MapValidity,
         labels: LabelsModel,
         edits: LabelEdits,
         library: ClassifierLibrary,
@@ -58,7 +58,7 @@ class ClassifyFeature(Feature):
     ) -> None:
         self._session, self._shell, self._suggest = session, shell, suggest
         self._labels, self._edits = labels, edits
-        self.model = ClassifyModel(session, standing, labels, library, parent)
+        self.model = ClassifyModel(session, validity, labels, library, parent)
         self.training = ClassTraining(
             session.settings, self.model.use, parent, command=command or COMMAND_IN_FOLDER
         )

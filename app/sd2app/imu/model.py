@@ -29,7 +29,7 @@ def place_words(place: str) -> str:
     return f"vertex {place}" if place.isdecimal() else place.replace("-", " ")
 
 
-class _Wish(NamedTuple):
+class _Request(NamedTuple):
     mesh: MeshSequence | None
     places: tuple[str, ...]
     current: str | None
@@ -53,7 +53,7 @@ class ImuModel(ReportingModel):
         self.vertices: Mapping[str, int] = {}  # that sensors sit on, by their places
         self.folded = session.settings.flag(_FOLDED, False)
         self._chosen: str | None = None
-        self._wish = _Wish(None, (), None)
+        self._request = _Request(None, (), None)
         self._known: dict[str, InertialSignals] = {}
         self._read: tuple[Path, InertialSignals | None] | None = None  # None: being read, or not
         self._runner = ListedRunner("inertial sensor", session.jobs, self, self._receive)
@@ -147,7 +147,7 @@ class ImuModel(ReportingModel):
         """Show another sensor of the recording."""
         self._chosen = place
         if self.signals is None:
-            self._wish = self._wish._replace(current=None)  # once more where it was stopped
+            self._request = self._request._replace(current=None)  # once more where it was stopped
         self._follow()
 
     def set_folded(self, folded: bool) -> None:
@@ -183,21 +183,21 @@ class ImuModel(ReportingModel):
 
     def _follow(self) -> None:
         self._follow_file()
-        wish = _Wish(self._document.mesh, self.places, self.current)
-        if wish == self._wish:
+        request = _Request(self._document.mesh, self.places, self.current)
+        if request == self._request:
             return
-        if wish.mesh is not self._wish.mesh:
+        if request.mesh is not self._request.mesh:
             self._known.clear()
             self.vertices = {}
-        self._wish, self.problem = wish, ""
-        self.signals = None if wish.current is None else self._known.get(wish.current)
-        mesh, known = wish.mesh, self.signals
-        if mesh is None or wish.current is None:
+        self._request, self.problem = request, ""
+        self.signals = None if request.current is None else self._known.get(request.current)
+        mesh, known = request.mesh, self.signals
+        if mesh is None or request.current is None:
             self._runner.cancel()
-            self.problem = "" if wish.current is None else self.why_not
+            self.problem = "" if request.current is None else self.why_not
         else:
-            title = f"Moving the sensor at {place_words(wish.current)}" if known is None else ""
-            self._runner.submit(lambda emit: _feel(mesh, wish, known, emit), title)
+            title = f"Moving the sensor at {place_words(request.current)}" if known is None else ""
+            self._runner.submit(lambda emit: _feel(mesh, request, known, emit), title)
         self.changed.emit()
 
     def _take_seats(self, result: object) -> None:
@@ -206,8 +206,8 @@ class ImuModel(ReportingModel):
             self.changed.emit()
 
     def _receive(self, signals: InertialSignals) -> None:
-        if self._wish.current is not None:
-            self._known[self._wish.current] = self.signals = signals
+        if self._request.current is not None:
+            self._known[self._request.current] = self.signals = signals
             self.changed.emit()
 
     def _say_problem(self, problem: str) -> None:
@@ -265,11 +265,11 @@ class ImuModel(ReportingModel):
 
 
 def _feel(
-    mesh: MeshSequence, wish: _Wish, known: InertialSignals | None, emit: Emit
+    mesh: MeshSequence, request: _Request, known: InertialSignals | None, emit: Emit
 ) -> InertialSignals:
     """Compute in the background: where sensors sit first, then what the current one feels."""
     vertices = {}
-    for place in wish.places:
+    for place in request.places:
         try:
             vertices[place] = mounted(mesh, place).vertex
         except Sd2Error:
@@ -277,5 +277,5 @@ def _feel(
     emit(vertices)
     if known is not None:
         return known
-    assert wish.current is not None
-    return virtual_imu(mesh, wish.current, progress=lambda done, total: emit((done, total)))
+    assert request.current is not None
+    return virtual_imu(mesh, request.current, progress=lambda done, total: emit((done, total)))

@@ -14,7 +14,7 @@ from sd2app.session.content import UNTITLED
 from sd2app.session.document import DocumentModel
 from sd2app.widgets.text import clock_text
 from sd2core.errors import Sd2Error
-from sd2core.files.edit_lock import BEAT_EVERY_S, edit_lock
+from sd2core.files.edit_lock import HEARTBEAT_EVERY_S, edit_lock
 from sd2core.labels.journal import Journal
 from sd2core.labels.recovery import Found, Recoverable, RecoveryPlace, offers_in
 from sd2core.labels.spans import Labels
@@ -52,9 +52,9 @@ class LabelAutosave(QObject):
         self._step = 0  # of the history
         self.notes: tuple[str, ...] = ()  # on unreadable sessions, or edits that are not kept
         self.waiting = Found()  # at the start, until a recording is open
-        beat = QTimer(self)
-        beat.timeout.connect(lambda: self._place is not None and self._place.beat())
-        beat.start(round(BEAT_EVERY_S * 1000))
+        heartbeat = QTimer(self)
+        heartbeat.timeout.connect(lambda: self._place is not None and self._place.heartbeat())
+        heartbeat.start(round(HEARTBEAT_EVERY_S * 1000))
         document.saved.connect(self._follow_saving)
         document.undo_stack.indexChanged.connect(self._keep_others)
 

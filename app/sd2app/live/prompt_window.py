@@ -34,7 +34,7 @@ _FRAME_MS = 50
 _HEAD, _COUNT, _DETAIL, _SMALL, _READ = 0.1, 0.26, 0.075, 0.028, 0.036
 """Heights of letters, as shares of the window's height."""
 _MARGIN = 0.05
-_LEAST_PX, _LEAST_READ_PX = 11.0, 15.0
+_MIN_PX, _MIN_READ_PX = 11.0, 15.0
 _CONSENT_TOP, _CONSENT_BOTTOM = 0.28, 0.15
 """Shares of the window's height above and below the text to agree to."""
 _KEYS: dict[int, str] = {
@@ -148,7 +148,7 @@ class PromptWindow(QWidget):
         super().resizeEvent(event)
         height, width = self.height(), self.width()
         font = QFont(self.font())
-        font.setPixelSize(round(max(_READ * height, _LEAST_READ_PX)))
+        font.setPixelSize(round(max(_READ * height, _MIN_READ_PX)))
         self._consent_text.setFont(font)
         top, bottom, side = (
             round(share * height) for share in (_CONSENT_TOP, _CONSENT_BOTTOM, 2 * _MARGIN)
@@ -221,14 +221,14 @@ class PromptWindow(QWidget):
         """Write a text, smaller where it would not fit."""
         font = QFont(self.font())
         font.setBold(bold)
-        size_px = max(letters_px, _LEAST_PX)
+        size_px = max(letters_px, _MIN_PX)
         while True:
             font.setPixelSize(round(size_px))
             needed = QFontMetricsF(font).boundingRect(room, int(how), text)
             fits = needed.height() <= room.height() and needed.width() <= room.width() + 1.0
-            if fits or size_px <= _LEAST_PX:
+            if fits or size_px <= _MIN_PX:
                 break
-            size_px = max(0.9 * size_px, _LEAST_PX)
+            size_px = max(0.9 * size_px, _MIN_PX)
         painter.setFont(font)
         painter.drawText(room, int(how), text)
 

@@ -91,7 +91,7 @@ class SynthesisModel(QObject):
         session.playback.frame_changed.connect(self._follow_clock)
         accuracy.plan_changed.connect(self._take_plan)
         accuracy.decided.connect(self._go_on)
-        accuracy.wished.connect(self._go_on)
+        accuracy.requested.connect(self._go_on)
 
     # --- what is known --------------------------------------------------------------------
 

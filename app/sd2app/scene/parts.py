@@ -23,9 +23,9 @@ from sd2core.sensor import Beam, VirtualSensor
 
 _ANY_BEAM = Beam(90.0, 90.0)
 _MARKER_M = 0.10
-_MARKER_LEAST_PX = 7.0
+_MARKER_MIN_PX = 7.0
 _INERTIAL_M = 0.028
-_INERTIAL_LEAST_PX = 5.5
+_INERTIAL_MIN_PX = 5.5
 _MARKER_STEP = 1.15
 """Relative change of size from which markers are rebuilt."""
 
@@ -346,7 +346,7 @@ class Markers(Shape):
 
     def set_pixel(self, metres: float) -> None:
         """Size of a pixel where the body is; markers are never too small to be clicked."""
-        length_m = max(_MARKER_M, _MARKER_LEAST_PX * metres)
+        length_m = max(_MARKER_M, _MARKER_MIN_PX * metres)
         if not 1 / _MARKER_STEP < length_m / self._length_m < _MARKER_STEP:
             self._length_m = length_m
             self._build()
@@ -375,7 +375,7 @@ class InertialMarkers(Shape):
         self.points_m = points_m
         self.show(len(points_m) > 0)
         if len(points_m):
-            radius_m = max(_INERTIAL_M, _INERTIAL_LEAST_PX * metres_per_px)
+            radius_m = max(_INERTIAL_M, _INERTIAL_MIN_PX * metres_per_px)
             points, triangles = shapes.octahedra(points_m, radius_m)
             self.set_shape(points, triangles=triangles)
 

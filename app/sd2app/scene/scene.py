@@ -19,7 +19,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 
 SENSOR_RADIUS_M = 0.045
-SENSOR_LEAST_PX = 7.0
+SENSOR_MIN_PX = 7.0
 _CAMERA_M = 0.20
 _DOTS_PX = (1.4, 6.0)
 _INSIDE_M = 0.25
@@ -269,7 +269,7 @@ class Scene:
     def sensor_radius_m(self) -> float:
         """Radius of the sphere: never too small on screen to take hold of."""
         pixel = self.pose.metres_per_pixel(self.sensor.position_m)
-        return max(SENSOR_RADIUS_M, SENSOR_LEAST_PX * pixel) if np.isfinite(pixel) else 0.01
+        return max(SENSOR_RADIUS_M, SENSOR_MIN_PX * pixel) if np.isfinite(pixel) else 0.01
 
     @property
     def body_box_px(self) -> tuple[float, float, float, float] | None:

@@ -85,7 +85,7 @@ class SceneView(QWidget):
         self._followed = (
             (session.display.theme_changed, self._follow_theme),
             (session.display.mesh_changed, self._follow_colour),
-            (session.document.opened, self._take_over),
+            (session.document.opened, self._attach),
             (session.playback.time_changed, self._follow_clock),
             (session.sensor.changed, self._follow_sensor),
             (synthesis.frame_changed, self._follow_scattering),
@@ -215,7 +215,7 @@ class SceneView(QWidget):
 
     # What changed
 
-    def _take_over(self) -> None:
+    def _attach(self) -> None:
         self.scene.look_from("overview")
         self._frame = None
         self.scene.clear_mesh()

@@ -31,7 +31,7 @@ class Planned:
     coverage: SensorCoverage | None = None  # what each sees; None while it is computed
 
 
-class _Wish(NamedTuple):
+class _Request(NamedTuple):
     mesh: MeshSequence
     plan: Placements
 
@@ -49,7 +49,7 @@ class PlacementsModel(ReportingModel):
         self.edits = session.edits
         self.planned = Planned()  # empty until the places are computed
         self.shown = True  # in the scene
-        self._wish: _Wish | None = None
+        self._request: _Request | None = None
         self._body: tuple[MeshSequence, BodyExtent] | None = None
         self._runner = LatestRunner("placements", self, self._receive, self._fail)
         self._runner.partial.connect(self._receive)
@@ -124,17 +124,17 @@ class PlacementsModel(ReportingModel):
 
     def _follow(self) -> None:
         mesh, plan = self._document.mesh, self.plan
-        wish = _Wish(mesh, plan) if mesh is not None and plan is not None else None
-        if wish == self._wish:
+        request = _Request(mesh, plan) if mesh is not None and plan is not None else None
+        if request == self._request:
             return
-        if wish is None or self._wish is None or wish.mesh is not self._wish.mesh:
+        if request is None or self._request is None or request.mesh is not self._request.mesh:
             self.planned = Planned()  # places of another body say nothing of this one
-        self._wish = wish
-        if wish is None:
+        self._request = request
+        if request is None:
             self._runner.cancel()
         else:
             known = self._body
-            self._runner.submit(lambda emit: _compute_view(wish, known, emit))
+            self._runner.submit(lambda emit: _compute_view(request, known, emit))
         self.changed.emit()
 
     def _receive(self, result: Any) -> None:
@@ -148,13 +148,13 @@ class PlacementsModel(ReportingModel):
 
 
 def _compute_view(
-    wish: _Wish, known: tuple[MeshSequence, BodyExtent] | None, emit: Emit
+    request: _Request, known: tuple[MeshSequence, BodyExtent] | None, emit: Emit
 ) -> tuple[tuple[MeshSequence, BodyExtent], Planned]:
     """Compute in the background: the places first, then what they see."""
-    body = known if known is not None and known[0] is wish.mesh else None
+    body = known if known is not None and known[0] is request.mesh else None
     if body is None:
-        body = (wish.mesh, BodyExtent.of(wish.mesh))
-    places = wish.plan.places()
+        body = (request.mesh, BodyExtent.of(request.mesh))
+    places = request.plan.places()
     sensors = tuple(place.sensor(body[1].target_m) for place in places)
     emit((body, Planned(places, sensors)))
     coverage = body[1].coverage(sensors, lambda done, total: emit(None))

@@ -155,7 +155,7 @@ class Features:
             self.classify, self.denoise, self.maps, self.accuracy, self.video, self.labels,
             self.figures, self.live, self.playback, self.program, self.imu, self.files, self.scene,
         )  # fmt: skip
-        session.document.opened.connect(lambda: _take_over(session, self))
+        session.document.opened.connect(lambda: _attach(session, self))
 
     def __iter__(self) -> Iterator[Feature]:
         """Iterate over all of them, in the order in which they are closed."""
@@ -167,7 +167,7 @@ class Features:
             feature.close()
 
 
-def _take_over(session: Session, features: Features) -> None:
+def _attach(session: Session, features: Features) -> None:
     if session.has_content():
         session.attach()
         # Each of them uses what those before it have taken over.

@@ -15,7 +15,7 @@ from sd2core.errors import Sd2Error
 from sd2core.io.radar.capture import RadarCapture, Signal
 from sd2core.radar_config import RadarConfig
 
-_MOST_FRAMES, _MOST_SAMPLES = 32, 1 << 22
+_MAX_FRAMES, _MAX_SAMPLES = 32, 1 << 22
 _WHITE_LEVEL, _WHITE_CORRELATION = 0.3, 0.1
 """Even noise over all of a converter's range has 0.58 of full scale, and 0; echoes are tones."""
 _FEWEST_GATES = 16
@@ -47,7 +47,7 @@ def judged(capture: RadarCapture) -> RadarCapture:
 def _some_frames(capture: RadarCapture) -> Signal:
     """Frames from the first to the last, evenly between."""
     each = int(np.prod(capture.samples.shape[1:]))
-    count = min(capture.frame_count, max(2, min(_MOST_FRAMES, _MOST_SAMPLES // each)))
+    count = min(capture.frame_count, max(2, min(_MAX_FRAMES, _MAX_SAMPLES // each)))
     places = np.linspace(0, capture.frame_count - 1, count).astype(int).tolist()
     return np.concatenate([capture.read(place, place + 1) for place in places])
 

@@ -45,7 +45,7 @@ COLUMNS = tuple(_NAMES)
 _UNITS = {"m", "mps", "ms", "s", "db", "sec", "dbm"}
 _IGNORED = "-"
 _EXPECTED = "a table of points with the columns frame and doppler"
-_FEWEST, _MOST = 3, 12
+_FEWEST, _MAX = 3, 12
 _LOOKED_AT = 20_000
 _FASTEST_MPS = 30.0
 
@@ -61,7 +61,7 @@ class PointsDescription(BaseModel):
 
     format: Literal["sd2-radar"] = "sd2-radar"
     version: Literal[1] = 1
-    columns: tuple[str, ...] = Field(min_length=2, max_length=_MOST)
+    columns: tuple[str, ...] = Field(min_length=2, max_length=_MAX)
     dataset: str | None = None
     frame_repetition_s: float | None = Field(default=None, ge=1e-3, le=1e3)
     sign: Literal[1, -1] | None = None
@@ -264,7 +264,7 @@ class _Array(_Table):
         self._stored, self.names = stored, tuple(fields)
         dimensions = len(stored.shape) + bool(fields)
         self.width = len(fields) or (stored.shape[-1] if dimensions in (2, 3) else 0)
-        if not (dimensions in (2, 3) and _FEWEST <= self.width <= _MOST):
+        if not (dimensions in (2, 3) and _FEWEST <= self.width <= _MAX):
             raise Sd2Error(f"{path} has shape {stored.shape}", _EXPECTED)
         if any(stored.dtype[name].kind not in "iuf" for name in fields) or (
             not fields and stored.dtype.kind not in "iuf"

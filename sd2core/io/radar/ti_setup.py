@@ -28,7 +28,7 @@ from sd2core.radar_config import RadarConfig, Sampling
 _SAMPLINGS: dict[int, Sampling] = {0: "real", 1: "complex", 2: "complex with image band"}
 """By ``adcOutputFmt``, the same in both kinds of file."""
 _BITS_16 = 2
-_MOST = 2**20
+_MAX = 2**20
 _CFG = "a .cfg of the mmWave SDK"
 _JSON = "the .mmwave.json of mmWave Studio"
 
@@ -313,7 +313,7 @@ def _setup(device: _Device, lanes: int, notes: list[str]) -> TiSetup:
         raise Sd2Error("No receiver is enabled", "a mask of one to four")
     frame = device.frame
     loops, frames = frame.numLoops, frame.numFrames
-    if not (0 < loops < _MOST and 0 <= frames < 2**31):
+    if not (0 < loops < _MAX and 0 <= frames < 2**31):
         raise Sd2Error(f"A recording of {frames} frames of {loops} loops", "some of both")
     turns = _turns(device.chirps, frame.chirpStartIdx, frame.chirpEndIdx)
     number = turns[0].profileId
@@ -355,7 +355,7 @@ def _setup(device: _Device, lanes: int, notes: list[str]) -> TiSetup:
     if slope_hz_per_s < 0:
         notes.append("Chirps fall in frequency; samples are turned round.")
     samples, rate_hz = profile.numAdcSamples, profile.digOutSampleRate * 1e3
-    if not 1 < samples < _MOST or not rate_hz > 0:
+    if not 1 < samples < _MAX or not rate_hz > 0:
         raise Sd2Error(
             f"A chirp has {samples} samples at {rate_hz:g} Hz",
             "two samples or more, at a rate",

@@ -35,7 +35,7 @@ UNNAMED = "unnamed"
 
 _ROUNDING_S = 1e-3
 """What times in whole milliseconds may lie beyond a recording without being worth a word."""
-_MOST_LISTED = 5
+_MAX_LISTED = 5
 
 
 @dataclass(frozen=True)
@@ -187,8 +187,8 @@ class LabelReading:
         if not self.left_out:
             said.append("nothing left out")
         else:
-            more = len(self.left_out) - _MOST_LISTED
-            listed = [*self.left_out[:_MOST_LISTED], *([f"{more} more"] if more > 0 else [])]
+            more = len(self.left_out) - _MAX_LISTED
+            listed = [*self.left_out[:_MAX_LISTED], *([f"{more} more"] if more > 0 else [])]
             said.append(f"{len(self.left_out):,} left out ({'; '.join(listed)})")
         return ", ".join(said) + "."
 

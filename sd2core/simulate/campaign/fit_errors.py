@@ -108,24 +108,24 @@ class FitErrors:
         """
         path = resource_path(RESOURCE) if path is None else Path(path)
         try:
-            said = read_json(path, _EXPECTED)
-            check_meta(said, path, FORMAT, VERSION)
+            content = read_json(path, _EXPECTED)
+            check_meta(content, path, FORMAT, VERSION)
             groups: dict[Group, GroupErrors] = {
                 name: GroupErrors(
                     **{key: np.array(one[key], np.float64) for key in ("gain", "bias", "spread")},
                     length=float(one["length"]),
                     mixing=float(one["mixing"]),
                 )
-                for name, one in said["groups"].items()
+                for name, one in content["groups"].items()
             }
             wanted = {group for group, _ in all_groups()}
             if set(groups) != wanted:
                 raise KeyError(", ".join(sorted(wanted - set(groups))))
             return cls(
                 groups,
-                np.array(said["shape_mean"], np.float64),
-                np.array(said["shape_covariance"], np.float64),
-                said["provenance"],
+                np.array(content["shape_mean"], np.float64),
+                np.array(content["shape_covariance"], np.float64),
+                content["provenance"],
             )
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise Sd2Error(

@@ -39,7 +39,7 @@ _BETWEEN = (
     ("spine01", "head", ("neck01", "neck02", "neck03")),
 )
 _MIRRORED_VECTOR = np.array([-1.0, 1.0, 1.0])
-_TURNED_LEAST = 1e-9
+_TURNED_MIN = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +167,7 @@ def _limb_turns(
     """Extra turns of one limb's bones: the least that bring each to its new direction."""
     directions = true.limbs[group, side]
     wanted = directions + change.reshape(directions.shape)
-    wanted /= np.maximum(np.linalg.norm(wanted, axis=2, keepdims=True), _TURNED_LEAST)
+    wanted /= np.maximum(np.linalg.norm(wanted, axis=2, keepdims=True), _TURNED_MIN)
     if side == "L":
         directions, wanted = directions * _MIRRORED_VECTOR, wanted * _MIRRORED_VECTOR
     back = transposed(true.axes)[:, None]
@@ -182,7 +182,7 @@ def least_turn(before: Floats, after: Floats) -> Floats:
     sine = np.linalg.norm(axis, axis=-1, keepdims=True)
     cosine = (before * after).sum(axis=-1, keepdims=True)
     angle = np.arctan2(sine, cosine)
-    return from_vector(axis * (angle / np.maximum(sine, _TURNED_LEAST)))
+    return from_vector(axis * (angle / np.maximum(sine, _TURNED_MIN)))
 
 
 def all_groups() -> list[tuple[Group, str]]:

@@ -38,10 +38,11 @@ class Protocol:
         """Content for a campaign's provenance; nothing if varied, which all campaigns once were."""
         if self == VARIED:
             return {}
-        said = {"name": self.name, **asdict(self)}
+        content = {"name": self.name, **asdict(self)}
         # Campaigns of before there was a choice say nothing of it.
         usual = {"movements": VARIED.movements, "drawn_radars": VARIED.drawn_radars}
-        return {"protocol": {key: said[key] for key in said if said[key] != usual.get(key)}}
+        changed = {key: one for key, one in content.items() if one != usual.get(key)}
+        return {"protocol": changed}
 
     def captured(self, number: int) -> bool:
         """True if a take is of recorded motion."""

@@ -71,8 +71,10 @@ class TargetOptions:
 
     def provenance(self) -> dict[str, Any]:
         """Content for a campaign's provenance; once all surfaces were rough and nothing said so."""
-        said = asdict(self)
-        return said if self.smooth else {name: said[name] for name in said if name != "smooth"}
+        content = asdict(self)
+        if not self.smooth:
+            del content["smooth"]
+        return content
 
 
 def radar_at(frames_per_s: float, bins: int, radar: RadarConfig = PAPER_RADAR) -> RadarConfig:

@@ -118,7 +118,7 @@ def test_another_tolerance_asks_for_a_choice_and_surveys_the_place_once(desk, qt
     trade = desk.trade
     desk.fake.plans[0.1] = FACING
     desk.choose(qtbot)
-    with qtbot.waitSignal(trade.wished):
+    with qtbot.waitSignal(trade.requested):
         trade.set_tolerance(0.1)
     assert not trade.is_decided(HERE, BUDGET_MS)
     desk.choose(qtbot)

@@ -27,7 +27,7 @@ from sd2core.body.landmark_files import (
 )
 from sd2core.body.lifter import LiftedInParts, Lifter
 from sd2core.body.raw_track import RawTrack
-from sd2core.body.refining import Stretch
+from sd2core.body.refining import RefinedFrames
 from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.sides import swap_sides
@@ -108,7 +108,7 @@ def stored(known: LandmarkTrack, folder: Path | None, max_gap_s: float = 0.5) ->
         names = ("image_px", "depth_px", "world_m", "visibility", "confidence")
         refined.add(
             start,
-            Stretch(
+            RefinedFrames(
                 **{name: getattr(part, name) for name in names},
                 silhouette_frames=part.silhouette_frames + start,
                 silhouettes=part.silhouettes,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sd2core.body.blazepose import POINTS, Pose
-from sd2core.body.refining import Refiner, Stretch
+from sd2core.body.refining import RefinedFrames, Refiner
 from sd2core.body.roi import Roi
 from sd2core.timebase import Timebase
 
@@ -38,7 +38,7 @@ class Landmarker:
 
 def refined(
     frames_per_s: float, path: Path, frames: int = 90, gone: range = range(0)
-) -> tuple[Stretch, list[int]]:
+) -> tuple[RefinedFrames, list[int]]:
     landmarker = Landmarker(frames_per_s, path, gone)
     video = SimpleNamespace(
         width=320,

@@ -108,12 +108,12 @@ def test_a_beat_makes_the_note_new(tmp_path: Path) -> None:
     assert lock.take()
     path = tmp_path / ".edited-by.json"
     os.utime(path, (1.0, 1.0))
-    lock.beat()
+    lock.heartbeat()
     assert path.stat().st_mtime > 1.0
     # Of one who took it over, while this machine slept, nothing is touched.
     note(tmp_path, host="elsewhere")
     os.utime(path, (1.0, 1.0))
-    lock.beat()
+    lock.heartbeat()
     assert path.stat().st_mtime == 1.0
     lock.release()
     assert path.exists()

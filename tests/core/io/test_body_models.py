@@ -224,7 +224,7 @@ def test_shapes_of_another_family_are_left_out_and_said(tmp_path: Path) -> None:
 def test_more_frames_than_memory_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sd2core.io.body_model._MOST_BYTES", 10**4)
+    monkeypatch.setattr("sd2core.io.body_model._MAX_BYTES", 10**4)
     np.savez(tmp_path / "long.npz", **capture(10))
     model = write_model(tmp_path / "SMPLH.npz", 52)
     with pytest.raises(Sd2Error, match=r"10 frames of 416 vertices.*Cut the motion"):

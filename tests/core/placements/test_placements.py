@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
 from sd2core.placements.placements import (
-    MOST,
+    MAX_PLACEMENTS,
     Place,
     PlacementCloud,
     PlacementGrid,
@@ -151,10 +151,10 @@ def test_a_cloud_keeps_within_its_intervals(cloud):
         ({"kind": "grid", "ranges_m": [10**400]}, "finite"),
         ({"kind": "grid", "ranges_m": "12"}, "list"),
         ({"kind": "grid", "ranges_m": [1], "spacing": 3}, "spacing"),
-        ({"kind": "grid", "ranges_m": [1] * 101, "azimuths_deg": [0] * 100}, str(MOST)),
+        ({"kind": "grid", "ranges_m": [1] * 101, "azimuths_deg": [0] * 100}, str(MAX_PLACEMENTS)),
         ({"kind": "cloud", "range_m": [1, 2]}, "no count"),
         ({"kind": "cloud", "count": 0, "range_m": [1, 2]}, "count"),
-        ({"kind": "cloud", "count": MOST + 1, "range_m": [1, 2]}, str(MOST)),
+        ({"kind": "cloud", "count": MAX_PLACEMENTS + 1, "range_m": [1, 2]}, str(MAX_PLACEMENTS)),
         ({"kind": "cloud", "count": 2.0, "range_m": [1, 2]}, "2.0"),
         ({"kind": "cloud", "count": 2, "range_m": [2, 1]}, "smaller one first"),
         ({"kind": "cloud", "count": 2, "range_m": [1, 2, 3]}, "two numbers"),

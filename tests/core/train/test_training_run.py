@@ -32,7 +32,7 @@ from sd2core.options.training import (
 from sd2core.pairs.store import read_pairs
 from sd2core.runs import pace
 from sd2core.runs.control import write_control
-from sd2core.runs.progress import Event, ProgressTail, last_of, read_events, standing
+from sd2core.runs.progress import Event, ProgressTail, effective, last_of, read_events
 from sd2core.train.config import config_text
 from sd2core.train.folder import TrainingFolder
 from sd2core.train.start import Ending, begin, go_on
@@ -78,7 +78,7 @@ def curve(run: Path) -> list[tuple[Any, ...]]:
     """What is to be drawn, without the times."""
     return [
         (event["epoch"], event["train_rmse"], event["validation_rmse"], event["best"])
-        for event in standing(read_events(run / "progress.jsonl"))
+        for event in effective(read_events(run / "progress.jsonl"))
         if event["event"] == "epoch"
     ]
 

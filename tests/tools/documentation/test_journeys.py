@@ -7,7 +7,7 @@ from html import unescape
 
 import pytest
 
-from tools.documentation.journeys import JOURNEYS, MOST_STATIONS, path_of
+from tools.documentation.journeys import JOURNEYS, MAX_STATIONS, path_of
 
 each_journey = pytest.mark.parametrize("name", JOURNEYS)
 
@@ -15,7 +15,7 @@ each_journey = pytest.mark.parametrize("name", JOURNEYS)
 @each_journey
 def test_every_station_is_there_and_in_its_file(name: str) -> None:
     stations = JOURNEYS[name].stations
-    assert len(stations) <= MOST_STATIONS
+    assert len(stations) <= MAX_STATIONS
     for station in stations:
         found = station.found()
         assert callable(found)
