@@ -106,15 +106,16 @@ def count_expected(
     if not kernels_ready():
         _count_plain(frames, sensor, counting, scatterers, sigma_bins[:, vertex_limb], into)
         return
-    place = sensor.astype(frames.positions.dtype)
-    for first in range(0, len(frames), _FRAMES):
-        rows = slice(first, min(first + _FRAMES, len(frames)))
+    place, axis = sensor.astype(frames.positions.dtype), counting.arguments()
+    count = len(frames)
+    for first in range(0, count, _FRAMES):
+        rows = slice(first, min(first + _FRAMES, count))
         some, counts, sigma = frames.rows(rows), into.rows(rows), sigma_bins[rows, limb]
         room = 0 if counting.beyond == WRAP else math.ceil(REACH * sigma.max()) + 1
-        fine = np.zeros((len(some), len(pairs), FineAxis(counting, room).parts, 2))
+        fine = np.zeros((rows.stop - first, len(pairs), FineAxis(counting, room).parts, 2))
         fine_kernel(
             tuple(some.paths()), counting.scale(some.duration_s, place.dtype),
-            scatterers.rows(rows).arguments(), place, counting.arguments(), group, room,
+            scatterers.rows(rows).arguments(), place, axis, group, room,
             sigma, part, fine, counts.histogram, counts.visible, counts.beyond,
         )  # fmt: skip
         spread_kernel(fine, sigma, part, counting.bins, room, counting.beyond, counts.histogram)

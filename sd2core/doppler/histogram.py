@@ -59,18 +59,14 @@ class Scatterers:
 
     def arguments(self) -> tuple[Any, ...]:
         """What kernels take: values as :class:`Paths` has places, empty where there are none."""
-        normals, mask, parts = self.normals, self.mask, self.parts
-        areas, vectors, multiplicity = (
-            _NO_AREAS if values is None else values.reshape(-1)
-            for values in (self.areas, self.area_vectors, self.vertex_counts)
-        )
+        normals, areas, vectors = self.normals, self.areas, self.area_vectors
         return (
             _NO_NORMALS if normals is None else normals.reshape(-1),
-            _NO_MASK if mask is None else mask,
-            areas,
-            vectors,
-            multiplicity,
-            _NO_PARTS if parts is None else parts,
+            _NO_MASK if self.mask is None else self.mask,
+            _NO_AREAS if areas is None else areas.reshape(-1),
+            _NO_AREAS if vectors is None else vectors.reshape(-1),
+            _NO_AREAS if self.vertex_counts is None else self.vertex_counts,
+            _NO_PARTS if self.parts is None else self.parts,
             *self.kinds,
             tuple(beam_tables(self.sensor)),
         )

@@ -73,7 +73,7 @@ class ClassifyModel(ReportingModel):
         self._patience = delayed(self._load, _PATIENCE_MS, self)
         self.track.changed.connect(self.moved)
         for track in self._maps:
-            track.changed.connect(self._follow)
+            track.came_or_went.connect(self._follow)
         self._playback.frame_changed.connect(lambda _: self.moved.emit())
         validity.changed.connect(self.counts_changed)
         self.counts_changed.connect(self.moved)

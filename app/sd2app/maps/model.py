@@ -454,7 +454,7 @@ class SynthesisModel(QObject):
 
     def _say_quality(self) -> None:
         if self._synthesizers is not None:
-            final = final_words(self._synthesizers, self._accuracy.in_use)
+            final = functools.partial(final_words, self._synthesizers, self._accuracy.in_use)
             self._partial.say_quality(self.frames_in_view(), final, self._compiler.busy)
 
     def _fail(self, error: Exception) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -134,15 +134,15 @@ class PartialMap:
         covered = None if self.full else self.quality > 0
         self._track.set_map(self._map, covered, self._key if self.final else None)
 
-    def say_quality(self, view: View, final_words: str, compiling: bool) -> None:
-        """Write the lowest quality in view on the track."""
+    def say_quality(self, view: View, final_words: Callable[[], str], compiling: bool) -> None:
+        """Write the lowest quality in view on the track; ``final_words`` gives the final one."""
         start, stop = view
         quality = self.quality[start:stop]
         if not quality.any():
             return
         final = float((quality >= FINAL).mean())
         lowest = int(quality[quality > 0].min())
-        words = final_words if lowest == FINAL else self._words.get(lowest, "")
+        words = final_words() if lowest == FINAL else self._words.get(lowest, "")
         if 0 < final < 1 and lowest < FINAL:
             words = f"{words}, {100 * final:.0f} % final"
         if compiling:

@@ -69,7 +69,7 @@ class Overlay(Canvas):
         self.hint = ""  # on what a click does now
         self.marker_words: list[str] = []
         self._legend = QRectF()
-        self._state: tuple[object, ...] | None = None
+        self._states: tuple[object, ...] = (None, None)  # what legend and the rest show
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
@@ -84,19 +84,23 @@ class Overlay(Canvas):
         return words + 2 * _PAD + 2 * _GAP + 4.0
 
     def paint(self, painter: QPainter) -> None:
-        """Paint all texts; repainted only after a change."""
+        """Paint all texts; legend and the rest are repainted only after a change."""
         scene, navigator, colouring = self._scene, self._navigator, self._scene.colouring
-        state = (
-            (self.message, self.hint, self.font()),
-            (scene.pose, scene.sensor, scene.colours, scene.has_mesh),
+        legend = (
+            (self.font(), scene.colours, scene.has_mesh, scene.knows_hidden),
             (colouring.mode, colouring.v_max_mps, colouring.range_limits_m),
-            (scene.knows_hidden, scene.metre_labels),
+        )
+        rest = (
+            (self.message, self.hint, scene.pose, scene.sensor, scene.metre_labels),
             (navigator.hovers_sensor, navigator.holds_sensor, navigator.marker),
         )
-        if state != self._state:
-            self._state = state
+        if legend != self._states[0]:
             self._kept.clear()
-        self.paint_kept(painter, self._paint_all)
+        elif rest != self._states[1]:
+            self._kept.pop(self._paint_rest, None)
+        self._states = legend, rest
+        self.paint_kept(painter, self._paint_legend)
+        self.paint_kept(painter, self._paint_rest)
         if self.reading:
             area, colours = QRectF(self.rect()), self._theme.palette
             paint_readout(painter, area, self._read_at, (self.reading,), colours)
@@ -107,15 +111,13 @@ class Overlay(Canvas):
             self.reading, self._read_at = text, QPointF(*place_px)
             self.update()
 
-    def _paint_all(self, painter: QPainter) -> None:
+    def _paint_rest(self, painter: QPainter) -> None:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setFont(self._font())
         if self.message:
             rows = QRectF(self.rect().adjusted(16, 8, -16, -12))
             where = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom
             self._write(painter, rows, self.message, where | Qt.TextFlag.TextWordWrap)
-        self._legend = QRectF()
-        self._paint_legend(painter)
         names = self._paint_names(painter)
         # Behind the virtual camera there is no body.
         box = self._scene.body_box_px
@@ -220,6 +222,9 @@ class Overlay(Canvas):
 
     def _paint_legend(self, painter: QPainter) -> None:
         """Paint a bar of colours, a swatch for each of the others, and a card behind them."""
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setFont(self._font())
+        self._legend = QRectF()
         scene, colours, metrics = self._scene, self._colours, QFontMetricsF(painter.font())
         mode, bar = scene.colouring.mode, _Bar.of(scene.colouring)
         swatches = [(colours.visible, "visible")] if mode == "visibility" else []

@@ -70,7 +70,7 @@ class SensorPanel(QWidget):
         synthesis.frame_changed.connect(self._refresh_placement)
         synthesis.readout_changed.connect(self._refresh_readout)
         session.document.changed.connect(self._refresh_capture)
-        self._refresh_placement()
+        self._refresh_readout()
         self._refresh_capture()
 
     # --- building -------------------------------------------------------------------------
@@ -203,7 +203,6 @@ class SensorPanel(QWidget):
             self._mark_range(float(spherical[0]))
         else:
             self._mark_range(0.0)
-        self._refresh_readout()
 
     def _mark_range(self, range_m: float) -> None:
         """Mark a range at which the radar in use sees the body elsewhere."""
