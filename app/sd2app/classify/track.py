@@ -251,12 +251,11 @@ class ClassTrack(BackgroundModel):
     @property
     def _key(self) -> Hashable:
         """Key of all that the answers depend on; None until the map is final."""
-        source = self.source.key if self.source is not None else None
-        return source and (source, self._classifier)
+        return None if self.source is None else self.source.key_with(self._classifier)
 
     def _restore(self) -> bool:
         """Show what the classifier answered before of the same map."""
-        kept = None if self._key is None else self._results.get(self._key)
+        kept = self._results.get(self._key)
         if kept is None or self._again or self.done.all():
             return False
         self._calm.stop()

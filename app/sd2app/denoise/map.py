@@ -274,8 +274,7 @@ class DenoisedMap(BackgroundModel):
     @property
     def _key(self) -> Hashable:
         """Key of all that the denoised map depends on; None until the synthetic map is final."""
-        source = self._synthetic.key
-        return source and (source, self.denoiser, self._texture is not None)
+        return self._synthetic.key_with(self.denoiser, self._texture is not None)
 
     @property
     def _final(self) -> bool:
@@ -288,9 +287,8 @@ class DenoisedMap(BackgroundModel):
 
     def _restore(self) -> bool:
         """Show the map if it was made before of the same synthetic map, by the same model."""
-        if self._key is None or self.denoiser is None or self._held or not self._wanted.any():
-            return False
-        if (kept := self._results.get(self._key)) is None:
+        kept = None if self._held or not self._wanted.any() else self._results.get(self._key)
+        if kept is None:
             return False
         self._stop()
         self._made = replace(kept, values=kept.values.copy())

@@ -428,18 +428,11 @@ class SynthesisModel(QObject):
 
     def _restore(self, final: QualityLevel) -> None:
         """Show final frames that were made before, with the same sensor, plan and options."""
-        kept = self._session.results.get(final.key_of(self._sensor))
-        if kept is None:
-            return
-        lacking = self._partial.quality_for(self._sensor) < FINAL
-        for start, stop in runs(kept.known & lacking):
-            limbs = None if kept.limbs is None else kept.limbs.between(start, stop)
-            self._take(
-                Part(
-                    self._sensor, start, kept.values[:, start:stop], limbs, FINAL, final.words,
-                    kept.unit, final.key_of(self._sensor),
-                )
-            )  # fmt: skip
+        key = final.key_of(self._sensor)
+        if (kept := self._session.results.get(key)) is not None:
+            lacking = self._partial.quality_for(self._sensor) < FINAL
+            for start, stop in runs(kept.known & lacking):
+                self._take(kept.part(start, stop, self._sensor, final.words, key))
 
     def _take(self, part: Part) -> None:
         first = self._track.map is None

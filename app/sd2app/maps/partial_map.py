@@ -38,6 +38,24 @@ class Kept(NamedTuple):
         split = 0 if self.limbs is None else self.limbs.values.nbytes
         return self.values.nbytes + split
 
+    def part(self, start: int, stop: int, sensor: VirtualSensor, words: str, key: Hashable) -> Part:
+        """Make a part of some of the frames, as if they were computed now.
+
+        Parameters
+        ----------
+        start, stop : int
+            Frames, half-open.
+        sensor : VirtualSensor
+            Placement that they are of.
+        words : str
+            Their quality.
+        key : hashable
+            Key that they were kept by.
+        """
+        values = self.values[:, start:stop]
+        limbs = None if self.limbs is None else self.limbs.between(start, stop)
+        return Part(sensor, start, values, limbs, FINAL, words, self.unit, key)
+
 
 class PartialMap:
     """Map on screen that is filled part by part, each frame with its quality."""

@@ -142,6 +142,10 @@ class MapModel(QObject):
         if came_or_went:
             self.came_or_went.emit()
 
+    def key_with(self, *maker: Hashable) -> Hashable:
+        """Key of what a maker makes of the map; None until the map is final."""
+        return None if self.key is None else (self.key, *maker)
+
     def set_awaited(self, awaited: bool) -> None:
         """Say if the map is going to be made."""
         if awaited != self.awaited:
