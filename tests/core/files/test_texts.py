@@ -10,7 +10,14 @@ import pytest
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import VARIABLE
-from sd2core.files.texts import parse_json, parse_toml, read_content, read_json, read_text
+from sd2core.files.texts import (
+    check_meta,
+    parse_json,
+    parse_toml,
+    read_content,
+    read_json,
+    read_text,
+)
 
 
 def test_a_huge_file_is_refused_without_reading_it(
@@ -72,3 +79,26 @@ def test_a_number_that_no_float_holds_is_refused_with_its_line(digits: str) -> N
     with pytest.raises(Sd2Error, match=rf"x\.json cannot .*{words}"):
         parse_json(f'{{"b": 1,\n\n"a": {digits}}}', "x.json", "a list")
     assert parse_json("1" * 300, "x.json", "a number") == int("1" * 300)
+
+
+@pytest.mark.parametrize(
+    ("meta", "oldest", "found"),
+    [
+        ({"format": "cups", "version": 2}, 0, None),
+        ({"format": "cups"}, 0, None),  # written before there were versions
+        ({"format": "cups"}, 1, "'cups' version None"),
+        ({"format": "cups", "version": 3}, 0, "'cups' version 3"),
+        ({"format": "jugs", "version": 1}, 0, "'jugs' version 1"),
+        ({}, 0, "None version None"),
+    ],
+)
+def test_metadata_of_a_known_version_pass_and_others_are_named(
+    meta: dict[str, object], oldest: int, found: str | None
+) -> None:
+    if found is None:
+        check_meta(meta, "shelf.npz", "cups", 2, oldest=oldest)
+        return
+    with pytest.raises(Sd2Error) as refused:
+        check_meta(meta, "shelf.npz", "cups", 2, oldest=oldest, remedy="Wash up")
+    assert refused.value.found == f"shelf.npz is of format {found}"
+    assert (refused.value.expected, refused.value.remedy) == ("'cups' up to version 2", "Wash up")
