@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -134,6 +133,8 @@ def _show(paths: Sequence[Path], screenshot: Path | None) -> int:
         raise explain_missing(missing)
     with plain_imports():
         from sd2app.shell.app import run as run_window
+
+    import signal
 
     # Qt's event loop gives Python no turn to raise KeyboardInterrupt.
     previous = signal.signal(signal.SIGINT, signal.SIG_DFL)
