@@ -144,8 +144,15 @@ class MapWidget(TimePlot):
         self.track = track  # the map that is shown
         self._image: QImage | None = None
         self.setMouseTracking(True)
-        for signal in (track.changed, self._display.levels_changed, self._display.theme_changed):
+        track.changed.connect(self._redraw_map)
+        for signal in (self._display.levels_changed, self._display.theme_changed):
             signal.connect(self.invalidate)
+
+    def _redraw_map(self) -> None:
+        self._image = None
+        for draw in [draw for draw in self._kept if draw != self._paint_overlays]:
+            del self._kept[draw]  # labels over the map stay
+        self.update()
 
     def invalidate(self) -> None:
         """Draw the map again, and all that is around it."""

@@ -29,9 +29,9 @@ class Overview(MapWidget):
 
     def set_track(self, track: MapModel) -> None:
         """Show another track."""
-        self.track.changed.disconnect(self.invalidate)
+        self.track.changed.disconnect(self._redraw_map)
         self.track = track
-        track.changed.connect(self.invalidate)
+        track.changed.connect(self._redraw_map)
         self.invalidate()
 
     @property

@@ -34,3 +34,18 @@ def test_a_span_comes_and_goes_and_the_rest_stays(labelled) -> None:
     c.document.undo_stack.undo()
     c.labels.select(())
     np.testing.assert_array_equal(picture(view), before)
+
+
+def test_a_map_that_changes_keeps_its_labels(labelled) -> None:
+    c = models_of(labelled)
+    view = next(one for one in labelled.findChildren(HeatmapView) if one.track is c.synthetic)
+    c.playback.seek(2.3)
+    reference, before = c.synthetic.reference, picture(view)
+    c.synthetic.set_reference(100.0 * reference)
+    fainter = picture(view)
+    assert (fainter != before).any()
+    c.labels.select([1])
+    assert (picture(view) != fainter).any()
+    c.synthetic.set_reference(reference)
+    c.labels.select(())
+    np.testing.assert_array_equal(picture(view), before)
