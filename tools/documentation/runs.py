@@ -13,7 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from sd2core.runs.progress import read_events, standing
+from sd2core.runs.progress import effective, read_events
 from sd2core.train.folder import TrainingFolder
 from tools.documentation.pages import spread
 
@@ -82,7 +82,7 @@ def timed(folder: Path, job: Job, minutes: float) -> TimedJob:
 
 def epoch_ends_s(run: Path) -> list[float]:
     """Processor time that a run had used by the end of each epoch."""
-    events = standing(read_events(TrainingFolder(run).progress))
+    events = effective(read_events(TrainingFolder(run).progress))
     return [event["processor_s"] for event in events if event["event"] == "epoch"]
 
 

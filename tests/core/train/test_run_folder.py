@@ -16,8 +16,8 @@ from sd2core.runs.control import Control, read_control, write_control
 from sd2core.runs.progress import (
     ProgressTail,
     ProgressWriter,
+    effective,
     read_events,
-    standing,
 )
 from sd2core.train.folder import TrainingFolder, runs_in
 
@@ -68,7 +68,7 @@ class TestProgress:
         again = [{"event": "step", "step": n, "first": False} for n in range(4, 7)]
         start = {"event": "start", "resumed": False}
         resumed = {"event": "start", "resumed": True, "steps_done": 3}
-        kept = standing(
+        kept = effective(
             [start, *step, {"event": "epoch", "step": 5}, {"event": "end"}, resumed, *again]
         )
         assert [one["step"] for one in kept if one["event"] == "step"] == [1, 2, 3, 4, 5, 6]
