@@ -1,11 +1,14 @@
 """Configuration of TI's mmWave radars: ``.cfg`` of the mmWave SDK, ``.json`` of mmWave Studio.
 
 Commands and their fields after TI's *mmWave SDK User Guide* (section "Configuration (.cfg) File
-Format"), JSON after the files that mmWave Studio 2.x and 3.x write (``*.mmwave.json``).
+Format"), JSON after the files that mmWave Studio 2.x and 3.x write (``*.mmwave.json``). pymmw
+keeps the commands as JSON, in a ``.cfg`` as well: the values of each stand in the order in which
+they are sent, under names of its own.
 """
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,14 +25,14 @@ from pydantic import (
 )
 
 from sd2core.errors import Sd2Error
-from sd2core.files.texts import errors_in, faults_in, read_json, read_text
+from sd2core.files.texts import errors_in, faults_in, parse_json, read_json, read_text
 from sd2core.radar_config import RadarConfig, Sampling
 
 _SAMPLINGS: dict[int, Sampling] = {0: "real", 1: "complex", 2: "complex with image band"}
 """By ``adcOutputFmt``, the same in both kinds of file."""
 _BITS_16 = 2
 _MAX = 2**20
-_CFG = "a .cfg of the mmWave SDK"
+_CFG = "a .cfg of the mmWave SDK, or JSON of pymmw,"
 _JSON = "the .mmwave.json of mmWave Studio"
 
 
@@ -155,16 +158,13 @@ def _of_cfg(path: Path) -> TiSetup:
     if text.lstrip().startswith("{"):
         if "mmWaveDevices" in text:
             return _of_json(path)
-        raise Sd2Error(
-            "It is JSON, as pymmw keeps it, which fills in masks only as it sends the commands",
-            f"{_CFG}: lines of commands, such as 'channelCfg 15 1 0'",
-            "Write the commands that were sent into a .cfg, one a line",
-        )
-    commands: dict[str, list[list[str]]] = {}
-    for line in text.splitlines():
-        words = re.split("%|#|//", line, maxsplit=1)[0].split()
-        if words:
-            commands.setdefault(words[0], []).append(words[1:])
+        commands = _commands_of_pymmw(text, path)
+    else:
+        commands = {}
+        for line in text.splitlines():
+            words = re.split("%|#|//", line, maxsplit=1)[0].split()
+            if words:
+                commands.setdefault(words[0], []).append(words[1:])
     for name in ("advFrameCfg", "subFrameCfg"):
         if name in commands:
             raise Sd2Error(f"{name} makes frames of several kinds", "frameCfg")
@@ -184,7 +184,8 @@ def _of_cfg(path: Path) -> TiSetup:
                 "samples only: enableHeader 0, dataFmt 1",
                 "Record again without",
             )
-    platform = re.search(r"[xIA]WR(\d\d)", text, re.IGNORECASE)
+    named = (re.search(r"[xIA]WR(\d\d)", one, re.IGNORECASE) for one in (text, path.name))
+    platform = next(filter(None, named), None)
     notes = []
     if platform is not None:
         lanes = 4 if platform[1] in ("12", "14", "22") else 2
@@ -192,8 +193,8 @@ def _of_cfg(path: Path) -> TiSetup:
         lanes = 4 if interleaved == 0 else 2
         notes.append(
             f"The .cfg does not say its platform; {lanes} lanes of LVDS are assumed, as receivers"
-            f" {'are' if interleaved == 0 else 'are not'} interleaved. A line '% Platform:xWR14xx'"
-            " says otherwise."
+            f" {'are' if interleaved == 0 else 'are not'} interleaved. A line '% Platform:xWR14xx',"
+            " or xWR14xx in the file's name, says otherwise."
         )
     profiles = [
         _Profile.model_construct(
@@ -237,6 +238,33 @@ def _of_cfg(path: Path) -> TiSetup:
         shifts=[],
     )
     return _setup(device, lanes, notes)
+
+
+def _commands_of_pymmw(text: str, path: Path) -> dict[str, list[list[str]]]:
+    """Commands that pymmw sends: values in order, no nulls, and masks by the number of antennas."""
+    settings = parse_json(text, path, _CFG).get("_settings_")
+    antennas = settings.get("rxAntennas") if isinstance(settings, dict) else None
+    filled = {"adcBits": _BITS_16, "txMask": 1, "cascading": 0}
+    if antennas is not None:
+        if antennas not in (1, 2, 3, 4):
+            raise Sd2Error(f"rxAntennas is {antennas!r:.40}", "1 to 4")
+        filled["rxMask"] = 2 ** int(antennas) - 1
+    commands: dict[str, list[list[str]]] = {}
+    # Pairs in place of tables: a command may be there several times.
+    for name, values in json.loads(text, object_pairs_hook=list):
+        known = filled if name in ("channelCfg", "adcCfg") else {}
+        commands.setdefault(name, []).append(_words_of_pymmw(values, known))
+    return commands
+
+
+def _words_of_pymmw(value: Any, filled: dict[str, int]) -> list[str]:
+    """Words of a command: values in lists and in pairs with their names."""
+    if isinstance(value, list):
+        return [word for one in value for word in _words_of_pymmw(one, filled)]
+    if isinstance(value, tuple):
+        name, value = value
+        return _words_of_pymmw(filled.get(name) if value is None else value, filled)
+    return [] if value is None else [str(value)]
 
 
 def _buffer(numbers: list[float]) -> tuple[int, int]:

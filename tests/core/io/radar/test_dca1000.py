@@ -103,6 +103,20 @@ def test_every_sample_comes_back_in_its_place(tmp_path: Path, lanes: int, output
     np.testing.assert_array_equal(of_one.read(0, 3), found[:, 4:8])
 
 
+@pytest.mark.parametrize("lanes", [2, 4])
+def test_a_profile_of_pymmw_opens_as_the_cfg_that_it_sends(tmp_path: Path, lanes: int) -> None:
+    recording = replace(PLAIN, receivers=2, transmitters=3, lanes=lanes, loops=8)
+    path = write_ti(tmp_path, recording)
+    sent = load_capture(path)
+    path.with_suffix(".cfg").unlink()
+    named = tmp_path / f"mmw-xWR{14 if lanes == 4 else 18}xx.cfg"
+    named.write_text(_pymmw_of(recording))
+    kept = load_capture(path)
+    assert kept.config == sent.config
+    assert kept.meta["lanes"] == lanes
+    np.testing.assert_array_equal(kept.samples[:], sent.samples[:])
+
+
 def test_a_map_of_all_channels_is_the_mean_of_theirs(tmp_path: Path) -> None:
     capture = load_capture(write_ti(tmp_path, replace(PLAIN, transmitters=2)))
     axis = VelocityAxis(32, 2.0)
@@ -212,6 +226,24 @@ def _coded(device: dict[str, Any], name: str, **phases: object) -> None:
     device["rfConfig"][name] = [{inner: told}]
 
 
+def _pymmw_of(recording: TiRecording, **settings: object) -> str:
+    """Profile of pymmw: every command a table, nulls where it fills in, chirps under one name."""
+    nulls = {"channelCfg": [None, None, None], "adcCfg": [None, recording.output]}
+    commands = ['"_settings_": ' + json.dumps({"rxAntennas": recording.receivers} | settings)]
+    for line in cfg_of(recording, comment="").strip().splitlines():
+        name, *words = line.split()
+        values = nulls.get(name, [json.loads(word) for word in words])
+        names = {"channelCfg": ("rxMask", "txMask", "cascading"), "adcCfg": ("adcBits", "format")}
+        titles = names.get(name, [f"value{place}" for place in range(len(values))])
+        entries = dict(zip(titles, values, strict=True))
+        if name == "chirpCfg":
+            inner = {title: entries.pop(title) for title in titles[3:7]}
+            mask = entries.popitem()
+            entries |= {"variation": inner, mask[0]: mask[1]}
+        commands.append(f"{json.dumps(name)}: {json.dumps(entries)}")
+    return "{" + ", ".join(commands) + "}"
+
+
 MISMATCHES: dict[str, tuple[Callable[[Path], object], str]] = {
     "no configuration": (
         lambda path: path.with_suffix(".cfg").unlink(),
@@ -275,11 +307,21 @@ MISMATCHES: dict[str, tuple[Callable[[Path], object], str]] = {
         _json(lambda d: _together(d) or _coded(d, "rlRfPhaseShiftCfgs", tx1PhaseShift=90.0)),
         r"walk\.mmwave\.json: rlRfPhaseShiftCfgs gives transmitters other phases",
     ),
-    "commands kept as JSON": (
-        lambda path: path.with_suffix(".cfg").write_text(
-            json.dumps({"channelCfg": {"rxMask": None}, "adcCfg": {"outputFormat": 1}})
-        ),
-        r"walk\.cfg: It is JSON, as pymmw keeps it.*lines of commands",
+    "JSON of something else": (
+        lambda path: path.with_suffix(".cfg").write_text('{"answer": 42}'),
+        r"walk\.cfg: There is no channelCfg\. Expected: a \.cfg .* or JSON of pymmw",
+    ),
+    "JSON that is torn": (
+        lambda path: path.with_suffix(".cfg").write_text('{"channelCfg": {"rxMask": 15'),
+        r"walk\.cfg cannot be read as JSON",
+    ),
+    "more antennas than a radar has": (
+        lambda path: path.with_suffix(".cfg").write_text(_pymmw_of(PLAIN, rxAntennas=5)),
+        r"walk\.cfg: rxAntennas is 5\. Expected: 1 to 4",
+    ),
+    "masks by a number of antennas that is not there": (
+        lambda path: path.with_suffix(".cfg").write_text(_pymmw_of(PLAIN, rxAntennas=None)),
+        r"walk\.cfg: channelCfg is '1 0'",
     ),
     "12 bits": (_cfg(adcCfg="adcCfg 0 1"), r"walk\.cfg: The number of bits of the converter is 0"),
     "pseudo real": (_cfg(adcCfg="adcCfg 2 3"), r"walk\.cfg: The output format .* is 3"),
