@@ -241,18 +241,19 @@ def _of_cfg(path: Path) -> TiSetup:
 
 
 def _commands_of_pymmw(text: str, path: Path) -> dict[str, list[list[str]]]:
-    """Commands that pymmw sends: values in order, no nulls, and masks by the number of antennas."""
+    """Commands that pymmw sends: values in order, with what it puts in place of nulls."""
     settings = parse_json(text, path, _CFG).get("_settings_")
     antennas = settings.get("rxAntennas") if isinstance(settings, dict) else None
-    filled = {"adcBits": _BITS_16, "txMask": 1, "cascading": 0}
+    channels = {"txMask": 1, "cascading": 0}
     if antennas is not None:
         if antennas not in (1, 2, 3, 4):
             raise Sd2Error(f"rxAntennas is {antennas!r:.40}", "1 to 4")
-        filled["rxMask"] = 2 ** int(antennas) - 1
+        channels["rxMask"] = 2 ** int(antennas) - 1
+    filled = {"channelCfg": channels, "adcCfg": {"adcBits": _BITS_16}}
     commands: dict[str, list[list[str]]] = {}
     # Pairs in place of tables: a command may be there several times.
     for name, values in json.loads(text, object_pairs_hook=list):
-        known = filled if name in ("channelCfg", "adcCfg") else {}
+        known = {"subFrameIndex": -1} | filled.get(name, {})
         commands.setdefault(name, []).append(_words_of_pymmw(values, known))
     return commands
 
@@ -264,7 +265,7 @@ def _words_of_pymmw(value: Any, filled: dict[str, int]) -> list[str]:
     if isinstance(value, tuple):
         name, value = value
         return _words_of_pymmw(filled.get(name) if value is None else value, filled)
-    return [] if value is None else [str(value)]
+    return ["null" if value is None else str(value)]
 
 
 def _buffer(numbers: list[float]) -> tuple[int, int]:
