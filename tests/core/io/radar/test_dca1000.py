@@ -226,20 +226,26 @@ def _coded(device: dict[str, Any], name: str, **phases: object) -> None:
     device["rfConfig"][name] = [{inner: told}]
 
 
+_NULLS = {
+    "channelCfg": ["rxMask", "txMask", "cascading"],
+    "adcCfg": ["adcBits"],
+    "adcbufCfg": ["subFrameIndex"],
+    "lvdsStreamCfg": ["subFrameIndex"],
+}
+
+
 def _pymmw_of(recording: TiRecording, **settings: object) -> str:
     """Profile of pymmw: every command a table, nulls where it fills in, chirps under one name."""
-    nulls = {"channelCfg": [None, None, None], "adcCfg": [None, recording.output]}
     commands = ['"_settings_": ' + json.dumps({"rxAntennas": recording.receivers} | settings)]
     for line in cfg_of(recording, comment="").strip().splitlines():
         name, *words = line.split()
-        values = nulls.get(name, [json.loads(word) for word in words])
-        names = {"channelCfg": ["rxMask", "txMask", "cascading"], "adcCfg": ["adcBits", "format"]}
-        titles = names.get(name, [f"value{place}" for place in range(len(values))])
-        entries = dict(zip(titles, values, strict=True))
+        entries = {f"value{place}": json.loads(word) for place, word in enumerate(words)}
+        nulls = dict.fromkeys(_NULLS.get(name, []))
+        entries = nulls | dict(list(entries.items())[len(nulls) :])
         if name == "chirpCfg":
-            inner = {title: entries.pop(title) for title in titles[3:7]}
             mask = entries.popitem()
-            entries |= {"variation": inner, mask[0]: mask[1]}
+            variation = dict(entries.popitem() for _ in range(4))
+            entries |= {"variation": variation, mask[0]: mask[1]}
         commands.append(f"{json.dumps(name)}: {json.dumps(entries)}")
     return "{" + ", ".join(commands) + "}"
 
