@@ -21,7 +21,7 @@ _SHAPES = ("betas", "shape", "pred_shape", "smpl_betas")
 _PLACES = ("trans", "transl", "smpl_trans", "pred_trans", "cam_trans", "pred_cam_t")
 PARAMETER_NAMES = (*_MATRICES, *_VECTORS, *_ROOT, *_BODY, *_SHAPES, *_PLACES)
 
-CAPTURE_RATES = ("mocap_framerate", "mocap_frame_rate")
+_CAPTURE_RATES = ("mocap_framerate", "mocap_frame_rate")
 _AIST_RATE = 60.0
 _AIST_M = 0.01  # its unit is the centimetre
 _OF_SMPLX = {25, 55}
@@ -39,7 +39,7 @@ class BodyParameters:
     of_smplx: bool | None = None  # None: its pose is that of any model
     to_camera: Floats | None = None  # turns (3, 3) its world to ours; None: it is the camera's
     scale: float = 1.0  # size of the body, and unit of its places, in metres
-    frames_per_s: float | None = None
+    usual_frames_per_s: float | None = None  # where the file states no rate
 
     def vertices(
         self, model: BodyModel, notes: list[str], progress: Progress = silent
@@ -98,9 +98,8 @@ def parameters_of(entry: Mapping[Any, Any], source: str) -> BodyParameters:
     if str(entry.get("surface_model_type", "")).startswith("smplx"):  # of AMASS
         of_smplx = True
     to_camera, rate, scale = None, None, 1.0
-    if any(name in entry for name in CAPTURE_RATES):
+    if any(name in entry for name in _CAPTURE_RATES):  # read by mesh_clock
         to_camera = _Y_DOWN_OF_Z_UP
-        rate = float(np.asarray(first_of(entry, CAPTURE_RATES)).reshape(-1)[0])
     elif "smpl_scaling" in entry:
         to_camera, rate, scale = _Y_DOWN_OF_Y_UP, _AIST_RATE, _scaling(entry, source)
         if places_m is not None:

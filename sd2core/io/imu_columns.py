@@ -15,6 +15,7 @@ from pathlib import Path
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import open_regular
+from sd2core.plausibility.clock import UNITS_S
 
 STANDARD_GRAVITY_MPS2 = 9.80665
 """The unit g (CGPM 1901)."""
@@ -28,7 +29,7 @@ UNITS: dict[str, dict[str, float]] = {
         "rad/s": 1.0, "radps": 1.0, "rads": 1.0,
         "°/s": math.pi / 180, "deg/s": math.pi / 180, "degps": math.pi / 180, "dps": math.pi / 180,
     },
-    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9},
+    "time": UNITS_S,
 }  # fmt: skip
 """Factors from a column's unit to m/s², rad/s and s."""
 AXES = tuple((quantity, axis) for quantity in ("acc", "gyr") for axis in "xyz")

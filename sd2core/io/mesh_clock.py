@@ -12,15 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.plausibility.clock import probable_unit
+from sd2core.plausibility.clock import UNITS_S, probable_unit
 
 _OWN_TIMES = "times_s"
 """The name in files of this program, which are taken at their word."""
-_TIMES = re.compile(
-    "(?:frame_?)?(?:times?|time_?stamps?)(?:_?(s|secs?|seconds|ms|msecs?|milliseconds"
-    "|us|usecs?|microseconds|ns|nsecs?|nanoseconds))?"
-)
-_UNIT_S = {"s": 1.0, "m": 1e-3, "u": 1e-6, "mi": 1e-6, "n": 1e-9}
+_TIMES = re.compile(f"(?:frame_?)?(?:times?|time_?stamps?)(?:_?({'|'.join(UNITS_S)}))?")
 _RATES = {"fps", "framerate", "framespers", "framespersecond", "mocapframerate", "videofps"}
 _NUMBERS = {"frameid", "frameids", "framenumber", "framenumbers", "frameindex", "frameindices"}
 _SURE = {"times", "timess", "frameids"} | _RATES
@@ -110,8 +106,7 @@ def _seconds(name: str, values: NDArray[Any], notes: list[str]) -> NDArray[np.fl
         return times_s
     match = _TIMES.fullmatch(name.lower())
     if match is not None and match[1]:
-        unit = match[1]
-        times_s = times_s * _UNIT_S["mi" if unit.startswith("mic") else unit[0]]
+        times_s = times_s * UNITS_S[match[1]]
     elif len(times_s) > 1:
         step = float(np.median(np.diff(times_s)))
         probable = probable_unit(step)

@@ -119,7 +119,7 @@ def _person_of(path: Path, hints: MeshHints) -> RawMesh:
         else:
             model, parameters = read_body_model(hints.body_model), parameters_of(entry, str(path))
             raw.vertices, raw.faces = parameters.vertices(model, notes, hints.progress), model.faces
-            rate = parameters.frames_per_s
+            rate = parameters.usual_frames_per_s
     else:
         raw.vertices = _stacked(vertices, path)
         raw.faces = _numbers(path, entry, shared, FACE_NAMES)

@@ -77,6 +77,8 @@ class Take:
                 f" {frames} times",
                 "the same number, at least one",
             )
+        if not (np.isfinite(self.times_s).all() and (np.diff(self.times_s) > 0).all()):
+            raise Sd2Error(f"Take {self.title}: its times do not increase", "one after the other")
         values_of = {"synthetic": self.synthetic, "radar": self.radar}
         if self.limbs is not None:
             values_of["limbs"] = self.limbs.values

@@ -11,14 +11,26 @@ from sd2core.plausibility.findings import Finding
 USUAL_FRAMES_PER_S = (5.0, 1000.0)
 """Rates outside are of no camera or radar that sees a body move."""
 
-_UNITS_S = {"milliseconds": 1e-3, "microseconds": 1e-6, "nanoseconds": 1e-9}
+UNITS_S = {
+    name: unit_s
+    for unit_s, names in {
+        1.0: ("s", "sec", "secs", "second", "seconds"),
+        1e-3: ("ms", "msec", "msecs", "millisecond", "milliseconds"),
+        1e-6: ("us", "µs", "usec", "usecs", "microsecond", "microseconds"),
+        1e-9: ("ns", "nsec", "nsecs", "nanosecond", "nanoseconds"),
+    }.items()
+    for name in names
+}
+"""Seconds in a unit of time, by the names that files give it."""
+_RECOGNISED_FRAMES_PER_S = (1.0, 1000.0)
+"""Rates by which a unit is known: as far apart as units are, so that no more than one fits."""
 _GAP_STEPS, _GAP_S = 4.0, 0.25
 _WHOLE_RATES = (24_000.0, 30_000.0, 60_000.0, 120_000.0)
 """Numerators of the rates of television, such as 30000/1001."""
 
 
 def probable_unit(step: float) -> tuple[str, float] | None:
-    """Name of the unit, and its seconds, in which frames a step apart have a usual rate.
+    """Name of the unit, and its seconds, in which frames a step apart come 1 to 1000 a second.
 
     None where seconds fit, or nothing does. A step of 1 counts frames.
 
@@ -29,12 +41,12 @@ def probable_unit(step: float) -> tuple[str, float] | None:
     >>> probable_unit(0.033) is None
     True
     """
-    slowest, fastest = USUAL_FRAMES_PER_S
+    slowest, fastest = _RECOGNISED_FRAMES_PER_S
     if step <= 1.0:
         return None
-    for name, unit_s in _UNITS_S.items():
-        if slowest <= 1.0 / (step * unit_s) <= fastest:
-            return name, unit_s
+    for name in ("milliseconds", "microseconds", "nanoseconds"):
+        if slowest < 1.0 / (step * UNITS_S[name]) <= fastest:
+            return name, UNITS_S[name]
     return None
 
 

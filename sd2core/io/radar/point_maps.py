@@ -17,13 +17,12 @@ from sd2core.io.radar.points import (
 )
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
+from sd2core.plausibility.clock import probable_unit
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
 USUAL_FRAME_S = 0.1
 """Between frames of most published sets; no file of theirs says it exactly."""
-_UNITS_S = {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
-_PLAUSIBLE_FRAME_S = (0.005, 1.0)
 _CLEAR = 0.25
 """Correlation of velocities with changes of distance that decides on their sign."""
 _ENOUGH_FRAMES = 40
@@ -86,7 +85,7 @@ def load_points_map(path: Path, axis: VelocityAxis | None = None) -> RecordedMap
         )
     numbers, rows = np.unique(points.frame, return_inverse=True)
     stated_s = None if told is None else told.frame_repetition_s
-    columns, times_s = _clock(numbers, rows, points.time, stated_s, path, notes)
+    columns, times_s = _clock(numbers, rows, points, stated_s, path, notes)
     weight = _weights(points, notes)
     sign = _sign(points, rows, None if told is None else told.sign, path, notes)
     velocity_mps = -sign * points.doppler  # positive when approaching
@@ -119,7 +118,7 @@ def load_points_map(path: Path, axis: VelocityAxis | None = None) -> RecordedMap
 def _clock(
     numbers: NDArray[np.float64],
     rows: NDArray[np.intp],
-    time: NDArray[np.float64] | None,
+    points: RadarPoints,
     stated_s: float | None,
     path: Path,
     notes: list[str],
@@ -131,10 +130,10 @@ def _clock(
     steps = np.maximum(np.diff(numbers), 1.0)
     frame_s = stated_s
     moments_s = None
-    if frame_s is None and time is not None and len(numbers) > 1:
+    if frame_s is None and points.time is not None and len(numbers) > 1:
         first = np.zeros(len(numbers))
-        first[rows[::-1]] = time[::-1]
-        moments_s, frame_s = _in_seconds(first, steps, notes)
+        first[rows[::-1]] = points.time[::-1]
+        moments_s, frame_s = _in_seconds(first, steps, points.time_unit_s, notes)
     if frame_s is None:
         frame_s = USUAL_FRAME_S
         notes.append(
@@ -152,21 +151,23 @@ def _clock(
 
 
 def _in_seconds(
-    first: NDArray[np.float64], steps: NDArray[np.float64], notes: list[str]
+    first: NDArray[np.float64],
+    steps: NDArray[np.float64],
+    unit_s: float | None,
+    notes: list[str],
 ) -> tuple[NDArray[np.float64] | None, float | None]:
     """Times of frames in seconds, and the usual step; None where they tell nothing."""
     if not np.isfinite(first).all():
         return None, None
     step = float(np.median(np.diff(first) / steps))
-    low, high = _PLAUSIBLE_FRAME_S
-    for unit, unit_s in _UNITS_S.items():
-        if low <= step * unit_s <= high:
-            if unit != "s":
-                notes.append(
-                    f"Times are taken to be in {unit}: {1 / (step * unit_s):.3g} frames/s."
-                )
-            return (first - first[0]) * unit_s, step * unit_s
-    return None, None
+    if unit_s is None:
+        unit_s = 1.0
+        if (probable := probable_unit(step)) is not None:
+            name, unit_s = probable
+            notes.append(f"Times are taken to be {name}: {1 / (step * unit_s):.3g} frames/s.")
+        elif not 1e-3 <= step < 1.0:  # steps of 1 count frames
+            return None, None
+    return ((first - first[0]) * unit_s, step * unit_s) if step > 0 else (None, None)
 
 
 def _weights(points: RadarPoints, notes: list[str]) -> NDArray[np.float64]:

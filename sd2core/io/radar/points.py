@@ -25,6 +25,7 @@ from sd2core.files.limits import open_regular
 from sd2core.files.texts import faults_in, lines_of, read_toml
 from sd2core.io.imu_columns import titles_of
 from sd2core.io.radar.stored_arrays import MATLAB_SUFFIX, array_names, open_stored
+from sd2core.plausibility.clock import UNITS_S
 
 TEXT_SUFFIXES = (".csv", ".tsv")
 SUFFIXES = (*TEXT_SUFFIXES, ".npy", MATLAB_SUFFIX)
@@ -42,7 +43,7 @@ _NAMES = {
 }  # fmt: skip
 COLUMNS = tuple(_NAMES)
 """Columns that are known; the velocity alone must be there, and the frame or the time."""
-_UNITS = {"m", "mps", "ms", "s", "db", "sec", "dbm"}
+_UNITS = {"m", "mps", "db", "dbm", *UNITS_S}
 _IGNORED = "-"
 _EXPECTED = "a table of points with the columns frame and doppler"
 _FEWEST, _MAX = 3, 12
@@ -74,6 +75,7 @@ class RadarPoints:
     frame: NDArray[np.float64]  # (P,) ascending
     doppler: NDArray[np.float64]  # (P,) as in the file
     time: NDArray[np.float64] | None
+    time_unit_s: float | None  # None: its heading does not name it
     range_m: NDArray[np.float64] | None
     intensity: NDArray[np.float64] | None
     columns: tuple[str, ...]  # names in the order of the file, "-" for what is not needed
@@ -156,7 +158,8 @@ def read_points(path: Path, description: PointsDescription | None = None) -> Rad
     if not finite.all():
         row = int(np.flatnonzero(~finite)[0])
         raise Sd2Error(f"{path}: the velocity of row {row + 1} is no number", "a finite number")
-    return _sorted(path, numbers, columns, guessed)
+    unit_s = _unit_s(table.names[places["time"]]) if table.names and "time" in places else None
+    return _sorted(path, numbers, columns, unit_s, guessed)
 
 
 def column_names(path: Path, dataset: str | None = None) -> tuple[str, ...]:
@@ -179,7 +182,11 @@ def _unknown(path: Path, table: _Table) -> Sd2Error:
 
 
 def _sorted(
-    path: Path, numbers: dict[str, NDArray[np.float64]], columns: tuple[str, ...], guessed: bool
+    path: Path,
+    numbers: dict[str, NDArray[np.float64]],
+    columns: tuple[str, ...],
+    time_unit_s: float | None,
+    guessed: bool,
 ) -> RadarPoints:
     """Points by their frames: their numbers, or moments of the same time."""
     time = numbers.get("time")
@@ -199,7 +206,14 @@ def _sorted(
     if range_m is None and len(place) > 1:
         range_m = np.sqrt(sum(axis * axis for axis in place))
     return RadarPoints(
-        frame, numbers["doppler"], time, range_m, numbers.get("intensity"), columns, guessed
+        frame,
+        numbers["doppler"],
+        time,
+        time_unit_s,
+        range_m,
+        numbers.get("intensity"),
+        columns,
+        guessed,
     )
 
 
@@ -365,6 +379,12 @@ def _plain(title: str) -> str:
     while len(words) > 1 and words[-1] in _UNITS:
         words.pop()
     return "".join(words)
+
+
+def _unit_s(title: str) -> float | None:
+    """Unit of times that a title names after the column, or in brackets."""
+    words = re.findall(r"[a-zµ]+", title.lower())
+    return UNITS_S.get(words[-1]) if len(words) > 1 else None
 
 
 def _by_numbers(table: _Table) -> tuple[str, ...] | None:

@@ -31,6 +31,7 @@ from sd2core.labels.formats.numbers import finite_number, whole_number
 from sd2core.labels.formats.rows import UNNAMED, LabelRows, Row
 from sd2core.labels.spans import Labels
 from sd2core.labels.typed_times import seconds_of
+from sd2core.plausibility.clock import UNITS_S
 from sd2core.timebase import Timebase
 
 FORMAT = LabelFormat(
@@ -70,9 +71,6 @@ _NAMES = {
     "origin": ("origin",),
     "observation": ("observation_id",),
 }  # fmt: skip
-
-_UNITS_S = {"_ms": 1e-3, "_msec": 1e-3, "_us": 1e-6, "_ns": 1e-9}
-"""Ends of headings of times that are not in seconds."""
 
 _TIMES = ("start_s", "end_s", "duration_s")
 
@@ -229,10 +227,9 @@ def _named(heading: str) -> tuple[str, float]:
     """Plain name of a column, and its unit in seconds where it names another one."""
     plain = _plain(heading)
     if not any(plain in names for names in _NAMES.values()):
-        for ending, unit_s in _UNITS_S.items():
-            name = plain.removesuffix(ending)
-            if name != plain and any(name in _NAMES[column] for column in _TIMES):
-                return name, unit_s
+        name, _, unit = plain.rpartition("_")
+        if unit in UNITS_S and any(name in _NAMES[column] for column in _TIMES):
+            return name, UNITS_S[unit]
     return plain, 1.0
 
 

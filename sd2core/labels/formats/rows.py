@@ -28,13 +28,12 @@ from sd2core.labels.spans import (
     Overlap,
     Span,
 )
+from sd2core.plausibility.spans import are_beyond
 from sd2core.timebase import Timebase
 
 UNNAMED = "unnamed"
 """Label of a span for which the file has none, and name of a track without one."""
 
-_ROUNDING_S = 1e-3
-"""What times in whole milliseconds may lie beyond a recording without being worth a word."""
 _MAX_LISTED = 5
 
 
@@ -155,7 +154,7 @@ class LabelClock:
             return at_s, at_s + self.mark_s
         if self.timebase is None:
             assert self.frames_per_s is not None
-            frame = math.floor(at_s * self.frames_per_s + _ROUNDING_S)
+            frame = math.floor(at_s * self.frames_per_s + 1e-3)  # of a rounded time
             return frame / self.frames_per_s, (frame + 1) / self.frames_per_s
         if not self.timebase.covers(at_s):
             return at_s, at_s + self.timebase.frame_duration_s
@@ -196,8 +195,8 @@ class LabelReading:
         """The same, with a remark on spans that reach beyond a recording; their times stay."""
         if timebase is None:
             return self
-        low_s, high_s = timebase.start_s - _ROUNDING_S, timebase.end_s + _ROUNDING_S
-        beyond = sum(one.start_s < low_s or one.end_s > high_s for one in self.labels.spans)
+        spans_s = [(one.start_s, one.end_s) for one in self.labels.spans]
+        beyond = int(are_beyond(spans_s, timebase.start_s, timebase.end_s).sum())
         if not beyond:
             return self
         reach = "reaches" if beyond == 1 else "reach"

@@ -132,7 +132,9 @@ def test_frames_with_a_rate(tmp_path: Path) -> None:
     assert spans(reading(tmp_path / "a.csv", content, None, frames_per_s=20.0)) == [(0.5, 1.0, "A")]
 
 
-@pytest.mark.parametrize(("start_s", "end_s"), [(15.6, 15.6), (9.0, 12.0), (-1.0, 1.0)])
+@pytest.mark.parametrize(
+    ("start_s", "end_s"), [(15.6, 15.6), (9.0, 12.0), (-1.0, 1.0), (10.1, 10.2)]
+)
 def test_what_is_beyond_the_recording_stays_and_is_told(
     tmp_path: Path, start_s: float, end_s: float
 ) -> None:
@@ -149,6 +151,11 @@ def test_labels_within_the_recording_are_not_beyond_it(tmp_path: Path) -> None:
         write_labels(tmp_path / name, labels, BASE)
         found = read_label_file(tmp_path / name, BASE)
         assert found.sentence == "1 span on 1 track taken, nothing left out."
+
+
+def test_what_ends_a_moment_after_the_last_frame_is_not_beyond(tmp_path: Path) -> None:
+    found = reading(tmp_path / "a.csv", "label,start,end\nA,9,10.4\n")
+    assert found.sentence == "1 span on 1 track taken, nothing left out."
 
 
 # ELAN.
