@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.output import print_json, progress_bar
+from sd2core.cli.output import print_json, progress_bar, tell_lost
 from sd2core.errors import Sd2Error
 from sd2core.options.records import ARGUMENTS, Place
 from sd2core.options.shared import Figure, Json
@@ -87,6 +87,7 @@ def _eval(options: Evaluate) -> None:
     from sd2core.train.evaluation_text import as_markdown, as_text, draw
 
     pairs = read_mixed(options.data)
+    tell_lost(pairs.lost_frames)
     subjects = None
     if options.subjects is not None:
         subjects = named_subjects(options.subjects, pairs.subjects)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -71,6 +72,14 @@ def print_facts(title: str, facts: Mapping[str, str]) -> None:
     width = max(map(len, shown), default=0)
     for name, value in shown.items():
         print(f"  {name:<{width}}  {value}")
+
+
+def tell_lost(frames: int) -> None:
+    """Say on standard error how many frames of pairs are lost, where some are."""
+    from sd2core.pairs.rows import lost_in_words
+
+    if frames:
+        print(f"sd2: {lost_in_words(frames)}.", file=sys.stderr)
 
 
 def listed(counts: Mapping[Any, int]) -> str:

@@ -163,14 +163,17 @@ def _label(options: Label) -> None:
     """
     from sd2core.labels.formats import read_label_file
     from sd2core.pairs.labelling import TakeLabel, label_pairs, read_take_labels
-    from sd2core.pairs.store import read_pairs
+    from sd2core.pairs.store import open_takes
     from sd2core.timebase import Timebase
 
     rows = [] if options.table is None else read_take_labels(options.table)
     clocks = {}
     if options.take:
-        takes = read_pairs(options.pairs).takes
-        clocks = {f"{take.subject}/{take.name}": Timebase(take.times_s) for take in takes}
+        facts, arrays = open_takes(options.pairs)
+        clocks = {
+            f"{take.subject}/{take.name}": Timebase(arrays["times_s"][take.rows])
+            for take in facts.takes
+        }
     for said in options.take:
         name, _, file = said.partition("=")
         if name not in clocks:

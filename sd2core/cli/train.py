@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.output import picked, print_facts, print_json
+from sd2core.cli.output import picked, print_facts, print_json, tell_lost
 from sd2core.errors import Sd2Error
 from sd2core.options.training import DataConfig, Train, TrainConfig
 
@@ -122,6 +122,7 @@ def _bar(what: str) -> Iterator[Watch]:
             kind = event["event"]
             if kind == "start":
                 minutes = event["minutes"]
+                tell_lost(event.get("frames_lost", 0))
                 bar.unit = "step" if minutes is None else "s"
                 steps = (event["epochs"] or 0) * event["steps_per_epoch"]
                 bar.total = steps if minutes is None else round(60 * minutes)

@@ -300,10 +300,10 @@ def limits(card: dict[str, Any]) -> list[str]:
 
 
 def damage_text(frames: int) -> str:
-    """What became of frames that were lost to damaged chunks of meshes."""
+    """What became of frames that were lost to damaged chunks of meshes or pairs."""
     return (
-        f"{frames:,} frames are lost to damaged chunks of their meshes and are in no segment:"
-        " copy those meshes again, or write them again."
+        f"{frames:,} frames are lost to damaged chunks of their files and are in no segment:"
+        " copy those files again, or write them again."
     )
 
 

@@ -7,10 +7,12 @@ import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sd2core.datasets.recording_sources import (
     Making,
@@ -36,7 +38,8 @@ from sd2core.labels.formats import read_labels
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
-from sd2core.pairs.store import limbs_of, open_takes
+from sd2core.pairs.rows import lost_frames, read_around
+from sd2core.pairs.store import SPLIT, limbs_of, open_takes
 from sd2core.pairs.summary import TakeEntry
 from sd2core.progress import Progress
 from sd2core.recording.recording import SUFFIX, is_recording, open_recording
@@ -245,30 +248,53 @@ class _PairStore:
             sums.update(np.ascontiguousarray(self._part(name, take)).data)
         return sums.hexdigest()
 
-    def _part(self, name: str, take: TakeEntry) -> Any:
-        return np.asarray(self._arrays[name][take.rows])
+    @cached_property
+    def _lost(self) -> NDArray[np.bool_]:
+        return lost_frames(self._arrays, self.facts.frames)
+
+    def _part(self, name: str, take: TakeEntry) -> NDArray[Any]:
+        """Frames of a take, zeros where they are lost."""
+        return read_around(self._arrays[name], take.rows, self._lost)
+
+    def _times_s(self, take: TakeEntry) -> NDArray[np.float64]:
+        """Times of a take; those that are lost follow the others at the frame rate."""
+        frame, kept = np.arange(take.stop - take.start), ~self._lost[take.rows]
+        regular_s = frame / self.facts.frame_rate_hz
+        if not kept.any():
+            return regular_s
+        offset_s = (self._part("times_s", take) - regular_s)[kept]
+        return np.asarray(regular_s + np.interp(frame, frame[kept], offset_s))
 
     def _outline(self, take: TakeEntry) -> Outline:
-        label = self._part("label", take)
-        times_s = self._part("times_s", take)
-        runs = runs_of(label, times_s)
-        return Outline(self._kinds, times_s, None, label, self.facts.labels, runs)
+        label, times_s = self._part("label", take), self._times_s(take)
+        runs, there = runs_of(label, times_s), ~self._lost[take.rows]
+        return Outline(self._kinds, times_s, there, label, self.facts.labels, runs)
 
     def _source(self, key: SourceKey, take: TakeEntry) -> Source:
-        clock = Timebase(self._part("times_s", take))
+        lost = self._lost[take.rows]
+        clock = Timebase(self._times_s(take))
         sensor = VirtualSensor(take.sensor_position_m)
         meta = {"sensor": {"position_m": list(sensor.position_m)}}
 
         def as_map(name: str, kind: MapKind, unit: str) -> DopplerMap:
             values = self._part(name, take).T
             return DopplerMap(
-                values, self._axis, clock, kind, unit, self.facts.null_bins, meta=meta
+                values,
+                self._axis,
+                clock,
+                kind,
+                unit,
+                self.facts.null_bins,
+                present=~lost,
+                meta=meta,
             )
 
         maps: dict[MapKind, DopplerMap] = {}
         if {"synthetic", "denoised"} & {*self._kinds}:
             counted = as_map("synthetic", "synthetic", "share of vertices")
-            limbs = limbs_of(self.facts, self._arrays, take)
+            split = {name: self._part(name, take) for name in SPLIT if name in self._arrays}
+            own = take.model_copy(update={"start": 0, "stop": len(lost)})
+            limbs = limbs_of(self.facts, split, own)
             maps["synthetic"] = replace(counted, limbs=limbs)
         if self._model is not None:
             maps["denoised"] = denoised(maps["synthetic"], self._model, self._texture)
@@ -283,5 +309,9 @@ class _PairStore:
             self.facts.labels,
             {name: known[name] for name in self.facts.labels if known.get(name)},
             None,
-            {"pairs": self.path.name, "take": take.name},
+            {
+                "pairs": self.path.name,
+                "take": take.name,
+                **({"damaged_frames": int(lost.sum())} if lost.any() else {}),
+            },
         )

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.files.stores import Damage, StoredArray
+from sd2core.files.stores import StoredArray
 from sd2core.mesh.vertex_parts import QUANTITIES
 from sd2core.pairs.summary import INDEX_NAME, REMAKE, TakeEntry
 
@@ -60,46 +59,58 @@ def row_kinds(
 
 
 def read_rows(
-    path: Path, arrays: Mapping[str, StoredArray], takes: Sequence[TakeEntry]
-) -> dict[str, NDArray[Any]]:
-    """Read all frames that belong to a take.
+    arrays: Mapping[str, StoredArray], frames: int
+) -> tuple[dict[str, NDArray[Any]], NDArray[np.bool_]]:
+    """Read the first frames of all arrays, and tell which are lost to damaged chunks.
 
-    Raises Sd2Error if some of them are damaged, with the takes that are lost.
+    Raises Sd2Error if all are, or the damage is none of chunks.
     """
-    frames = max(take.stop for take in takes)
-    read: dict[str, NDArray[Any]] = {}
-    found: list[Damage] = []
-    for name, array in arrays.items():
-        try:
-            read[name] = array[:frames]
-        except Sd2Error:
-            damaged = array.damage("values", range(frames))
-            if not damaged:
-                raise
-            found += damaged
-            read[name] = _undamaged(array, frames, damaged)
-    lost = [
-        f"{take.subject}/{take.name}@{take.placement}"
-        for take in takes
-        if any(take.start < damage.stop and damage.start < take.stop for damage in found)
+    try:
+        return {name: array[:frames] for name, array in arrays.items()}, np.zeros(frames, bool)
+    except Sd2Error:
+        lost = lost_frames(arrays, frames)
+        if not lost.any() or lost.all():
+            raise
+        read = {name: read_around(array, slice(0, frames), lost) for name, array in arrays.items()}
+        return read, lost
+
+
+def lost_frames(arrays: Mapping[str, StoredArray], frames: int) -> NDArray[np.bool_]:
+    """Frames of which some array has a damaged chunk, (frames,)."""
+    lost = np.zeros(frames, bool)
+    for array in arrays.values():
+        for one in array.damage("checksums" if array.checksums else "values", range(frames)):
+            lost[one.start : one.stop] = True
+    return lost
+
+
+def read_around(array: StoredArray, rows: slice, lost: NDArray[np.bool_]) -> NDArray[Any]:
+    """Some rows of an array, with zeros in frames that are lost."""
+    values = np.zeros((rows.stop - rows.start, *array.shape[1:]), array.dtype)
+    for start, stop in _runs(~lost[rows]):
+        values[start:stop] = array[rows.start + start : rows.start + stop]
+    return values
+
+
+def kept_parts(take: TakeEntry, lost: NDArray[np.bool_]) -> list[TakeEntry]:
+    """Uninterrupted parts of a take between frames that are lost, under its name."""
+    return [
+        take.model_copy(update={"start": take.start + start, "stop": take.start + stop})
+        for start, stop in _runs(~lost[take.rows])
     ]
-    if lost:
-        raise Sd2Error(
-            f"{path} is damaged: {'; '.join(map(str, found))}."
-            f" These takes are lost: {', '.join(lost)}",
-            "chunks as they were written",
-            f"Copy it again from where it came, or delete the lines of these takes in {INDEX_NAME}"
-            " to go on with the others",
-        )
-    return read
 
 
-def _undamaged(array: StoredArray, frames: int, damaged: Sequence[Damage]) -> NDArray[Any]:
-    """Rows with zeros where they are damaged."""
-    rows = np.zeros((frames, *array.shape[1:]), array.dtype)
-    start = 0
-    for one in damaged:
-        rows[start : one.start] = array[start : one.start]
-        start = min(one.stop, frames)
-    rows[start:] = array[start:frames]
-    return rows
+def lost_in_words(frames: int) -> str:
+    """What became of frames of pairs that were lost to damaged chunks; empty if none were."""
+    if not frames:
+        return ""
+    return (
+        f"{frames:,} frames of the pairs are lost to damaged chunks and left out: copy the pairs"
+        " again. `sd2 info --verify` names the chunks"
+    )
+
+
+def _runs(there: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First frame, and the one after the last, of runs that are there."""
+    edges = np.flatnonzero(np.diff(there.astype(np.int8), prepend=0, append=0)).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))

@@ -29,7 +29,7 @@ from sd2core.files.stores import (
 from sd2core.files.texts import append_lines, drop_torn_line
 from sd2core.maps import LimbMaps
 from sd2core.mesh.vertex_parts import JOINTS, PARTS
-from sd2core.pairs.rows import check_array, read_rows, row_kinds
+from sd2core.pairs.rows import check_array, kept_parts, read_rows, row_kinds
 from sd2core.pairs.summary import (
     FORMAT,
     INDEX_NAME,
@@ -45,7 +45,11 @@ from sd2core.pairs.summary import (
 )
 from sd2core.sensor import VelocityAxis
 
+LOST = "frames_lost"
+"""Entry of the provenance with the frames lost of each take, where chunks are damaged."""
 _ARRAYS = ("synthetic", "radar", "times_s", "label")
+SPLIT = ("limbs", "kinematics")
+"""Arrays that a store has where its input is split by the parts of the body."""
 _CHUNK_FRAMES = 2250
 
 
@@ -128,7 +132,7 @@ class Take:
     @property
     def title(self) -> str:
         """Name for messages."""
-        return f"{self.subject}/{self.name}" + (f"@{self.placement}" if self.placement else "")
+        return self.key.title
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +146,12 @@ class PairSet:
     labels: tuple[str, ...]  # The first is the background.
     takes: tuple[Take, ...]
     provenance: dict[str, Any] = field(default_factory=dict)  # Origin of the set; kept as JSON.
+
+    @property
+    def lost_frames(self) -> int:
+        """Number of frames that were left out because their chunks are damaged."""
+        stores = self.provenance.get("mixed", [self.provenance])
+        return sum(sum(one.get(LOST, {}).values()) for one in stores)
 
     @property
     def has_limbs(self) -> bool:
@@ -280,6 +290,8 @@ class PairWriter:
 def read_pairs(path: Path) -> PairSet:
     """Read a store of pairs.
 
+    Frames in damaged chunks are left out: a take is read in parts of the same name around them.
+
     Raises
     ------
     Sd2Error
@@ -287,9 +299,16 @@ def read_pairs(path: Path) -> PairSet:
     """
     path = Path(path)
     facts, lazily = open_takes(path)
-    arrays = read_rows(path, lazily, facts.takes)
+    arrays, lost = read_rows(lazily, facts.frames)
+    lost_in = {take.key.title: int(lost[take.rows].sum()) for take in facts.takes}
+    lost_in = {title: frames for title, frames in lost_in.items() if frames}
+    kept = [part for take in facts.takes for part in kept_parts(take, lost)]
+    if not kept:
+        raise Sd2Error(
+            f"{path} is damaged: all takes are lost", "chunks as they were written", REMAKE
+        )
     split: dict[str, Any] = {}
-    split |= {name: arrays.pop(name) for name in ("limbs", "kinematics") if name in arrays}
+    split |= {name: arrays.pop(name) for name in SPLIT if name in arrays}
     try:
         takes = tuple(
             Take(
@@ -300,7 +319,7 @@ def read_pairs(path: Path) -> PairSet:
                 limbs=limbs_of(facts, split, entry),
                 **{name: array[entry.rows] for name, array in arrays.items()},
             )
-            for entry in facts.takes
+            for entry in kept
         )
     except Sd2Error as error:
         raise Sd2Error(f"{path}: {error.found}", error.expected, REMAKE) from error
@@ -319,7 +338,7 @@ def read_pairs(path: Path) -> PairSet:
         frame_rate_hz=facts.frame_rate_hz,
         labels=facts.labels,
         takes=takes,
-        provenance=facts.provenance,
+        provenance=facts.provenance | ({LOST: lost_in} if lost_in else {}),
     )
 
 
@@ -343,7 +362,7 @@ def limbs_of(facts: PairFacts, arrays: Mapping[str, Any], take: TakeEntry) -> Li
         return None
     limbs, moves = (
         np.asarray(arrays[name][take.rows]).transpose(1, 2, 0) if name in arrays else None
-        for name in ("limbs", "kinematics")
+        for name in SPLIT
     )
     assert limbs is not None
     return LimbMaps(facts.parts, limbs, moves)

@@ -41,6 +41,11 @@ class TakeKey(NamedTuple):
     name: str
     placement: int
 
+    @property
+    def title(self) -> str:
+        """Name for messages."""
+        return f"{self.subject}/{self.name}" + (f"@{self.placement}" if self.placement else "")
+
 
 class TakeEntry(BaseModel):
     """One take as a line of the store describes it."""

@@ -234,6 +234,7 @@ def _say_start(
         test_subjects=list(split.test),
         split_by_take=split.by_take,
         kind=data.pairs.kind,
+        frames_lost=data.pairs.lost_frames,
         resumed=resumed,
         epochs_done=position.epoch,
         steps_done=position.steps_done,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+from sd2core.cli.output import tell_lost
 from sd2core.cli.recording_maps import MapName, maps_of, usual_maps
 from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.errors import Sd2Error
@@ -90,6 +91,7 @@ def clips_of(
             stores.append(one.path)
     if stores:
         pairs = read_mixed(stores)
+        tell_lost(pairs.lost_frames)
         for name in maps or ("synthetic", "radar"):
             wanted: MapKind = pairs.kind if name == "radar" else name
             sets.append(clips_of_pairs(pairs, wanted, _denoiser_of(pairs, wanted, denoiser)))

@@ -15,7 +15,6 @@ from zarr.codecs import BloscCodec
 
 from sd2core.files.resources import resource_path
 from sd2core.io.mesh import load_mesh
-from sd2core.pairs.summary import INDEX_NAME
 from tests.damaged_files import change, cut, lose
 from tests.small_pairs import write_pairs
 
@@ -105,7 +104,7 @@ def test_damaged_pairs_say_which_frames(
     assert "frames 0 to" in refused.err
     assert "of radar (radar/c/0/0" in refused.err
     assert "of label (label/c/0" in refused.err
-    assert f"delete the lines of these takes in {INDEX_NAME}" in sd2("info", path).err
+    assert "cannot be read: frames 0 to 599 of radar" in sd2("info", path).err
 
 
 @pytest.mark.parametrize("ending", [".zarr", ".h5"])

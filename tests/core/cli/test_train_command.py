@@ -15,6 +15,7 @@ from small_pairs import write_pairs
 
 from sd2core.runs.progress import ProgressWriter, read_events
 from sd2core.train.folder import TrainingFolder
+from tests.damaged_files import lose
 
 SMALL = ("--model", "gru", "--set", "channels=4", "--set", "depth=1", "--segment-frames", "30")
 QUICK = (*SMALL, "--device", "cpu", "--threads", "1", "--epochs", "2")
@@ -64,6 +65,23 @@ class TestTrain:
         assert f"{mean:.3f} ± " in outcome.out
         assert f"{mean:.3f} ± " in table.read_text()
         assert picture.read_bytes().startswith(b"\x89PNG")
+
+    def test_frames_of_a_damaged_chunk_are_left_out_and_told(
+        self, sd2: Sd2, tmp_path: Path
+    ) -> None:
+        damaged, run = write_pairs(tmp_path / "pairs.zarr", takes=6), tmp_path / "run"
+        lose(damaged / "radar" / "c" / "1" / "0")  # frames 2250 to 2699, the last ones of s3
+        told = "450 frames of the pairs are lost to damaged chunks"
+        outcome = sd2("train", damaged, *QUICK, "--out", run)
+        assert outcome.code == 0, outcome.err
+        assert told in outcome.err
+        (start, *_) = read_events(run / "progress.jsonl")
+        assert start["frames_lost"] == 450
+        assert '"frames_lost"' in sd2("info", run / "best.safetensors", "--json").out
+        assert told in sd2("eval", run, "--data", damaged, "--json").err
+        outcome = sd2("info", damaged, "--json")
+        content = json.loads(outcome.out)
+        assert (content["frames"], told in content["notes"][0]) == (2250, True)
 
     @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 0), (signal.SIGINT, 130)])
     def test_a_signal_stops_it(

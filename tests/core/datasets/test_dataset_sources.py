@@ -40,6 +40,7 @@ from sd2core.placements.placements import PlacementGrid
 from sd2core.progress import silent
 from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import Recording
+from tests.damaged_files import lose
 
 GRID = PlacementGrid((1.0, 2.5), (0.0, 30.0))
 SWINGS = LabelSet("Swings", (Label("swing", "#0072b2", "1", "vertical"),))
@@ -342,3 +343,25 @@ def test_frames_of_damaged_chunks_are_in_no_segment_and_told(tmp_path: Path) -> 
     assert made_pairs.damaged == {"anna.sd2": 20}
     takes = read_pairs(tmp_path / "pairs.zarr").takes
     assert sum(len(take.times_s) for take in takes) == FRAMES - 20
+
+
+@pytest.mark.parametrize("chunk", ["radar/c/1/0", "times_s/c/1", "limbs/c/1/0/0"])
+def test_frames_of_pairs_in_damaged_chunks_are_in_no_segment_and_counted(
+    tmp_path: Path, chunk: str
+) -> None:
+    path = tmp_path / "pairs.zarr"
+    write_pairs(path, takes=1, frames=1500, limbs=True)  # chunks of 2250: s2 from frame 750 on
+    whole = tmp_path / "whole.zarr"
+    making = Making(kinds=("synthetic", "simulated"))
+    options = DatasetOptions(kinds=making.kinds, length=50, overlap=0)
+    write_dataset(whole, gather([path], making), options)
+    lose(path / chunk)
+    out, sources = tmp_path / "set.zarr", gather([path], making)
+    forecast = Counting.of(sources).forecast(options, 32)
+    write_dataset(out, sources, options)
+    with open_dataset(out) as opened, open_dataset(whole) as before:
+        card = describe_dataset(opened)
+        assert len(opened) == forecast.segments == len(before) - 45  # 750 frames, and all of s3
+        np.testing.assert_array_equal(opened["simulated"][:], before["simulated"][: len(opened)])
+    assert card["frames_damaged"] == 2250
+    assert [one for one in limits(card) if "2,250 frames are lost to damaged chunks" in one]

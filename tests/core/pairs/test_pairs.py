@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
 from sd2core.maps import LimbMaps
+from sd2core.pairs.rows import lost_in_words
 from sd2core.pairs.segments import cut, join, segment_starts
 from sd2core.pairs.store import PairWriter, Take, read_pairs
 from sd2core.pairs.summary import INDEX_NAME, TakeKey, is_pair_store
@@ -236,25 +237,42 @@ def test_an_overlap_as_long_as_the_window_is_refused() -> None:
 
 
 @pytest.mark.parametrize("damage", [change, lose])
-def test_takes_in_a_damaged_chunk_are_named_and_the_others_can_be_kept(
+def test_frames_in_a_damaged_chunk_are_read_around_and_told(
     tmp_path: Path, damage: Callable[[Path], None]
 ) -> None:
     path = tmp_path / "pairs.zarr"
     writer = PairWriter(path, **HEADER)
-    takes = [take("a", 2000), take("b", 200), take("c", 300), take("d", 2000), take("e", 1000)]
-    for (
-        each
-    ) in takes:  # chunks of 2250 frames: the second one holds the end of c, d, the start of e
+    takes = [take("a", 2000), take("b", 5000), take("c", 100), take("d", 3000)]
+    for each in takes:
         writer.append(each)
-    damage(path / "radar" / "c" / "1" / "0")
-    with pytest.raises(Sd2Error, match=r"frames 2250 to 4499 of radar \(radar/c/1/0") as refused:
+    # Chunks of 2250 frames: the second is within b, the fourth holds the end of b, c, and of d.
+    for number in (1, 3):
+        damage(path / "radar" / "c" / str(number) / "0")
+    pairs = read_pairs(path)
+    kept = [
+        takes[0],
+        takes[1].part(slice(0, 250)),
+        takes[1].part(slice(2500, 4750)),
+        takes[3].part(slice(9000 - 7100, 3000)),
+    ]
+    assert all(same(*two) for two in zip(pairs.takes, kept, strict=True))
+    assert pairs.provenance["frames_lost"] == {"s1/b": 2500, "s1/c": 100, "s1/d": 1900}
+    assert pairs.lost_frames == 4500
+    assert "4,500 frames of the pairs are lost" in lost_in_words(pairs.lost_frames)
+
+
+def test_pairs_of_which_nothing_is_left_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "pairs.zarr"
+    PairWriter(path, **HEADER).append(take("a"))
+    lose(path / "times_s" / "c" / "0")
+    with pytest.raises(Sd2Error, match=r"pairs\.zarr .*frames 0 to 19 of times_s"):
         read_pairs(path)
-    assert "takes are lost: s1/c@0, s1/d@0. Exp" in str(refused.value)
-    index = path / INDEX_NAME
-    lines = index.read_text().splitlines(keepends=True)
-    index.write_text("".join(lines[:2] + lines[4:]))
-    kept = read_pairs(path).takes
-    assert all(same(*two) for two in zip(kept, takes[:2] + takes[4:], strict=True))
+
+
+@pytest.mark.parametrize("times_s", [[0.0, 0.0, 0.1], [0.0, 0.2, 0.1], [0.0, 0.1, np.nan]])
+def test_times_of_a_take_increase(times_s: list[float]) -> None:
+    with pytest.raises(Sd2Error, match="s1/a: its times do not increase"):
+        replace(take("a", 3), times_s=np.array(times_s))
 
 
 def test_a_store_comes_into_being_whole(tmp_path: Path) -> None:
