@@ -138,6 +138,8 @@ def _export(options: Export) -> int:
     wanted = _dataset_options(options)
     making = _making(options, wanted.kinds)
     sources = gather(options.inputs, making, subjects=options.subjects, label_files=options.labels)
+    for remark in (said for one in sources for said in one.remarks):
+        print(f"sd2: {remark}", file=sys.stderr)
     if options.dry_run:
         return _dry_run(options, sources, wanted, making)
     from sd2core.datasets.preview import write_preview
@@ -218,6 +220,7 @@ def _dry_run(
                 "segments_of_split": forecast.of_split(),
                 **picked(forecast, "frame_rate_hz", "total_bytes"),
                 "seconds": seconds,
+                "frames_damaged": forecast.frames_damaged,
                 "failed": list(forecast.failed),
             }
         )
@@ -229,7 +232,7 @@ def _dry_run(
             else f"about {duration(seconds)}, as such maps took here before"
         )
         print_facts(f"{options.out} would hold", facts)
-    _complain(forecast.failed)
+    _complain(forecast.frames_damaged, forecast.failed)
     return 1 if forecast.failed else 0
 
 
@@ -272,13 +275,13 @@ def _print(written: Written, sheet: Path) -> None:
             "sheet": content["sheet"],
         },
     )
-    if content["frames_damaged"]:
-        from sd2core.datasets.card import damage_text
-
-        print(f"sd2: {damage_text(content['frames_damaged'])}", file=sys.stderr)
-    _complain(content["failed"])
+    _complain(content["frames_damaged"], content["failed"])
 
 
-def _complain(failed: tuple[str, ...] | list[str]) -> None:
+def _complain(frames_damaged: int, failed: tuple[str, ...] | list[str]) -> None:
+    from sd2core.datasets.card import damage_text
+
+    if frames_damaged:
+        print(f"sd2: {damage_text(frames_damaged)}", file=sys.stderr)
     for one in failed:
         print(f"sd2: left out {one}", file=sys.stderr)

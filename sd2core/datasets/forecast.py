@@ -10,7 +10,7 @@ from sd2core.datasets.cutting import count_segments
 from sd2core.datasets.index import empty_header
 from sd2core.datasets.layout import bytes_per_segment
 from sd2core.datasets.options import DatasetOptions
-from sd2core.datasets.source import KINDS, LazySource, Outline, Source
+from sd2core.datasets.source import KINDS, LazySource, Outline, Source, SourceKey
 from sd2core.datasets.splitting import named_splits, split_people
 from sd2core.errors import Sd2Error
 from sd2core.maps import MapKind
@@ -33,6 +33,7 @@ class Forecast:
     split: Split
     frame_rate_hz: float
     total_bytes: int  # Size of the arrays before compression.
+    frames_damaged: int = 0  # Lost to damaged chunks, each recording counted once.
     failed: tuple[str, ...] = ()  # Sources that cannot be read, each with its reason.
 
     def of_split(self) -> dict[str, int]:
@@ -47,7 +48,7 @@ class Forecast:
 class Counting:
     """Outlines of sources, read once and counted with several options."""
 
-    outlines: list[tuple[str, Outline]] = field(default_factory=list)  # With the subject of each.
+    outlines: list[tuple[SourceKey, Outline]] = field(default_factory=list)
     failed: list[str] = field(default_factory=list)
 
     @classmethod
@@ -60,7 +61,7 @@ class Counting:
             try:
                 if one.outline is None:
                     raise Sd2Error(f"{one.key.title} does not say what it holds", "an outline")
-                found.outlines.append((one.key.subject, one.outline()))
+                found.outlines.append((one.key, one.outline()))
             except Sd2Error as error:
                 found.failed.append(f"{one.key.title}: {error}")
         progress(len(sources), len(sources))
@@ -77,11 +78,12 @@ class Counting:
         of_subject: Counter[str] = Counter()
         of_label: Counter[str] = Counter()
         of_kind: Counter[MapKind] = Counter()
-        for subject, outline in self.outlines:
+        damaged = {key[:2]: outline.damaged for key, outline in self.outlines}
+        for key, outline in self.outlines:
             labels = count_segments(outline, header.frame_rate_hz, options)
             of_label.update(labels)
             total = labels.total()
-            of_subject += Counter({subject: total})
+            of_subject += Counter({key.subject: total})
             of_kind.update({kind: total for kind in outline.kinds if kind in options.kinds})
         segments = of_label.total()
         split = Split((), (), ())
@@ -97,5 +99,6 @@ class Counting:
             split=split,
             frame_rate_hz=header.frame_rate_hz,
             total_bytes=segments * bytes_per_segment(replace(header, kinds=kinds)),
+            frames_damaged=sum(damaged.values()),
             failed=tuple(self.failed),
         )

@@ -218,6 +218,7 @@ class _Opened:
             self._label(timebase.times_s),
             self._names,
             labelled_spans(self._spans, self._names),
+            self._damaged,
         )
 
     def source(self, key: SourceKey, progress: Progress) -> Source:

@@ -62,6 +62,7 @@ class Outline:
     label: NDArray[np.integer]  # Index into ``labels``, per frame.
     labels: tuple[str, ...]  # The first is :data:`BACKGROUND`.
     spans: tuple[LabelledSpan, ...]
+    damaged: int = 0  # Frames lost to damaged chunks of its files.
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,13 +223,14 @@ class LazySource:
     ``fingerprint`` gives a hash of everything that the source is made of and of the settings, and
     may read files and raise ``Sd2Error``; a data set that holds a source of this key and of another
     fingerprint is not continued. Empty: not compared. ``outline`` foretells the content cheaply;
-    needed for a dry run.
+    needed for a dry run. ``remarks`` say what of its files is taken and what not.
     """
 
     key: SourceKey
     load: Callable[[Progress], Source]
     fingerprint: Callable[[], str] = str
     outline: Callable[[], Outline] | None = None
+    remarks: tuple[str, ...] = ()
 
 
 def plain_name(label: str) -> str:

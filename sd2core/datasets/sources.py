@@ -34,14 +34,14 @@ from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
 from sd2core.io.kinds import kind_of
 from sd2core.io.radar import holds_map, load_recorded_map
-from sd2core.labels.formats import read_labels
+from sd2core.labels.formats import read_label_file
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.pairs.rows import lost_frames, read_around
 from sd2core.pairs.store import SPLIT, limbs_of, open_takes
 from sd2core.pairs.summary import TakeEntry
-from sd2core.progress import Progress
+from sd2core.progress import Progress, silent
 from sd2core.recording.recording import SUFFIX, is_recording, open_recording
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
@@ -148,7 +148,7 @@ def map_source(path: Path, subject: str, label_file: Path | None = None) -> Lazy
         return sums.hexdigest()
 
     def load(_: Progress) -> Source:
-        doppler, labels = _read_map(path, label_file)
+        doppler, labels, _told = _read_map(path, label_file)
         names, classes = labels_and_classes(labels)
         return Source(
             *key,
@@ -162,19 +162,22 @@ def map_source(path: Path, subject: str, label_file: Path | None = None) -> Lazy
             spans=labelled_spans(labels.spans, names),
         )
 
-    return LazySource(key, load, fingerprint, lambda: load(lambda *_: None).outline())
+    remarks = () if label_file is None else (_read_map(path, label_file)[2],)
+    return LazySource(key, load, fingerprint, lambda: load(silent).outline(), remarks)
 
 
-def _read_map(path: Path, label_file: Path | None) -> tuple[DopplerMap, Labels]:
-    labels = Labels()
+def _read_map(path: Path, label_file: Path | None) -> tuple[DopplerMap, Labels, str]:
+    """A map, its labels, and what of the file with labels is taken."""
+    labels, told = Labels(), ""
     if holds_map(path):
         recorded = load_recorded_map(path)
         doppler, labels = recorded.doppler, recorded.labels
     else:
         doppler = DopplerMap.load(path)
     if label_file is not None:
-        labels = read_labels(label_file, doppler.timebase)
-    return doppler, labels
+        reading = read_label_file(label_file, doppler.timebase)
+        labels, told = reading.labels, f"{label_file}: {reading.sentence}"
+    return doppler, labels, told
 
 
 def _sensor(meta: dict[str, Any]) -> VirtualSensor:
@@ -268,7 +271,8 @@ class _PairStore:
     def _outline(self, take: TakeEntry) -> Outline:
         label, times_s = self._part("label", take), self._times_s(take)
         runs, there = runs_of(label, times_s), ~self._lost[take.rows]
-        return Outline(self._kinds, times_s, there, label, self.facts.labels, runs)
+        damaged = int(np.count_nonzero(~there))
+        return Outline(self._kinds, times_s, there, label, self.facts.labels, runs, damaged)
 
     def _source(self, key: SourceKey, take: TakeEntry) -> Source:
         lost = self._lost[take.rows]

@@ -166,6 +166,21 @@ def test_one_damaged_recording_is_reported_and_the_rest_is_written(
         assert dataset.header.subjects == ("anna", "carla")
 
 
+@pytest.mark.parametrize("more", [(), ("--dry-run",)])
+def test_what_of_a_label_file_is_taken_is_told(
+    sd2: Sd2, tmp_path: Path, more: tuple[str, ...]
+) -> None:
+    octahedron = recording(tmp_path / "anna.sd2", radar=False).folder
+    assert sd2("synth", octahedron, "--out", tmp_path / "map.npz").code == 0
+    labels = tmp_path / "labels.csv"
+    labels.write_text("label,start,end\nswing,1,2\nswing,3,x\nswing,70,71\n")
+    asked = ("export", tmp_path / "map.npz", "--labels", labels, "--kinds", "synthetic")
+    told = sd2(*asked, "--segment-frames", 30, "--out", tmp_path / "set.zarr", *more)
+    assert told.code == 0, told.err
+    assert f"sd2: {labels}: 2 spans on 1 track taken, of which 1 reaches beyond" in told.err
+    assert told.err.count("1 left out (line 3: ") == 1
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
