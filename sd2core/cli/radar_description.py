@@ -92,7 +92,12 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
         plain_axes,
         write_description,
     )
-    from sd2core.io.radar.points import TEXT_SUFFIXES, looks_like_points
+    from sd2core.io.radar.points import (
+        COLUMNS_OPTION,
+        TEXT_SUFFIXES,
+        holds_unnamed_columns,
+        looks_like_points,
+    )
     from sd2core.io.radar.stored_arrays import array_names
 
     told = given(options, DESCRIPTION)
@@ -105,6 +110,18 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
         raise Sd2Error(
             f"{path} cannot be described", "a .npy, .h5, .mat or .sigmf-meta of radar samples"
         )
+    if not told and holds_unnamed_columns(path):
+        if not sys.stdin.isatty():
+            raise Sd2Error(
+                f"{path} may hold points, or samples of a radar",
+                f"{COLUMNS_OPTION} for points; --carrier-hz and others for samples",
+            )
+        prompt = f"{DESCRIPTION['columns'].words}; nothing if these are samples"
+        print(f"columns ({prompt}): ", end="", file=sys.stderr, flush=True)
+        if answer := sys.stdin.readline().strip():
+            told["columns"] = tuple(one.strip() for one in answer.split(","))
+            _describe_points(path, told, as_json=as_json)
+            return
     told = _told_by_sigmf(path) | told
     if len(names := array_names(path)) > 1:
         _ask_for("dataset", told, f" ({', '.join(names[:9])})")
@@ -128,7 +145,12 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
 def _describe_points(path: Path, told: dict[str, Any], *, as_json: bool) -> None:
     from sd2core.cli.info.description import describe_radar, show
     from sd2core.io.radar.described import write_description
-    from sd2core.io.radar.points import column_names, described_points, read_points
+    from sd2core.io.radar.points import (
+        column_names,
+        described_points,
+        points_description,
+        read_points,
+    )
 
     foreign = told.keys() - {"columns", "dataset", "frame_repetition_s", "sign"}
     if foreign:
@@ -136,6 +158,8 @@ def _describe_points(path: Path, told: dict[str, Any], *, as_json: bool) -> None
             f"{DESCRIPTION[min(foreign)].flags[0]} is given for a table of points",
             "--columns, --dataset, --frame-repetition-s and --sign",
         )
+    if "columns" not in told and (before := points_description(path)) is not None:
+        told = before.model_dump(exclude_defaults=True) | told
     if "columns" not in told:
         try:
             told["columns"] = column_names(path, told.get("dataset"))

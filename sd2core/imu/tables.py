@@ -41,7 +41,7 @@ def read_table(
     acceleration_unit: AccelerationUnit | None = None,
     turn_rate_unit: TurnRateUnit | None = None,
 ) -> InertialSignals:
-    """Read a table of a real or virtual sensor: separated by commas, semicolons or tabs.
+    """Read a table of a real or virtual sensor: separated by commas, semicolons, tabs or spaces.
 
     Lines that begin with ``#`` are skipped; ``# rate_hz: 100`` among those before the heading
     stands for a column of times. An empty cell or NaN is a value that is not known.
@@ -154,7 +154,7 @@ def _factors(path: Path, columns: list[Column], given: dict[str, str]) -> NDArra
 
 
 def _numbers(
-    path: Path, lines: Iterable[tuple[int, str]], separator: str, columns: list[Column]
+    path: Path, lines: Iterable[tuple[int, str]], separator: str | None, columns: list[Column]
 ) -> NDArray[np.float64]:
     """Values of the columns, (N, columns)."""
     values, last = array("d"), max(one.number for one in columns)

@@ -57,9 +57,11 @@ class Column:
     unit: str  # empty if it is not stated
 
 
-def titles_of(heading: str) -> tuple[str, list[str]]:
-    """Separator of a heading, and the titles between."""
+def titles_of(heading: str) -> tuple[str | None, list[str]]:
+    """Separator of a heading, None where it is spaces, and the titles between."""
     separator = max(",;\t", key=heading.count)
+    if separator not in heading:
+        return None, [cell_text(title) for title in heading.split()]
     return separator, [cell_text(title) for title in heading.split(separator)]
 
 

@@ -63,7 +63,7 @@ def kind_of(path: Path) -> Kind:
         return "imu"
     if suffix == ".npz":
         return "map" if _is_doppler_map(path) else "mesh"
-    from sd2core.io.radar.points import looks_like_points
+    from sd2core.io.radar.points import column_names, holds_unnamed_columns, looks_like_points
 
     if looks_like_points(path):
         return "radar"
@@ -74,6 +74,8 @@ def kind_of(path: Path) -> Kind:
         return "mesh"  # whose reader says what to do
     if _holds_pictures(path):
         return "video"
+    if holds_unnamed_columns(path):
+        column_names(path)  # refuses it, and says how to name them
     raise Sd2Error(
         f"{path} is of no kind that is known",
         "a recording (.sd2), a video (.mp4, .mkv …), a mesh (.npz, .zarr, .obj, .ply, .glb, .pkl),"

@@ -36,9 +36,11 @@ from sd2core.io.radar.judging import judged
 from sd2core.io.radar.kkt import RecordedMap, load_kkt
 from sd2core.io.radar.point_maps import load_points_map
 from sd2core.io.radar.points import (
+    COLUMNS_OPTION,
     TEXT_SUFFIXES,
     column_names,
     has_columns_told,
+    holds_unnamed_columns,
     looks_like_points,
 )
 from sd2core.io.radar.sigmf import DATA, META
@@ -70,8 +72,8 @@ __all__ = [
 SUPPORTED = (
     "an Infineon recording: the folder with radar.npy, config.json and radar_timestamp.csv"
     " (or the folder above it, or its radar.npy); an A121's .h5; a DCA1000's .bin with the .cfg or"
-    " .json of the radar; what `sd2 listen` wrote; or .npy, .h5 or SigMF samples with a description"
-    " (docs/radar-files.md)"
+    " .json of the radar; what `sd2 listen` wrote; .npy, .h5 or SigMF samples with a description;"
+    " or a table of points, .csv, .npy or .mat (docs/radar-files.md)"
 )
 
 
@@ -209,7 +211,8 @@ def _ask_description(path: Path) -> RadarCapture:
     raise Sd2Error(
         f"{path} does not say what radar it is from{held}",
         f"its description, {description_of(path).name}, beside it",
-        f"Write it with `sd2 radar describe {path.name}`",
+        f"Write it with `sd2 radar describe {path.name}`"
+        + (f"; if they are points, with {COLUMNS_OPTION}" if holds_unnamed_columns(path) else ""),
     )
 
 

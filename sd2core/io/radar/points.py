@@ -43,6 +43,8 @@ _NAMES = {
 }  # fmt: skip
 COLUMNS = tuple(_NAMES)
 """Columns that are known; the velocity alone must be there, and the frame or the time."""
+COLUMNS_OPTION = "--columns frame,x,y,z,doppler,intensity (- for others)"
+"""How the user names the columns, for messages."""
 _UNITS = {"m", "mps", "db", "dbm", *UNITS_S}
 _IGNORED = "-"
 _EXPECTED = "a table of points with the columns frame and doppler"
@@ -113,6 +115,17 @@ def looks_like_points(path: Path) -> bool:
         return False
 
 
+def holds_unnamed_columns(path: Path) -> bool:
+    """True if a file is a table of numbers whose columns nothing names, perhaps of points."""
+    if path.suffix.lower() not in SUFFIXES or _told_beside(path):
+        return False
+    try:
+        table = _opened(path, None)
+    except Sd2Error:
+        return False
+    return not table.names and _FEWEST <= table.width <= _MOST and _recognised(table) is None
+
+
 def has_columns_told(path: Path) -> bool:
     """True if the description beside a file, right or wrong, is of a table of points."""
     return "columns" in _told_beside(path)
@@ -176,8 +189,7 @@ def _unknown(path: Path, table: _Table) -> Sd2Error:
     return Sd2Error(
         f"{path} holds {held}",
         "frame (or time) and doppler, and x, y, z, intensity where they are known",
-        f"Name the columns in order: sd2 radar describe {path.name} --columns"
-        " frame,x,y,z,doppler,intensity (- for others)",
+        f"Name the columns in order: sd2 radar describe {path.name} {COLUMNS_OPTION}",
     )
 
 

@@ -13,6 +13,7 @@ from scipy.io import savemat
 
 from sd2core.io.radar import load_capture
 from sd2core.io.radar.described import read_description
+from sd2core.io.radar.points import points_description
 from sd2core.maps import DopplerMap
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.sensor import VelocityAxis
@@ -257,6 +258,42 @@ def test_what_a_table_of_points_lacks_is_described(sd2: Sd2, tmp_path: Path) -> 
     outcome = sd2("radar", "describe", path, *columns, "--carrier-hz", 60e9)
     assert outcome.code == 1
     assert "--carrier-hz is given for a table of points" in outcome.err
+
+
+def test_what_is_said_of_points_later_adds_to_what_was_said(sd2: Sd2, tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "points.csv", walk()[:, :5], ("n", "a", "b", "c", "d"))
+    assert sd2("radar", "describe", path, "--columns", "frame,x,y,z,doppler").code == 0
+    for more in (("--frame-repetition-s", 0.05), ("--sign", -1)):
+        assert sd2("radar", "describe", path, *more).code == 0
+    found = points_description(path)
+    assert found is not None
+    assert (found.columns, found.frame_repetition_s, found.sign) == (
+        ("frame", "x", "y", "z", "doppler"),
+        0.05,
+        -1,
+    )
+
+
+@pytest.mark.parametrize("name", ["points.csv", "points.tsv", "points.npy"])
+def test_columns_that_nothing_names_are_asked_for(
+    sd2: Sd2, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    path, table = tmp_path / name, walk()
+    table[:, 4] += np.random.default_rng(1).normal(0.0, 0.01, len(table))  # no steps tell it
+    if path.suffix == ".npy":
+        np.save(path, table)
+    else:  # by spaces, as NumPy writes tables
+        np.savetxt(path, table)
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    for command in (("info",), ("radar",), ("radar", "describe")):
+        outcome = sd2(*command, path)
+        assert outcome.code == 1
+        assert "--columns frame,x,y,z,doppler,intensity" in outcome.err
+    answers = io.StringIO("frame,x,y,z,doppler,intensity\n")
+    monkeypatch.setattr(answers, "isatty", lambda: True)
+    monkeypatch.setattr("sys.stdin", answers)
+    assert sd2("radar", "describe", path).code == 0
+    assert "200 frames" in sd2("info", path).out
 
 
 @pytest.mark.parametrize(
