@@ -78,13 +78,23 @@ def clock_of(places: Sequence[Mapping[Any, Any]], frames: int, source: str) -> C
     notes: list[str] = []
     try:
         times_s = _seconds(*times[0], notes) if times else None
-        rate = float(np.asarray(rates[0]).reshape(-1)[0]) if rates else None
-    except (TypeError, ValueError, IndexError) as error:
+        rate = _rate(rates[0]) if rates else None
+    except (TypeError, ValueError, IndexError, ZeroDivisionError) as error:
         raise Sd2Error(
             f"{source}: its times or frames per second are no numbers ({error})", "real numbers"
         ) from error
     known = None if times or not numbers else _frame_numbers(numbers[0], frames, source)
     return Clock(times_s, rate, known, tuple(notes))
+
+
+def _rate(value: Any) -> float:
+    """Frames per second: a number, or a fraction such as ``30000/1001``, also as two numbers."""
+    parts = np.asarray(value).reshape(-1)
+    if parts.dtype.kind == "U":
+        parts = np.asarray(str(parts[0]).split("/"))
+    rate = float(parts[0])
+    # Two rates alike may as well be those of two people.
+    return rate / float(parts[1]) if len(parts) == 2 and parts[0] != parts[1] else rate
 
 
 def _plain(name: str) -> str:

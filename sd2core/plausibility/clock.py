@@ -14,6 +14,7 @@ USUAL_FRAMES_PER_S = (5.0, 1000.0)
 UNITS_S = {
     name: unit_s
     for unit_s, names in {
+        60.0: ("min", "mins", "minute", "minutes"),
         1.0: ("s", "sec", "secs", "second", "seconds"),
         1e-3: ("ms", "msec", "msecs", "millisecond", "milliseconds"),
         1e-6: ("us", "µs", "usec", "usecs", "microsecond", "microseconds"),

@@ -74,6 +74,8 @@ _NAMES = {
 
 _TIMES = ("start_s", "end_s", "duration_s")
 
+_SEPARATOR_TOLD = re.compile(r"\A\s*sep=.\r?\n", re.IGNORECASE)
+"""First line by which spreadsheets are told what separates the columns."""
 _BANNED = re.compile("[\0\ud800-\udfff]")
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
@@ -122,7 +124,7 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
     not separate; times may be hours, minutes and seconds. Raises Sd2Error when columns are missing
     or it is not certain what a number means.
     """
-    text = read_text(path, _EXPECTED)
+    text = _SEPARATOR_TOLD.sub("\n", read_text(path, _EXPECTED))
     separator = _separator(path, text)
     heading, lines = _table(path, text, separator)
     where = _columns(path, heading)
@@ -136,6 +138,8 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
         whole = _of_observation(path, whole, where["observation"], observation)
     units_s = {column: _named(heading[where[column]])[1] for column in _TIMES if column in where}
     numbers = _Numbers(path, whole, where, units_s)
+    if not where.keys() & {"end_s", "duration_s", "start_frame"}:
+        found.remarks.append(f"marks, as no column of ends is known ({', '.join(heading)[:200]})")
     for line, cells in whole:
         with found.entry():
             cell = {name: of_cell(cells[index]) for name, index in where.items()}
@@ -335,7 +339,7 @@ def _times(
 
 
 def _frame(path: Path, line: int, column: str, text: str) -> int:
-    number = whole_number(text.strip())
+    number = whole_number(text.strip().removesuffix(".0"))  # pandas', where some are missing
     if number is None:
         raise Sd2Error(f"{path}, line {line}: {column} is {text[:50]!r}", "a whole number from 0")
     return number

@@ -72,13 +72,21 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
 def _tasks(path: Path) -> dict[str, dict[str, Any]]:
     content = read_json(path, _EXPECTED, "Export it again")
     listed = content if isinstance(content, list) else [content]
-    if not listed or not all(isinstance(one, dict) for one in listed):
-        raise Sd2Error(f"{path} is JSON without tasks", _EXPECTED)
+    if not all(isinstance(one, dict) for one in listed) or not any(map(_is_annotated, listed)):
+        raise Sd2Error(f"{path} is JSON without annotated tasks", _EXPECTED)
     tasks: dict[str, dict[str, Any]] = {}
     for number, task in enumerate(listed, start=1):
         name = _name(task)
         tasks[name if name and name not in tasks else f"task {task.get('id', number)}"[:100]] = task
     return tasks
+
+
+def _is_annotated(task: dict[str, Any]) -> bool:
+    """True for a task with annotations, perhaps none, or of JSON-MIN with regions."""
+    if isinstance(task.get("annotations", task.get("completions")), list):
+        return True
+    lists = (one for one in task.values() if isinstance(one, list))
+    return any(isinstance(one, dict) and {*_KINDS} & one.keys() for found in lists for one in found)
 
 
 def _name(task: dict[str, Any]) -> str:

@@ -32,7 +32,9 @@ def remarks(mesh: MeshSequence) -> list[str]:
 @pytest.mark.parametrize(
     "name", ["fps", "FPS", "frame_rate", "frameRate", "mocap_framerate", "mocap_frame_rate"]
 )
-@pytest.mark.parametrize("value", [25, 25.0, np.array([25.0])])
+@pytest.mark.parametrize(
+    "value", [25, 25.0, np.array([25.0]), "25", "25000/1000", np.array([25025, 1001])]
+)
 def test_a_rate_has_many_names(tmp_path: Path, name: str, value: object) -> None:
     mesh = read(tmp_path, **{name: value})
     np.testing.assert_allclose(mesh.times_s, TIMES_S)
@@ -49,6 +51,7 @@ def test_a_rate_has_many_names(tmp_path: Path, name: str, value: object) -> None
         ("frame_times_ns", 1e9),
         ("timestamps_milliseconds", 1e3),
         ("times_microseconds", 1e6),
+        ("time_min", 1 / 60),
     ],
 )
 def test_a_unit_in_the_name_is_taken_at_its_word(tmp_path: Path, name: str, per_s: float) -> None:

@@ -158,6 +158,41 @@ def test_what_ends_a_moment_after_the_last_frame_is_not_beyond(tmp_path: Path) -
     assert found.sentence == "1 span on 1 track taken, nothing left out."
 
 
+# Tables and JSON of others.
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "label,start_min,end_min\nA,0.05,0.1\n",
+        "label,start (minutes),duration (sec)\nA,0.05,3\n",
+        "sep=;\r\nlabel;start;end\r\nA;3;6\r\n",
+        "label,first_frame,last_frame\nA,30.0,59.0\n",
+    ],
+)
+def test_units_separators_and_frames_as_others_write_them(tmp_path: Path, content: str) -> None:
+    assert spans(reading(tmp_path / "a.csv", content)) == [(3.0, 6.0, "A")]
+
+
+def test_a_table_without_ends_says_that_it_has_marks(tmp_path: Path) -> None:
+    found = reading(tmp_path / "a.csv", "label,start,duration_weeks\nA,1,2\n")
+    assert spans(found) == [(1.0, 1.1, "A")]
+    assert "marks, as no column of ends is known (label, start, duration_weeks)" in found.sentence
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        '[{"start": 1, "end": 2, "label": "A"}]',
+        '{"database": {"v": {"annotations": [{"segment": [1, 2], "label": "A"}]}}}',
+        "[]",
+    ],
+)
+def test_json_of_another_program_is_refused(tmp_path: Path, content: str) -> None:
+    with pytest.raises(Sd2Error, match=r"a\.json is JSON without annotated tasks"):
+        reading(tmp_path / "a.json", content)
+
+
 # ELAN.
 
 
