@@ -136,8 +136,9 @@ def _clock(
         moments_s, frame_s = _in_seconds(first, steps, points.time_unit_s, notes)
     if frame_s is None:
         frame_s = USUAL_FRAME_S
+        told = "The table tells no times" if points.time is None else "Its times tell no frame rate"
         notes.append(
-            f"The table tells no times: a frame is taken every {1e3 * frame_s:g} ms."
+            f"{told}: a frame is taken every {1e3 * frame_s:g} ms."
             f" `sd2 radar describe {path.name} --frame-repetition-s S` says otherwise."
         )
     if moments_s is not None and (np.diff(moments_s) > 0).all():

@@ -45,12 +45,18 @@ COLUMNS = tuple(_NAMES)
 """Columns that are known; the velocity alone must be there, and the frame or the time."""
 COLUMNS_OPTION = "--columns frame,x,y,z,doppler,intensity (- for others)"
 """How the user names the columns, for messages."""
-_UNITS = {"m", "mps", "db", "dbm", *UNITS_S}
+_SPEEDS_MPS = {
+    "m/s": 1.0, "mps": 1.0, "ms": 1.0, "ms-1": 1.0, "cm/s": 0.01, "cmps": 0.01, "mm/s": 0.001,
+    "km/h": 1 / 3.6, "kmh": 1 / 3.6, "kph": 1 / 3.6,
+}  # fmt: skip
+_UNITS = {"m", "db", "dbm", *_SPEEDS_MPS, *UNITS_S}
 _IGNORED = "-"
 _EXPECTED = "a table of points with the columns frame and doppler"
 _FEWEST, _MAX = 3, 12
 _LOOKED_AT = 20_000
 _FASTEST_MPS = 30.0
+_SHUFFLED = 0.1
+"""Share of rows whose frame is before the last one's: beyond it they are in no order."""
 
 
 class PointsDescription(BaseModel):
@@ -161,18 +167,31 @@ def read_points(path: Path, description: PointsDescription | None = None) -> Rad
     try:
         numbers = dict(zip(places, table.read(tuple(places.values())), strict=True))
     except Sd2Error:
-        if not {"frame", "time"} <= places.keys():
+        if "time" not in places or not isinstance(table, _Text):
             raise
-        del places["time"]  # dates in words, perhaps
-        numbers = dict(zip(places, table.read(tuple(places.values())), strict=True))
+        numbers = _with_dates(table, places)
     if table.frame is not None:
         numbers["frame"] = table.frame()
     finite = np.isfinite(numbers["doppler"])
     if not finite.all():
         row = int(np.flatnonzero(~finite)[0])
         raise Sd2Error(f"{path}: the velocity of row {row + 1} is no number", "a finite number")
-    unit_s = _unit_s(table.names[places["time"]]) if table.names and "time" in places else None
+    titles = {name: table.names[place] for name, place in places.items() if table.names}
+    numbers["doppler"] *= _speed_mps(path, titles.get("doppler", ""))
+    unit_s = _unit_s(titles.get("time", ""))
     return _sorted(path, numbers, columns, unit_s, guessed)
+
+
+def _with_dates(table: _Text, places: dict[str, int]) -> dict[str, NDArray[np.float64]]:
+    """Columns of a table whose times are dates, or else are left out where frames are numbered."""
+    try:
+        read = table.read_dates(tuple(places.values()), places["time"])
+    except Sd2Error:
+        if "frame" not in places:
+            raise
+        del places["time"]
+        read = table.read(tuple(places.values()))
+    return dict(zip(places, read, strict=True))
 
 
 def column_names(path: Path, dataset: str | None = None) -> tuple[str, ...]:
@@ -209,6 +228,10 @@ def _sorted(
     frame = numbers["frame"]
     if not (np.isfinite(frame).all() and (frame == np.round(frame)).all()):
         raise Sd2Error(f"{path}: frames are numbered {frame[frame % 1 != 0][0]:g}", "whole numbers")
+    if (np.diff(frame) < 0).mean() > _SHUFFLED:
+        order = np.argsort(frame, kind="stable")
+        numbers = {name: values[order] for name, values in numbers.items()}
+        frame, time = numbers["frame"], numbers.get("time")
     # A number that falls begins another recording in the same file.
     starts = np.flatnonzero(np.diff(frame) < 0) + 1
     for start in starts.tolist():
@@ -253,17 +276,30 @@ class _Text(_Table):
         self._path = path
         with open_regular(path) as stream:
             first = next((one for one in lines_of(stream) if one.strip()), b"")
+        if b"\0" in first:
+            raise Sd2Error(f"{path} is not in UTF-8", _EXPECTED, "Save it as UTF-8")
         self._separator, titles = titles_of(first.decode("utf-8-sig", "replace").strip())
         self.width = len(titles)
         self._headed = not all(map(_is_number, titles))
         self.names = tuple(titles) if self._headed else ()
 
     def read(self, places: tuple[int, ...], most: int | None = None) -> list[NDArray[np.float64]]:
+        return self._read(places, most, {})
+
+    def read_dates(self, places: tuple[int, ...], dated: int) -> list[NDArray[np.float64]]:
+        """Columns at some places; what one of them has are dates as ISO 8601 writes them."""
+        return self._read(places, None, {dated: _unix_s})
+
+    def _read(
+        self, places: tuple[int, ...], most: int | None, converters: dict[int | str, Any]
+    ) -> list[NDArray[np.float64]]:
         try:
             with open_regular(self._path) as stream:
                 lines = (
                     text.decode("utf-8-sig", "replace") for text in lines_of(stream) if text.strip()
                 )
+                if self._separator == ";":  # then decimal points may be commas
+                    lines = (line.replace(",", ".") for line in lines)
                 if self._headed:
                     next(lines, None)
                 first = next(lines, None)
@@ -276,6 +312,8 @@ class _Text(_Table):
                     ndmin=2,
                     max_rows=most,
                     comments=None,
+                    converters=converters or None,
+                    encoding="utf-8",
                 )
         except (OSError, ValueError) as error:
             expected = "numbers in every row, separated alike"
@@ -376,6 +414,8 @@ def _named(titles: Sequence[str], *, framed: bool = False) -> tuple[str, ...] | 
     for name, aliases in _NAMES.items():
         place = next((plain.index(one) for one in aliases if one in plain), None)
         if place is not None:
+            if plain.count(plain[place]) > 1 and name in ("frame", "doppler"):
+                return None  # which of them is meant?
             found[place] = name
     has = set(found.values())
     if "doppler" not in has or not (framed or has & {"frame", "time"}):
@@ -397,6 +437,19 @@ def _unit_s(title: str) -> float | None:
     """Unit of times that a title names after the column, or in brackets."""
     words = re.findall(r"[a-zµ]+", title.lower())
     return UNITS_S.get(words[-1]) if len(words) > 1 else None
+
+
+def _speed_mps(path: Path, title: str) -> float:
+    """Unit of velocities that a title names likewise, m/s where it names none."""
+    brackets = re.search(r"[\[(](.*?)[\])]", title.lower())
+    unit = "" if brackets is None else re.sub(r"[\s^·]", "", brackets[1])
+    if unit not in _SPEEDS_MPS and unit:
+        raise Sd2Error(
+            f"{path}: {title} has the unit {unit}", f"one of {', '.join(_SPEEDS_MPS)}",
+            "Write velocities in m/s",
+        )  # fmt: skip
+    last = re.split(r"[\s_]", title.lower())[-1]
+    return _SPEEDS_MPS.get(unit or last, 1.0)
 
 
 def _by_numbers(table: _Table) -> tuple[str, ...] | None:
@@ -448,6 +501,11 @@ def doppler_step(velocities: NDArray[np.float64]) -> float:
     if step < 0.01 or (np.abs(found / step - np.round(found / step)) > 0.1).any():
         return 0.0
     return round(step, 6)
+
+
+def _unix_s(text: str) -> float:
+    moment = np.datetime64(text.strip().strip('"').removesuffix("Z"), "us")
+    return float(moment.astype(np.int64)) / 1e6
 
 
 def _is_number(text: str) -> bool:

@@ -12,8 +12,13 @@ from sd2core.errors import Sd2Error
 from sd2core.io.kinds import kind_of
 from sd2core.io.radar import companions, holds_map, load_capture, load_recorded_map
 from sd2core.io.radar.described import write_description
-from sd2core.io.radar.point_maps import velocity_histogram
-from sd2core.io.radar.points import PointsDescription, doppler_step, looks_like_points
+from sd2core.io.radar.point_maps import load_points_map, velocity_histogram
+from sd2core.io.radar.points import (
+    PointsDescription,
+    doppler_step,
+    looks_like_points,
+    read_points,
+)
 from sd2core.sensor import VelocityAxis
 from tests.core.io.radar.point_files import (
     FRAME_S,
@@ -180,6 +185,74 @@ def test_the_step_of_a_radar_is_found_in_rounded_velocities(step_mps: float) -> 
     velocities = np.round(step_mps * rng.integers(-6, 7, 5000), 3)
     assert doppler_step(velocities) == pytest.approx(step_mps, rel=0.01)
     assert doppler_step(rng.normal(size=5000)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("title", "mps"),
+    [("doppler (cm/s)", 0.01), ("velocity_kmh", 1 / 3.6), ("Doppler[m/s]", 1.0), ("v_mps", 1.0)],
+)
+def test_velocities_are_in_the_unit_of_their_title(tmp_path: Path, title: str, mps: float) -> None:
+    table = walk()
+    table[:, 4] /= mps
+    path = write_csv(tmp_path / "p.csv", table, (*NAMES[:4], title, NAMES[5]))
+    np.testing.assert_allclose(read_points(path).doppler, walk()[:, 4], atol=1e-4)
+
+
+@pytest.mark.parametrize("unit", ["Hz", "bins"])
+def test_what_is_no_velocity_is_refused(tmp_path: Path, unit: str) -> None:
+    path = write_csv(tmp_path / "p.csv", walk(), (*NAMES[:4], f"doppler ({unit})", NAMES[5]))
+    with pytest.raises(Sd2Error, match=f"has the unit {unit.lower()}"):
+        load_points_map(path)
+
+
+def test_two_velocities_are_refused(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "p.csv", walk(), ("frame", "x", "y", "doppler", "doppler", "snr"))
+    with pytest.raises(Sd2Error, match="holds frame, x, y, doppler, doppler, snr"):
+        read_points(path)
+
+
+def test_rows_in_no_order_are_sorted_by_their_frames(tmp_path: Path) -> None:
+    table = walk()
+    shuffled = write_csv(tmp_path / "p.csv", np.random.default_rng(0).permutation(table))
+    in_order = load_points_map(write_csv(tmp_path / "q.csv", table)).doppler
+    np.testing.assert_allclose(load_points_map(shuffled).doppler.values, in_order.values)
+
+
+def test_semicolons_go_with_decimal_commas(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "p.csv", walk(), by=";")
+    path.write_text(path.read_text().replace(".", ","))
+    np.testing.assert_allclose(read_points(path).doppler, walk()[:, 4])
+
+
+def test_text_in_another_encoding_is_named(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "p.csv", walk())
+    path.write_bytes(path.read_text().encode("utf-16"))
+    with pytest.raises(Sd2Error, match=r"p\.csv is not in UTF-8"):
+        read_points(path)
+
+
+@pytest.mark.parametrize("frames", [True, False])
+def test_dates_of_points_are_times(tmp_path: Path, frames: bool) -> None:
+    table = walk()[:600]
+    path = tmp_path / "p.csv"
+    titles = ("stamp" if not frames else "frame", *NAMES[1:], "timestamp")
+    rows = [
+        ",".join(f"{value:g}" for value in row) + f",2024-05-01T10:00:{0.05 * row[0]:06.3f}Z"
+        for row in table
+    ]
+    path.write_text("\n".join([",".join(titles), *rows]))
+    made = load_points_map(path).doppler
+    np.testing.assert_allclose(made.times_s, 0.05 * np.arange(50), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("title", "per_s"), [("Time (ms)", 1e3), ("timestamp_us", 1e6), ("time_min", 1 / 60)]
+)
+def test_times_are_in_the_unit_of_their_title(tmp_path: Path, title: str, per_s: float) -> None:
+    table = walk()
+    timed = np.column_stack([table, 2.0 * per_s * table[:, 0]])  # no rate that would tell the unit
+    made = load_points_map(write_csv(tmp_path / "p.csv", timed, (*NAMES, title))).doppler
+    np.testing.assert_allclose(made.times_s, 2.0 * np.arange(200), rtol=1e-5)
 
 
 def test_dates_in_words_are_left_out_where_frames_are_numbered(tmp_path: Path) -> None:
