@@ -159,6 +159,8 @@ def _numbers(
     """Values of the columns, (N, columns)."""
     values, last = array("d"), max(one.number for one in columns)
     for number, line in lines:
+        if separator == ";":  # then decimal points may be commas
+            line = line.replace(",", ".")
         cells = line.split(separator)
         if len(cells) <= last:
             raise Sd2Error(

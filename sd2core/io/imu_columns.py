@@ -28,6 +28,7 @@ UNITS: dict[str, dict[str, float]] = {
     "gyr": {
         "rad/s": 1.0, "radps": 1.0, "rads": 1.0,
         "°/s": math.pi / 180, "deg/s": math.pi / 180, "degps": math.pi / 180, "dps": math.pi / 180,
+        "mdps": math.pi / 180_000,
     },
     "time": UNITS_S,
 }  # fmt: skip
@@ -76,7 +77,9 @@ def column_of(number: int, title: str) -> Column | None:
     if parts is None:
         return None
     words = [word for word in re.split(r"[\s_.\-:]+", parts["name"].lower()) if word]
-    unit = (parts["unit"] or "").strip().lower().replace("⁻²", "-2").replace("μ", "µ")
+    unit = (parts["unit"] or "").strip().lower()
+    for theirs, ours in (("⁻²", "-2"), ("μ", "µ"), ("/sec", "/s")):
+        unit = unit.replace(theirs, ours)
     units = {name for table in UNITS.values() for name in table}
     if not unit and len(words) > 1 and words[-1] in units:
         unit = words.pop()

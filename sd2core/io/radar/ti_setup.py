@@ -32,6 +32,8 @@ _SAMPLINGS: dict[int, Sampling] = {0: "real", 1: "complex", 2: "complex with ima
 """By ``adcOutputFmt``, the same in both kinds of file."""
 _BITS_16 = 2
 _MAX = 2**20
+_LATEST = 1.05
+"""Of the length of a chirp: no radar samples later, but for rounding."""
 _CFG = "a .cfg of the mmWave SDK, or JSON of pymmw,"
 _JSON = "the .mmwave.json of mmWave Studio"
 
@@ -162,7 +164,8 @@ def _of_cfg(path: Path) -> TiSetup:
     else:
         commands = {}
         for line in text.splitlines():
-            words = re.split("%|#|//", line, maxsplit=1)[0].split()
+            sent = re.sub(r"^\s*\w+:/>", "", line)  # the prompt, in the log of a terminal
+            words = re.split("%|#|//", sent, maxsplit=1)[0].split()
             if words:
                 commands.setdefault(words[0], []).append(words[1:])
     for name in ("advFrameCfg", "subFrameCfg"):
@@ -198,38 +201,38 @@ def _of_cfg(path: Path) -> TiSetup:
         )
     profiles = [
         _Profile.model_construct(
-            profileId=int(one[0]),
+            profileId=_whole(one[0]),
             startFreqConst_GHz=one[1],
             idleTimeConst_usec=one[2],
             adcStartTimeConst_usec=one[3],
             rampEndTime_usec=one[4],
             freqSlopeConst_MHz_usec=one[7],
-            numAdcSamples=int(one[9]),
+            numAdcSamples=_whole(one[9]),
             digOutSampleRate=one[10],
         )
         for one in _all_numbers(commands, "profileCfg", 11)
     ]
     chirps = [
         _Chirp.model_construct(
-            chirpStartIdx=int(one[0]),
-            chirpEndIdx=int(one[1]),
-            profileId=int(one[2]),
+            chirpStartIdx=_whole(one[0]),
+            chirpEndIdx=_whole(one[1]),
+            profileId=_whole(one[2]),
             idleTimeVar_usec=one[5],
-            txEnable=int(one[7]),
+            txEnable=_whole(one[7]),
         )
         for one in _all_numbers(commands, "chirpCfg", 8)
     ]
     device = _Device.model_construct(
-        rxChannelEn=int(channels[0]),
-        bits=int(adc[0]),
-        output=int(adc[1]),
+        rxChannelEn=_whole(channels[0]),
+        bits=_whole(adc[0]),
+        output=_whole(adc[1]),
         profiles=profiles,
         chirps=chirps,
         frame=_Frame.model_construct(
-            chirpStartIdx=int(frame[0]),
-            chirpEndIdx=int(frame[1]),
-            numLoops=int(frame[2]),
-            numFrames=int(frame[3]),
+            chirpStartIdx=_whole(frame[0]),
+            chirpEndIdx=_whole(frame[1]),
+            numLoops=_whole(frame[2]),
+            numFrames=_whole(frame[3]),
             framePeriodicity_msec=frame[4],
         ),
         swapped=swapped,
@@ -299,9 +302,18 @@ def _all_numbers(
         except ValueError:
             numbers = []
         if len(numbers) < least or not all(abs(one) < 1e9 for one in numbers):
-            raise Sd2Error(f"{name} is {' '.join(words)[:80]!r}", f"{least} numbers or more")
+            raise Sd2Error(
+                f"{name} is {' '.join(words)[:80]!r}",
+                f"{least} numbers or more, in the units of the SDK (GHz, µs, ms)",
+            )
         found.append(numbers)
     return found
+
+
+def _whole(number: float) -> int:
+    if number % 1:
+        raise Sd2Error(f"A count, a mask or the number of a chirp is {number:g}", "a whole number")
+    return int(number)
 
 
 # --- mmWave Studio ---------------------------------------------------------------------------
@@ -390,6 +402,13 @@ def _setup(device: _Device, lanes: int, notes: list[str]) -> TiSetup:
             "two samples or more, at a rate",
         )
     adc_start_s = profile.adcStartTimeConst_usec * 1e-6
+    ramp_s = profile.rampEndTime_usec * 1e-6
+    if adc_start_s + samples / rate_hz > _LATEST * ramp_s:
+        raise Sd2Error(
+            f"{samples} samples at {rate_hz:g} Hz from {1e6 * adc_start_s:g} µs on end after the"
+            f" chirp, which lasts {1e6 * ramp_s:g} µs",
+            "samples within the chirp (their rate is in ksps, times are in µs)",
+        )
     first_hz = profile.startFreqConst_GHz * 1e9 + slope_hz_per_s * adc_start_s
     last_hz = first_hz + slope_hz_per_s * samples / rate_hz
     config = RadarConfig(

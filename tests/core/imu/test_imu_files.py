@@ -80,6 +80,10 @@ def read(tmp_path: Path, text: str, **options: object) -> InertialSignals:
          '"omega.z (rad/s)"', STANDARD_GRAVITY_MPS2 / 1000, 1.0),
         ("time_s,accel x m/s^2,accel y m/s^2,accel z m/s^2,gyro-x rad/s,gyro-y rad/s,"
          "gyro-z rad/s", 1.0, 1.0),
+        ("time_s,acc_x_g,acc_y_g,acc_z_g,gyr_x (mdps),gyr_y (mdps),gyr_z (mdps)",
+         STANDARD_GRAVITY_MPS2, math.pi / 180_000),
+        ("time_s,acc_x_g,acc_y_g,acc_z_g,gyr_x (rad/sec),gyr_y (rad/sec),gyr_z (rad/sec)",
+         STANDARD_GRAVITY_MPS2, 1.0),
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
@@ -91,6 +95,14 @@ def test_columns_are_found_by_their_names_with_their_units(
     np.testing.assert_allclose(signals.times_s, [0.0, 0.01, 0.02])
     np.testing.assert_allclose(signals.acceleration_mps2[1], acceleration * np.array([1, 2, 3]))
     np.testing.assert_allclose(signals.turn_rate_radps[2], turn_rate * np.array([4, 5, 6]))
+
+
+def test_semicolons_go_with_decimal_commas_and_minutes_are_minutes(tmp_path: Path) -> None:
+    heading = HEADING.replace("time_s", "time (min)").replace(",", ";")
+    rows = "\n".join(f"{row / 60:.9f};1;2;3;0.5;0.5;0.5".replace(".", ",") for row in range(3))
+    signals = read(tmp_path, f"{heading}\n{rows}\n")
+    np.testing.assert_allclose(signals.times_s, [0.0, 1.0, 2.0], atol=1e-6)
+    np.testing.assert_allclose(signals.turn_rate_radps, 0.5)
 
 
 def test_order_and_other_columns_do_not_matter(tmp_path: Path) -> None:

@@ -335,6 +335,18 @@ MISMATCHES: dict[str, tuple[Callable[[Path], object], str]] = {
         _cfg(extra="advFrameCfg 2 0 1 1 0"),
         r"walk\.cfg: advFrameCfg makes frames of several kinds",
     ),
+    "half a receiver": (
+        _cfg(channelCfg="channelCfg 1.5 1 0"),
+        r"walk\.cfg: .*is 1\.5\. Expected: a whole number",
+    ),
+    "a rate in Msps": (
+        _cfg(profileCfg="profileCfg 0 60 20 5 30 0 0 60 1 32 4 0 0 30"),
+        r"walk\.cfg: 32 samples at 4000 Hz .* end after the chirp",
+    ),
+    "a frequency in Hz": (
+        _cfg(profileCfg="profileCfg 0 60e9 20 5 30 0 0 60 1 32 4000 0 0 30"),
+        r"walk\.cfg: profileCfg is .*in the units of the SDK",
+    ),
     "no profile": (_cfg(profileCfg=""), r"walk\.cfg: There is no profileCfg"),
     "words for numbers": (_cfg(frameCfg="frameCfg a b"), r"walk\.cfg: frameCfg is 'a b'"),
     "a chirp too few": (
@@ -453,6 +465,14 @@ def test_comments_of_a_cfg_may_be_in_any_encoding(tmp_path: Path, encoding: str)
     lines = cfg_of(PLAIN, note="% 实验 一", other="// 帧").replace(" 1 0\n", " 1 0 % 表示\n")
     path.with_suffix(".cfg").write_bytes(lines.encode(encoding, "replace"))
     assert (load_capture(path).read(0, 3) == plain).all()
+
+
+def test_a_terminals_log_is_read_as_the_commands_in_it(tmp_path: Path) -> None:
+    path = write_ti(tmp_path, PLAIN)
+    lines = (f"mmwDemo:/>{line}\nDone" for line in cfg_of(PLAIN).splitlines())
+    sent = load_capture(path)
+    path.with_suffix(".cfg").write_text("\n".join(lines))
+    assert load_capture(path).config == sent.config
 
 
 def test_the_configuration_of_mmwave_studio_may_be_called_cfg(tmp_path: Path) -> None:
