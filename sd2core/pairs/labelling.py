@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -18,6 +19,8 @@ from sd2core.files.texts import read_text
 from sd2core.pairs.store import PairSet, open_takes
 
 _NEEDED = ("subject", "take", "label")
+_USED = (*_NEEDED, "start_s", "end_s")
+_LIKE_A_TIME = re.compile("start|end|stop|begin|onset|offset|duration|time")
 _EXPECTED = "columns subject, take, label, and start_s, end_s where a label is not of a whole take"
 
 
@@ -42,13 +45,21 @@ class TakeLabel:
 
 def read_take_labels(path: Path) -> list[TakeLabel]:
     """Read a table (CSV) with a row per label: ``subject,take,label[,start_s,end_s]``."""
-    rows = csv.DictReader(read_text(path, _EXPECTED).splitlines(), skipinitialspace=True)
-    missing = [name for name in _NEEDED if name not in (rows.fieldnames or ())]
+    lines = read_text(path, _EXPECTED).splitlines()
+    separator = max(",;\t", key=lines[0].count)
+    rows = csv.DictReader(lines, skipinitialspace=True, delimiter=separator)
+    rows.fieldnames = [name.strip().casefold() for name in rows.fieldnames or ()]
+    missing = [name for name in _NEEDED if name not in rows.fieldnames]
+    other = [name for name in rows.fieldnames if name not in _USED and _LIKE_A_TIME.match(name)]
+    if other:
+        raise Sd2Error(f"{path} has the column {other[0]}", "start_s and end_s, in seconds")
     if missing:
         raise Sd2Error(f"{path} has no column {', '.join(missing)}", _EXPECTED)
     found = []
     for number, row in enumerate(rows, start=2):
         try:
+            if None in row:
+                raise ValueError("more columns than the heading")
             subject, take, label = ((row[name] or "").strip() for name in _NEEDED)
             start_s, end_s = float(row.get("start_s") or 0.0), float(row.get("end_s") or math.inf)
             found.append(TakeLabel(subject, take, label, start_s, end_s))

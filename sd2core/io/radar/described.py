@@ -37,6 +37,8 @@ DATA_NAME = "radar.npy"
 """Name of the samples in a folder of their own."""
 Axis = Literal["frame", "transmitter", "receiver", "chirp", "sample", "iq", "stream"]
 
+_LOWEST_HZ = 1e5
+"""A carrier or a bandwidth below is stated in another unit."""
 _META = "meta.json"
 _EXPECTED = "the description of radar samples (docs/radar-files.md)"
 _ORDER = ("frame", "transmitter", "receiver", "chirp", "sample", "iq")
@@ -382,11 +384,22 @@ def _config(
         frame_s = chirp_s * sizes["chirp"]
     if chirp_s is None or frame_s is None:
         raise Sd2Error("It states no times", "chirp_repetition_s and frame_repetition_s")
+    for name, value, such in (
+        ("carrier_hz", told.carrier_hz, "60 GHz is 60e9"),
+        ("bandwidth_hz", told.bandwidth_hz or math.inf, "1 GHz is 1e9; 0 for a continuous wave"),
+    ):
+        if value < _LOWEST_HZ:
+            raise Sd2Error(f"{name} is {value:g}", f"Hz: {such}")
     has_beat = told.bandwidth_hz != 0 and told.range_step_m is None
     if rate_hz is None:
         if has_beat:
             raise Sd2Error("It states no sample_rate_hz", "samples per second within a chirp")
         rate_hz = samples / chirp_s
+    if samples / rate_hz > chirp_s * (1 + 1e-9):
+        raise Sd2Error(
+            f"{samples} samples at {rate_hz:g} Hz last longer than a chirp of {chirp_s:g} s",
+            "sample_rate_hz in Hz, chirp_repetition_s in seconds",
+        )
     bandwidth_hz = told.bandwidth_hz
     if bandwidth_hz is None:
         assert told.slope_hz_per_s is not None

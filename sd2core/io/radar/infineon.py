@@ -367,9 +367,9 @@ def _parse_times(path: Path) -> NDArray[np.float64]:
         texts = (line.decode(errors="replace").strip() for line in lines_of(stream))
         for number, line in enumerate(filter(None, texts), start=1):
             try:
-                times.append(float(line.split(",")[0]))
+                times.append(float(line.removesuffix(",")))
             except ValueError as error:
-                if number == 1:
+                if number == 1 and not line[:1].isdigit():
                     continue
                 raise Sd2Error(
                     f"{path}, line {number}: {line[:40]!r} is not a time",

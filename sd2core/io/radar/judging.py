@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.capture import RadarCapture, Signal
+from sd2core.plausibility.clock import judge_rate
 from sd2core.radar_config import RadarConfig
 
 _MAX_FRAMES, _MAX_SAMPLES = 32, 1 << 22
@@ -30,6 +31,8 @@ def judged(capture: RadarCapture) -> RadarCapture:
     except Sd2Error:  # said where these frames are needed
         return capture
     notes = _empty(signal, capture)
+    if capture.config.frame_repetition_s > 1.0:
+        notes += map(str, judge_rate(capture.config.frame_repetition_s))
     if capture.full_scale_known and _is_white(signal):
         notes.append(
             "The samples fill the whole range of the converter evenly, as no echo does: the file"

@@ -43,9 +43,11 @@ def test_whole_takes_and_parts_of_them(pairs: Path) -> None:
     assert label_pairs(pairs, [TakeLabel("*", "*", "walk")]) == {"walk": before.frames}
 
 
-def test_a_table_is_read_with_its_gaps(tmp_path: Path) -> None:
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_a_table_is_read_with_its_gaps(tmp_path: Path, separator: str) -> None:
     table = tmp_path / "table.csv"
-    table.write_text("subject, take, label, start_s, end_s\n1,*-01,squat,,\n1,*-02,lunge,1.5,2\n")
+    heading, rows = "Subject, take, label, start_s, end_s\n", "1,*-01,squat,,\n1,*-02,lunge,1.5,2\n"
+    table.write_text((heading + rows).replace(",", separator))
     assert read_take_labels(table) == [
         TakeLabel("1", "*-01", "squat"),
         TakeLabel("1", "*-02", "lunge", 1.5, 2.0),
@@ -60,6 +62,9 @@ def test_a_table_is_read_with_its_gaps(tmp_path: Path) -> None:
         ("subject,take,label,start_s\n1,a,b,soon\n", "line 2"),
         ("subject,take,label,start_s,end_s\n1,a,b,2,1\n", "line 2.*start before the end"),
         ("subject,take,label\n1,a,\n", "line 2"),
+        ("subject,take,label\n1,a,b,c\n", "line 2"),
+        ("subject,take,label,start,end\n1,a,b,1,2\n", "has the column start.*start_s and end_s"),
+        ("subject,take,label,start_ms,end_ms\n1,a,b,1,2\n", "has the column start_ms"),
     ],
 )
 def test_a_table_that_cannot_be_is_named(tmp_path: Path, text: str, said: str) -> None:

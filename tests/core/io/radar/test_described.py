@@ -290,7 +290,9 @@ FAULTS: dict[str, tuple[np.ndarray, dict[str, Any], str]] = {
         "real .float32., at distances",
     ),
     "a continuous wave of real samples": (CUBE, {"bandwidth_hz": 0.0}, "with 1 real samples"),
-    "megahertz": (CUBE, {"carrier_hz": 24000.0}, "negative|radar's|radar sweeps"),
+    "megahertz": (CUBE, {"carrier_hz": 24000.0}, "carrier_hz is 24000. Expected: Hz: 60 GHz is"),
+    "a bandwidth in GHz": (CUBE, {"bandwidth_hz": 1.0}, "bandwidth_hz is 1. Expected: Hz: 1 GHz"),
+    "a rate in MHz": (CUBE, {"sample_rate_hz": 2.0}, "8 samples at 2 Hz last longer than a chirp"),
     "frames too short": (CUBE, {"frame_repetition_s": 1e-3}, "do not fit into"),
     "no numbers": (np.zeros((2, 8, 8), "U3"), {}, "The array is of <U3"),
     "a stream without chirps": (

@@ -245,6 +245,10 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda f: (f / "meta.json").write_text('{"adc_resolution": "many"}'),
         r"meta\.json: adc_resolution is 'many'",
     ),
+    "times with their numbers": (
+        lambda f: (f / "radar_timestamp.csv").write_text("0,1.5\n1,1.6\n"),
+        r"radar_timestamp\.csv, line 1: '0,1\.5' is not a time",
+    ),
     "text among the times": (
         lambda f: (f / "radar_timestamp.csv").write_text("1.5\nnoon\n"),
         r"radar_timestamp\.csv, line 2: 'noon' is not a time",

@@ -56,6 +56,15 @@ def test_a_receiver_without_a_signal_is_named(tmp_path: Path) -> None:
     assert "channel 2 of 2" in " ".join(load_capture(path).notes)
 
 
+def test_a_frame_period_in_another_unit_is_told(tmp_path: Path) -> None:
+    path = write_ti(tmp_path, PLAIN)
+    sent = f" {1e3 * PLAIN.frame_s:g} 1 0"
+    path.with_suffix(".cfg").write_text(
+        cfg_of(PLAIN).replace(sent, sent.replace(" 1 0", "000 1 0"))
+    )
+    assert "The times are probably milliseconds" in load_capture(path).notes[-1]
+
+
 @pytest.mark.parametrize("start", [b"MSTR", b"RPRC", b"\x7fELF"])
 def test_firmware_is_refused_by_its_name(tmp_path: Path, start: bytes) -> None:
     path = write_ti(tmp_path, PLAIN)
