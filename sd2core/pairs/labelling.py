@@ -47,24 +47,35 @@ def read_take_labels(path: Path) -> list[TakeLabel]:
     """Read a table (CSV) with a row per label: ``subject,take,label[,start_s,end_s]``."""
     lines = read_text(path, _EXPECTED).splitlines()
     separator = max(",;\t", key=lines[0].count)
-    rows = csv.DictReader(lines, skipinitialspace=True, delimiter=separator)
-    rows.fieldnames = [name.strip().casefold() for name in rows.fieldnames or ()]
-    missing = [name for name in _NEEDED if name not in rows.fieldnames]
-    other = [name for name in rows.fieldnames if name not in _USED and _LIKE_A_TIME.match(name)]
-    if other:
-        raise Sd2Error(f"{path} has the column {other[0]}", "start_s and end_s, in seconds")
+    try:
+        names, *rows = csv.reader(lines, skipinitialspace=True, delimiter=separator)
+    except csv.Error as error:
+        raise Sd2Error(f"{path} cannot be read ({error})", _EXPECTED) from error
+    names = [name.strip().casefold() for name in names]
+    missing = [name for name in _NEEDED if name not in names]
     if missing:
         raise Sd2Error(f"{path} has no column {', '.join(missing)}", _EXPECTED)
+    for name in names:
+        if (name in _USED and names.count(name) > 1) or (
+            name not in _USED and _LIKE_A_TIME.match(name)
+        ):
+            raise Sd2Error(
+                f"{path} has the columns {', '.join(names)}"[:300],
+                "times in start_s and end_s, in seconds, and each column once",
+            )
     found = []
-    for number, row in enumerate(rows, start=2):
+    for number, cells in enumerate(rows, start=2):
+        if not any(cells):
+            continue
+        row = dict(zip(names, cells, strict=False))
         try:
-            if None in row:
+            if len(cells) > len(names):
                 raise ValueError("more columns than the heading")
-            subject, take, label = ((row[name] or "").strip() for name in _NEEDED)
+            subject, take, label = (row.get(name, "").strip() for name in _NEEDED)
             start_s, end_s = float(row.get("start_s") or 0.0), float(row.get("end_s") or math.inf)
             found.append(TakeLabel(subject, take, label, start_s, end_s))
-        except (ValueError, TypeError) as error:
-            raise Sd2Error(f"{path}: line {number} is {list(row.values())}", _EXPECTED) from error
+        except ValueError as error:
+            raise Sd2Error(f"{path}: line {number} is {cells!r:.200}", _EXPECTED) from error
         except Sd2Error as error:
             raise error.within(f"{path}: line {number}") from error
     if not found:

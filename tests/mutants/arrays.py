@@ -47,7 +47,7 @@ from sd2core.timebase import Timebase
 from tests.core.classify.classifiers import classifier
 from tests.core.denoise.denoisers import trained
 from tests.core.io.radar.acconeer_files import write_a121
-from tests.core.io.radar.dca1000_files import TiRecording, write_ti
+from tests.core.io.radar.dca1000_files import TiRecording, pymmw_of, write_ti
 from tests.core.io.radar.kkt_files import write_kkt
 from tests.mutants.target import Target
 from tests.mutants.telling import tell
@@ -86,6 +86,11 @@ def _read_capture(path: Path) -> None:
 
 def _write_dca1000(path: Path) -> None:
     write_ti(path, TiRecording(transmitters=2), parts=2, studio=True)
+
+
+def _write_pymmw(path: Path) -> None:
+    recording = TiRecording(receivers=2)
+    write_ti(path, recording).with_suffix(".cfg").write_text(pymmw_of(recording))
 
 
 _RADAR = RadarDescription(
@@ -245,5 +250,6 @@ TARGETS = [
     Target("own", _write_own, _read_capture),
     Target("hdf5", _write_own_hdf5, lambda path: _read_capture(path / "radar.h5")),
     Target("sdk", lambda path: write_ti(path, TiRecording(lanes=4)), _read_capture),
+    Target("pymmw", _write_pymmw, _read_capture),
     Target("sigmf", _write_sigmf, lambda path: _read_capture(path / "radar.sigmf-meta")),
 ]

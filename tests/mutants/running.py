@@ -24,6 +24,8 @@ SLOW_S = 10.0
 """Processor time that no reader may take for a mutant."""
 HANGING_S = 60.0
 """Time after which a process is ended that says nothing, on a machine with other things to do."""
+STARTING_S = 600.0
+"""The same before the first mutant: imports, and an undamaged file of each kind, take a while."""
 LARGE_BYTES = 10**9
 """Memory that no reader may take for a mutant, beyond what its process had."""
 _ADDRESS_BYTES = 4 * 10**9
@@ -146,7 +148,9 @@ def tried(mutants: Sequence[Mutant], originals: Path) -> dict[str, Tally]:
 
 def _reports(listen: Any) -> Iterator[_Report]:
     """Reports of a process, until it ends or hangs."""
-    while listen.poll(HANGING_S):
+    patience_s = STARTING_S
+    while listen.poll(patience_s):
+        patience_s = HANGING_S
         try:
             report = listen.recv()
         except EOFError:

@@ -14,7 +14,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.recording_json import CameraEntry
 from sd2core.imu.files import read_signals, write_signals
 from sd2core.imu.signals import InertialSignals
-from sd2core.io.radar import write_capture
+from sd2core.io.radar import load_recorded_map, write_capture
 from sd2core.io.radar.mars import mars_parts, read_mars
 from sd2core.io.video import open_video
 from sd2core.labels import files
@@ -23,6 +23,7 @@ from sd2core.labels.journal import Kept, change, head, packed
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.recovery import search
 from sd2core.labels.spans import Labels
+from sd2core.pairs.labelling import read_take_labels
 from sd2core.placements.placements import PlacementCloud, read_placements, write_placements
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import Recording
@@ -31,6 +32,7 @@ from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.timebase import Timebase
 from sd2core.train.config import read_config
 from sd2core.train.folder import TrainingFolder
+from tests.core.io.radar.point_files import walk, write_csv
 from tests.core.mocap.mars_files import approaching, write_part
 from tests.labelled import imported
 from tests.mutants.target import Target
@@ -182,6 +184,7 @@ def _write_imu(path: Path) -> None:
     write_signals(path, InertialSignals(np.arange(50) / 100.0, *values, meta))
 
 
+_TAKES = "subject,take,label,start_s,end_s\n1,walk-*,squat,,\n2,*,lunge,1.5,2\n"
 _REAL_IMU = "time (ms);acc_x [g];acc_y [g];acc_z [g];gx_dps;gy_dps;gz_dps\n" + "".join(
     f"{10 * row};0.1;0.2;1.0;1.5;;-3e1\n" for row in range(20)
 )
@@ -234,6 +237,8 @@ TARGETS = [
     Target("mars", _write_mars, _read_mars),
     Target("imu.csv", _write_imu, _read_imu),
     Target("imu.sto", _write_imu, _read_imu),
+    Target("points.csv", lambda path: write_csv(path, walk()[:600]), load_recorded_map),
+    _text("takes.csv", _TAKES, read_take_labels),
     _text("real.csv", _REAL_IMU, _read_imu),
     Target("video.mp4", write_video, _read_video),
     Target("video.mkv", write_video, _read_video),

@@ -63,8 +63,13 @@ def test_a_table_is_read_with_its_gaps(tmp_path: Path, separator: str) -> None:
         ("subject,take,label,start_s,end_s\n1,a,b,2,1\n", "line 2.*start before the end"),
         ("subject,take,label\n1,a,\n", "line 2"),
         ("subject,take,label\n1,a,b,c\n", "line 2"),
-        ("subject,take,label,start,end\n1,a,b,1,2\n", "has the column start.*start_s and end_s"),
-        ("subject,take,label,start_ms,end_ms\n1,a,b,1,2\n", "has the column start_ms"),
+        ("subject,take,label,label\n1,a,b,c\n", "each column once"),
+        ("subject,take,label\n1,a," + 200_000 * "b" + "\n", "cannot be read .*limit"),
+        (
+            "subject,take,label,start,end\n1,a,b,1,2\n",
+            "has the columns .*start, end.*start_s and end_s",
+        ),
+        ("subject,take,label,start_ms,end_ms\n1,a,b,1,2\n", "has the columns .*start_ms"),
     ],
 )
 def test_a_table_that_cannot_be_is_named(tmp_path: Path, text: str, said: str) -> None:

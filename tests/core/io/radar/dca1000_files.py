@@ -108,6 +108,30 @@ def cfg_of(recording: TiRecording, **changes: str) -> str:
     return "\n".join((lines | changes).values()) + "\n"
 
 
+_NULLS = {
+    "channelCfg": ["rxMask", "txMask", "cascading"],
+    "adcCfg": ["adcBits"],
+    "adcbufCfg": ["subFrameIndex"],
+    "lvdsStreamCfg": ["subFrameIndex"],
+}
+
+
+def pymmw_of(recording: TiRecording, **settings: object) -> str:
+    """Profile of pymmw: every command a table, nulls where it fills in, chirps under one name."""
+    commands = ['"_settings_": ' + json.dumps({"rxAntennas": recording.receivers} | settings)]
+    for line in cfg_of(recording, comment="").strip().splitlines():
+        name, *words = line.split()
+        entries = {f"value{place}": json.loads(word) for place, word in enumerate(words)}
+        nulls = dict.fromkeys(_NULLS.get(name, []))
+        entries = nulls | dict(list(entries.items())[len(nulls) :])
+        if name == "chirpCfg":
+            mask = entries.popitem()
+            variation = dict(entries.popitem() for _ in range(4))
+            entries |= {"variation": variation, mask[0]: mask[1]}
+        commands.append(f"{json.dumps(name)}: {json.dumps(entries)}")
+    return "{" + ", ".join(commands) + "}"
+
+
 def json_of(recording: TiRecording) -> dict[str, Any]:
     """Configuration of mmWave Studio."""
     profile = {

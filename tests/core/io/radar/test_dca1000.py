@@ -26,6 +26,7 @@ from tests.core.io.radar.dca1000_files import (
     TiRecording,
     cfg_of,
     json_of,
+    pymmw_of,
     words_of,
     write_ti,
 )
@@ -110,7 +111,7 @@ def test_a_profile_of_pymmw_opens_as_the_cfg_that_it_sends(tmp_path: Path, lanes
     sent = load_capture(path)
     path.with_suffix(".cfg").unlink()
     named = tmp_path / f"mmw-xWR{14 if lanes == 4 else 18}xx.cfg"
-    named.write_text(_pymmw_of(recording))
+    named.write_text(pymmw_of(recording))
     kept = load_capture(path)
     assert kept.config == sent.config
     assert kept.meta["lanes"] == lanes
@@ -226,30 +227,6 @@ def _coded(device: dict[str, Any], name: str, **phases: object) -> None:
     device["rfConfig"][name] = [{inner: told}]
 
 
-_NULLS = {
-    "channelCfg": ["rxMask", "txMask", "cascading"],
-    "adcCfg": ["adcBits"],
-    "adcbufCfg": ["subFrameIndex"],
-    "lvdsStreamCfg": ["subFrameIndex"],
-}
-
-
-def _pymmw_of(recording: TiRecording, **settings: object) -> str:
-    """Profile of pymmw: every command a table, nulls where it fills in, chirps under one name."""
-    commands = ['"_settings_": ' + json.dumps({"rxAntennas": recording.receivers} | settings)]
-    for line in cfg_of(recording, comment="").strip().splitlines():
-        name, *words = line.split()
-        entries = {f"value{place}": json.loads(word) for place, word in enumerate(words)}
-        nulls = dict.fromkeys(_NULLS.get(name, []))
-        entries = nulls | dict(list(entries.items())[len(nulls) :])
-        if name == "chirpCfg":
-            mask = entries.popitem()
-            variation = dict(entries.popitem() for _ in range(4))
-            entries |= {"variation": variation, mask[0]: mask[1]}
-        commands.append(f"{json.dumps(name)}: {json.dumps(entries)}")
-    return "{" + ", ".join(commands) + "}"
-
-
 MISMATCHES: dict[str, tuple[Callable[[Path], object], str]] = {
     "no configuration": (
         lambda path: path.with_suffix(".cfg").unlink(),
@@ -322,11 +299,11 @@ MISMATCHES: dict[str, tuple[Callable[[Path], object], str]] = {
         r"walk\.cfg cannot be read as JSON",
     ),
     "more antennas than a radar has": (
-        lambda path: path.with_suffix(".cfg").write_text(_pymmw_of(PLAIN, rxAntennas=5)),
+        lambda path: path.with_suffix(".cfg").write_text(pymmw_of(PLAIN, rxAntennas=5)),
         r"walk\.cfg: rxAntennas is 5\. Expected: 1 to 4",
     ),
     "masks by a number of antennas that is not there": (
-        lambda path: path.with_suffix(".cfg").write_text(_pymmw_of(PLAIN, rxAntennas=None)),
+        lambda path: path.with_suffix(".cfg").write_text(pymmw_of(PLAIN, rxAntennas=None)),
         r"walk\.cfg: channelCfg is 'null 1 0'",
     ),
     "12 bits": (_cfg(adcCfg="adcCfg 0 1"), r"walk\.cfg: The number of bits of the converter is 0"),

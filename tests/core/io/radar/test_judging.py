@@ -59,9 +59,8 @@ def test_a_receiver_without_a_signal_is_named(tmp_path: Path) -> None:
 def test_a_frame_period_in_another_unit_is_told(tmp_path: Path) -> None:
     path = write_ti(tmp_path, PLAIN)
     sent = f" {1e3 * PLAIN.frame_s:g} 1 0"
-    path.with_suffix(".cfg").write_text(
-        cfg_of(PLAIN).replace(sent, sent.replace(" 1 0", "000 1 0"))
-    )
+    text = cfg_of(PLAIN).replace(sent, sent.replace(" 1 0", "000 1 0"))
+    path.with_suffix(".cfg").write_text(text)
     assert "The times are probably milliseconds" in load_capture(path).notes[-1]
 
 
