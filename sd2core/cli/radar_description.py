@@ -92,9 +92,9 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
         plain_axes,
         write_description,
     )
+    from sd2core.io.radar.point_tables import TEXT_SUFFIXES
     from sd2core.io.radar.points import (
         COLUMNS_OPTION,
-        TEXT_SUFFIXES,
         holds_unnamed_columns,
         looks_like_points,
     )

@@ -35,9 +35,9 @@ from sd2core.io.radar.infineon import (
 from sd2core.io.radar.judging import judged
 from sd2core.io.radar.kkt import RecordedMap, load_kkt
 from sd2core.io.radar.point_maps import load_points_map
+from sd2core.io.radar.point_tables import TEXT_SUFFIXES
 from sd2core.io.radar.points import (
     COLUMNS_OPTION,
-    TEXT_SUFFIXES,
     column_names,
     has_columns_told,
     holds_unnamed_columns,

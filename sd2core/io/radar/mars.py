@@ -15,15 +15,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from itertools import chain, pairwise
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.files.limits import check_regular
-from sd2core.files.texts import lines_of
+from sd2core.io.radar.point_tables import TextTable
 from sd2core.io.radar.points import LONGEST_GAP_FRAMES
 
 JOINTS = (
@@ -193,29 +192,18 @@ def _joints(path: Path) -> NDArray[np.float64]:
 
 def _columns(path: Path, names: tuple[str, ...] | list[str]) -> NDArray[np.float64]:
     """Some columns of a file of numbers under a heading, (n, len(names))."""
-    expected = "numbers separated by commas under a heading"
-    check_regular(path)
-    try:
-        with path.open("rb") as stream:
-            lines = (line.decode("utf-8-sig") for line in lines_of(stream) if line.strip())
-            heading = [name.strip() for name in next(lines, "").split(",")]
-            missing = [name for name in names if name not in heading]
-            if missing:
-                more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
-                raise Sd2Error(
-                    f"{path} has no column {', '.join(missing[:3])}{more}",
-                    "the columns of the MARS recordings",
-                )
-            first = next(lines, None)
-            if first is None:
-                raise Sd2Error(f"{path} holds no rows", "at least one")
-            places = [heading.index(name) for name in names]
-            table = np.loadtxt(chain([first], lines), delimiter=",", usecols=places, ndmin=2)
-    except (OSError, ValueError) as error:
-        raise Sd2Error(f"{path} cannot be read ({error})", expected) from error
+    found = TextTable(path)
+    missing = [name for name in names if name not in found.names]
+    if missing:
+        more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
+        raise Sd2Error(
+            f"{path} has no column {', '.join(missing[:3])}{more}",
+            "the columns of the MARS recordings",
+        )
+    table = np.stack(found.read(tuple(map(found.names.index, names))), axis=1)
     if not np.isfinite(table).all():
         row, column = np.argwhere(~np.isfinite(table))[0]
         raise Sd2Error(
             f"{path}: {names[column]} of row {row + 1} is {table[row, column]}", "a finite number"
         )
-    return np.asarray(table, np.float64)
+    return table

@@ -8,11 +8,8 @@ as the description beside them says.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,38 +18,26 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from sd2core.errors import Sd2Error
-from sd2core.files.limits import open_regular
-from sd2core.files.texts import faults_in, lines_of, read_toml
-from sd2core.io.imu_columns import titles_of
-from sd2core.io.radar.stored_arrays import MATLAB_SUFFIX, array_names, open_stored
-from sd2core.plausibility.clock import UNITS_S
+from sd2core.files.texts import faults_in, read_toml
+from sd2core.io.radar.point_columns import (
+    COLUMNS,
+    IGNORED,
+    named_columns,
+    speed_unit_mps,
+    time_unit_s,
+)
+from sd2core.io.radar.point_tables import (
+    EXPECTED,
+    FEWEST,
+    MOST,
+    SUFFIXES,
+    Table,
+    TextTable,
+    open_table,
+)
 
-TEXT_SUFFIXES = (".csv", ".tsv")
-SUFFIXES = (*TEXT_SUFFIXES, ".npy", MATLAB_SUFFIX)
-
-_NAMES = {
-    "frame": ("frame", "frameid", "framenum", "framenumber", "frameno", "frameindex", "frameidx"),
-    "time": ("time", "timestamp", "abstime", "t", "ts"),
-    "x": ("x", "px", "posx", "xpos", "pointx"),
-    "y": ("y", "py", "posy", "ypos", "pointy"),
-    "z": ("z", "pz", "posz", "zpos", "pointz"),
-    "range": ("range", "r", "distance", "dist"),
-    "doppler": ("doppler", "velocity", "radialvelocity", "dopplervelocity", "vel", "speed", "vr",
-                "v"),
-    "intensity": ("intensity", "snr", "power", "peak", "peakval", "energy", "amplitude", "rcs"),
-}  # fmt: skip
-COLUMNS = tuple(_NAMES)
-"""Columns that are known; the velocity alone must be there, and the frame or the time."""
 COLUMNS_OPTION = "--columns frame,x,y,z,doppler,intensity (- for others)"
 """How the user names the columns, for messages."""
-_SPEEDS_MPS = {
-    "m/s": 1.0, "mps": 1.0, "ms": 1.0, "ms-1": 1.0, "cm/s": 0.01, "cmps": 0.01, "mm/s": 0.001,
-    "km/h": 1 / 3.6, "kmh": 1 / 3.6, "kph": 1 / 3.6,
-}  # fmt: skip
-_UNITS = {"m", "db", "dbm", *_SPEEDS_MPS, *UNITS_S}
-_IGNORED = "-"
-_EXPECTED = "a table of points with the columns frame and doppler"
-_FEWEST, _MAX = 3, 12
 _LOOKED_AT = 20_000
 _FASTEST_MPS = 30.0
 _SHUFFLED = 0.1
@@ -70,7 +55,7 @@ class PointsDescription(BaseModel):
 
     format: Literal["sd2-radar"] = "sd2-radar"
     version: Literal[1] = 1
-    columns: tuple[str, ...] = Field(min_length=2, max_length=_MAX)
+    columns: tuple[str, ...] = Field(min_length=2, max_length=MOST)
     dataset: str | None = None
     frame_repetition_s: float | None = Field(default=None, ge=1e-3, le=1e3)
     sign: Literal[1, -1] | None = None
@@ -101,7 +86,7 @@ def described_points(place: Path, told: Mapping[str, Any]) -> PointsDescription:
     with faults_in(place, "the description of a table of points"):
         description = PointsDescription.model_validate(dict(told))
     columns = description.columns
-    named = [one for one in columns if one != _IGNORED]
+    named = [one for one in columns if one != IGNORED]
     if not set(named) <= set(COLUMNS) or len(set(named)) < len(named) or "doppler" not in named:
         raise Sd2Error(
             f"{place}: columns are {', '.join(columns)}",
@@ -116,7 +101,7 @@ def looks_like_points(path: Path) -> bool:
         return False
     told = _told_beside(path)
     try:
-        return bool("columns" in told or (not told and _recognised(_opened(path, None))))
+        return bool("columns" in told or (not told and _recognised(open_table(path, None))))
     except Sd2Error:
         return False
 
@@ -126,10 +111,10 @@ def holds_unnamed_columns(path: Path) -> bool:
     if path.suffix.lower() not in SUFFIXES or _told_beside(path):
         return False
     try:
-        table = _opened(path, None)
+        table = open_table(path, None)
     except Sd2Error:
         return False
-    return not table.names and _FEWEST <= table.width <= _MOST and _recognised(table) is None
+    return not table.names and FEWEST <= table.width <= MOST and _recognised(table) is None
 
 
 def has_columns_told(path: Path) -> bool:
@@ -143,7 +128,7 @@ def _told_beside(path: Path) -> dict[str, Any]:
     if path.suffix.lower() not in SUFFIXES or not beside.is_file():
         return {}
     try:
-        content = read_toml(beside, _EXPECTED)
+        content = read_toml(beside, EXPECTED)
     except Sd2Error:
         return {}
     return content if content.get("format") == "sd2-radar" else {}
@@ -154,7 +139,7 @@ def read_points(path: Path, description: PointsDescription | None = None) -> Rad
 
     Raises Sd2Error if its columns are not known, or it holds what is no finite number.
     """
-    table = _opened(path, description.dataset if description else None)
+    table = open_table(path, description.dataset if description else None)
     found = _recognised(table) if description is None else (description.columns, False)
     if found is None:
         raise _unknown(path, table)
@@ -167,7 +152,7 @@ def read_points(path: Path, description: PointsDescription | None = None) -> Rad
     try:
         numbers = dict(zip(places, table.read(tuple(places.values())), strict=True))
     except Sd2Error:
-        if "time" not in places or not isinstance(table, _Text):
+        if "time" not in places or not isinstance(table, TextTable):
             raise
         numbers = _with_dates(table, places)
     if table.frame is not None:
@@ -177,15 +162,15 @@ def read_points(path: Path, description: PointsDescription | None = None) -> Rad
         row = int(np.flatnonzero(~finite)[0])
         raise Sd2Error(f"{path}: the velocity of row {row + 1} is no number", "a finite number")
     titles = {name: table.names[place] for name, place in places.items() if table.names}
-    numbers["doppler"] *= _speed_mps(path, titles.get("doppler", ""))
-    unit_s = _unit_s(titles.get("time", ""))
+    numbers["doppler"] *= speed_unit_mps(path, titles.get("doppler", ""))
+    unit_s = time_unit_s(titles.get("time", ""))
     return _sorted(path, numbers, columns, unit_s, guessed)
 
 
-def _with_dates(table: _Text, places: dict[str, int]) -> dict[str, NDArray[np.float64]]:
+def _with_dates(table: TextTable, places: dict[str, int]) -> dict[str, NDArray[np.float64]]:
     """Columns of a table whose times are dates, or else are left out where frames are numbered."""
     try:
-        read = table.read_dates(tuple(places.values()), places["time"])
+        read = table.read(tuple(places.values()), dated=places["time"])
     except Sd2Error:
         if "frame" not in places:
             raise
@@ -196,14 +181,14 @@ def _with_dates(table: _Text, places: dict[str, int]) -> dict[str, NDArray[np.fl
 
 def column_names(path: Path, dataset: str | None = None) -> tuple[str, ...]:
     """Columns of a table as far as they are known; Sd2Error where they are not, or it is none."""
-    table = _opened(path, dataset)
+    table = open_table(path, dataset)
     found = _recognised(table)
     if found is None:
         raise _unknown(path, table)
     return found[0]
 
 
-def _unknown(path: Path, table: _Table) -> Sd2Error:
+def _unknown(path: Path, table: Table) -> Sd2Error:
     held = ", ".join(table.names) if table.names else f"{table.width} columns without names"
     return Sd2Error(
         f"{path} holds {held}",
@@ -228,7 +213,7 @@ def _sorted(
     frame = numbers["frame"]
     if not (np.isfinite(frame).all() and (frame == np.round(frame)).all()):
         raise Sd2Error(f"{path}: frames are numbered {frame[frame % 1 != 0][0]:g}", "whole numbers")
-    if (np.diff(frame) < 0).mean() > _SHUFFLED:
+    if (np.diff(frame) < 0).sum() > _SHUFFLED * len(frame):
         order = np.argsort(frame, kind="stable")
         numbers = {name: values[order] for name, values in numbers.items()}
         frame, time = numbers["frame"], numbers.get("time")
@@ -256,203 +241,16 @@ LONGEST_GAP_FRAMES = 10
 """Frames without a point that are taken for silence; a longer gap is one in time."""
 
 
-# --- tables in files -------------------------------------------------------------------------
-
-
-class _Table:
-    """Columns of numbers: their names, if they have any, and how to read some of them."""
-
-    names: tuple[str, ...] = ()
-    width: int
-    frame: Any = None  # of arrays by frame: gives the number of every point's frame
-
-    def read(self, places: tuple[int, ...], most: int | None = None) -> list[NDArray[np.float64]]:
-        """Columns at some places, of the first rows or all."""
-        raise NotImplementedError
-
-
-class _Text(_Table):
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        with open_regular(path) as stream:
-            first = next((one for one in lines_of(stream) if one.strip()), b"")
-        if b"\0" in first:
-            raise Sd2Error(f"{path} is not in UTF-8", _EXPECTED, "Save it as UTF-8")
-        self._separator, titles = titles_of(first.decode("utf-8-sig", "replace").strip())
-        self.width = len(titles)
-        self._headed = not all(map(_is_number, titles))
-        self.names = tuple(titles) if self._headed else ()
-
-    def read(self, places: tuple[int, ...], most: int | None = None) -> list[NDArray[np.float64]]:
-        return self._read(places, most, {})
-
-    def read_dates(self, places: tuple[int, ...], dated: int) -> list[NDArray[np.float64]]:
-        """Columns at some places; what one of them has are dates as ISO 8601 writes them."""
-        return self._read(places, None, {dated: _unix_s})
-
-    def _read(
-        self, places: tuple[int, ...], most: int | None, converters: dict[int | str, Any]
-    ) -> list[NDArray[np.float64]]:
-        try:
-            with open_regular(self._path) as stream:
-                lines = (
-                    text.decode("utf-8-sig", "replace") for text in lines_of(stream) if text.strip()
-                )
-                if self._separator == ";":  # then decimal points may be commas
-                    lines = (line.replace(",", ".") for line in lines)
-                if self._headed:
-                    next(lines, None)
-                first = next(lines, None)
-                if first is None:
-                    raise Sd2Error(f"{self._path} holds no rows", "at least one")
-                table = np.loadtxt(
-                    chain([first], lines),
-                    delimiter=self._separator,
-                    usecols=places,
-                    ndmin=2,
-                    max_rows=most,
-                    comments=None,
-                    converters=converters or None,
-                    encoding="utf-8",
-                )
-        except (OSError, ValueError) as error:
-            expected = "numbers in every row, separated alike"
-            raise Sd2Error(f"{self._path} cannot be read ({error})", expected) from error
-        return list(table.T.astype(np.float64))
-
-
-class _Array(_Table):
-    def __init__(self, path: Path, dataset: str | None) -> None:
-        stored = open_stored(path, dataset)
-        fields = stored.dtype.names or ()
-        self._stored, self.names = stored, tuple(fields)
-        dimensions = len(stored.shape) + bool(fields)
-        self.width = len(fields) or (stored.shape[-1] if dimensions in (2, 3) else 0)
-        if not (dimensions in (2, 3) and _FEWEST <= self.width <= _MAX):
-            raise Sd2Error(f"{path} has shape {stored.shape}", _EXPECTED)
-        if any(stored.dtype[name].kind not in "iuf" for name in fields) or (
-            not fields and stored.dtype.kind not in "iuf"
-        ):
-            raise Sd2Error(f"{path} is of {stored.dtype}", "real numbers")
-        self._by_frame = dimensions == 3
-        if self._by_frame:
-            self.frame = self._frames
-
-    def _rows(self, most: int | None = None) -> NDArray[Any]:
-        """Points, (P, columns); rows of zeros fill up frames, and are left out."""
-        if most is None:
-            return self._whole[0]
-        return self._filled(-(-most // self._stored.shape[1]) if self._by_frame else most)[0]
-
-    @cached_property
-    def _whole(self) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-        return self._filled(None)
-
-    def _filled(self, most: int | None) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-        """Points of the first rows or all, and where they are in the array."""
-        values = np.asarray(self._stored.read((slice(0, most),)))
-        if values.dtype.names:
-            values = np.stack([values[name].astype(np.float64) for name in values.dtype.names], -1)
-        values = values.astype(np.float64)
-        there = np.ones(len(values), bool)
-        if self._by_frame:
-            there = np.asarray(values.any(axis=-1))
-        return values[there], there
-
-    def _frames(self) -> NDArray[np.float64]:
-        return np.nonzero(self._whole[1])[0].astype(np.float64)
-
-    def read(self, places: tuple[int, ...], most: int | None = None) -> list[NDArray[np.float64]]:
-        rows = self._rows(most)
-        return [np.ascontiguousarray(rows[:, place]) for place in places]
-
-
-class _Vectors(_Table):
-    """A vector for each column, all of the same length."""
-
-    def __init__(self, path: Path, names: Sequence[str]) -> None:
-        self._path, self.names, self.width = path, tuple(names), len(names)
-
-    def read(self, places: tuple[int, ...], most: int | None = None) -> list[NDArray[np.float64]]:
-        found = []
-        for place in places:
-            stored = open_stored(self._path, self.names[place])
-            whole = np.asarray(stored.read(tuple(slice(None) for _ in stored.shape)))
-            found.append(whole.ravel().astype(np.float64)[:most])
-        if len({len(one) for one in found}) > 1:
-            told = ", ".join(str(len(one)) for one in found)
-            raise Sd2Error(f"{self._path} has columns of {told} entries", "as many in each")
-        return found
-
-
-def _opened(path: Path, dataset: str | None) -> _Table:
-    if path.suffix.lower() in TEXT_SUFFIXES:
-        return _Text(path)
-    if path.suffix.lower() == MATLAB_SUFFIX and dataset is None:
-        names = array_names(path)
-        if _named(names) is not None:
-            return _Vectors(path, names)
-    return _Array(path, dataset)
-
-
-# --- which column is what --------------------------------------------------------------------
-
-
-def _recognised(table: _Table) -> tuple[tuple[str, ...], bool] | None:
+def _recognised(table: Table) -> tuple[tuple[str, ...], bool] | None:
     """Columns in order, and True if by their numbers; None where they are not known."""
     if table.names:
-        named = _named(table.names, framed=table.frame is not None)
+        named = named_columns(table.names, framed=table.frame is not None)
         return None if named is None else (named, False)
     guessed = _by_numbers(table)
     return None if guessed is None else (guessed, True)
 
 
-def _named(titles: Sequence[str], *, framed: bool = False) -> tuple[str, ...] | None:
-    """Columns by their titles, the first of several for the same."""
-    plain = [_plain(title) for title in titles]
-    found: dict[int, str] = {}
-    for name, aliases in _NAMES.items():
-        place = next((plain.index(one) for one in aliases if one in plain), None)
-        if place is not None:
-            if plain.count(plain[place]) > 1 and name in ("frame", "doppler"):
-                return None  # which of them is meant?
-            found[place] = name
-    has = set(found.values())
-    if "doppler" not in has or not (framed or has & {"frame", "time"}):
-        return None
-    if not has & {"x", "y", "range", "intensity"}:
-        return None
-    return tuple(found.get(place, _IGNORED) for place in range(len(titles)))
-
-
-def _plain(title: str) -> str:
-    """Letters of a title alone, without a unit."""
-    words = re.findall(r"[a-z]+", re.sub(r"[\[(].*?[\])]", "", title.lower()))
-    while len(words) > 1 and words[-1] in _UNITS:
-        words.pop()
-    return "".join(words)
-
-
-def _unit_s(title: str) -> float | None:
-    """Unit of times that a title names after the column, or in brackets."""
-    words = re.findall(r"[a-zµ]+", title.lower())
-    return UNITS_S.get(words[-1]) if len(words) > 1 else None
-
-
-def _speed_mps(path: Path, title: str) -> float:
-    """Unit of velocities that a title names likewise, m/s where it names none."""
-    brackets = re.search(r"[\[(](.*?)[\])]", title.lower())
-    unit = "" if brackets is None else re.sub(r"[\s^·]", "", brackets[1])
-    if unit not in _SPEEDS_MPS and unit:
-        raise Sd2Error(
-            f"{path}: {title} has the unit {unit}", f"one of {', '.join(_SPEEDS_MPS)}",
-            "Write velocities in m/s",
-        )  # fmt: skip
-    last = re.split(r"[\s_]", title.lower())[-1]
-    return _SPEEDS_MPS.get(unit or last, 1.0)
-
-
-def _by_numbers(table: _Table) -> tuple[str, ...] | None:
+def _by_numbers(table: Table) -> tuple[str, ...] | None:
     """Columns of an array without names, where nothing else is possible."""
     try:
         columns = table.read(tuple(range(table.width)), _LOOKED_AT)
@@ -479,7 +277,7 @@ def _by_numbers(table: _Table) -> tuple[str, ...] | None:
     ]
     if len(strong) == 1:
         found[strong[0]] = "intensity"
-    return tuple(found.get(place, _IGNORED) for place in range(table.width))
+    return tuple(found.get(place, IGNORED) for place in range(table.width))
 
 
 def _is_frame(values: NDArray[np.float64]) -> bool:
@@ -501,16 +299,3 @@ def doppler_step(velocities: NDArray[np.float64]) -> float:
     if step < 0.01 or (np.abs(found / step - np.round(found / step)) > 0.1).any():
         return 0.0
     return round(step, 6)
-
-
-def _unix_s(text: str) -> float:
-    moment = np.datetime64(text.strip().strip('"').removesuffix("Z"), "us")
-    return float(moment.astype(np.int64)) / 1e6
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
