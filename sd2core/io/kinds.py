@@ -74,6 +74,10 @@ def kind_of(path: Path) -> Kind:
         return "mesh"  # whose reader says what to do
     if _holds_pictures(path):
         return "video"
+    if not path.stat().st_size:
+        raise Sd2Error(
+            f"{path} is empty", "a file with content", "Copy it again, or write it again"
+        )
     if holds_unnamed_columns(path):
         column_names(path)  # refuses it, and says how to name them
     raise Sd2Error(

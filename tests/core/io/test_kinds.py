@@ -89,11 +89,13 @@ def test_folders_are_told_apart(tmp_path):
 
 
 def test_what_is_nothing_known_is_explained(tmp_path):
-    (tmp_path / "notes.txt").touch()
+    (tmp_path / "notes.txt").write_text("dear diary")
+    (tmp_path / "nothing.csv").touch()
     (tmp_path / "bad.npz").write_text("no zip")
     (tmp_path / "empty").mkdir()
     for name, words in (
         ("notes.txt", "is of no kind that is known"),
+        ("nothing.csv", "is empty"),
         ("missing.mp4", "does not exist"),
         ("bad.npz", "is not a readable .npz"),
         ("empty", "holds nothing that is known"),
