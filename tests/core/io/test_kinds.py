@@ -61,7 +61,7 @@ def test_a_table_of_an_inertial_sensor_is_known_by_its_heading(tmp_path, heading
 )
 def test_other_tables_are_none(tmp_path, text):
     (tmp_path / "labels.csv").write_bytes(text.encode("latin-1"))
-    with pytest.raises(Sd2Error, match="no kind that is known|is empty"):
+    with pytest.raises(Sd2Error, match=r"no kind that is known|is empty"):
         kind_of(tmp_path / "labels.csv")
 
 
