@@ -20,6 +20,7 @@ from sd2core.cli.output import (
     print_json,
     progress_bar,
     progress_events,
+    tell_lost,
 )
 from sd2core.options.exporting import MAPS, PEOPLE, SEGMENTS, Exporting, SpanOptions
 from sd2core.options.kinds import Names
@@ -279,9 +280,6 @@ def _print(written: Written, sheet: Path) -> None:
 
 
 def _complain(frames_damaged: int, failed: tuple[str, ...] | list[str]) -> None:
-    from sd2core.datasets.card import damage_text
-
-    if frames_damaged:
-        print(f"sd2: {damage_text(frames_damaged)}", file=sys.stderr)
+    tell_lost(frames_damaged)
     for one in failed:
         print(f"sd2: left out {one}", file=sys.stderr)

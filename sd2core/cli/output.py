@@ -75,11 +75,11 @@ def print_facts(title: str, facts: Mapping[str, str]) -> None:
 
 
 def tell_lost(frames: int) -> None:
-    """Say on standard error how many frames of pairs are lost, where some are."""
-    from sd2core.pairs.rows import lost_in_words
+    """Say on standard error how many frames are lost to damaged chunks, where some are."""
+    from sd2core.files.stores import lost_in_words
 
     if frames:
-        print(f"sd2: {lost_in_words(frames)}.", file=sys.stderr)
+        print(f"sd2: {lost_in_words(frames)}", file=sys.stderr)
 
 
 def listed(counts: Mapping[Any, int]) -> str:

@@ -14,6 +14,7 @@ from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS
 from sd2core.datasets.splitting import RULE, named_splits, reassigned, split_people
 from sd2core.files.atomic import atomic_write_json, atomic_write_text
+from sd2core.files.stores import lost_in_words
 from sd2core.files.tables import counted
 from sd2core.mesh.vertex_parts import QUANTITIES
 from sd2core.numerics.map_accuracy import MapAccuracy
@@ -271,7 +272,7 @@ def limits(card: dict[str, Any]) -> list[str]:
             f" were brought to {card['frame_rate_hz']:g} frames/s by linear interpolation."
         )
     if damaged := card["frames_damaged"]:
-        found.append(damage_text(damaged))
+        found.append(lost_in_words(damaged))
     if card["frames_without_person"] > damaged:
         found.append(
             f"{card['frames_without_person'] - damaged:,} frames without a person are in no"
@@ -297,14 +298,6 @@ def limits(card: dict[str, Any]) -> list[str]:
             "Placements show the same movements from other places: they add views, not movements."
         )
     return found
-
-
-def damage_text(frames: int) -> str:
-    """What became of frames that were lost to damaged chunks of meshes or pairs."""
-    return (
-        f"{frames:,} frames are lost to damaged chunks of their files and are in no segment:"
-        " copy those files again, or write them again."
-    )
 
 
 def duration_text(card: dict[str, Any]) -> str:

@@ -58,6 +58,14 @@ class Damage:
         return f"{self.unit} {self.start} to {self.stop - 1} of {self.array} ({self.reason})"
 
 
+def lost_in_words(frames: int) -> str:
+    """What became of frames that were lost to damaged chunks."""
+    return (
+        f"{frames:,} frames are lost to damaged chunks and left out: copy their files again, or"
+        " write them again. `sd2 info --verify` names the chunks."
+    )
+
+
 class StoredArray:
     """Numbers that stay on disk until they are sliced; Sd2Error names what is damaged.
 

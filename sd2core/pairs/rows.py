@@ -100,16 +100,6 @@ def kept_parts(take: TakeEntry, lost: NDArray[np.bool_]) -> list[TakeEntry]:
     ]
 
 
-def lost_in_words(frames: int) -> str:
-    """What became of frames of pairs that were lost to damaged chunks; empty if none were."""
-    if not frames:
-        return ""
-    return (
-        f"{frames:,} frames of the pairs are lost to damaged chunks and left out: copy the pairs"
-        " again. `sd2 info --verify` names the chunks"
-    )
-
-
 def _runs(there: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First frame, and the one after the last, of runs that are there."""
     edges = np.flatnonzero(np.diff(there.astype(np.int8), prepend=0, append=0)).tolist()

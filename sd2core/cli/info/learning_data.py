@@ -11,7 +11,7 @@ from sd2core.cli.info.description import Description, axis_in_words, bins_in_wor
 from sd2core.cli.output import counted, listed
 from sd2core.datasets.card import describe_dataset, duration_text, limits
 from sd2core.datasets.reading import open_dataset
-from sd2core.pairs.rows import lost_in_words
+from sd2core.files.stores import lost_in_words
 from sd2core.pairs.store import PairSet
 from sd2core.plausibility.radar import judge_map
 
@@ -91,8 +91,8 @@ def describe_pairs(path: Path, pairs: PairSet) -> Description:
         for values, measured in ((take.synthetic, False), (take.radar, pairs.kind == "real"))
         for finding in judge_map(values.T, take.times_s, measured=measured)
     )
-    if lost := lost_in_words(pairs.lost_frames):
-        notes = (f"{lost}.", *notes)
+    if pairs.lost_frames:
+        notes = (lost_in_words(pairs.lost_frames), *notes)
     data["notes"] = list(notes)
     return Description(f"Pairs {path}", data, facts, notes)
 

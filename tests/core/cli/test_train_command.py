@@ -71,7 +71,7 @@ class TestTrain:
     ) -> None:
         damaged, run = write_pairs(tmp_path / "pairs.zarr", takes=6), tmp_path / "run"
         lose(damaged / "radar" / "c" / "1" / "0")  # frames 2250 to 2699, the last ones of s3
-        told = "450 frames of the pairs are lost to damaged chunks"
+        told = "450 frames are lost to damaged chunks"
         outcome = sd2("train", damaged, *QUICK, "--out", run)
         assert outcome.code == 0, outcome.err
         assert told in outcome.err

@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
 from sd2core.maps import LimbMaps
-from sd2core.pairs.rows import lost_in_words
 from sd2core.pairs.segments import cut, join, segment_starts
 from sd2core.pairs.store import PairWriter, Take, read_pairs
 from sd2core.pairs.summary import INDEX_NAME, TakeKey, is_pair_store
@@ -258,7 +257,6 @@ def test_frames_in_a_damaged_chunk_are_read_around_and_told(
     assert all(same(*two) for two in zip(pairs.takes, kept, strict=True))
     assert pairs.provenance["frames_lost"] == {"s1/b": 2500, "s1/c": 100, "s1/d": 1900}
     assert pairs.lost_frames == 4500
-    assert "4,500 frames of the pairs are lost" in lost_in_words(pairs.lost_frames)
 
 
 def test_pairs_of_which_nothing_is_left_are_refused(tmp_path: Path) -> None:
