@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from sd2core.cli.command_parser import add_command
-from sd2core.cli.output import print_event, print_json, progress_bar
+from sd2core.cli.output import print_event, print_json, progress_bar, tell_lost
 from sd2core.options.kinds import Count
 from sd2core.options.records import ARGUMENT, Place
 from sd2core.options.shared import JsonAndProgress
@@ -82,6 +82,7 @@ def make_study(plan: StudyPlan, options: Running) -> None:
     workers = options.workers or os.cpu_count() or 1
     with _events() if options.progress_json else progress_bar("Studying", "run") as progress:
         results = run_study(plan, processes=workers, scheduler=options.scheduler, progress=progress)
+    tell_lost(results.lost_frames)
     said = write_report(results, Path(plan.out))
     if options.progress_json:
         print_event("written", folder=plan.out)

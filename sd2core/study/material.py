@@ -78,6 +78,11 @@ class Material:
     pairs: PairSet | None  # Without its takes; None where there is no input to learn from.
 
     @property
+    def lost_frames(self) -> int:
+        """Frames of the pairs that the radar saw which are lost to damaged chunks."""
+        return 0 if self.pairs is None else self.pairs.lost_frames
+
+    @property
     def kind(self) -> str:
         """Kind of the radar."""
         kinds = {one.clip.kind for one in self.real}

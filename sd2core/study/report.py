@@ -16,6 +16,7 @@ from sd2core.classify.confusion_figure import confusion_figure
 from sd2core.classify.metrics import Score, mean_recall, shares
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.figure_files import save_figure
+from sd2core.files.stores import lost_in_words
 from sd2core.files.tables import counted, markdown_table
 from sd2core.study.certainty import Gain, adjusted, gain_of
 from sd2core.study.plan import OF_VIDEO
@@ -241,6 +242,8 @@ def _folds_in_words(results: Results) -> str:
     text += "." if by_person else ", the parts dealt anew."
     if plan.learns_denoisers and filmed:
         text += " The denoiser of a fold learns from those same data alone."
+    if results.lost_frames:
+        text += f" {lost_in_words(results.lost_frames)}"
     if results.others:
         text += f" {results.others} movements of other bodies, of the program's, may be added."
     if plan.speeds:

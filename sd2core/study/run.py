@@ -48,6 +48,7 @@ class Results:
     subject_of: Mapping[str, str]  # Of every movement, by title.
     others: int  # Movements of bodies that no radar saw.
     runs: tuple[Run, ...]
+    lost_frames: int = 0  # Of pairs, in damaged chunks.
 
     @property
     def takes(self) -> dict[str, int]:
@@ -147,7 +148,7 @@ def _made(
     subject_of = {one.title: one.clip.subject for one in material.real}
     found = tuple(run for run in runs.values() if run is not None)
     classes, others = material.known.classes, len(material.others)
-    return Results(plan, material.kind, classes, subject_of, others, found)
+    return Results(plan, material.kind, classes, subject_of, others, found, material.lost_frames)
 
 
 def _learn(place: Path, plan: StudyPlan, material: Material, task: Task) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_pairs import AXIS, write_pairs
+from study_results import some_results
 
 from sd2core.classify.data import Clip
 from sd2core.cli import build_parser, run
@@ -20,7 +22,9 @@ from sd2core.study.certainty import adjusted, gain_of
 from sd2core.study.folds import folds_of, groups_of, share_of
 from sd2core.study.material import Material, material_of
 from sd2core.study.plan import StudyPlan, read_study, study_text
+from sd2core.study.report import write_report
 from sd2core.study.windows import Ridge, at_speed, window_features
+from tests.damaged_files import lose
 
 
 @pytest.fixture(scope="module")
@@ -92,6 +96,17 @@ def test_more_video_is_of_its_people_or_of_others(store: Path, tmp_path: Path) -
     assert len(found.filmed) == 13
     assert all(one.clip.label.max() == 1 for one in found.others)
     assert len(found.real) == 12  # What is filmed only is never judged.
+
+
+def test_frames_in_damaged_chunks_are_left_out_and_told(tmp_path: Path) -> None:
+    damaged = write_pairs(tmp_path / "pairs.zarr", takes=6)
+    lose(damaged / "radar" / "c" / "1" / "0")  # frames 2250 to 2699, the last ones of s3
+    found = material_of(plan_of(damaged))
+    assert sum(len(one.clip) for one in found.real) == 2250
+    assert found.lost_frames == 450
+    results = replace(some_results(tmp_path), lost_frames=found.lost_frames)
+    write_report(results, tmp_path)
+    assert "450 frames are lost to damaged chunks" in (tmp_path / "study.md").read_text()
 
 
 def test_radar_files_are_one_persons_movements(shared_data: Path, tmp_path: Path) -> None:
