@@ -32,8 +32,8 @@ _SAMPLINGS: dict[int, Sampling] = {0: "real", 1: "complex", 2: "complex with ima
 """By ``adcOutputFmt``, the same in both kinds of file."""
 _BITS_16 = 2
 _MAX = 2**20
-_LATEST = 1.05
-"""Of the length of a chirp: no radar samples later, but for rounding."""
+_LATEST = 2.0
+"""Of the length of a chirp: samples that end later have a rate or times in another unit."""
 _CFG = "a .cfg of the mmWave SDK, or JSON of pymmw,"
 _JSON = "the .mmwave.json of mmWave Studio"
 
@@ -405,8 +405,8 @@ def _setup(device: _Device, lanes: int, notes: list[str]) -> TiSetup:
     ramp_s = profile.rampEndTime_usec * 1e-6
     if adc_start_s + samples / rate_hz > _LATEST * ramp_s:
         raise Sd2Error(
-            f"{samples} samples at {rate_hz:g} Hz from {1e6 * adc_start_s:g} µs on end after the"
-            f" chirp, which lasts {1e6 * ramp_s:g} µs",
+            f"{samples} samples at {rate_hz:g} Hz from {1e6 * adc_start_s:g} µs on end long after"
+            f" the chirp, which lasts {1e6 * ramp_s:g} µs",
             "samples within the chirp (their rate is in ksps, times are in µs)",
         )
     first_hz = profile.startFreqConst_GHz * 1e9 + slope_hz_per_s * adc_start_s

@@ -318,7 +318,7 @@ MISMATCHES: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "a rate in Msps": (
         _cfg(profileCfg="profileCfg 0 60 20 5 30 0 0 60 1 32 4 0 0 30"),
-        r"walk\.cfg: 32 samples at 4000 Hz .* end after the chirp",
+        r"walk\.cfg: 32 samples at 4000 Hz .* end long after the chirp",
     ),
     "a frequency in Hz": (
         _cfg(profileCfg="profileCfg 0 60e9 20 5 30 0 0 60 1 32 4000 0 0 30"),
