@@ -136,7 +136,7 @@ def _row(
     missing = [edge for edge in edges if edge not in times_ms]
     if missing:
         raise Sd2Error(
-            f"{path}, {place}: the time slot {missing[0][:50]!r} has no time",
+            f"{path}, {place}: the time slot {missing[0][:50]!r} has no time in numbers",
             "annotations with a start and an end",
             "Align it in ELAN, or delete its tier",
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element
 
-from sd2core.labels.formats.numbers import whole_number
+from sd2core.labels.formats.numbers import finite_number
 
 
 class ElanTimes:
@@ -24,9 +24,9 @@ class ElanTimes:
         for slot in document.iter("TIME_SLOT"):
             name, text = slot.get("TIME_SLOT_ID", ""), slot.get("TIME_VALUE")
             self._order.append(name)
-            value = whole_number(text or "")
-            if value is not None:
-                self._stated_ms[name] = float(value)
+            value = finite_number(text or "")  # whole in ELAN, not so in files of others
+            if value is not None and value >= 0:
+                self._stated_ms[name] = value
             elif text is None:
                 self._open.add(name)
         self._in_order_ms = self._between(self._order)

@@ -28,7 +28,7 @@ from sd2core.labels.spans import (
     Overlap,
     Span,
 )
-from sd2core.plausibility.spans import are_beyond
+from sd2core.plausibility.spans import are_beyond, judge_spans
 from sd2core.timebase import Timebase
 
 UNNAMED = "unnamed"
@@ -196,12 +196,15 @@ class LabelReading:
         if timebase is None:
             return self
         spans_s = [(one.start_s, one.end_s) for one in self.labels.spans]
-        beyond = int(are_beyond(spans_s, timebase.start_s, timebase.end_s).sum())
-        if not beyond:
+        found = judge_spans(spans_s, timebase.start_s, timebase.end_s)
+        if not found:
             return self
+        beyond = int(are_beyond(spans_s, timebase.start_s, timebase.end_s).sum())
         reach = "reaches" if beyond == 1 else "reach"
         extent = f"{timebase.start_s:.3f} to {timebase.end_s:.3f} s"
-        return replace(self, beyond=f"of which {beyond} {reach} beyond the recording ({extent})")
+        cause = found[0].remedy[0].lower() + found[0].remedy[1:]
+        said = f"of which {beyond} {reach} beyond the recording ({extent}; {cause})"
+        return replace(self, beyond=said)
 
 
 def assembled(path: Path, found: LabelRows, clock: LabelClock) -> LabelReading:

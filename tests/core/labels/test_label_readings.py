@@ -142,7 +142,12 @@ def test_what_is_beyond_the_recording_stays_and_is_told(
     (span,) = (one for one in found.labels.spans if one.label == "B")
     assert span.start_s == start_s
     assert span.end_s == (end_s if end_s > start_s else pytest.approx(start_s + 0.1))
-    assert "1 reaches beyond the recording (0.000 to 10.000 s)" in found.sentence
+    assert "1 reaches beyond the recording (0.000 to 10.000 s; " in found.sentence
+
+
+def test_times_in_another_unit_are_told_as_such(tmp_path: Path) -> None:
+    found = reading(tmp_path / "a.csv", "label,start,end\nA,1000,2000\nB,3000,4000\n")
+    assert "(0.000 to 10.000 s; their times are probably milliseconds)" in found.sentence
 
 
 def test_labels_within_the_recording_are_not_beyond_it(tmp_path: Path) -> None:
@@ -228,6 +233,11 @@ def test_slots_without_a_time_divide_evenly(tmp_path: Path, between: int, others
     assert starts_s == pytest.approx([1.0 + k * step_s for k in range(between + 1)], abs=1e-5)
     assert found.labels.spans[-1].end_s == 4.0
     assert ("evenly between" in found.sentence) == bool(between)
+
+
+def test_slots_may_have_parts_of_milliseconds(tmp_path: Path) -> None:
+    found = reading(tmp_path / "a.eaf", eaf({"a": "1000.5", "b": "2000.0"}, [("a", "b")]))
+    assert [(one.start_s, one.end_s) for one in found.labels.spans] == [(1.0005, 2.0)]
 
 
 def test_slots_that_cannot_be_placed_leave_their_annotations_out(tmp_path: Path) -> None:
