@@ -120,6 +120,7 @@ class PairProvenance(_Record):
 
     made_by: str = ""
     protocol: _Protocol | None = None
+    frames_lost: dict[str, _Rows] = {}
 
 
 def check_record(kind: type[BaseModel], content: Any, place: str | Path) -> None:
