@@ -66,7 +66,7 @@ def examine() -> list[Finding]:
         _bundled(),
         _landmark_models(),
         _gpu(),
-        *_plug_ins(),
+        *plug_in_findings(),
         *_folders(),
     ]
 
@@ -178,7 +178,8 @@ def _gpu() -> Finding:
     return Finding("Learning", "ok", f"torch {torch.__version__} on the processor, no GPU")
 
 
-def _plug_ins() -> list[Finding]:
+def plug_in_findings() -> list[Finding]:
+    """Find what other packages add, and what of it cannot be loaded."""
     from sd2core.classify.defaults import CLASSIFIERS
     from sd2core.cli.parser import COMMAND_PLUG_INS
     from sd2core.denoise.registry import DENOISERS

@@ -36,7 +36,9 @@ _PASSING = (
     *("_image", "_picture", "_strongest", "_dirty", "_fine"),  # painted when it is next on screen
     "_prefetcher",  # looked ahead, for the next frame
     *("_lister", "_thread", "_synthesizers._made", "_kept"),  # made in the background, or kept
-    *("edits._before", "_last_px"),  # of a drag that is over
+    *("edits._before", "_last_px", "_pressed_px", "_drops"),  # of a drag that is over
+    *("_tabbed", "_behind"),  # where Tab went last; actions that are followed soon
+    "_notices]._at",  # found anew when a notice appears
     "._body",  # what places were last drawn about, and their markers
     *("scene.markers.points", "scene.markers._colours", "scene.markers._colour_array"),
     # Tables that are filled when they are next on screen.
@@ -201,7 +203,7 @@ def remembered(window: MainWindow, recording: Path) -> dict[str, str]:
     rest: list[tuple[str, Any]] = [("", parts)]
     while rest:
         name, value = rest.pop()
-        if name.endswith(_PASSING):
+        if name.rstrip("]").endswith(_PASSING):
             continue
         if isinstance(value, (*_PLAIN, np.generic)):
             found[name] = repr(value).replace(str(recording), "<recording>")
@@ -274,5 +276,7 @@ def _widgets(widget: QWidget, place: str) -> list[str]:
         if isinstance(child, QWidget) and child.isVisible():
             found += _widgets(child, place)
         elif isinstance(child, QAction):
-            found.append(f"{place} {child.text()} {child.isEnabled()} {child.isChecked()}")
+            found.append(
+                f"{place} {child.text().replace('&', '')} {child.isEnabled()} {child.isChecked()}"
+            )
     return found

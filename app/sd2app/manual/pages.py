@@ -7,7 +7,7 @@ import posixpath
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from pathlib import Path
 
 from sd2app.manual.library import described
@@ -81,7 +81,7 @@ class Manual:
     """
 
     def __init__(self, folder: Path, parser: Callable[[], argparse.ArgumentParser]) -> None:
-        self.folder, self._parser = folder, parser
+        self.folder, self._parser = folder, cache(parser)
         self.sought = ""  # what the page of the search is about
         self._sources: dict[str, str] = {}
         self.contents = self._entry(INDEX, "")

@@ -53,11 +53,11 @@ class StatusLine(QWidget):
         self._plan.setText(text)
 
     def _follow(self) -> None:
-        if self._jobs.jobs and not self._bar.isVisible():
-            if not self._delay.isActive():
-                self._delay.start()
-        else:
+        """Show what goes on in a moment: each step of a bar paints the window at once."""
+        if not self._jobs.jobs:
             self._show_job()
+        elif not self._delay.isActive():
+            self._delay.start()
 
     def _show_job(self) -> None:
         job = self._jobs.jobs[0] if self._jobs.jobs else None
@@ -72,3 +72,4 @@ class StatusLine(QWidget):
     def _cancel_job(self) -> None:
         if self._jobs.jobs:
             self._jobs.cancel(self._jobs.jobs[0])
+            self._show_job()

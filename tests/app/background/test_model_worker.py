@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import numpy as np
+import psutil
 import pytest
 
 from sd2app.background.model_worker.client import ModelProcess
@@ -111,8 +112,9 @@ def test_what_is_wrong_is_said_and_the_process_goes_on(process, folder):
 def test_one_that_died_is_started_again(process, folder):
     model = process.load(folder / "gru.safetensors")
     before = model.denoise(a_map()).values
-    process._process.kill()
-    process._process.wait()
+    (worker,) = psutil.Process().children()
+    worker.kill()
+    worker.wait()
     np.testing.assert_array_equal(model.denoise(a_map()).values, before)
 
 

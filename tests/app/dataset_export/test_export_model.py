@@ -39,8 +39,8 @@ def made(qtbot, tmp_path: Path):
     parent = QObject()
     models = []
 
-    def make(how: str = "done") -> ExportModel:
-        command = [sys.executable, str(FAKE), how]
+    def make(how: str = "done", program: str = sys.executable) -> ExportModel:
+        command = [program, str(FAKE), how]
         models.append(ExportModel(TaskList(parent), parent, command, tmp_path / "exports"))
         return models[-1]
 
@@ -234,7 +234,7 @@ def test_what_was_written_meanwhile_is_said(made, people, qtbot, tmp_path) -> No
 def test_one_that_was_killed_is_said(made, people, qtbot) -> None:
     model = made("slow")
     begun(model, people, qtbot)
-    os.kill(model.run._launched.pid, signal.SIGKILL)
+    os.kill(model.run.process.pid, signal.SIGKILL)
     with qtbot.waitSignal(model.failed, timeout=20_000) as failed:
         pass
     assert failed.args[0].startswith("set.h5 was not written to its end")
@@ -242,8 +242,7 @@ def test_one_that_was_killed_is_said(made, people, qtbot) -> None:
 
 
 def test_one_that_cannot_be_started_is_said(made, people, qtbot) -> None:
-    model = made()
-    model._command = ("/no/such/program",)
+    model = made(program="/no/such/program")
     model.begin(people)
     counted(model, qtbot)
     with qtbot.waitSignal(model.failed, timeout=20_000) as failed:

@@ -32,7 +32,8 @@ def said(**content: object) -> FitProgress:
 def test_every_event_of_the_format_is_read() -> None:
     begun = said(**START)
     assert (begun.size, begun.resumed) == ((640, 480), False)
-    assert begun._stages == ("find", "refine", "fit", "write")
+    assert begun.take([{"event": "progress", "stage": "write", "done": 1, "total": 1}])
+    assert begun.share == 1.0  # it is the last of the stages
     progress = said(event="progress", stage="find", done=3, total=90, unit="frame")
     assert (progress.stage, progress.done, progress.total) == ("find", 3, 90)
     assert progress.unit == "frame"

@@ -89,8 +89,8 @@ def desk(qtbot, root: Path):
     """Makes desks, and clears them in the end."""
     made = []
 
-    def make() -> Desk:
-        made.append(Desk(qtbot, root))
+    def make(home: Path = root) -> Desk:
+        made.append(Desk(qtbot, home))
         return made[-1]
 
     yield make
@@ -427,8 +427,7 @@ class TestTwoWindows:
         assert len(read_labels(recording / "labels.json").labels.spans) == 1
 
     def test_one_with_another_home_looks_on_as_well(self, desk, recording, tmp_path) -> None:
-        first, second = desk(), desk()
-        second.session._root = tmp_path / "home of another"
+        first, second = desk(), desk(tmp_path / "home of another")
         first.open(recording)
         second.open(recording)
         assert second.session.read_only

@@ -245,7 +245,7 @@ def test_windows_join_without_a_step(fitted: BodyFit, fitted_in_windows: BodyFit
 def test_windows_cover_a_stretch(frames: int) -> None:
     covered = np.zeros(frames + 7, int)
     end = 7
-    for start, stop, shared in fit_windows._windows(7, 7 + frames):
+    for start, stop, shared in fit_windows.Windows(np.arange(7 + frames) >= 7, None).spans:
         assert start + shared == end
         covered[start + shared : stop] += 1
         end = stop
@@ -271,7 +271,7 @@ def test_a_stopped_fit_goes_on(
     real = fitting.solve
     monkeypatch.setattr(fitting, "solve", lambda *a: calls.append(1) or real(*a))
     resumed = scene.fit(workspace=tmp_path)
-    assert len(calls) < len(list(fit_windows._windows(0, 60)))
+    assert len(calls) < len(fit_windows.Windows(np.ones(60, bool), None).spans)
     np.testing.assert_array_equal(resumed.turns, whole.turns)
     # What another clip left there is not used, nor what is damaged.
     file = next(iter(tmp_path.glob("pose-*.npz")))

@@ -304,7 +304,8 @@ class TestFit:
                 patch.setattr(fit_windows, "_WINDOW_FRAMES", frames)
                 patch.setattr(track, "PART_FRAMES", frames)
                 found.append(fit_body(known, CAMERA, stature_m=STATURE_M).keypoints_m)
-                seams = [span[0] for span in fit_windows._windows(0, self.FRAMES)][1:]
+                spans = fit_windows.Windows(np.ones(self.FRAMES, bool), None).spans
+                seams = [span[0] for span in spans][1:]
         times_s = known.timebase.times_s
         true = velocity_mps(found[0], times_s)
         apart = velocity_mps(found[1], times_s) - true

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 
 import sd2core as sd2
 from sd2core.body import mesh_refining
 from sd2core.body.mesh_refining import refined, smooth_paths
-from sd2core.body.model import vertex_normals
+from sd2core.body.model import Body, vertex_normals
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.mesh.sequence import MeshSequence
@@ -23,8 +24,11 @@ from tools.motion_capture.jitter import Floats, approaching_mps, facing, jitteri
 
 @lru_cache
 def swipes() -> MeshSequence:
-    """The bundled sample's true body; nothing of the smoothing was chosen on it."""
-    return sd2.load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(0, 300)
+    """The sample's true body, on the coarsest surface; nothing of the smoothing was chosen on it."""
+    mesh = sd2.load_mesh(resource_path("swipes.sd2") / "mesh.zarr")
+    medium, low = Body.load("medium"), Body.load("low")
+    _, rows = cKDTree(medium.vertices_m).query(low.vertices_m)
+    return replace(mesh.between(0, 300), vertices=mesh.read(0, 300)[:, rows], faces=low.faces)
 
 
 def cloud(paths_m: Floats, times_s: Floats | None = None) -> MeshSequence:

@@ -165,7 +165,7 @@ class TestEach:
         assert not imported()
 
     def test_all_are_listed_by_the_doctor(self) -> None:
-        found = doctor._plug_ins()
+        found = doctor.plug_in_findings()
         assert [one.state for one in found] == ["ok"] * len(GROUPS)
         assert {one.found.partition("(")[2].partition(")")[0] for one in found} == {*GROUPS}
         assert all(one.found.endswith("of sd2-sample") for one in found)
@@ -225,14 +225,14 @@ class TestRefusals:
         assert words in said
         assert said.endswith("Update bad-package, or uninstall it.")
         assert named_radar("paper") is sd2.PAPER_RADAR
-        (finding,) = doctor._plug_ins()
+        (finding,) = doctor.plug_in_findings()
         assert finding.state == "problem"
         assert words in finding.found
 
     def test_the_name_of_what_is_built_in(self, install: Install) -> None:
         install("bad-package", "radars", "paper = added:RADAR", RADAR + "RADAR = None")
         assert named_radar("paper") is sd2.PAPER_RADAR
-        (finding,) = doctor._plug_ins()
+        (finding,) = doctor.plug_in_findings()
         assert "called like what is built in" in finding.found
         assert finding.remedy == "Uninstall bad-package"
 
@@ -242,7 +242,7 @@ class TestRefusals:
         said = refusal(named_radar, "tea")
         assert "one-package" in said
         assert "Uninstall one-package or other-package" in said
-        assert [one.state for one in doctor._plug_ins()] == ["problem"] * 2
+        assert [one.state for one in doctor.plug_in_findings()] == ["problem"] * 2
 
     def test_a_file_that_two_read(self, install: Install, points: Path) -> None:
         text = READER.format(result="None")
@@ -300,7 +300,7 @@ class TestRefusals:
         self, install: Install, group: str, text: str, words: str
     ) -> None:
         install("bad-package", group, "bad = added:X", text)
-        (finding,) = doctor._plug_ins()
+        (finding,) = doctor.plug_in_findings()
         assert f"({group}) of the package bad-package cannot be used: {words}" in finding.found
 
     def test_a_command_that_cannot_be_used(

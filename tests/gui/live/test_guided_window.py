@@ -9,7 +9,7 @@ import pytest
 from answering import once_asked
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QScrollArea, QWidget
+from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QScrollArea, QToolButton, QWidget
 
 from sd2app.live.dialog import ListenDialog
 from sd2app.live.gesture_picture import has_picture
@@ -200,6 +200,7 @@ def test_the_dialog_offers_protocols_and_sets_a_session_up(
 ) -> None:
     window, folder = empty_window, tmp_path / "session"
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(protocol), ""))
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(folder), ""))
     started: list[ListenRequest] = []
     guided = window.features.live.guided
     monkeypatch.setattr(guided, "start", started.append)
@@ -213,7 +214,9 @@ def test_the_dialog_offers_protocols_and_sets_a_session_up(
         )
         assert not begin.isEnabled()  # takes are filmed
         choices["Camera"].setCurrentIndex(choices["Camera"].findData("test"))
-        dialog._setup.choose_folder(folder)
+        tools = dialog.findChildren(QToolButton)
+        (into,) = (one for one in tools if one.text() == "Choose…" and one.isVisible())
+        QTest.mouseClick(into, Qt.MouseButton.LeftButton)
         assert begin.isEnabled()
         QTest.mouseClick(begin, Qt.MouseButton.LeftButton)
 

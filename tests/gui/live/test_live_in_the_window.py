@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from answering import answer, once_asked
+from finding import splitter_around
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QSplitter, QToolButton, QWidget
@@ -15,6 +16,7 @@ from window_models import models_of
 from sd2app.live.bar import LiveBar
 from sd2app.live.dialog import ListenDialog
 from sd2app.live.setup import ListenRequest
+from sd2app.video.view import VideoView
 from sd2app.widgets.inputs import Choice
 from sd2core.io.radar import write_capture
 from sd2core.recording.recording import open_recording
@@ -126,7 +128,8 @@ def test_a_radar_alone_has_no_empty_pane_and_its_message_leaves_with_it(
 ):
     window, folder = empty_window, tmp_path / "walk.sd2"
     models, live = models_of(window), window.features.live.model
-    top, video = window._top, window._panels["video"]
+    video = window.findChild(VideoView)
+    top = splitter_around(video, Qt.Orientation.Horizontal)
     assert video.isVisible()
     before = top.sizes()
     listen(window, monkeypatch, capture, folder)
@@ -152,7 +155,7 @@ def test_a_radar_alone_has_no_empty_pane_and_its_message_leaves_with_it(
 
 def test_a_camera_that_is_filmed_has_its_pane(empty_window, qtbot, tmp_path):
     window, folder = empty_window, tmp_path / "walk.sd2"
-    live, video = window.features.live.model, window._panels["video"]
+    live, video = window.features.live.model, window.findChild(VideoView)
     live.start(ListenRequest(folder, radar="test", camera="test"))
     qtbot.waitUntil(lambda: live.on_screen and live.pictures > 30, timeout=LIMIT_MS)
     assert video.isVisible()

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QApplication, QMainWindow
 from window_models import models_of
 
 from sd2app.shell.action_search import ActionSearch, entries_of, found
+from sd2app.widgets.inputs import SearchLine
 
 
 @pytest.fixture
@@ -36,6 +37,11 @@ def bar(bare_window):
     off.setEnabled(False)
     inner.addAction(off)
     return menus
+
+
+def line_of(search):
+    """Where one types."""
+    return search.findChild(SearchLine)
 
 
 def texts(entries):
@@ -80,9 +86,9 @@ def test_typing_and_return_do_it(bar, qtbot):
     search = ActionSearch(bar)
     qtbot.addWidget(search)
     search.show()
-    qtbot.keyClicks(search.focusWidget() or search._line, "write")
+    qtbot.keyClicks(line_of(search), "write")
     assert search.current.text == "Save as…"
-    qtbot.keyClick(search.focusWidget() or search._line, Qt.Key.Key_Return)
+    qtbot.keyClick(line_of(search), Qt.Key.Key_Return)
     assert search.chosen.text() == "Save &as…"
     search.chosen.trigger()
     assert done == ["save as"]
@@ -92,10 +98,10 @@ def test_what_is_disabled_says_why_and_is_not_done(bar, qtbot):
     search = ActionSearch(bar)
     qtbot.addWidget(search)
     search.show()
-    qtbot.keyClicks(search._line, "open")
-    qtbot.keyClick(search._line, Qt.Key.Key_Down)
+    qtbot.keyClicks(line_of(search), "open")
+    qtbot.keyClick(line_of(search), Qt.Key.Key_Down)
     assert search.current.tip == "There is no mesh"
-    qtbot.keyClick(search._line, Qt.Key.Key_Return)
+    qtbot.keyClick(line_of(search), Qt.Key.Key_Return)
     assert search.chosen is None
     assert search.isVisible()
 
@@ -106,8 +112,8 @@ def test_the_key_opens_it_and_what_is_chosen_is_done(empty_window, qtbot):
 
     def type_it():
         search = QApplication.activeModalWidget()
-        qtbot.keyClicks(search._line, "dark theme")
-        qtbot.keyClick(search._line, Qt.Key.Key_Return)
+        qtbot.keyClicks(line_of(search), "dark theme")
+        qtbot.keyClick(line_of(search), Qt.Key.Key_Return)
 
     QTimer.singleShot(0, type_it)
     qtbot.keyClick(

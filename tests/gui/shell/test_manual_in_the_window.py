@@ -15,6 +15,7 @@ from window_models import menu_of
 from sd2app.labels.cut_out import CutOutDialog
 from sd2app.manual.help import HELP
 from sd2app.shell.program import ProgramFeature
+from sd2app.shell.side_panel import RailButton
 
 APP = Path(__file__).resolve().parents[3] / "app" / "sd2app"
 SMALL = {"TrackDialog", "MessagesDialog", "ModelCardDialog", "ActionSearch"}
@@ -70,9 +71,8 @@ def test_without_its_pages_it_says_so(window, manual, monkeypatch, tmp_path) -> 
     assert manual.window is None
 
 
-@pytest.mark.parametrize(
-    ("panel", "page", "topic"),
-    [
+def test_every_panel_at_the_side_has_help(window, manual) -> None:
+    panels = (
         ("Sensor", "Sensor", "Sensor"),
         ("Sensor", "Placements", "Placements"),
         ("Accuracy", "", "Accuracy"),
@@ -81,17 +81,12 @@ def test_without_its_pages_it_says_so(window, manual, monkeypatch, tmp_path) -> 
         ("Labels", "Spans", "Labels"),
         ("Labels", "Label set", "Label set"),
         ("Agree", "", "Agree"),
-    ],
-)
-def test_every_panel_at_the_side_has_help(window, manual, panel, page, topic) -> None:
-    window.bring_up(panel, page)
-    QTest.mouseClick(help_in(window.side), Qt.MouseButton.LeftButton)
-    assert place_in(manual) == HELP[topic]
-
-
-def test_all_panels_at_the_side_are_looked_at(window) -> None:
-    marks = test_every_panel_at_the_side_has_help.pytestmark
-    assert {row[0] for row in marks[0].args[1]} == set(window.side._names)
+    )
+    assert {row[0] for row in panels} == {one.name for one in window.side.findChildren(RailButton)}
+    for panel, page, topic in panels:
+        window.bring_up(panel, page)
+        QTest.mouseClick(help_in(window.side), Qt.MouseButton.LeftButton)
+        assert place_in(manual) == HELP[topic]
 
 
 def test_every_larger_dialog_has_help() -> None:
