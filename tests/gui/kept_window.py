@@ -39,7 +39,8 @@ _PASSING = (
     *("edits._before", "_last_px", "_pressed_px", "_drops"),  # of a drag that is over
     *("_tabbed", "_behind"),  # where Tab went last; actions that are followed soon
     "_notices]._at",  # found anew when a notice appears
-    "._body",  # what places were last drawn about, and their markers
+    *("inertial_hand._model._chosen", "].found"),  # of places and a search that are no more
+    *("._body", "scene.inertial.points"),  # what places were last drawn about, and their markers
     *("scene.markers.points", "scene.markers._colours", "scene.markers._colour_array"),
     # Tables that are filled when they are next on screen.
     *("spans.table._model.rows", "spans.table._model._row_of"),
@@ -158,6 +159,7 @@ class KeptWindow:
         models.pointer.leave()
         models.keys.reset_all()
         models.trade.tolerance = DEFAULT_TOLERANCE
+        models.trade.measured.set_family("histogram")
         for table in window.findChildren(QTableView):
             table.setCurrentIndex(QModelIndex())
         window.side.bring_up("Sensor")

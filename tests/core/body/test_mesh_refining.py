@@ -24,7 +24,7 @@ from tools.motion_capture.jitter import Floats, approaching_mps, facing, jitteri
 
 @lru_cache
 def swipes() -> MeshSequence:
-    """The sample's true body, on the coarsest surface; nothing of the smoothing was chosen on it."""
+    """The sample's true body on the coarsest surface, on which nothing was chosen."""
     mesh = sd2.load_mesh(resource_path("swipes.sd2") / "mesh.zarr")
     medium, low = Body.load("medium"), Body.load("low")
     _, rows = cKDTree(medium.vertices_m).query(low.vertices_m)

@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sd2core.cli import build_parser, run
 from sd2core.datasets.reading import open_dataset
 from sd2core.files.resources import resource_path
 from sd2core.io.video_writing import HEADS_COVERED
@@ -197,20 +198,14 @@ def test_a_session_ends_in_recordings_of_the_right_labels(tmp_path: Path) -> Non
     assert sorted(segments) == [("left-to-right", "horizontal"), ("wave", "wave")]
 
 
-def test_what_cannot_be_is_refused_before_anything_is_made(tmp_path: Path) -> None:
+def test_what_cannot_be_is_refused_before_anything_is_made(tmp_path: Path, capsys) -> None:
     words = ["record", "--camera", "test", "--radar", "test", "--out", str(tmp_path / "some")]
-    done = subprocess.run(
-        [*SD2, *words, "--protocol", "none.toml"], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 1
-    assert "sd2: There is no protocol none.toml" in done.stderr
-    done = subprocess.run(
-        [*SD2, *words, "--protocol", "paper", "--seconds", "3"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert "--protocol is given with --seconds" in done.stderr
+    for more, said in (
+        (["--protocol", "none.toml"], "sd2: There is no protocol none.toml"),
+        (["--protocol", "paper", "--seconds", "3"], "--protocol is given with --seconds"),
+    ):
+        assert run(build_parser(typed=words)[0], [*words, *more]) != 0
+        assert said in capsys.readouterr().err
     assert not (tmp_path / "some").exists()
 
 

@@ -14,9 +14,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sd2core.cli import build_parser, run
 from sd2core.errors import Sd2Error
 from sd2core.io.video import open_video
 from sd2core.live.clocks import Clocks, fit_line
@@ -55,6 +56,7 @@ def _events_s(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     return _centres_s(pictures_s, flashes), _centres_s(radar_s, bursts / bursts.max())
 
 
+@settings(max_examples=40)
 @given(st.floats(-1e5, 1e5), st.floats(-4e-4, 4e-4), st.floats(30.0, 3000.0), st.integers(0, 2**32))
 def test_a_clock_is_found_whatever_is_held_up(
     start_s: float, drift: float, length_s: float, seed: int
@@ -177,22 +179,23 @@ def _wait_for(is_so) -> None:
         time.sleep(0.01)
 
 
-def test_a_camera_that_is_not_there_is_named_and_leaves_nothing(tmp_path: Path) -> None:
+def refused(out: Path, camera: str, capsys: pytest.CaptureFixture[str]) -> str:
+    """Words by which the command refuses to record a camera and the radar of tests."""
+    words = ["record", "--camera", camera, "--radar", "test", "--out", str(out)]
+    assert run(build_parser(typed=words)[0], words) == 1
+    return capsys.readouterr().err
+
+
+def test_a_camera_that_is_not_there_is_named_and_leaves_nothing(tmp_path: Path, capsys) -> None:
     out = tmp_path / "take.sd2"
-    words = ["--camera", "97", "--radar", "test", "--out", str(out)]
-    done = subprocess.run([*RECORD, *words], capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert "sd2: Camera 97 cannot be opened, or gives no picture." in done.stderr
+    assert "sd2: Camera 97 cannot be opened, or gives no picture." in refused(out, "97", capsys)
     assert not out.exists()
 
 
-def test_what_was_recorded_is_not_recorded_over(tmp_path: Path) -> None:
+def test_what_was_recorded_is_not_recorded_over(tmp_path: Path, capsys) -> None:
     out = tmp_path / "take.sd2"
     out.mkdir()
-    words = ["--camera", "test", "--radar", "test", "--out", str(out)]
-    done = subprocess.run([*RECORD, *words], capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert "take.sd2 exists. Expected: a new folder." in done.stderr
+    assert "take.sd2 exists. Expected: a new folder." in refused(out, "test", capsys)
 
 
 def test_a_radar_that_is_silent_leaves_the_video(tmp_path: Path) -> None:
