@@ -4,43 +4,21 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
+from sd2core.cli.command_parser import add_command
 from sd2core.cli.running import run
-from sd2core.options.bounds import COUNT
-from sd2core.options.kinds import number_reader
+from sd2core.options.records import OptionRecord
 
-positive_int = number_reader(COUNT)
-
-
-def add_json(parser: argparse.ArgumentParser) -> None:
-    """Add ``--json``."""
-    parser.add_argument("--json", action="store_true", help="print JSON, for other programs")
+Commands = Mapping[str, tuple[type[OptionRecord], Callable[[Any], None]]]
+"""Names of commands, their options, and what does them; its docstring is the help."""
 
 
-def run_tool(
-    name: str,
-    description: str,
-    add_commands: Callable[[argparse._SubParsersAction], None],
-    arguments: Sequence[str] | None = None,
-) -> int:
-    """Run one command of ``python -m tools.NAME`` and return its exit code.
-
-    Parameters
-    ----------
-    name : str
-        Package in ``tools``.
-    description : str
-        First lines of ``--help``.
-    add_commands : callable
-        Adds the commands, each with its handler.
-    arguments : sequence of str, optional
-        Those of the process by default.
-    """
-    parser = argparse.ArgumentParser(
-        prog=f"python -m tools.{name}",
-        description=description,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    add_commands(parser.add_subparsers(title="commands", metavar="COMMAND", required=True))
+def run_tool(name: str, commands: Commands, arguments: Sequence[str] | None = None) -> int:
+    """Run one command of ``python -m tools.NAME``, by default as typed; return its exit code."""
+    parser = argparse.ArgumentParser(prog=f"python -m tools.{name}")
+    places = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for command, (options, handler) in commands.items():
+        add_command(places, command, options=options, handler=handler)
     return run(parser, sys.argv[1:] if arguments is None else arguments)

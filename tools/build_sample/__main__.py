@@ -2,43 +2,42 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
-from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import progress_bar
+from sd2core.options.records import ARGUMENT, OptionRecord
 from tools.build_sample.sample import make_sample
 from tools.command_line import run_tool
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Make the sample; return the exit code."""
-    return run_tool("build_sample", "The bundled sample recording.", _add_commands, arguments)
+class Make(OptionRecord):
+    """Options of ``make``.
+
+    Parameters
+    ----------
+    out : OUT
+        the recording to make (NAME.sd2)
+    """
+
+    out: Annotated[Path, ARGUMENT]
 
 
-def _add_commands(commands: argparse._SubParsersAction) -> None:
-    sample = add_command(
-        commands,
-        "make",
-        "make the bundled sample recording",
-        handler=_make,
-        description=(
-            "A body makes two swipes to the right, left, down and up, 2.2 m in front of the\n"
-            "camera and a 60 GHz radar: a rendered video, what `sd2 fit` makes of it, the true\n"
-            "mesh, and the raw samples of the radar with noise and static clutter. Takes some\n"
-            "minutes, and the landmark models."
-        ),
-        examples="  python -m tools.build_sample make resources/swipes.sd2",
-    )
-    sample.add_argument("out", type=Path, metavar="OUT", help="the recording to make (NAME.sd2)")
+def _make(options: Make) -> None:
+    """Make the bundled sample recording.
 
-
-def _make(options: argparse.Namespace) -> None:
+    A body swipes before a camera and a 60 GHz radar. Takes some minutes, and the landmark models.
+    """
     with progress_bar("Simulating", unit="frame") as progress:
         made = make_sample(options.out, progress)
     print(f"Made {made}")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Make the sample; return the exit code."""
+    return run_tool("build_sample", {"make": (Make, _make)}, arguments)
 
 
 if __name__ == "__main__":

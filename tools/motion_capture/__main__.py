@@ -2,60 +2,64 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
-from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import progress_bar
-from tools.command_line import positive_int, run_tool
+from sd2core.options.kinds import Count
+from sd2core.options.records import ARGUMENT, OptionRecord
+from tools.command_line import Commands, run_tool
 from tools.motion_capture.bodies import drive_bodies
 from tools.motion_capture.refining import measure_refining
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one of the commands; return the exit code."""
-    about = "Bodies in the motion of real people."
-    return run_tool("motion_capture", about, _add_commands, arguments)
+class Drive(OptionRecord):
+    """Options of ``drive``.
+
+    Parameters
+    ----------
+    source : SOURCE
+        folder of motion capture
+    out : OUT
+        folder of the bodies' motions
+    processes : P
+        at work at once
+    """
+
+    source: Annotated[Path, ARGUMENT]
+    out: Annotated[Path, ARGUMENT]
+    processes: Count = 2
 
 
-def _add_commands(kinds: argparse._SubParsersAction) -> None:
-    drive = add_command(
-        kinds,
-        "drive",
-        "drive a body by every recording of a folder",
-        handler=_drive,
-        description=(
-            "All recordings of one person drive one body of that person's measures. Stopped and\n"
-            "started again it goes on where it was."
-        ),
-        examples="  python -m tools.motion_capture drive ../shared/data/motion motions",
-    )
-    drive.add_argument("source", type=Path, metavar="SOURCE", help="folder of motion capture")
-    drive.add_argument("out", type=Path, metavar="OUT", help="folder of the bodies' motions")
-    drive.add_argument(
-        "--processes", type=positive_int, default=2, metavar="P", help="(default: 2)"
-    )
-    measure = add_command(
-        kinds,
-        "refining",
-        "measure `sd2 refine` on recorded motion with jitter",
-        handler=_refining,
-        examples="  python -m tools.motion_capture refining motions",
-    )
-    measure.add_argument("motions", type=Path, metavar="MOTIONS", help="what `drive` made")
+class Refining(OptionRecord):
+    """Options of ``refining``.
+
+    Parameters
+    ----------
+    motions : MOTIONS
+        what `drive` made
+    """
+
+    motions: Annotated[Path, ARGUMENT]
 
 
-def _drive(options: argparse.Namespace) -> None:
+def _drive(options: Drive) -> None:
+    """Drive a body by every recording of a folder.
+
+    All recordings of one person drive one body of that person's measures. Stopped and
+    started again it goes on where it was.
+    """
     with progress_bar("Driving bodies", unit="recording") as progress:
         notes = drive_bodies(options.source, options.out, options.processes, progress)
     print("\n".join([*notes, f"Wrote {options.out}"]))
 
 
-def _refining(options: argparse.Namespace) -> None:
+def _refining(options: Refining) -> None:
+    """Measure `sd2 refine` on recorded motion with jitter."""
     with progress_bar("Smoothing", unit="recording") as progress:
         errors = measure_refining(options.motions, progress)
     for trial, (before, after) in errors.items():
@@ -66,6 +70,12 @@ def _refining(options: argparse.Namespace) -> None:
         f" {np.mean(after / before):.2f} (mean), {np.max(after / before):.2f} (greatest),"
         f" below half in {np.sum(after < 0.5 * before)}"
     )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one of the commands; return the exit code."""
+    commands: Commands = {"drive": (Drive, _drive), "refining": (Refining, _refining)}
+    return run_tool("motion_capture", commands, arguments)
 
 
 if __name__ == "__main__":

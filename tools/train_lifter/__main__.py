@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import get_args
+from typing import Annotated
 
 from sd2core.body.landmark_models import DEFAULT_MODEL, LandmarkModel
 from sd2core.body.lifter import Lifter
-from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_json, progress_bar
-from sd2core.cli.output_folders import check_output
 from sd2core.errors import Sd2Error
 from sd2core.mocap.body_motion import Role
-from tools.command_line import (
-    add_json,
-    positive_int,
-    run_tool,
-)
+from sd2core.options.kinds import Count
+from sd2core.options.records import ARGUMENT, ARGUMENTS, OptionRecord, Place
+from sd2core.options.shared import Json
+from tools.command_line import Commands, run_tool
 from tools.motion_capture.bodies import load_motions
 from tools.train_lifter.data import load_takes, make_lifter_data
 from tools.train_lifter.deeds import Manner
@@ -31,141 +27,128 @@ from tools.train_lifter.swaps import score_sides
 from tools.train_lifter.takes import Take
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one of the commands; return the exit code."""
-    return run_tool("train_lifter", "The lifter of `sd2 fit`.", _add_commands, arguments)
+class Motion(OptionRecord):
+    """How the people of takes move.
+
+    Parameters
+    ----------
+    seed : S
+        seed of all random numbers
+    held_out
+        with the kinds of motion kept for testing
+    manner
+        how people move: with elbows any way they can be, as people have them, or gesturing before
+        the camera, with arms or with forearms alone
+    motions : FOLDER
+        people move as those recorded there do (made by python -m tools.motion_capture)
+    """
+
+    seed: int = 0
+    held_out: bool = False
+    manner: Manner = "any"
+    motions: Path | None = None
 
 
-def _add_commands(kinds: argparse._SubParsersAction) -> None:
-    data = add_command(
-        kinds,
-        "data",
-        "draw random people in random motion and look at them as `sd2 fit` does",
-        handler=_data,
-        description=(
-            "Makes takes of 96 frames: what the landmark models say, and the truth. Stopped and\n"
-            "started again it goes on where it was. The same seed makes the same takes."
-        ),
-        examples=(
-            "  python -m tools.train_lifter data people --takes 400 --seed 1\n"
-            "  python -m tools.train_lifter data unseen --takes 40 --held-out\n"
-            "  python -m tools.train_lifter data walkers --motions motions --takes 400"
-        ),
-    )
-    data.add_argument("out", type=Path, metavar="OUT", help="folder of the takes")
-    data.add_argument(
-        "--takes", type=positive_int, default=400, metavar="N", help="how many (default: 400)"
-    )
-    _add_motion(data)
-    data.add_argument("--processes", type=positive_int, default=2, metavar="P", help="(default: 2)")
-    data.add_argument("--models", type=Path, metavar="FOLDER", help="the landmark models")
-    data.add_argument(
-        "--landmark-model",
-        choices=get_args(LandmarkModel),
-        default=DEFAULT_MODEL,
-        help="which of them looks (default: %(default)s)",
-    )
-    pairs = add_command(
-        kinds,
-        "pairs",
-        "make pairs to train a denoiser on: fits of such takes beside a simulated radar",
-        handler=_pairs,
-        description="The other options are those that the takes were made with.",
-        examples=(
-            "  python -m tools.train_lifter pairs people --seed 1 --out fits.zarr\n"
-            "  sd2 train campaign.zarr fits.zarr --inputs kinematics --out run"
-        ),
-    )
-    pairs.add_argument("data", type=Path, metavar="DATA", help="folder of the takes")
-    pairs.add_argument("--out", type=Path, required=True, metavar="FILE", help="to write (.zarr)")
-    _add_motion(pairs)
-    train = add_command(
-        kinds,
-        "train",
-        "train the lifter of `sd2 fit` on such takes",
-        handler=_train,
-        examples=(
-            "  python -m tools.train_lifter train people walkers --kept unseen --motions motions"
-            " --out lifter.npz"
-        ),
-    )
-    _add_learning(train, steps=9000)
-    train.add_argument(
-        "--kept",
-        type=Path,
-        nargs="+",
-        required=True,
-        metavar="DATA",
-        help="folders of takes that only calibrate: of people and motion not learnt from",
-    )
-    train.add_argument(
-        "--start", type=Path, metavar="FILE", help="a lifter to go on from (default: from nothing)"
-    )
-    sides = add_command(
-        kinds,
-        "sides",
-        "train what tells left from right, on such takes",
-        handler=_sides,
-        examples="  python -m tools.train_lifter sides people --motions motions --out sides.npz",
-    )
-    _add_learning(sides, steps=4000)
-    scoring = add_command(
-        kinds,
-        "score",
-        "measure the lifter, and what tells left from right, on such takes",
-        handler=_score,
-        description="Errors of the velocity along the line of sight, joint by joint, and frames in"
-        " which left is taken for right.",
-        examples="  python -m tools.train_lifter score unseen",
-    )
-    scoring.add_argument("data", type=Path, metavar="DATA", help="folder of the takes")
-    scoring.add_argument("--lifter", type=Path, metavar="FILE", help="(default: the bundled one)")
-    add_json(scoring)
+class Data(Motion):
+    """Options of ``data``.
+
+    Parameters
+    ----------
+    out : OUT
+        folder of the takes
+    takes : N
+        how many
+    processes : P
+        at work at once
+    models : FOLDER
+        the landmark models
+    landmark_model
+        which of them looks
+    """
+
+    out: Annotated[Path, ARGUMENT]
+    takes: Count = 400
+    processes: Count = 2
+    models: Path | None = None
+    landmark_model: LandmarkModel = DEFAULT_MODEL
 
 
-def _add_motion(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="S", help="seed of all random numbers"
-    )
-    parser.add_argument(
-        "--held-out", action="store_true", help="with the kinds of motion kept for testing"
-    )
-    parser.add_argument(
-        "--manner",
-        choices=get_args(Manner),
-        default="any",
-        help=(
-            "how people move: with elbows any way they can be (default), as people have them,"
-            " or gesturing before the camera, with arms or with forearms alone"
-        ),
-    )
-    parser.add_argument(
-        "--motions",
-        type=Path,
-        metavar="FOLDER",
-        help="people move as those recorded there do (made by python -m tools.motion_capture)",
-    )
+class Pairs(Motion):
+    """Options of ``pairs``.
+
+    Parameters
+    ----------
+    data : DATA
+        folder of the takes
+    out : FILE
+        to write (.zarr)
+    """
+
+    data: Annotated[Path, ARGUMENT]
+    out: Path
 
 
-def _add_learning(parser: argparse.ArgumentParser, steps: int) -> None:
-    parser.add_argument("data", type=Path, nargs="+", metavar="DATA", help="folders of the takes")
-    parser.add_argument(
-        "--motions", type=Path, metavar="FOLDER", help="real motion to emulate (see data --motions)"
-    )
-    parser.add_argument(
-        "--steps",
-        type=positive_int,
-        metavar="N",
-        help="of optimisation (default: %(default)s)",
-        default=steps,
-    )
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="to write (.npz)")
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="S", help="seed of all random numbers"
-    )
+class Learning(OptionRecord):
+    """What is learnt from, how long, and where it goes.
+
+    Parameters
+    ----------
+    data : DATA
+        folders of the takes
+    motions : FOLDER
+        real motion to emulate (see data --motions)
+    steps : N
+        of optimisation
+    out : FILE
+        to write (.npz)
+    seed : S
+        seed of all random numbers
+    """
+
+    data: Annotated[tuple[Path, ...], ARGUMENTS]
+    motions: Path | None = None
+    steps: Count = 4000
+    out: Annotated[Path, Place(endings=(".npz",))]
+    seed: int = 0
 
 
-def _data(options: argparse.Namespace) -> None:
+class Train(Learning):
+    """Options of ``train``.
+
+    Parameters
+    ----------
+    kept : DATA
+        folders of takes that only calibrate: of people and motion not learnt from
+    start : FILE
+        a lifter to go on from (default: from nothing)
+    """
+
+    steps: Count = 9000
+    kept: Annotated[tuple[Path, ...], Place(many="together")]
+    start: Path | None = None
+
+
+class Score(Json):
+    """Options of ``score``.
+
+    Parameters
+    ----------
+    data : DATA
+        folder of the takes
+    lifter : FILE
+        (default: the bundled one)
+    """
+
+    data: Annotated[Path, ARGUMENT]
+    lifter: Path | None = None
+
+
+def _data(options: Data) -> None:
+    """Draw random people in random motion and look at them as `sd2 fit` does.
+
+    Makes takes of 96 frames: what the landmark models say, and the truth. Stopped and started
+    again it goes on where it was. The same seed makes the same takes.
+    """
     with progress_bar("Drawing people", unit="take") as progress:
         made = make_lifter_data(
             options.out,
@@ -182,7 +165,11 @@ def _data(options: argparse.Namespace) -> None:
     print(f"Made {made} takes in {options.out}")
 
 
-def _pairs(options: argparse.Namespace) -> None:
+def _pairs(options: Pairs) -> None:
+    """Make pairs to train a denoiser on: fits of such takes beside a simulated radar.
+
+    The other options are those that the takes were made with.
+    """
     role: Role = "calibrate" if options.held_out else "learn"
     with progress_bar("Fitting", unit="take") as progress:
         made = make_pairs(
@@ -197,8 +184,8 @@ def _pairs(options: argparse.Namespace) -> None:
     print(f"Added pairs of {made} takes to {options.out}")
 
 
-def _train(options: argparse.Namespace) -> None:
-    check_output(options.out, ".npz")
+def _train(options: Train) -> None:
+    """Train the lifter of `sd2 fit` on such takes."""
     takes = [repaired(take) for folder in options.data for take in _takes(folder)]
     kept = [take for folder in options.kept for take in _takes(folder)]
     motions = load_motions(options.motions, "learn") if options.motions else []
@@ -214,8 +201,8 @@ def _train(options: argparse.Namespace) -> None:
     print(f"Wrote {options.out}")
 
 
-def _sides(options: argparse.Namespace) -> None:
-    check_output(options.out, ".npz")
+def _sides(options: Learning) -> None:
+    """Train what tells left from right, on such takes."""
     takes = [take for folder in options.data for take in _takes(folder)]
     motions = load_motions(options.motions, "learn") if options.motions else []
     from tools.train_lifter.network import save_network  # needs torch
@@ -230,7 +217,12 @@ def _sides(options: argparse.Namespace) -> None:
     print(f"Wrote {options.out}")
 
 
-def _score(options: argparse.Namespace) -> None:
+def _score(options: Score) -> None:
+    """Measure the lifter, and what tells left from right, on such takes.
+
+    Errors of the velocity along the line of sight, joint by joint, and frames in which left is
+    taken for right.
+    """
     takes = _takes(options.data)
     found, sides = score(Lifter.load(options.lifter), takes), score_sides(takes)
     if options.json:
@@ -267,6 +259,18 @@ def _takes(folder: Path) -> list[Take]:
             "a folder made by `python -m tools.train_lifter data`",
         )
     return takes
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one of the commands; return the exit code."""
+    commands: Commands = {
+        "data": (Data, _data),
+        "pairs": (Pairs, _pairs),
+        "train": (Train, _train),
+        "sides": (Learning, _sides),
+        "score": (Score, _score),
+    }
+    return run_tool("train_lifter", commands, arguments)
 
 
 if __name__ == "__main__":
