@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from sd2core.classify.data import UNKNOWN, Clip
@@ -23,6 +24,8 @@ as well from 0.1 to 1."""
 _HARMONICS = 8
 _LAGS_S = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 _QUANTILES = (0.05, 0.25, 0.75, 0.95)
+_TOGETHER = 256
+"""Windows that are described at once."""
 
 Features = NDArray[np.float64]
 """(frames, numbers)."""
@@ -56,31 +59,42 @@ def window_features(
     share = energies / np.where(total > 0, total, 1.0)
     square = share @ (axis.centres_mps / rate) ** 2
     spread = np.sqrt(np.maximum(square - mean**2, 0.0))
-    base = np.stack([mean, spread, np.abs(mean), peak], axis=1)
+    series = np.column_stack([mean, spread, np.abs(mean), peak, share])
     half = max(1, round(0.5 * window_s * frame_rate_hz))
     lags = [max(1, round(lag_s * frame_rate_hz)) for lag_s in _LAGS_S]
-    rows = []
-    for frame in range(len(base)):
-        inside = slice(max(0, frame - half), frame + half)
-        own, columns, moves = base[inside], share[inside], mean[inside]
-        spectrum = np.zeros(_HARMONICS)
-        found = np.abs(np.fft.rfft(moves, 2 * half))[:_HARMONICS]
-        spectrum[: len(found)] = found / np.sqrt(2 * half)
-        alike = [(moves[lag:] * moves[:-lag]).mean() if len(moves) > lag else 0.0 for lag in lags]
-        rows.append(
-            np.concatenate(
-                [
-                    own.mean(axis=0),
-                    own.std(axis=0),
-                    np.quantile(moves, _QUANTILES),
-                    np.sqrt(columns.mean(axis=0)),
-                    columns.std(axis=0),
-                    spectrum,
-                    alike,
-                ]
-            )
-        )
-    return np.array(rows)
+    frames = len(series)
+    # Windows that are cut stand alone, the others are described together.
+    windows = [series[None, : frame + half] for frame in range(min(half, frames))]
+    if frames >= 2 * half:
+        whole = np.moveaxis(sliding_window_view(series, 2 * half, axis=0), 2, 1)
+        windows += [whole[k : k + _TOGETHER] for k in range(0, len(whole), _TOGETHER)]
+    cut = range(max(frames - half + 1, half), frames)
+    windows += [series[None, frame - half :] for frame in cut]
+    return np.concatenate([_described(one, half, lags) for one in windows])
+
+
+def _described(windows: Features, half: int, lags: Sequence[int]) -> Features:
+    """Describe windows (n, frames, mean velocity, three others and shares), (n, numbers)."""
+    base, columns, moves = windows[..., :4], windows[..., 4:], windows[..., 0]
+    spectrum = np.zeros((len(windows), _HARMONICS))
+    found = np.abs(np.fft.rfft(moves, 2 * half, axis=1))[:, :_HARMONICS]
+    spectrum[:, : found.shape[1]] = found / np.sqrt(2 * half)
+    alike = np.zeros((len(windows), len(lags)))
+    for number, lag in enumerate(lags):
+        if moves.shape[1] > lag:
+            alike[:, number] = (moves[:, lag:] * moves[:, :-lag]).mean(axis=1)
+    return np.concatenate(
+        [
+            base.mean(axis=1),
+            base.std(axis=1),
+            np.quantile(moves, _QUANTILES, axis=1).T,
+            np.sqrt(columns.mean(axis=1)),
+            columns.std(axis=1),
+            spectrum,
+            alike,
+        ],
+        axis=1,
+    )
 
 
 def at_speed(
