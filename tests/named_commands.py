@@ -10,6 +10,7 @@ import argparse
 import re
 from collections.abc import Iterator
 from functools import cache
+from itertools import chain
 
 from guide_pages import REPOSITORY, sd2_arguments
 from parsers import arguments_of, options_of
@@ -18,6 +19,7 @@ from sd2app.command_line import full_parser
 from sd2app.manual.markup import commands_of
 from sd2core.cli.running import attach_negative_values
 from sd2core.errors import Sd2Error
+from sd2core.options.records import flag
 
 PARSER = full_parser()
 
@@ -146,10 +148,13 @@ def _sd2_options() -> frozenset[str]:
 
 @cache
 def _tool_options() -> frozenset[str]:
+    """Options of the tools: those that they add, and fields of their records."""
     texts = [path.read_text("utf-8") for path in sorted((REPOSITORY / "tools").rglob("*.py"))]
-    return frozenset(
-        name for one in texts for name in re.findall(r'add_argument\(\s*"(--[a-z][\w-]*)"', one)
-    )
+    added = [re.findall(r'add_argument\(\s*"(--[a-z][\w-]*)"', one) for one in texts]
+    records = [
+        re.findall(r"^    (\w+): .*$", one, re.MULTILINE) for one in texts if "OptionRecord" in one
+    ]
+    return frozenset(chain(*added, map(flag, chain(*records))))
 
 
 def _fault_of_target(words: list[str]) -> str | None:

@@ -15,13 +15,13 @@ from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.recording.recording import Recording
 
 
-@pytest.fixture
-def body(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def body(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The bundled body in motion for two seconds, without a person for a fifth of one."""
     mesh = load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(30, 90)
     there = np.ones(60, bool)
     there[20:26] = False
-    path = tmp_path / "body.npz"
+    path = tmp_path_factory.mktemp("bodies") / "body.npz"
     save_mesh(type(mesh)(mesh.vertices, mesh.faces, mesh.timebase, present=there), path)
     return path
 
