@@ -264,10 +264,11 @@ def untried(results: Results) -> list[str]:
         for run in results.runs
         for name, reason in run.missing.items()
     )
-    failed = [
-        f"adding {_maps(name)} in {count} of {runs[share]} runs at {share:.0%}: {reason}"
-        for (name, share, reason), count in reasons.items()
-    ]
+    where: dict[str, list[str]] = {}
+    for (name, share, reason), count in reasons.items():
+        failed = f"{_maps(name)} in {count} of {runs[share]} runs at {share:.0%}"
+        where.setdefault(reason, []).append(failed)
+    missing = [f"adding {', '.join(maps)}: {reason}" for reason, maps in where.items()]
     inputs = [one for one in ("map", "limbs", "kinematics") if one != plan.denoiser.inputs]
     tried = ", ".join(one.title for one in plan.classifiers)
     more = [f"other classifiers than {tried}", "the video of several at a time"]
@@ -279,7 +280,7 @@ def untried(results: Results) -> list[str]:
         more.append(f"more movements of {', '.join(few)}: over so few, intervals are too narrow")
     if not plan.placements and not plan.video:
         more.append("other places of the sensor, bodies of other shape, mirrored movements")
-    return [*left, *failed, *more]
+    return [*left, *missing, *more]
 
 
 def draw_curve(results: Results) -> Figure:

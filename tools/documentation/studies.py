@@ -29,11 +29,15 @@ _VARIANTS = ("places", "shapes", "mirrored")
 
 
 def study_section(folder: Path, name: str) -> str:
-    """Return a study's page as a section of another, its pictures among those of the guide."""
+    """Return a study's page as a section of another, its pictures among those of the guide.
+
+    What its columns mean the other page says once.
+    """
     text = (folder / "study.md").read_text(encoding="utf-8")
     for picture in ("curve", "confusion"):
         shutil.copy(folder / f"{picture}.png", IMAGES / f"study-{name}-{picture}.png")
         text = text.replace(f"({picture}.png)", f"(images/study-{name}-{picture}.png)")
+    text = re.sub(r"^(Points of frames over|Mean recall over) .*\n\n", "", text, flags=re.MULTILINE)
     return re.sub(r"^#", "##", text, flags=re.MULTILINE).strip()
 
 
