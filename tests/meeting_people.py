@@ -91,10 +91,10 @@ def pictures(actors: Sequence[Actor]) -> Iterator[Picture]:
     layers = sorted(actors, key=lambda each: -each.away_m)
     for frame in range(len(actors[0].vertices_m)):
         seen = [each.vertices_m[frame] for each in layers]
-        shadows = [each.drawer._light_buffer(part) for each, part in zip(layers, seen, strict=True)]
-        picture = layers[0].drawer._background(np.maximum.reduce(shadows))
+        shadows = [each.drawer.light_buffer(part) for each, part in zip(layers, seen, strict=True)]
+        picture = layers[0].drawer.background(np.maximum.reduce(shadows))
         for each, part, shadow in zip(layers, seen, shadows, strict=True):
-            colours, coverage = each.drawer._person(part, shadow)
+            colours, coverage = each.drawer.person(part, shadow)
             picture = picture * (1.0 - coverage[..., None]) + colours
         noise = np.random.default_rng(frame).standard_normal(picture.shape, dtype=np.float32)
         yield (np.clip(srgb(_tone(picture)) + 0.012 * noise, 0.0, 1.0) * 255.0).astype(np.uint8)

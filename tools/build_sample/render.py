@@ -71,7 +71,7 @@ class Renderer:
         self.body = body
         self.camera = camera or Camera()
         self.studio = studio or Studio()
-        self._clothes = clothes or Clothes.of(body)
+        self.clothes = clothes or Clothes.of(body)
         self._offsets = _disc(12, 2.6)
 
     def frame(self, vertices_m: NDArray[np.float64], seed: int = 0) -> NDArray[np.uint8]:
@@ -80,9 +80,9 @@ class Renderer:
         Vertices, (V, 3), are in the camera frame, all in front of the camera. The seed is that of
         the camera's noise, if the studio has any.
         """
-        shadow = self._light_buffer(vertices_m)
-        picture = self._background(shadow)  # (H, W, 3) linear
-        colours, coverage = self._person(vertices_m, shadow)
+        shadow = self.light_buffer(vertices_m)
+        picture = self.background(shadow)  # (H, W, 3) linear
+        colours, coverage = self.person(vertices_m, shadow)
         picture = picture * (1.0 - coverage[..., None]) + colours
         picture = srgb(_tone(picture))
         if self.studio.noise > 0:
@@ -93,7 +93,7 @@ class Renderer:
         # Half a step of fixed dither, or the wall's gradient shows bands.
         return (picture * 255.0 + self._dither[..., None]).astype(np.uint8)
 
-    def _person(self, vertices_m: NDArray[np.float64], shadow: Singles) -> tuple[Singles, Singles]:
+    def person(self, vertices_m: NDArray[np.float64], shadow: Singles) -> tuple[Singles, Singles]:
         """Linear colours times coverage, and coverage, at picture resolution."""
         n = _OVERSAMPLING
         height, width = n * self.camera.height, n * self.camera.width
@@ -104,7 +104,7 @@ class Renderer:
         rasterise(points, nearness, self.body.faces, buffer, owner)
         rows, columns = np.nonzero(owner >= 0)
         attributes = np.concatenate(
-            [vertices_m, vertex_normals(vertices_m, self.body.faces), self._clothes.attributes],
+            [vertices_m, vertex_normals(vertices_m, self.body.faces), self.clothes.attributes],
             axis=1,
         ).astype(np.float32)
         values = np.empty((len(rows), attributes.shape[1]), np.float32)
@@ -117,7 +117,7 @@ class Renderer:
     def _shade(
         self, positions: Singles, normals: Singles, attributes: Singles, shadow: Singles
     ) -> Singles:
-        albedo, gloss = self._clothes.colours(attributes)  # linear (N, 3), (N,)
+        albedo, gloss = self.clothes.colours(attributes)  # linear (N, 3), (N,)
         studio, normals, view = self.studio, _units(normals), _units(-positions)
         key, fill, rim = (
             _unit(direction).astype(np.float32)
@@ -165,14 +165,15 @@ class Renderer:
         points = seen[..., :2] * scale + _LIGHT_PIXELS / 2
         return points.astype(np.float32), seen[..., 2].astype(np.float32)
 
-    def _light_buffer(self, vertices_m: NDArray[np.float64]) -> Singles:
+    def light_buffer(self, vertices_m: NDArray[np.float64]) -> Singles:
+        """Nearness of what the lamp sees first, for shadows, seen from the lamp (P, P)."""
         points, nearness = self._seen_by_light(vertices_m)
         buffer = np.full((_LIGHT_PIXELS, _LIGHT_PIXELS), -1e9, np.float32)
         owner = np.full(buffer.shape, -1, np.int32)
         rasterise(points, nearness, self.body.faces, buffer, owner)
         return buffer
 
-    def _background(self, shadow: Singles) -> Singles:
+    def background(self, shadow: Singles) -> Singles:
         """The empty room with the person's soft shadow, linear (H, W, 3)."""
         silhouette = (shadow > -1e8).astype(np.float32)
         for _ in range(3):

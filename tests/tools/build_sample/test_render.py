@@ -104,8 +104,8 @@ def test_the_mesh_projects_onto_the_person(renderer: Renderer, picture: np.ndarr
 def test_the_outline_is_that_of_the_mesh(renderer: Renderer) -> None:
     """Every row's leftmost and rightmost person pixel is where the mesh ends."""
     vertices = renderer.body.vertices_m + PLACE
-    shadow = renderer._light_buffer(vertices)
-    _, coverage = renderer._person(vertices, shadow)
+    shadow = renderer.light_buffer(vertices)
+    _, coverage = renderer.person(vertices, shadow)
     pixels = renderer.camera.project(vertices)
     start, end = (pixels[renderer.body.faces[:, k]] for k in ([0, 1, 2], [1, 2, 0]))
     for row in range(60, 400, 10):

@@ -147,7 +147,7 @@ def test_a_shaped_body_wears_the_same_clothes(space: ShapeSpace) -> None:
     known = scene(clip, space)
     drawer = clip_module.renderer(clip, space, known)
     np.testing.assert_array_equal(
-        drawer._clothes.fields, Clothes.of(Body.load("high"), drawer._clothes.outfit).fields
+        drawer.clothes.fields, Clothes.of(Body.load("high"), drawer.clothes.outfit).fields
     )
 
 
