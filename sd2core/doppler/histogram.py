@@ -26,7 +26,8 @@ from sd2core.doppler.kernels import (
 )
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.scattering.amplitude import projected_areas, range_weight
-from sd2core.scattering.beam import beam_tables, two_way_gain
+from sd2core.scattering.beam import two_way_gain
+from sd2core.scattering.beam_kernels import beam_tables
 from sd2core.scattering.visibility import facing_mask
 from sd2core.sensor import VirtualSensor
 

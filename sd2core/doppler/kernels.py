@@ -17,7 +17,7 @@ import numpy as np
 
 from sd2core.numerics.compiled import compiled
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
-from sd2core.scattering.beam import beam_tables, weigh_by_beam
+from sd2core.scattering.beam_kernels import beam_tables, weigh_by_beam
 from sd2core.scattering.visibility import facing_kernel
 
 RUN = 16384
@@ -269,7 +269,7 @@ def weigh_run(  # type: ignore[no-untyped-def]
     which, weighting : int
         Which vertices count, and what.
     beam : tuple
-        :class:`~sd2core.scattering.beam.BeamTables`.
+        :class:`~sd2core.scattering.beam_kernels.BeamTables`.
     sensor, distance
         Place (3,), and its :func:`distance_of`.
     exponent, reference : float

@@ -22,7 +22,7 @@ from sd2core.doppler.kernels import (
     weigh_run,
 )
 from sd2core.numerics.compiled import compiled
-from sd2core.scattering.beam import beam_tables
+from sd2core.scattering.beam_kernels import beam_tables
 
 PARTS = 8
 """Number of parts of the fine axis per bin."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sd2core.fmcw.facet import bent_facet_mean, unit_phasor
 from sd2core.numerics.compiled import compiled
-from sd2core.scattering.beam import beam_tables, gain_towards
+from sd2core.scattering.beam_kernels import beam_tables, gain_towards
 
 Floats = NDArray[np.float64]
 
@@ -118,7 +118,7 @@ def facet_echoes(
     wave_number : float
         4 pi / lambda: phase per metre of range.
     across, up
-        Tables of the beam's two-way power, :class:`~sd2core.scattering.beam.BeamTables`.
+        Tables of the beam's two-way power, :class:`~sd2core.scattering.beam_kernels.BeamTables`.
     half_s : float
         Half the duration.
     index, range_m, rate_mps : (F,)

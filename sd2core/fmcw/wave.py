@@ -15,7 +15,8 @@ from sd2core.fmcw.scene import NEAREST_M, FacetsSeen, MeshScene
 from sd2core.fmcw.sums import Echoes, direct, nufft
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import RadarConfig
-from sd2core.scattering.beam import angles_deg, beam_tables, one_way
+from sd2core.scattering.beam import angles_deg, one_way
+from sd2core.scattering.beam_kernels import beam_tables
 from sd2core.sensor import VirtualSensor
 
 GoOn = Callable[[], None]

@@ -30,7 +30,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 KERNEL_MODULES = (
     "sd2core.scattering.amplitude",
-    "sd2core.scattering.beam",
+    "sd2core.scattering.beam_kernels",
     "sd2core.scattering.visibility",
     "sd2core.scattering.exact",
     "sd2core.scattering.depth",

@@ -25,7 +25,7 @@ from sd2core.fmcw.simulation import simulate_radar
 from sd2core.fmcw.sums import NUFFT_TOLERANCE, Echoes, direct, nufft, recurrent
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import SPEED_OF_LIGHT_MPS, RadarConfig
-from sd2core.scattering.beam import beam_tables
+from sd2core.scattering.beam_kernels import beam_tables
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 

@@ -30,7 +30,8 @@ from sd2core.fmcw.sums import Echoes, turns_of
 from sd2core.fmcw.wave import WaveScene
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import CLUTTER, PAPER_RADAR, RadarConfig
-from sd2core.scattering.beam import beam_tables, sensor_axes
+from sd2core.scattering.beam import sensor_axes
+from sd2core.scattering.beam_kernels import beam_tables
 from sd2core.scattering.facets import visible_facets
 from sd2core.sensor import VelocityAxis, VirtualSensor
 

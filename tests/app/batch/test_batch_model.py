@@ -154,7 +154,7 @@ def test_what_cannot_be_worked_on_is_said(qtbot, tmp_path):
     (tmp_path / "notes.txt").write_text("")
     (tmp_path / "nothing").mkdir()
     for name, words in (
-        ("notes.txt", "no kind that is known"),
+        ("notes.txt", "is empty"),
         ("nowhere", "does not exist"),
         ("nothing", "nothing"),
     ):

@@ -24,14 +24,13 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.scattering.beam import (
     beam_of_cuts,
-    beam_tables,
     half_power_rim,
     one_way,
     sensor_axes,
     share_in_beam,
     two_way_gain,
-    weigh_by_beam,
 )
+from sd2core.scattering.beam_kernels import beam_tables, weigh_by_beam
 from sd2core.sensor import Beam, VirtualSensor, aimed_at, direction_from_angles
 from sd2core.timebase import Timebase
 
