@@ -26,9 +26,11 @@ if TYPE_CHECKING:
     from sd2core.imu.virtual import virtual_imu
     from sd2core.io.mesh import load_mesh, save_mesh
     from sd2core.io.radar import RadarCapture, load_capture
+    from sd2core.io.things import with_things
     from sd2core.io.video import VideoReader, open_video
     from sd2core.maps import DopplerMap
     from sd2core.mesh.sequence import MeshSequence
+    from sd2core.mesh.things import Thing
     from sd2core.radar_config import PAPER_RADAR, RadarConfig
     from sd2core.recording.recording import Recording, Span, open_recording, open_sample
     from sd2core.sensor import Beam, VelocityAxis, VirtualSensor
@@ -47,6 +49,7 @@ __all__ = [
     "Span",
     "SynthesisOptions",
     "Synthesizer",
+    "Thing",
     "Timebase",
     "VelocityAxis",
     "VideoReader",
@@ -61,6 +64,7 @@ __all__ = [
     "open_video",
     "save_mesh",
     "virtual_imu",
+    "with_things",
 ]
 
 _HOME = {
@@ -76,6 +80,7 @@ _HOME = {
     "Span": "recording.recording",
     "SynthesisOptions": "doppler",
     "Synthesizer": "doppler",
+    "Thing": "mesh.things",
     "Timebase": "timebase",
     "VelocityAxis": "sensor",
     "VideoReader": "io.video",
@@ -89,6 +94,7 @@ _HOME = {
     "open_video": "io.video",
     "save_mesh": "io.mesh",
     "virtual_imu": "imu.virtual",
+    "with_things": "io.things",
 }
 
 

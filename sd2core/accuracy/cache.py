@@ -66,6 +66,8 @@ def scene_fingerprint(
         "options": asdict(options),
         "family": family,
     }
+    if mesh.surroundings is not None:
+        what["surroundings"] = mesh.surroundings.digest
     if options.count == "expected" and (known := mesh.uncertainty) is not None:
         stated = known.vertex_limb, known.along_mps, known.across_mps
         what["uncertainty"] = [hashlib.sha256(one.tobytes()).hexdigest() for one in stated]

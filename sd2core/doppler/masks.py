@@ -15,6 +15,7 @@ from sd2core.doppler.histogram import Counting, Paths
 from sd2core.doppler.prepared import Block, PreparedMesh
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering import depth_plain, exact_plain
+from sd2core.scattering.behind_things import hide_behind
 from sd2core.scattering.depth import depth_visibility_kernel
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.scattering.visibility import facing_kernel, facing_mask
@@ -49,7 +50,8 @@ class VisibilityMasks:
     """Visibility of a mesh from any place; masks are kept in the mesh's byte budget.
 
     Calls may come from several threads. All visibility but none needs faces. ``counting``
-    determines the vertices that cannot change the map.
+    determines the vertices that cannot change the map. What stands around the mesh hides
+    vertices in depth and exact visibility; ``none`` and ``facing`` know nothing of it.
     """
 
     def __init__(self, prepared: PreparedMesh, counting: Counting) -> None:
@@ -168,7 +170,9 @@ class VisibilityMasks:
         options = self._prepared.options
         pixels = options.depth_resolution if occlusion == "depth" else None
         needed = options.axis, options.null_bins, options.beyond, self._prepared.spreads
-        return ("mask", occlusion, pixels, self._stride, needed, index, position_m)
+        around = self._prepared.mesh.surroundings
+        hiding = None if around is None else around.digest
+        return ("mask", occlusion, pixels, self._stride, needed, hiding, index, position_m)
 
     def _frames(self, index: int, rows: slice) -> NDArray[np.intp]:
         """Numbers of some of a block's frames in the clip."""
@@ -259,7 +263,7 @@ class VisibilityMasks:
 
     def _view(self, block: Block, rows: slice, place: NDArray[np.float64]) -> _View:
         points, around_m = self._prepared.near_points(block, rows)
-        return _View(points, place - around_m)
+        return _View(points, place - around_m, self._prepared.origin_m + around_m)
 
     def _counted(self, index: int) -> Block:
         return self._prepared.counted(index, self._counting, points=True)
@@ -302,7 +306,23 @@ class VisibilityMasks:
         visible: NDArray[np.uint8],
         occlusion: Occlusion,
     ) -> None:
-        """Set ``visible`` of the needed vertices."""
+        """Set ``visible`` of the needed vertices, and to 0 of those that a thing hides."""
+        self._test_body(view, needed, visible, occlusion)
+        around = self._prepared.mesh.surroundings
+        if around is None:
+            return
+        # Of all vertices: few large faces are soon looked at, and the share that is seen is right.
+        for t, seen in enumerate(visible):
+            hide_behind(around, view.points[t], view.origins_m[t], view.places_m[t], seen)
+
+    def _test_body(
+        self,
+        view: _View,
+        needed: NDArray[np.uint8],
+        visible: NDArray[np.uint8],
+        occlusion: Occlusion,
+    ) -> None:
+        """Set ``visible`` of the needed vertices that the body itself does not hide."""
         faces = self._prepared.faces
         assert faces is not None  # the Synthesizer refuses to ask it of a point cloud
         points, pixels = view.points, self._prepared.options.depth_resolution
@@ -332,6 +352,7 @@ class _View:
 
     points: NDArray[np.float32]
     places_m: NDArray[np.float64]
+    origins_m: NDArray[np.float64]  # these points, in the camera frame, (n, 3)
 
     def stretches(self) -> list[tuple[int, int]]:
         """Half-open runs of frames in which the sensor does not move."""

@@ -224,11 +224,16 @@ def _visible(
     origin, extent_m = middle, float(np.abs(points - middle[:, None]).max())
     if not keeps_shape(extent_m, float((high - low).max())):
         origin = 0.5 * (low + high)
-    single = (points - origin[:, None]).astype(np.float32)
-    needed = np.ones((1, points.shape[1]), np.uint8)
+    count = points.shape[1]
     faces = np.array(mesh.faces, np.int32)
+    if (around := mesh.surroundings) is not None:  # as if it were more of the body
+        points = np.concatenate([points, around.vertices_m.T], axis=1)
+        faces = np.concatenate([faces, around.faces + np.int32(count)])
+    single = (points - origin[:, None]).astype(np.float32)
+    needed = np.zeros((1, points.shape[1]), np.uint8)
+    needed[0, :count] = 1
     if not kernels_ready():
-        return exact_visibility(single, faces, place - origin, needed[0] > 0) > 0
+        return exact_visibility(single, faces, place - origin, needed[0] > 0)[:count] > 0
     visible = np.empty_like(needed)
     exact_visibility_kernel(single[None], faces, place - origin, needed, 0, 1, visible)
-    return visible[0] > 0
+    return visible[0, :count] > 0

@@ -65,8 +65,10 @@ class FrameScattering:
     quality: Quality  # visibility that was used
 
 
-def _map_notes(prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: int) -> list[str]:
-    """Sentences about frames without a person, and about limits of single precision.
+def _map_notes(
+    prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: int, quality: Quality
+) -> list[str]:
+    """Sentences about frames without a person, things not looked at, and single precision.
 
     There are none in ordinary scenes.
     """
@@ -77,6 +79,8 @@ def _map_notes(prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: 
             runs(~measured), mesh.times_s[start:stop], mesh.timebase.frame_duration_s
         )
         notes.append(f"Without a person: {share}. Those columns are empty.")
+    if mesh.surroundings is not None and quality in ("none", "facing"):
+        notes.append(f"Things in the scene hide nothing in visibility {quality}.")
     if np.dtype(mesh.vertices.dtype) == np.float32:
         duration_s = 2.0 * mesh.timebase.frame_duration_s / options.oversampling
         error_mps = stored_velocity_error_mps(prepared.reach_m, duration_s)
@@ -234,7 +238,8 @@ class Synthesizer:
         sensor : VirtualSensor, optional
             Where the radar is; by default at the camera.
         visibility : {"none", "facing", "depth", "exact", "frozen"}, optional
-            Otherwise that of the options.
+            Otherwise that of the options. What stands around the mesh hides vertices in ``depth``
+            and ``exact`` only.
         progress : Progress
             Called with frames done; may raise Cancelled.
 
@@ -244,10 +249,11 @@ class Synthesizer:
             Of kind ``synthetic``. Its meta names sensor, options, source and
             version, how vertices were counted (``count``), the quality of the
             visibility, how many frames share a mask,
-            per frame ``visible_share`` and ``beyond_share``, and in ``notes``
-            where single precision limits what the map says and how much of it
-            is empty. ``present`` is False in frames without a person, and in one
-            that stands alone: what moves how fast is not known there.
+            per frame ``visible_share`` and ``beyond_share``, in ``things`` what
+            stood around, if anything did, and in ``notes`` where single precision
+            limits what the map says and how much of it is empty. ``present`` is
+            False in frames without a person, and in one that stands alone: what
+            moves how fast is not known there.
         """
         return self._map(sensor or VirtualSensor(), None, visibility, frames, progress)
 
@@ -312,6 +318,7 @@ class Synthesizer:
         assert stretch.beyond_share is not None
         options = self.options
         unshared = stretch.quality in ("none", "facing")
+        around = self.mesh.surroundings
         return DopplerMap(
             values=stretch.values,
             axis=options.axis,
@@ -329,7 +336,8 @@ class Synthesizer:
                 "version": __version__,
                 "visible_share": _rounded(stretch.visible_share),
                 "beyond_share": _rounded(stretch.beyond_share),
-                "notes": _map_notes(self.prepared, sensor, start, stop),
+                "notes": _map_notes(self.prepared, sensor, start, stop, stretch.quality),
+                **({} if around is None else {"things": around.as_list()}),
             },
             present=self.mesh.presence.measured[start:stop],
             limbs=stretch.limbs,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.mesh.presence import Presence, checked
+from sd2core.mesh.things import Surroundings
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.plausibility.findings import Finding
 from sd2core.timebase import Timebase
@@ -57,6 +58,8 @@ class MeshSequence:
         Standard deviations of the velocities; None: not stated.
     findings : tuple of Finding
         What the reader found unlikely; in words it is among the notes.
+    surroundings : Surroundings, optional
+        Things that stand still around it; see :func:`sd2core.io.things.with_things`.
 
     Examples
     --------
@@ -83,6 +86,7 @@ class MeshSequence:
     present: NDArray[np.bool_] | None = None
     uncertainty: VelocityUncertainty | None = None
     findings: tuple[Finding, ...] = ()
+    surroundings: Surroundings | None = None
 
     def __post_init__(self) -> None:
         shape = tuple(self.vertices.shape)

@@ -1,0 +1,64 @@
+"""Things around a mesh: from the shelf, or read from mesh files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from sd2core.errors import Sd2Error
+from sd2core.io.mesh_files import read_surface
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.things import MOST_THINGS, Surface, Surroundings, Thing
+
+_MOST_FACES = 200_000
+"""Of a thing: each is looked at in every frame."""
+
+
+def with_things(mesh: MeshSequence, things: Iterable[Thing]) -> MeshSequence:
+    """Put things around a mesh, in place of those that were there.
+
+    They hide what is behind them wherever visibility is by ``depth`` or ``exact``, and echo
+    where a radar's signal is simulated.
+
+    Raises Sd2Error for a file that is no surface.
+
+    Examples
+    --------
+    A screen between camera and person leaves nothing to be seen:
+
+    >>> import sd2core as sd2
+    >>> mesh = sd2.open_sample().load_mesh().between(30, 36)
+    >>> screen = sd2.Thing("screen", position_m=(0, 2, 1), size_m=(3, 4, 0.03))
+    >>> float(sd2.Synthesizer(sd2.with_things(mesh, [screen])).map().values.sum())
+    0.0
+    """
+    standing = tuple(things)
+    if not standing:
+        return replace(mesh, surroundings=None)
+    if len(standing) > MOST_THINGS:
+        raise Sd2Error(f"There are {len(standing)} things", f"up to {MOST_THINGS}")
+    surfaces = [one.placed(_read(Path(one.shape)) if one.is_file else None) for one in standing]
+    return replace(mesh, surroundings=Surroundings.of(standing, surfaces))
+
+
+def _read(path: Path) -> Surface:
+    """Surface of a file in its own frame."""
+    if not path.is_file():
+        raise Sd2Error(
+            f"The mesh {path} of a thing is not there",
+            "the file where the recording or the command says",
+            "Move it back, or say anew what stands there: `sd2 set RECORDING --thing`",
+        )
+    vertices, faces = read_surface(path)
+    if faces is None or len(faces) > _MOST_FACES:
+        raise Sd2Error(
+            f"{path} has {0 if faces is None else len(faces):,} triangles",
+            f"a surface of up to {_MOST_FACES:,}",
+            "Export it with fewer" if faces is not None else "",
+        )
+    if not np.isfinite(vertices).all():
+        raise Sd2Error(f"{path} has a vertex without a place", "finite coordinates")
+    return vertices, faces.astype(np.int32)

@@ -1,0 +1,199 @@
+"""Things that stand still in a scene: a shelf of simple ones, their sizes and places."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.sensor import Vector
+
+FARTHEST_THING_M = 1000.0
+"""Largest coordinate of a thing, where single precision is right to a tenth of a millimetre."""
+
+SIZES_M = 1e-3, 100.0
+"""Least and greatest width, height and depth of a thing."""
+
+MOST_THINGS = 100
+"""In one scene."""
+
+Surface = tuple[NDArray[np.float64], NDArray[np.int32]]
+"""Vertices (V, 3) in metres, and faces (F, 3), counter-clockwise seen from outside."""
+
+_Boxes = tuple[tuple[Vector, Vector], ...]
+"""Lowest and highest corner of boxes in a thing of width, height and depth 1.
+
+It stands on the origin: x and z from −0.5 to 0.5, and y, which is down, from −1 to 0.
+"""
+
+SHELF: Mapping[str, tuple[Vector, _Boxes]] = {
+    "box": ((0.5, 0.5, 0.5), (((-0.5, -1.0, -0.5), (0.5, 0.0, 0.5)),)),
+    "table": (
+        (1.2, 0.75, 0.7),
+        (
+            ((-0.5, -1.0, -0.5), (0.5, -0.95, 0.5)),
+            *(
+                ((x, -0.95, z), (x + 0.05, 0.0, z + 0.08))
+                for x, z in product((-0.5, 0.45), (-0.5, 0.42))
+            ),
+        ),
+    ),
+    "screen": ((1.0, 1.8, 0.03), (((-0.5, -1.0, -0.5), (0.5, 0.0, 0.5)),)),
+    "doorway": (
+        (1.4, 2.2, 0.12),
+        (
+            ((-0.5, -1.0, -0.5), (-0.32, 0.0, 0.5)),
+            ((0.32, -1.0, -0.5), (0.5, 0.0, 0.5)),
+            ((-0.32, -1.0, -0.5), (0.32, -0.92, 0.5)),
+        ),
+    ),
+}
+"""Usual width, height and depth in metres of simple things, and the boxes that they are made of."""
+
+_BOX_FACES = np.array(
+    [
+        *((0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7)),  # of least and greatest x
+        *((0, 4, 5), (0, 5, 1), (2, 7, 6), (2, 3, 7)),  # y
+        *((0, 2, 6), (0, 6, 4), (1, 7, 3), (1, 5, 7)),  # z
+    ],
+    np.int32,
+)
+"""Faces of a box whose corners count up in z, then y, then x."""
+
+
+@dataclass(frozen=True)
+class Thing:
+    """A thing that stands still and hides what is behind it.
+
+    Parameters
+    ----------
+    shape : str
+        Name of a simple one from :data:`SHELF`, or the path of a mesh file (OBJ, PLY, GLB, STL;
+        metres, y up).
+    position_m : tuple of 3 floats
+        Middle of its foot in the camera frame: x right, y down, z forward.
+    turn_deg : float
+        Turn about the vertical, seen from above clockwise, from -360 to 360.
+    size_m : tuple of 3 floats, optional
+        Width, height and depth of what it fills; None: as usual, or as the file has it.
+
+    Examples
+    --------
+    >>> import sd2core as sd2
+    >>> sd2.Thing("screen", position_m=(0.3, 0.9, 1.2), size_m=(0.6, 1.8, 0.03)).words
+    'screen at x 0.3, y 0.9, z 1.2 m, 0.6 × 1.8 × 0.03 m'
+    """
+
+    shape: str
+    position_m: Vector
+    turn_deg: float = 0.0
+    size_m: Vector | None = None
+
+    def __post_init__(self) -> None:
+        if self.shape not in SHELF and "." not in self.shape:
+            raise Sd2Error(
+                f"The thing is {self.shape!r}",
+                f"one of {', '.join(SHELF)}, or the path of a mesh file such as chair.obj",
+            )
+        position = tuple(map(float, self.position_m))
+        if len(position) != 3 or not all(abs(value) <= FARTHEST_THING_M for value in position):
+            raise Sd2Error(
+                f"The place of the {self.name} is {self.position_m}",
+                f"three numbers x, y, z in metres, up to {FARTHEST_THING_M:g}",
+            )
+        object.__setattr__(self, "position_m", position)
+        if not abs(self.turn_deg) <= 360:
+            raise Sd2Error(f"The {self.name} is turned by {self.turn_deg}", "-360 to 360 degrees")
+        if self.size_m is None:
+            return
+        low, high = SIZES_M
+        size = tuple(map(float, self.size_m))
+        if len(size) != 3 or not all(low <= value <= high for value in size):
+            raise Sd2Error(
+                f"The size of the {self.name} is {self.size_m}",
+                f"width, height and depth from {low:g} to {high:g} m",
+            )
+        object.__setattr__(self, "size_m", size)
+
+    @property
+    def name(self) -> str:
+        """What it is called: its shape, or the file's name."""
+        return self.shape.replace("\\", "/").rpartition("/")[2]
+
+    @property
+    def is_file(self) -> bool:
+        """True if its shape is the path of a mesh file."""
+        return self.shape not in SHELF
+
+    @property
+    def words(self) -> str:
+        """Text such as ``box at x 0, y 1, z 2 m, turned by 30°``."""
+        x, y, z = self.position_m
+        turn = f", turned by {self.turn_deg:g}°" if self.turn_deg else ""
+        size = "" if self.size_m is None else f", {' × '.join(f'{m:g}' for m in self.size_m)} m"
+        return f"{self.name} at x {x:g}, y {y:g}, z {z:g} m{turn}{size}"
+
+    def placed(self, unplaced: Surface | None = None) -> Surface:
+        """Surface in the camera frame.
+
+        ``unplaced`` is that of its file, in metres and with y up; one of the shelf needs none.
+        """
+        if unplaced is None:
+            usual_m, boxes = SHELF[self.shape]
+            unit = [_box(*ends) for ends in boxes]
+            vertices = np.concatenate(unit) * (self.size_m or usual_m)
+            faces = np.concatenate([_BOX_FACES + 8 * number for number in range(len(boxes))])
+        else:
+            vertices, faces = unplaced[0] * [1.0, -1.0, -1.0], unplaced[1]
+            low, high = vertices.min(axis=0), vertices.max(axis=0)
+            vertices = vertices - [0.5 * (low[0] + high[0]), high[1], 0.5 * (low[2] + high[2])]
+            if self.size_m is not None:
+                extent_m = high - low
+                vertices = vertices * np.divide(
+                    self.size_m, extent_m, out=np.ones(3), where=extent_m > 0
+                )
+        turn = math.radians(self.turn_deg)
+        cos, sin = math.cos(turn), math.sin(turn)
+        x, y, z = vertices.T
+        turned = np.stack([cos * x + sin * z, y, cos * z - sin * x], axis=1)
+        return turned + self.position_m, faces
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """Things around a moving mesh, and their surfaces together in the camera frame."""
+
+    things: tuple[Thing, ...]
+    vertices_m: NDArray[np.float64]  # (V, 3)
+    faces: NDArray[np.int32]  # (F, 3)
+
+    @classmethod
+    def of(cls, things: tuple[Thing, ...], surfaces: list[Surface]) -> Surroundings:
+        """Join things and their surfaces, of which there is one at least."""
+        first = np.cumsum([0, *(len(vertices) for vertices, _ in surfaces)])
+        faces = [faces + number for (_, faces), number in zip(surfaces, first, strict=False)]
+        # Plain memory of this type, as compiled kernels take it.
+        joined = np.ascontiguousarray(np.concatenate(faces), np.int32)
+        return cls(things, np.concatenate([vertices for vertices, _ in surfaces]), joined)
+
+    @cached_property
+    def digest(self) -> str:
+        """Hash of the surfaces: all that a map depends on."""
+        return hashlib.sha256(self.vertices_m.tobytes() + self.faces.tobytes()).hexdigest()
+
+    def as_list(self) -> list[dict[str, Any]]:
+        """Plain values of the things, for provenance."""
+        return [asdict(thing) for thing in self.things]
+
+
+def _box(low: Vector, high: Vector) -> NDArray[np.float64]:
+    """Corners of a box, (8, 3)."""
+    return np.array(list(product(*zip(low, high, strict=True))))
