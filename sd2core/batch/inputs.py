@@ -20,6 +20,7 @@ from sd2core.files.atomic import atomic_write_text
 from sd2core.files.digests import Digests, signature
 from sd2core.files.paths import files_at, is_there
 from sd2core.files.texts import read_json
+from sd2core.mesh.things import Thing
 from sd2core.sensor import Vector, VirtualSensor
 
 if TYPE_CHECKING:
@@ -191,6 +192,7 @@ class _Look:
         reading = recording.mesh_options()
         faces = reading.pop("faces", None)
         parts = [self._digest(file) for file in files_at(path)]
+        parts += [self._digest(Path(one.shape)) for one in recording.things if one.is_file]
         identity = [parts, {key: str(value) for key, value in reading.items()}]
         if faces is not None:
             identity.append(self._digest(faces))
@@ -266,7 +268,8 @@ def open_mesh(path: Path, faces: str | None, reading: Mapping[str, Any]) -> Mesh
     told: dict[str, Any] = {
         key: tuple(one) if isinstance(one, list) else one for key, one in reading.items()
     }
-    return load_mesh(path, faces=faces, **told)
+    things = (one if isinstance(one, Thing) else Thing(**one) for one in told.pop("things", ()))
+    return load_mesh(path, faces=faces, things=things, **told)
 
 
 def _bytes_in_memory(path: Path) -> int:

@@ -19,6 +19,7 @@ from sd2core.options.records import (
     ARGUMENT,
     Group,
     OptionError,
+    Place,
     changed,
     given,
     given_flags,
@@ -26,6 +27,7 @@ from sd2core.options.records import (
 from sd2core.options.shared import Channel, Json, Looking, MeshReading
 
 if TYPE_CHECKING:
+    from sd2core.mesh.things import Thing
     from sd2core.recording.recording import Recording
     from sd2core.sensor import VirtualSensor
 
@@ -35,6 +37,7 @@ _ABOUT_THE_BODY = ("range_m", "azimuth_deg", "elevation_deg")
 _LEFT_OUT = {
     **{name: name for name in ("video", "mesh", "radar", "imu", "denoiser")},
     **{name: f"radar_{name}" for name in _CHANNEL},
+    "things": "things",
 }
 """What `sd2 set --without` names, and the fields that it empties."""
 
@@ -118,14 +121,20 @@ class Set(Content, SensorPlace, Json):
     ----------
     recording : RECORDING
         a recording (.sd2)
+    thing : SHAPE@X,Y,Z[,TURN[,W,H,D]]
+        what stands in the scene, in place of what did: a box, table, screen, doorway or mesh file,
+        the middle of its foot, degrees about the vertical, and width, height, depth in metres;
+        again for another
     without : LIST
-        take out what is named, some of video, mesh, radar, imu, denoiser, receiver, transmitter
+        take out what is named, some of video, mesh, radar, imu, denoiser, receiver, transmitter,
+        things
     anonymise : HOW
         after a fit, in the recording's own video: cover the head (blur), or delete it (drop); what
         is covered or deleted is gone
     """
 
     recording: Annotated[Path, ARGUMENT]
+    thing: Annotated[tuple[str, ...], Place(many="again")] = ()
     without: Names = ()
     anonymise: Literal["blur", "drop"] | None = None
 
@@ -276,6 +285,7 @@ def _set(options: Set) -> None:
       sd2 set walk.sd2 --mesh better.zarr --radar-offset-s 0.35
       sd2 set walk.sd2 --without receiver,denoiser
       sd2 set walk.sd2 --anonymise blur
+      sd2 set walk.sd2 --thing table@0,1.1,1.5,20 --thing chair.obj@0.8,1.1,2
     """
     from sd2core.cli.info.description import describe_parts, describe_recording, show
     from sd2core.cli.reading import mesh_reading, refuse_unused_mesh_options
@@ -287,7 +297,9 @@ def _set(options: Set) -> None:
     if is_bundled(recording.folder):
         raise Sd2Error(f"{recording.folder} comes with the program", "a recording of your own")
     for name in options.without:
-        setattr(recording, _LEFT_OUT[name], None)
+        setattr(recording, _LEFT_OUT[name], () if name == "things" else None)
+    if options.thing:
+        recording.things = tuple(map(_thing, options.thing))
     for name, value in _content(options).items():
         if isinstance(value, Path) and not value.exists():
             raise Sd2Error(f"The {name} {value} does not exist", "a file or folder")
@@ -316,6 +328,23 @@ def _set(options: Set) -> None:
         recording = open_recording(recording.folder)
         parts = describe_parts(recording)
     show(describe_recording(recording, parts), as_json=options.json)
+
+
+def _thing(text: str) -> Thing:
+    """Thing as it is typed."""
+    from sd2core.files.paths import plain_path
+    from sd2core.mesh.things import SHELF, Thing
+
+    shape, _, place = text.rpartition("@")
+    try:
+        numbers = tuple(map(float, place.split(",")))
+    except ValueError:
+        numbers = ()
+    if len(numbers) not in (3, 4, 7):
+        raise Sd2Error(f"--thing is {text!r}", "SHAPE@X,Y,Z[,TURN[,W,H,D]], e.g. box@0,1,2,30")
+    path = shape if shape in SHELF or "." not in shape else str(plain_path(Path(shape)))
+    x, y, z, turn_deg, *size = (*numbers, 0.0) if len(numbers) == 3 else numbers
+    return Thing(path, (x, y, z), turn_deg, (size[0], size[1], size[2]) if size else None)
 
 
 def _anonymise(folder: Path, how: Literal["blur", "drop"]) -> None:

@@ -85,6 +85,17 @@ class SensorEntry(BaseModel):
     beam: BeamEntry | None = None
 
 
+class ThingEntry(BaseModel):
+    """Fields of :class:`sd2core.mesh.things.Thing`; a mesh file's path is relative."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    shape: StoredPath
+    position_m: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+    turn_deg: FiniteFloat = 0.0
+    size_m: tuple[FiniteFloat, FiniteFloat, FiniteFloat] | None = None
+
+
 class MeshReading(BaseModel):
     """Options for reading a mesh file; see :func:`sd2core.io.mesh.load_mesh`."""
 
@@ -155,6 +166,7 @@ class Document(BaseModel):
     bundled_denoiser: str | None = None
     sensor: SensorEntry = SensorEntry()
     placements: dict[str, Any] | None = None
+    things: tuple[ThingEntry, ...] = ()
     spans: tuple[Span, ...] = ()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,9 @@ from sd2core.io.mesh_files import (
 from sd2core.io.mesh_models import is_estimate, read_model_output
 from sd2core.io.readers import MESH_FILES, FileReader, MeshHints, plug_in_for
 from sd2core.io.stored_vertices import StoredVertices, real_type
+from sd2core.io.things import with_things
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.things import Thing
 from sd2core.progress import Progress, silent
 from sd2core.timebase import Timebase
 
@@ -54,6 +57,7 @@ def load_mesh(
     distance_m: float | None = None,
     turn: Turn | None = None,
     body_model: Path | str | None = None,
+    things: Iterable[Thing] = (),
     progress: Progress = silent,
 ) -> MeshSequence:
     """Read a mesh sequence or point cloud.
@@ -89,6 +93,8 @@ def load_mesh(
     body_model : path, optional
         Model of SMPL, SMPL-H, SMPL-X, or MHR, that makes vertices of parameters. MHR's is a
         program in TorchScript, which is run (docs/formats.md).
+    things : iterable of Thing
+        What stands still around it, as for :func:`~sd2core.io.things.with_things`.
     progress : callable
         Called while files are read; may raise ``Cancelled``.
 
@@ -133,7 +139,7 @@ def load_mesh(
     known = uncertainty_of(raw, source)
     if known is not None:
         known = known.times(_velocity_factor(raw.times_s, times_s, scale))
-    return MeshSequence(
+    mesh = MeshSequence(
         raw.vertices,
         raw.faces,
         timebase,
@@ -144,6 +150,7 @@ def load_mesh(
         known,
         tuple(raw.findings),
     )
+    return with_things(mesh, things)
 
 
 def save_mesh(mesh: MeshSequence, path: Path | str, progress: Progress = silent) -> None:

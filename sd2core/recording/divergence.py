@@ -17,6 +17,7 @@ from sd2core.labels.spans import Labels
 WORDS = {
     "sensor": "sensor",
     "placements": "plan of placements",
+    "things": "set of things",
     "radar_offset_s": "offset of the radar",
     "radar_receiver": "receiver of the radar",
     "radar_transmitter": "transmitter of the radar",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,8 @@ _INERTIAL = ("imu", "imu_offset_s", "imu_places")
 _CHANNEL = ("radar_receiver", "radar_transmitter")
 MESH = ("mesh", "faces", "mesh_reading", "camera")
 """Names of the fields on which the mesh depends."""
-EDITED = (*_ALWAYS, *_INERTIAL, *_CHANNEL, *MESH)
-"""Names of the fields. Journals of earlier versions end with the third, sixth or eighth."""
+EDITED = (*_ALWAYS, *_INERTIAL, *_CHANNEL, *MESH, "things")
+"""Names of the fields. Journals of earlier versions end with the third, sixth, eighth or twelfth."""
 
 
 def edited_fields(recording: Recording) -> dict[str, Any]:
@@ -30,6 +31,7 @@ def edited_fields(recording: Recording) -> dict[str, Any]:
     entry = {name: getattr(recording, name) for name in EDITED} | {
         "sensor": recording.sensor.as_dict(),
         "placements": None if planned is None else planned.as_dict(),
+        "things": [asdict(thing) for thing in recording.things],
     }
     return dict(json.loads(json.dumps(entry, default=_encoded)))
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 import shutil
 import tempfile
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,12 +34,14 @@ from sd2core.files.recording_json import (
     MeshReading,
     SensorEntry,
     Span,
+    ThingEntry,
     read_document,
 )
 from sd2core.files.resources import resource_path
 from sd2core.files.texts import errors_in
 from sd2core.labels.files import FILE_NAME as LABELS_NAME
 from sd2core.labels.files import labels_of, read_labels, write_labels
+from sd2core.mesh.things import Thing
 from sd2core.placements.placements import Placements, placements_from_dict
 from sd2core.progress import Progress, silent
 from sd2core.recording.divergence import WORDS, Divergence, State, digests_of
@@ -126,6 +128,8 @@ class Recording:
         denoised. None: not chosen.
     placements : PlacementGrid, PlacementCloud or None
         Planned sensors around the body.
+    things : tuple of Thing
+        What stands still around the body; paths of their files are absolute.
     spans : tuple of Span
         Labels in ``recording.json`` itself, of a recording that was not labelled here.
     labels : Labels or None
@@ -170,6 +174,7 @@ class Recording:
     bundled_denoiser: str | None = None
     sensor: VirtualSensor = field(default_factory=VirtualSensor)
     placements: Placements | None = None
+    things: tuple[Thing, ...] = ()
     spans: tuple[Span, ...] = ()
     labels: Labels | None = None
     labels_elsewhere: bool = False
@@ -241,12 +246,15 @@ class Recording:
         folder.mkdir(exist_ok=True)
         copied: list[Path] = []
         try:
+            things = self.things
             if copy:
                 files = _copied(files, folder, copied, progress)
+                things = _copied_things(things, folder, copied)
             made = replace(
                 self,
                 folder=folder,
                 **files,  # type: ignore[arg-type]
+                things=things,
                 title=self.title or folder.stem,
                 labels_elsewhere=False,
                 _base=None,
@@ -349,6 +357,10 @@ class Recording:
                 raise Sd2Error(f"The {words} is {value}", "a finite number")
             setattr(document, name, value)
         document.placements = None if self.placements is None else self.placements.as_dict()
+        document.things = tuple(
+            ThingEntry.model_validate(asdict(one))
+            for one in _with_files(self.things, lambda path: stored_path(Path(path), self.folder))
+        )
         document.spans = () if self._writes_labels else tuple(self.spans)
         stated = {"beam": None} | self.sensor.as_dict()
         document.sensor = SensorEntry.model_validate(document.sensor.model_dump() | stated)
@@ -455,6 +467,8 @@ class Recording:
         options = self.mesh_reading.options()
         if self.faces is not None:
             options["faces"] = self._present("faces")
+        if self.things:
+            options["things"] = self.things
         has_video = self.video is not None and self.video.exists()
         if has_video and "image_size" not in options and is_estimate(path):
             with self.open_video() as video:
@@ -562,7 +576,7 @@ def open_recording(path: Path) -> Recording:
 def settings_of(document: Document, folder: Path) -> dict[str, Any]:
     """Fields of a recording by their names, but for labels, as its file holds them.
 
-    Raises Sd2Error where the sensor or the placements cannot be.
+    Raises Sd2Error where the sensor, the placements or a thing cannot be.
     """
     planned = document.placements
     return {
@@ -571,7 +585,18 @@ def settings_of(document: Document, folder: Path) -> dict[str, Any]:
         "imu_places": tuple(dict.fromkeys(document.imu_places)),
         "sensor": VirtualSensor.from_dict(document.sensor.model_dump()),
         "placements": None if planned is None else placements_from_dict(planned),
+        "things": _with_files(
+            (Thing(**entry.model_dump()) for entry in document.things),
+            lambda path: located_path(path, folder),
+        ),
     }
+
+
+def _with_files(things: Iterable[Thing], path_of: Callable[[str], object]) -> tuple[Thing, ...]:
+    """The same things with other paths of their mesh files."""
+    return tuple(
+        replace(one, shape=str(path_of(one.shape))) if one.is_file else one for one in things
+    )
 
 
 def open_sample() -> Recording:
@@ -643,3 +668,18 @@ def _copied(
         inside[role] = target / source.name if beside else target
     progress(len(files), len(files))
     return inside
+
+
+def _copied_things(things: tuple[Thing, ...], folder: Path, made: list[Path]) -> tuple[Thing, ...]:
+    """Copy mesh files of things into ``folder`` as :func:`_copied` does, each once."""
+    inside: dict[str, str] = {}
+    for thing in things:
+        path = Path(thing.shape)
+        if not thing.is_file or path.is_relative_to(folder) or thing.shape in inside:
+            continue
+        target = free_path(folder, path.name, "thing", reserved=FILE_NAME)
+        made.append(target)
+        with full_disk_named(target):
+            shutil.copy2(path, target)
+        inside[thing.shape] = str(target)
+    return _with_files(things, lambda path: inside.get(path, path))

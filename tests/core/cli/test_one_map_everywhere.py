@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -44,7 +45,35 @@ def test_every_command_makes_the_same_map(
     assert sd2("synth", fitted, "--out", tmp_path / "map.npz", *wish).code == 0
     made = DopplerMap.load(tmp_path / "map.npz")
     assert made.meta["count"] == (count or "expected")
+    _made_elsewhere(sd2, fitted, tmp_path, made, count)
 
+
+def test_everywhere_the_same_things_stand_before_it(sd2: Sd2, fitted: Path, tmp_path: Path) -> None:
+    """A screen from x = 0.1 m on hides a corner of the octahedron."""
+    assert sd2("synth", fitted, "--out", tmp_path / "free.npz").code == 0
+    corner = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3\nf 1 3 4\n"
+    (tmp_path / "wall.obj").write_text(corner)
+    assert sd2("set", fitted, "--thing", f"{tmp_path / 'wall.obj'}@1.1,1,1").code == 0
+    assert sd2("synth", fitted, "--out", tmp_path / "map.npz").code == 0
+    free, made = (DopplerMap.load(tmp_path / name) for name in ("free.npz", "map.npz"))
+    hidden = 1 - np.divide(made.meta["visible_share"], free.meta["visible_share"])
+    np.testing.assert_allclose(hidden, 1 / 5, atol=1e-4)
+    _made_elsewhere(sd2, fitted, tmp_path, made)
+    # What a batch keeps is of the file as it was: now the screen begins beside the line of sight.
+    (tmp_path / "wall.obj").write_text(corner.replace("v 2", "v 1.7"))
+    assert sd2("synth", fitted, "--out", tmp_path / "narrow.npz").code == 0
+    narrow = DopplerMap.load(tmp_path / "narrow.npz")
+    np.testing.assert_array_equal(narrow.values, free.values)
+    _made_elsewhere(sd2, fitted, tmp_path, narrow)
+
+
+def _made_elsewhere(
+    sd2: Sd2, fitted: Path, tmp_path: Path, made: DopplerMap, count: str | None = None
+) -> None:
+    """Pairs, data set and batch hold a map that ``sd2 synth`` made."""
+    wish = () if count is None else ("--count", count)
+    for name in ("pairs.zarr", "set.zarr"):
+        shutil.rmtree(tmp_path / name, ignore_errors=True)
     said = sd2("pairs", "recordings", fitted, "--out", tmp_path / "pairs.zarr", *wish)
     assert said.code == 0, said.err
     pairs = read_pairs(tmp_path / "pairs.zarr")

@@ -70,9 +70,40 @@ def test_a_part_can_be_taken_out(sd2: Sd2, one: Recording) -> None:
     assert open_recording(one.folder).radar is None
 
 
+def test_things_are_put_into_the_scene_and_taken_out(
+    sd2: Sd2, one: Recording, tmp_path: Path
+) -> None:
+    (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    before, given = content(one), ("table@0,1.1,1.5,20", "box@1,1,2,-30,0.2,0.3,0.4")
+    words = [
+        word for thing in (*given, f"{tmp_path / 'flat.obj'}@0,0,9") for word in ("--thing", thing)
+    ]
+    outcome = sd2("set", one.folder, *words)
+    assert outcome.code == 0, outcome.err
+    assert "things" in outcome.out
+    assert "table at x 0, y 1.1, z 1.5 m, turned by 20°; box at" in outcome.out
+    assert [list(one.values()) for one in content(one)["things"]] == [
+        ["table", [0, 1.1, 1.5], 20, None],
+        ["box", [1, 1, 2], -30, [0.2, 0.3, 0.4]],
+        ["../flat.obj", [0, 0, 9], 0, None],
+    ]
+    around = open_recording(one.folder).load_mesh().surroundings
+    assert around is not None
+    assert len(around.faces) == 60 + 12 + 1
+    told = json.loads(sd2("info", one.folder, "--json").out)
+    assert told["things"][1]["size_m"] == [0.2, 0.3, 0.4]
+    assert sd2("set", one.folder, "--without", "things").code == 0
+    assert content(one) == before
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
+        (("--thing", "table@0,1"), "SHAPE@X,Y,Z"),
+        (("--thing", "0,1,2"), "The thing is ''"),
+        (("--thing", "sofa@0,1,2"), "one of box, table"),
+        (("--thing", "gone.obj@0,1,2"), "is not there"),
+        (("--thing", "box@0,1,2,0,1,1,0"), "width, height and depth"),
         ((), "Nothing is to be set"),
         (("--mesh", "nowhere.zarr"), "The mesh nowhere.zarr does not exist"),
         (("--without", "mesh,radar"), "would hold nothing"),

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
 from sd2core.files.recording_json import CameraEntry, MeshReading
+from sd2core.mesh.things import Thing
 from sd2core.placements.placements import PlacementGrid
 from sd2core.recording.edited import decoded_fields, differing, edited_fields
 from sd2core.recording.recording import Recording
@@ -40,6 +41,16 @@ recordings = st.builds(
     imu=st.none() | st.just(Path("wrist.csv").absolute()),
     imu_offset_s=st.floats(-9, 9),
     imu_places=st.lists(st.sampled_from(["left-wrist", "head", "4711"]), unique=True).map(tuple),
+    things=st.lists(
+        st.builds(
+            Thing,
+            st.sampled_from(["table", str(Path("chair.obj").absolute())]),
+            st.tuples(metres, metres, metres),
+            angles,
+            st.none() | st.just((1.0, 2.0, 0.1)),
+        ),
+        max_size=3,
+    ).map(tuple),
     radar_receiver=st.none() | st.integers(1, 8),
     radar_transmitter=st.none() | st.integers(1, 8),
     mesh=st.none() | st.just(Path("body.pkl").absolute()),

@@ -18,6 +18,7 @@ from sd2core.files.recording_json import Document
 from sd2core.labels.files import write_labels
 from sd2core.labels.spans import Labels
 from sd2core.labels.spans import Span as LabelSpan
+from sd2core.mesh.things import Thing
 from sd2core.placements.placements import PlacementCloud, PlacementGrid
 from sd2core.recording.recording import (
     FILE_NAME,
@@ -622,3 +623,37 @@ def test_labels_that_somebody_else_edits_are_left_alone(files: Path) -> None:
     with pytest.raises(Sd2Error, match=r"labels\.json cannot be read"):
         made.read_labels_again()
     assert made.labels == theirs
+
+
+def test_files_of_things_go_with_a_copy(tmp_path: Path) -> None:
+    """The same file twice is copied once; a moved folder finds it."""
+    for name in ("walk.npz", "chair.obj"):
+        (tmp_path / name).write_text(name)
+    chair = str(tmp_path / "chair.obj")
+    things = (Thing(chair, (0, 1, 2)), Thing("box", (1, 1, 1)), Thing(chair, (0, 1, 3), 20.0))
+    linked = Recording.create(tmp_path / "linked", mesh=tmp_path / "walk.npz", things=things)
+    assert open_recording(linked.folder).things == things
+    copied = linked.save_as(tmp_path / "copied", copy=True)
+    moved = copied.folder.rename(tmp_path / "moved.sd2")
+    (tmp_path / "chair.obj").unlink()
+    found = open_recording(moved).things
+    assert [Path(one.shape).name for one in found] == ["chair.obj", "box", "chair.obj"]
+    assert Path(found[0].shape).read_text() == "chair.obj"
+    assert [one.position_m for one in found] == [one.position_m for one in things]
+    assert sorted(path.name for path in moved.iterdir()) == ["chair.obj", FILE_NAME, "walk.npz"]
+
+
+def test_a_thing_that_cannot_be_is_named_with_its_file(tmp_path: Path) -> None:
+    (tmp_path / "walk.npz").touch()
+    made = Recording.create(tmp_path / "walk", mesh=tmp_path / "walk.npz")
+    content = json.loads((made.folder / FILE_NAME).read_text())
+    for thing, said in (
+        ({"shape": "sofa", "position_m": [0, 0, 1]}, "sofa"),
+        ({"shape": "box", "position_m": [0, 0, 1], "turn_deg": 400}, "400"),
+        ({"shape": "box"}, "position_m"),
+        ({"shape": "box", "position_m": [0, 0, 1], "colour": "red"}, "colour"),
+    ):
+        (made.folder / FILE_NAME).write_text(json.dumps(content | {"things": [thing]}))
+        with pytest.raises(Sd2Error, match=FILE_NAME) as caught:
+            open_recording(made.folder)
+        assert said in str(caught.value)
