@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.fmcw.chain import taper
+from sd2core.fmcw.cutting import subdivided
 from sd2core.fmcw.sums import recurrent
 from sd2core.fmcw.wave import BeatSignal, GoOn, WaveScene
 
@@ -87,16 +88,6 @@ def doppler_marginal(signal: BeatSignal) -> NDArray[np.float64]:
     power = np.abs(np.fft.fft(over_range(tapered, axis=2), axis=1)) ** 2
     share: NDArray[np.float64] = power.sum(axis=(0, 2))
     return share / (share.sum() or 1.0)
-
-
-def subdivided(corners: NDArray[np.float64], cuts: int) -> NDArray[np.float64]:
-    """Triangles (n, 3 corners, 3) with all edges halved some times, (n 4^cuts, 3, 3)."""
-    for _ in range(cuts):
-        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-        ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
-        parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
-        corners = np.concatenate([np.stack(part, axis=1) for part in parts])
-    return corners
 
 
 def _cut(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) -> BeatSignal:

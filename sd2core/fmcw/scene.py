@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence, refuse_missing
 from sd2core.radar_config import RadarConfig
-from sd2core.scattering.facets import visible_facets
+from sd2core.scattering.facets import facets_before_things, visible_facets
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
@@ -38,7 +38,7 @@ class MeshScene:
 
     ``visibility``, (T, F), marks per mesh frame the facets that nothing hides from the sensor;
     ``"exact"`` finds them frame by frame as they are asked for, ``"facing"`` takes all whose normal
-    points towards it.
+    points towards it. What stands around the mesh hides facets in either case.
     """
 
     def __init__(
@@ -91,13 +91,20 @@ class MeshScene:
 
     def visible(self, time_s: float) -> NDArray[np.bool_] | None:
         """Mask of the facets that nothing hides, (F,); None if only the facing test applies."""
-        if isinstance(self.visibility, str) and self.visibility == "facing":
+        around = self.mesh.surroundings
+        if around is None and isinstance(self.visibility, str) and self.visibility == "facing":
             return None
         first, last = self._stretch(time_s)
         frame = min(max(self.mesh.timebase.nearest_frame(time_s), first), last)
-        if isinstance(self.visibility, str):
-            return visible_facets(self._frame(frame), self._faces, self.sensor.position_m)
-        return np.asarray(self.visibility[frame])
+        place = self.sensor.position_m
+        seen = np.ones(len(self._faces), np.bool_)
+        if not isinstance(self.visibility, str):
+            seen = np.asarray(self.visibility[frame])
+        elif self.visibility == "exact":
+            seen = visible_facets(self._frame(frame), self._faces, place)
+        if around is None:
+            return seen
+        return seen & facets_before_things(self._frame(frame), self._faces, place, around)
 
     def between(self, times_s: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.float64], ...]]:
         """Interpolate vertices and velocity at some times, on a smooth path through the frames.

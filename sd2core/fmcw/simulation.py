@@ -42,7 +42,7 @@ def simulate_radar(
     Parameters
     ----------
     mesh : MeshSequence
-        With faces.
+        With faces. What stands around it hides facets, and echoes as static clutter.
     sensor : VirtualSensor
         At the camera by default.
     visibility : bool array, shape (T, F), "facing" or "exact"
@@ -105,6 +105,7 @@ def simulate_radar(
         how={
             "visibility": visibility if isinstance(visibility, str) else "exact",
             "wave": asdict(wave),
+            **({} if mesh.surroundings is None else {"things": mesh.surroundings.as_list()}),
         },
         nobody=runs(~there),
     )

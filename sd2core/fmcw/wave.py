@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.fmcw.cutting import pieces_of
 from sd2core.fmcw.kernels import facet_echoes
 from sd2core.fmcw.options import Antenna, Reflector, WaveOptions, paths
 from sd2core.fmcw.scene import NEAREST_M, FacetsSeen, MeshScene
@@ -17,6 +18,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import RadarConfig
 from sd2core.scattering.beam import angles_deg, one_way
 from sd2core.scattering.beam_kernels import beam_tables
+from sd2core.scattering.facets import visible_facets
 from sd2core.sensor import VirtualSensor
 
 GoOn = Callable[[], None]
@@ -24,6 +26,9 @@ GoOn = Callable[[], None]
 
 BeatSignal = NDArray[Any]
 """Samples (receivers, chirps, samples): float64, or complex128 where a radar samples I and Q."""
+
+_LONGEST_PIECE_M = 0.1
+"""Of a thing: over it neither its direction nor its range changes much."""
 
 _NO_PLANE = np.array([0.0, 0.0, 0.0, 1.0])
 
@@ -55,6 +60,7 @@ class WaveScene:
                 "one of the two",
             )
         self._beam = sensor.beam
+        self._seed = seed
         self._tables = beam_tables(sensor)
         self.paths = paths(sensor, config, self.wave)
         faces = mesh.faces
@@ -127,18 +133,37 @@ class WaveScene:
         assert faces is None or self._random is None
         faces = self.faces if faces is None else faces
         parts = [
-            self._facets(position_m, velocity_mps, faces, visible, out, back)
+            self._facets(position_m, velocity_mps, faces, visible, out, back, self._random)
             for out, back in self.paths[receiver]
         ]
         return parts[0] if len(parts) == 1 else _joined(parts)
 
     def static(self, reflectors: tuple[Reflector, ...]) -> BeatSignal:
-        """Beat signal of static points, (receivers, chirps, samples)."""
+        """Beat signal of static points and of things, (receivers, chirps, samples).
+
+        Things are rough, whatever the body's surface is: a large smooth plane would echo in one
+        direction only. What the body hides of them is left out of account.
+        """
         found = self.silence()
         if reflectors:
             for receiver, pairs in enumerate(self.paths):
                 parts = [self._points(reflectors, out, back) for out, back in pairs]
                 found[receiver] = self.sampled(direct(_joined(parts), self.config))
+        around = self.scene.mesh.surroundings
+        if around is None:
+            return found
+        longest_m = min(self.config.range_resolution_m, _LONGEST_PIECE_M)
+        corners = pieces_of(around, longest_m).reshape(-1, 3)
+        faces = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+        visible = visible_facets(corners, faces, self.scene.sensor.position_m)
+        turns = np.random.default_rng([self._seed, 0, 2]).random(len(faces))
+        phases, still = np.exp(2j * np.pi * turns), np.zeros_like(corners)
+        for receiver, pairs in enumerate(self.paths):
+            parts = [
+                self._facets(corners, still, faces, visible, out, back, phases)
+                for out, back in pairs
+            ]
+            found[receiver] += self.sampled(nufft(_joined(parts), self.config))
         return found
 
     def _signal(
@@ -169,13 +194,15 @@ class WaveScene:
         visible: NDArray[np.bool_] | None,
         out: Antenna,
         back: Antenna,
+        phases: NDArray[np.complex128] | None,
     ) -> Echoes:
+        """Echoes on one path, of a rough surface with the phases of its facets, or a smooth one."""
         visible = np.ones(len(faces), np.bool_) if visible is None else visible
         count = int(np.count_nonzero(visible))
         index = np.empty(count, np.int32)
         range_m, rate_mps = np.empty(count), np.empty(count)
         # Interpolated motion has every chirp's own corners.
-        turning = self.wave.coherent and self.wave.motion == "constant"
+        turning = phases is None and self.wave.motion == "constant"
         amplitude = np.empty((3 if turning else 1, count), np.complex128)
         found = facet_echoes(
             position_m,
@@ -189,7 +216,7 @@ class WaveScene:
             self.wave.pattern_exponent,
             self._tables.across,
             self._tables.up,
-            self.wave.coherent,
+            phases is None,
             0.5 * self.config.chirps_per_frame * self.config.chirp_repetition_s,
             index,
             range_m,
@@ -197,8 +224,8 @@ class WaveScene:
             amplitude,
         )
         strength = amplitude[:, :found] * (out.gain * back.gain)
-        if self._random is not None:
-            strength *= self._random[index[:found]]
+        if phases is not None:
+            strength *= phases[index[:found]]
         return Echoes(range_m[:found], rate_mps[:found], strength)
 
     def _points(self, reflectors: tuple[Reflector, ...], out: Antenna, back: Antenna) -> Echoes:

@@ -22,7 +22,7 @@ _CHANNEL = ("radar_receiver", "radar_transmitter")
 MESH = ("mesh", "faces", "mesh_reading", "camera")
 """Names of the fields on which the mesh depends."""
 EDITED = (*_ALWAYS, *_INERTIAL, *_CHANNEL, *MESH, "things")
-"""Names of the fields. Journals of earlier versions end with the third, sixth, eighth or twelfth."""
+"""Names of the fields. Journals of earlier versions lack some of the later ones."""
 
 
 def edited_fields(recording: Recording) -> dict[str, Any]:

@@ -1,10 +1,12 @@
-"""Visibility of facets: those that face a sensor and whose centre nothing hides."""
+"""Visibility of facets: those that face a sensor, and whose centre neither body nor thing hides."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sd2core.mesh.things import Surroundings
+from sd2core.scattering.behind_things import hide_behind
 from sd2core.scattering.exact import exact_visibility_kernel
 
 
@@ -28,3 +30,19 @@ def visible_facets(
         np.ascontiguousarray(points, dtype=np.float32), faces, place, needed, 0, 1, seen
     )
     return seen[0, len(vertices) :].astype(bool)
+
+
+def facets_before_things(
+    vertices_m: NDArray[np.floating],
+    faces: NDArray[np.int32],
+    sensor_m: ArrayLike,
+    surroundings: Surroundings,
+) -> NDArray[np.bool_]:
+    """Facets (F,) of one frame whose centre no thing hides, whatever the body itself hides."""
+    centres = np.asarray(vertices_m, np.float64)[faces].mean(axis=1)
+    origin = np.rint(centres[0])
+    seen = np.ones(len(faces), np.uint8)
+    hide_behind(
+        surroundings, (centres - origin).T, origin, np.asarray(sensor_m, np.float64) - origin, seen
+    )
+    return seen > 0

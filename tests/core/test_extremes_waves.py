@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.fmcw.cutting import subdivided
 from sd2core.fmcw.facet import facet_mean, unit_phasor
 from sd2core.fmcw.kernels import facet_echoes
 from sd2core.fmcw.options import SignalOptions
 from sd2core.fmcw.processing import doppler_map
-from sd2core.fmcw.reference import subdivided
 from sd2core.fmcw.simulation import simulate_radar
 from sd2core.fmcw.sums import NUFFT_TOLERANCE, Echoes, direct, nufft, recurrent
 from sd2core.mesh.sequence import MeshSequence

@@ -11,7 +11,8 @@ from velocity_response import velocity_response
 
 from sd2core.errors import Sd2Error
 from sd2core.fmcw import ProcessingOptions, SignalOptions, WaveOptions, doppler_map, simulate_radar
-from sd2core.fmcw.reference import converged_frame, doppler_marginal, subdivided
+from sd2core.fmcw.cutting import subdivided
+from sd2core.fmcw.reference import converged_frame, doppler_marginal
 from sd2core.fmcw.spectra import frame_spectra
 from sd2core.fmcw.sums import direct
 from sd2core.fmcw.wave import WaveScene

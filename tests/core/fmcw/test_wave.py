@@ -18,6 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
+from sd2core.fmcw.cutting import subdivided
 from sd2core.fmcw.facet import bent_facet_mean, facet_mean, unit_phasor
 from sd2core.fmcw.options import (
     Antenna,
@@ -28,7 +29,6 @@ from sd2core.fmcw.options import (
     paths,
 )
 from sd2core.fmcw.processing import doppler_map
-from sd2core.fmcw.reference import subdivided
 from sd2core.fmcw.scene import MeshScene
 from sd2core.fmcw.simulation import simulate_radar
 from sd2core.fmcw.sums import Echoes, direct, nufft, recurrent
