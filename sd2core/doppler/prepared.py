@@ -86,19 +86,21 @@ class PreparedMesh:
         usual = max(_FEWEST_FRAMES, bytes_per_block // per_frame)
         self.block_frames = self.asked_frames or usual
 
-    def with_options(self, options: SynthesisOptions) -> PreparedMesh | None:
-        """Same blocks, in the same budget, for other options.
+    def shared(self, mesh: MeshSequence, options: SynthesisOptions) -> PreparedMesh | None:
+        """Same blocks, in the same budget, for other options, or other things around the mesh.
 
-        None if those need other knots or have other bin widths, on which the precision of a
-        block depends.
+        None for another mesh, and if the options need other knots or have other bin widths, on
+        which the precision of a block depends.
         """
+        if mesh.vertices is not self.mesh.vertices or mesh.faces is not self.mesh.faces:
+            return None
         for name in ("oversampling", "trajectory_smoothing_s", "velocity"):
             if getattr(options, name) != getattr(self.options, name):
                 return None
         if options.axis.bin_width_mps != self.options.axis.bin_width_mps:
             return None
         other = copy.copy(self)
-        other.options = options
+        other.mesh, other.options = mesh, options
         return other
 
     @property

@@ -131,8 +131,8 @@ class Synthesizer:
         Number of frames that are prepared together; by default some megabytes of them. Fewer
         are better where only a few frames of a clip are looked at.
     blocks_of : Synthesizer, optional
-        Another synthesizer of the same mesh, whose prepared blocks and budget are shared
-        where the options allow it.
+        Another synthesizer of the same mesh, maybe among other things, whose prepared blocks and
+        budget are shared where the options allow it.
 
     Raises
     ------
@@ -172,8 +172,8 @@ class Synthesizer:
         self.mesh = mesh
         self.options = options
         self._threads = threads
-        shared = blocks_of.prepared.with_options(options) if blocks_of is not None else None
-        if shared is None or shared.mesh is not mesh:
+        shared = blocks_of.prepared.shared(mesh, options) if blocks_of is not None else None
+        if shared is None:
             shared = PreparedMesh(mesh, options, ByteBudget(memory_budget_bytes), block_frames)
         self.prepared: PreparedMesh = shared
         self._frames = FrameCounts(shared)

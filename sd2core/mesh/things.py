@@ -172,7 +172,8 @@ class Surroundings:
     """Things around a moving mesh, and their surfaces together in the camera frame."""
 
     things: tuple[Thing, ...]
-    vertices_m: NDArray[np.float64]  # (V, 3)
+    surfaces: tuple[Surface, ...]  # of each
+    vertices_m: NDArray[np.float64]  # of all, (V, 3)
     faces: NDArray[np.int32]  # (F, 3)
 
     @classmethod
@@ -182,7 +183,8 @@ class Surroundings:
         faces = [faces + number for (_, faces), number in zip(surfaces, first, strict=False)]
         # Plain memory of this type, as compiled kernels take it.
         joined = np.ascontiguousarray(np.concatenate(faces), np.int32)
-        return cls(things, np.concatenate([vertices for vertices, _ in surfaces]), joined)
+        vertices_m = np.concatenate([vertices for vertices, _ in surfaces])
+        return cls(things, tuple(surfaces), vertices_m, joined)
 
     @cached_property
     def digest(self) -> str:

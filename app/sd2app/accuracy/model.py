@@ -152,6 +152,15 @@ class AccuracyModel(ReportingModel):
         self.plan_changed.emit()
         self.changed.emit()
 
+    def surround(self, mesh: MeshSequence) -> None:
+        """Go on with the same clip among other things; plans hold until others are chosen."""
+        assert self._scene is not None
+        self.hold()
+        self._scene = mesh, self._scene[1]
+        self._decided_for = self._asking = None
+        self.measured.attach(*self._scene)
+        self.changed.emit()
+
     def choose(self, sensor: VirtualSensor, budget_ms: float) -> None:
         """Choose for the sensor at rest, and for a drag from there at ``budget_ms`` per frame."""
         request = self._request(sensor, budget_ms)

@@ -192,18 +192,28 @@ class SynthesisModel(QObject):
         self._follow()
 
     def _recount(self) -> None:
-        """Count another way, at the same 0 dB; what was made before stays until it is replaced."""
-        count, synthesizers = self._session.document.count, self._synthesizers
-        if synthesizers is None or synthesizers.options.count == count:
+        """Count another way or among other things, at the same 0 dB.
+
+        What was made before stays until it is replaced.
+        """
+        document, synthesizers = self._session.document, self._synthesizers
+        if synthesizers is None or document.mesh is None:
+            return
+        before, mesh = synthesizers.mesh, document.mesh
+        moved = mesh.vertices is before.vertices and mesh.surroundings is not before.surroundings
+        if synthesizers.options.count == document.count and not moved:
             return
         self._stop()
         self._keep()
-        mesh, options = synthesizers.mesh, replace(synthesizers.options, count=count)
-        self._synthesizers = SynthesizerCache(mesh, options)
+        options = replace(synthesizers.options, count=document.count)
+        self._synthesizers = SynthesizerCache(mesh, options, synthesizers.full)
         self._synthesizers.limbs = synthesizers.limbs
         self._prefetcher.forget()
         self._partial.mark_stale()
-        self._accuracy.attach(mesh, options)
+        if options == synthesizers.options:
+            self._accuracy.surround(mesh)
+        else:
+            self._accuracy.attach(mesh, options)
         self._follow()
 
     def made_by(self) -> tuple[Callable[[], Synthesizer], VirtualSensor] | None:

@@ -50,13 +50,16 @@ class SynthesizerCache:
 
     Those that count as many vertices share what is prepared, as far as they can.
     ``options`` are those that no plan chooses. ``full`` is the synthesizer on the full mesh with
-    these options, for readouts of single vertices and for use without a plan.
+    these options, for readouts of single vertices and for use without a plan; it shares what
+    ``like`` has prepared, as far as it can.
     """
 
-    def __init__(self, mesh: MeshSequence, options: SynthesisOptions) -> None:
+    def __init__(
+        self, mesh: MeshSequence, options: SynthesisOptions, like: Synthesizer | None = None
+    ) -> None:
         self.mesh = mesh
         self.options = options
-        self.full = Synthesizer(mesh, options, memory_budget_bytes=_BUDGET_BYTES)
+        self.full = Synthesizer(mesh, options, memory_budget_bytes=_BUDGET_BYTES, blocks_of=like)
         self.limbs = False  # True: maps are also split by the parts of the body
         self._made: OrderedDict[AccuracyPlan, Synthesizer] = OrderedDict()
         self._lock = threading.Lock()

@@ -162,6 +162,14 @@ def drag_in_view(start: ArrayLike, pose: EyePose, x_px: float, y_px: float) -> V
     return pose.position + depth * pose.ray(x_px, y_px)
 
 
+def drag_level(start: ArrayLike, pose: EyePose, x_px: float, y_px: float) -> Vector | None:
+    """Point at which the pointer's ray meets the level plane through ``start``; None if far off."""
+    ray, height = pose.ray(x_px, y_px), float(np.asarray(start)[1] - pose.position[1])
+    if abs(ray[1]) < 1e-6 or not _NEAREST_M <= height / ray[1] <= _FARTHEST_DRAG_M:
+        return None
+    return pose.position + height / ray[1] * ray
+
+
 def drag_along(
     start: ArrayLike, direction: ArrayLike, pose: EyePose, x_px: float, y_px: float
 ) -> Vector | None:

@@ -1,4 +1,4 @@
-"""Mouse in the scene: rotate, pan, zoom, drag the sensor; no widgets, no VTK.
+"""Mouse in the scene: rotate, pan, zoom, drag the sensor and things; no widgets, no VTK.
 
 Positions are device-independent pixels of the view.
 """
@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from PySide6.QtCore import Qt
 
-from sd2app.scene.camera import Vector, drag_along, drag_in_view, triple
+from sd2app.scene.camera import Vector, drag_along, drag_in_view, drag_level, triple
 from sd2app.scene.scene import Scene
 from sd2app.session.undo import Edits
 
@@ -22,6 +22,7 @@ Constraint = Literal["view", "vertical", "sight"]
 
 MIN_GRAB_PX = 14.0
 _MARKER_PX = 9.0
+_BODY_PX = 6.0
 _CLICK_PX = 4.0
 """Movement below which a press counts as a click."""
 _ZOOM_PER_NOTCH = 0.88
@@ -34,13 +35,21 @@ class _Held:
     constraint: Constraint
 
 
+@dataclass
+class _HeldThing:
+    number: int
+    at_m: Vector  # where it was taken hold of
+    moved_m: Vector
+
+
 class Navigator:
-    """Turns pointer gestures into a new pose of the scene, or a drag of the sensor.
+    """Turns pointer gestures into a new pose of the scene, or a drag of the sensor or a thing.
 
     Left drags the sensor, or turns the view when it starts elsewhere; middle,
     right or Shift + left shift the view; the wheel zooms at the pointer. While
     the sensor is held, Shift keeps it on its vertical and Ctrl on the line
-    between it and the body. A click on a marker of a planned place picks it.
+    between it and the body. A thing stays on its level while it is dragged, with Shift on its
+    vertical. A click on a marker of a planned place picks it.
     """
 
     def __init__(
@@ -55,7 +64,9 @@ class Navigator:
         self.hovers_sensor = False  # the pointer is over the sensor
         self.marker: int | None = None  # number of the planned place under the pointer
         self._button: Qt.MouseButton | None = None
+        self.thing: int | None = None  # number of the thing under the pointer
         self._held: _Held | None = None
+        self._held_thing: _HeldThing | None = None
         self._moving: Literal["orbit", "pan"] | None = None
         self._last_px = (0.0, 0.0)
         self._clicking: tuple[int, float, float] | None = None
@@ -73,6 +84,23 @@ class Navigator:
             return False
         radius_px = scene.sensor_radius_m / scene.pose.metres_per_pixel(position_m)
         return math.hypot(x - x_px, y - y_px) <= max(MIN_GRAB_PX, radius_px)
+
+    @property
+    def holds_thing(self) -> bool:
+        """True while a thing is dragged."""
+        return self._held_thing is not None
+
+    def thing_at(self, x_px: float, y_px: float) -> tuple[int, Vector] | None:
+        """Number of the thing under the pointer, and where; not if the body is before it."""
+        scene, pose = self._scene, self._scene.pose
+        if not scene.things.surfaces or self.sensor_at(x_px, y_px):
+            return None
+        found = scene.things.under(pose.position, pose.ray(x_px, y_px))
+        if found is None or not scene.mesh_shown:
+            return found
+        x, y, depth = pose.project(scene.body.points).T
+        beneath = depth[np.hypot(x - x_px, y - y_px) <= _BODY_PX]
+        return None if (beneath < pose.project(found[1])[0, 2]).any() else found
 
     def marker_at(self, x_px: float, y_px: float) -> int | None:
         """Number of the planned place within reach of a pointer, the nearest to it."""
@@ -99,6 +127,8 @@ class Navigator:
             self._held = _Held(start, (x - x_px, y - y_px), _constraint(keys))
             self._edits.begin_sensor_drag()
             self._show_hot()
+        elif left and self._take_thing(x_px, y_px):
+            self._show_hot()
         elif left and not keys & Qt.KeyboardModifier.ShiftModifier:
             marker = self.marker_at(x_px, y_px)
             self._clicking = None if marker is None else (marker, x_px, y_px)
@@ -117,6 +147,8 @@ class Navigator:
         self._last_px = (x_px, y_px)
         if self._held is not None:
             self._drag(self._held, x_px, y_px, _constraint(keys))
+        elif self._held_thing is not None:
+            self._drag_thing(self._held_thing, x_px, y_px, _constraint(keys))
         elif self._moving is not None:
             pose = self._scene.pose
             self._scene.preset = None
@@ -142,19 +174,24 @@ class Navigator:
             self._held = None
             self._edits.end_sensor_drag()
             self._show_hot()
+        if self._held_thing is not None:
+            held, self._held_thing = self._held_thing, None
+            self._edits.move_thing(held.number, triple(held.moved_m))
+            self._show_hot()
 
     def look_again(self) -> None:
         """Test again what is under a resting pointer."""
-        if (self.hovers_sensor or self.marker is not None) and self._held is None:
+        hovers = self.hovers_sensor or self.marker is not None or self.thing is not None
+        if hovers and self._button is None:
             self._look(*self._last_px)
 
     def leave(self) -> None:
         """Handle the pointer's leaving the view."""
-        self._hover(False, None)
+        self._hover(False, None, None)
 
     def wheel(self, x_px: float, y_px: float, notches: float) -> None:
         """Zoom with the wheel; positive comes nearer."""
-        if self._held is None:
+        if self._held is None and self._held_thing is None:
             self._scene.pose = self._scene.pose.zoomed(_ZOOM_PER_NOTCH**notches, x_px, y_px)
             self._changed()
 
@@ -174,16 +211,39 @@ class Navigator:
         if position is not None:
             self._edits.drag_sensor(triple(position))
 
-    def _look(self, x_px: float, y_px: float) -> None:
-        self._hover(self.sensor_at(x_px, y_px), self.marker_at(x_px, y_px))
+    def _take_thing(self, x_px: float, y_px: float) -> bool:
+        found = None if self.marker_at(x_px, y_px) is not None else self.thing_at(x_px, y_px)
+        if found is not None:
+            self._held_thing = _HeldThing(*found, np.zeros(3))
+        return found is not None
 
-    def _hover(self, sensor: bool, marker: int | None) -> None:
-        if (sensor, marker) != (self.hovers_sensor, self.marker):
-            self.hovers_sensor, self.marker = sensor, marker
+    def _drag_thing(
+        self, held: _HeldThing, x_px: float, y_px: float, constraint: Constraint
+    ) -> None:
+        pose, now = self._scene.pose, held.at_m + held.moved_m
+        if constraint == "vertical":
+            at = drag_along(now, np.array([0.0, 1.0, 0.0]), pose, x_px, y_px)
+        else:
+            at = drag_level(now, pose, x_px, y_px)
+        if at is not None:
+            held.moved_m = at - held.at_m
+            self._scene.things.shift(held.number, held.moved_m)
+            self._changed()
+
+    def _look(self, x_px: float, y_px: float) -> None:
+        marker, found = self.marker_at(x_px, y_px), self.thing_at(x_px, y_px)
+        thing = None if found is None or marker is not None else found[0]
+        self._hover(self.sensor_at(x_px, y_px), marker, thing)
+
+    def _hover(self, sensor: bool, marker: int | None, thing: int | None) -> None:
+        if (sensor, marker, thing) != (self.hovers_sensor, self.marker, self.thing):
+            self.hovers_sensor, self.marker, self.thing = sensor, marker, thing
             self._show_hot()
 
     def _show_hot(self) -> None:
         self._scene.set_hot(self.hovers_sensor or self._held is not None)
+        held = self._held_thing
+        self._scene.things.set_hot(self.thing if held is None else held.number)
         self._changed()
 
 

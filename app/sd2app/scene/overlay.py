@@ -21,6 +21,7 @@ from sd2core.figures.colours import DIVERGING, SEQUENTIAL, Rgb
 
 HINT = "Drag moves the sensor  ·  Shift: up and down  ·  Ctrl: nearer and farther"
 MARKER_HINT = "Click puts the sensor there"
+THING_HINT = "Drag moves the {}  ·  Shift: up and down"
 _VELOCITY_TITLE = "Radial velocity, m/s"
 _BAR_WIDTH = 10.0
 _PAD = 10.0
@@ -68,6 +69,7 @@ class Overlay(Canvas):
         self.message = ""
         self.hint = ""  # on what a click does now
         self.marker_words: list[str] = []
+        self.thing_names: list[str] = []
         self._legend = QRectF()
         self._states: tuple[object, ...] = (None, None)  # what legend and the rest show
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
@@ -92,7 +94,7 @@ class Overlay(Canvas):
         )
         rest = (
             (self.message, self.hint, scene.pose, scene.sensor, scene.metre_labels),
-            (navigator.hovers_sensor, navigator.holds_sensor, navigator.marker),
+            (navigator.hovers_sensor, navigator.holds_sensor, navigator.marker, navigator.thing),
         )
         if legend != self._states[0]:
             self._kept.clear()
@@ -132,6 +134,8 @@ class Overlay(Canvas):
             self._paint_hint(painter, HINT)
         elif self.hint:
             self._paint_hint(painter, self.hint)
+        elif (thing := self._navigator.thing) is not None and thing < len(self.thing_names):
+            self._paint_hint(painter, THING_HINT.format(self.thing_names[thing]))
         elif marker is not None:
             place_m = tuple(self._scene.markers.positions_m[marker])
             self._paint_beside(painter, self.marker_words[marker], place_m)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,9 @@ from sd2app.scene.body import Extent
 from sd2app.scene.camera import EyePose, Margins, Preset, triple
 from sd2app.scene.colours import Colouring, SceneColours, fractions, mesh_colours, range_limits
 from sd2app.scene.parts import Body, GroundGrid, InertialMarkers, Markers, SensorGlyph, Shape
+from sd2app.scene.things import Things
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.things import Surface
 from sd2core.sensor import VirtualSensor
 
 SENSOR_RADIUS_M = 0.045
@@ -58,6 +60,7 @@ class Scene:
         self.sensor_glyph = SensorGlyph(renderer)
         self.markers = Markers(renderer, self.colours)
         self.inertial = InertialMarkers(renderer)
+        self.things = Things(renderer)
         self._inertial_rows = np.zeros(0, np.intp)
         self._set_extent(_NOTHING)
         self.set_colours(self.colours)
@@ -135,6 +138,12 @@ class Scene:
         self._framed = None
         self._lay_ground()
 
+    def set_things(self, surfaces: Sequence[Surface]) -> None:
+        """Show what stands around the body."""
+        self.things.set_surfaces(surfaces)
+        self._framed = None
+        self._lay_ground()
+
     def set_inertial(self, vertices: Iterable[int]) -> None:
         """Show inertial sensors on vertices of the mesh."""
         self._inertial_rows = np.array(list(vertices), np.intp)
@@ -154,6 +163,7 @@ class Scene:
         self.sensor_glyph.set_colours(colours, self._hot)
         self.markers.set_colours(colours)
         self.inertial.set_colours(colours)
+        self.things.set_colours(colours)
         self.body.shadow.GetProperty().SetColor(*fractions(colours.shadow))
         self._stale_colours = True
 
@@ -176,7 +186,7 @@ class Scene:
         if np.linalg.norm(body.centre_m - sensor) < _FAR_OFF_M:
             points.append(_box(sensor, 0.25))
             points.append(np.array([[sensor[0], body.floor_m, sensor[2]]]))
-        points.append(self._near_markers_m())
+        points += [self._near(self.markers.positions_m), self._near(self.things.points_m)]
         azimuth, elevation = {
             "overview": (-52.0, -16.0),
             "side": (-90.0, 0.0),
@@ -232,6 +242,7 @@ class Scene:
             self._colour_mesh()
         for shape in (
             self.camera_glyph, self.markers, *self.sensor_glyph.shapes, *self.ground.shapes,
+            *self.things.shapes,
         ):  # fmt: skip
             shape.set_pixel_scale(pixel_scale)
         if self.has_mesh and self.body.drawn_as_dots:
@@ -302,9 +313,8 @@ class Scene:
         fits = values is not None and self.has_mesh and len(values) == len(self.body.points)
         return values if fits else None
 
-    def _near_markers_m(self) -> NDArray[np.float64]:
-        """Planned places that are not far off, (n, 3)."""
-        places = self.markers.positions_m
+    def _near(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Those of some places, (n, 3), that are not far off."""
         return places[np.linalg.norm(places - self.extent.centre_m, axis=1) < _FAR_OFF_M]
 
     def _set_extent(self, extent: Extent) -> None:
@@ -321,8 +331,9 @@ class Scene:
         for place in (np.zeros(3), np.asarray(self.sensor.position_m)):
             if np.linalg.norm(self.extent.centre_m - place) < _FAR_OFF_M:
                 low, high = np.minimum(low, place), np.maximum(high, place)
-        if len(planned := self._near_markers_m()):
-            low, high = np.minimum(low, planned.min(axis=0)), np.maximum(high, planned.max(axis=0))
+        for places in (self.markers.positions_m, self.things.points_m):
+            if len(near := self._near(places)):
+                low, high = np.minimum(low, near.min(axis=0)), np.maximum(high, near.max(axis=0))
         covered = shapes.grid_rectangle(low[[0, 2]], high[[0, 2]])
         if covered == self._covered:
             return

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from sd2app.sensor.placements import PlacementsModel
     from sd2app.session.session import Session
     from sd2core.mesh.sequence import MeshSequence
+    from sd2core.mesh.things import Surroundings
 
 _MOUSE = (
     QEvent.Type.MouseMove,
@@ -81,11 +82,13 @@ class SceneView(QWidget):
         self._frame: int | None = None
         self._stale_scattering = True
         self._planned: object = None
+        self._around: Surroundings | None = None
         self._backend.widget.installEventFilter(self)
         self._followed = (
             (session.display.theme_changed, self._follow_theme),
             (session.display.mesh_changed, self._follow_colour),
             (session.document.opened, self._attach),
+            (session.document.changed, self._follow_things),
             (session.playback.time_changed, self._follow_clock),
             (session.sensor.changed, self._follow_sensor),
             (synthesis.frame_changed, self._follow_scattering),
@@ -211,7 +214,8 @@ class SceneView(QWidget):
 
     def _at_something(self, place: tuple[float, float]) -> bool:
         at_marker = self.navigator.marker_at(*place) is not None
-        return at_marker or self.navigator.sensor_at(*place)
+        at_thing = self.navigator.thing_at(*place) is not None
+        return at_marker or at_thing or self.navigator.sensor_at(*place)
 
     # What changed
 
@@ -268,6 +272,16 @@ class SceneView(QWidget):
         self.overlay.marker_words = [place.words for place in model.planned.places]
         self.navigator.look_again()
         self.request_render()
+
+    def _follow_things(self) -> None:
+        mesh = self._session.document.mesh
+        around = None if mesh is None else mesh.surroundings
+        if around is not self._around:
+            self._around = around
+            self.scene.set_things(() if around is None else around.surfaces)
+            self.overlay.thing_names = [] if around is None else [one.name for one in around.things]
+            self.navigator.look_again()
+            self.request_render()
 
     def _follow_inertial(self) -> None:
         self.scene.set_inertial(self._inertial.vertices.values())
@@ -329,11 +343,12 @@ class SceneView(QWidget):
     def _choose_cursor(self) -> None:
         if self._backend is None:
             return
-        if self.navigator.holds_sensor:
+        navigator = self.navigator
+        if navigator.holds_sensor or navigator.holds_thing:
             shape = Qt.CursorShape.ClosedHandCursor
-        elif self.navigator.hovers_sensor:
+        elif navigator.hovers_sensor or navigator.thing is not None:
             shape = Qt.CursorShape.OpenHandCursor
-        elif self.navigator.marker is not None:
+        elif navigator.marker is not None:
             shape = Qt.CursorShape.PointingHandCursor
         elif self.inertial_hand.placing:
             shape = Qt.CursorShape.CrossCursor

@@ -15,6 +15,7 @@ from sd2app.sensor.alignment_dialog import AlignmentDialog
 from sd2app.sensor.panel import SensorPanel
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.sensor.placements_page import PlacementsPage
+from sd2app.sensor.things_page import ThingsPage
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import accepted
 from sd2app.widgets.pages import InnerPage, paged_panel
@@ -61,6 +62,11 @@ class SensorFeature(Feature):
                 lambda: self._shell.bring_up("Sensor", "Placements"),
             ),
             Action(
+                "things", "Edit", "Things…", (),
+                "Put a box, a table, a screen or a mesh file between sensor and body",
+                lambda: self._shell.bring_up("Sensor", "Things"),
+            ),
+            Action(
                 "align", "Edit", "Align automatically…", (),
                 "Find the time offset of the radar by the motion that mesh and radar both show",
                 self._align, lambda: not alignment.why_not, why_not=lambda: alignment.why_not,
@@ -95,9 +101,11 @@ class SensorFeature(Feature):
             self._session, self._synthesis, radar, to_camera, aim, align, shell.warn
         )
         placements = PlacementsPage(self.placements, self._accuracy, shell, self._make_batch)
+        things = ThingsPage(self._session, self._synthesis, shell.warn)
         return {
             "Sensor": paged_panel(
                 InnerPage("Sensor", "Where the sensor is and what it sees", sensor),
                 InnerPage("Placements", "Many places around the body, for a map each", placements),
+                InnerPage("Things", "What stands around the body, and hides it", things),
             )
         }

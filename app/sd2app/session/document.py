@@ -26,7 +26,8 @@ from sd2app.session.content import (
 from sd2app.session.mesh_reading import MeshReader, ReadMesh, mesh_fields
 from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
-from sd2core.errors import Cure
+from sd2core.errors import Cure, Sd2Error
+from sd2core.io.things import with_things
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
@@ -295,6 +296,7 @@ class DocumentModel(QObject):
         unsaved = (self.same_recording and self.modified) or (self._cured and content.saved)
         if before is not None and self.same_recording:
             _keep_edits(before.recording, content.recording)
+            self._surround()
         self.growing = False
         self._tell_opened(unsaved)
         for problem in content.problems:
@@ -326,6 +328,7 @@ class DocumentModel(QObject):
             setattr(recording, name, value)
         if mesh_fields(recording) != mesh:
             self._meshes.follow(recording)
+        self._surround()
         self.changed.emit()
         if _channel(recording) != channel:
             self._process_capture()
@@ -339,10 +342,24 @@ class DocumentModel(QObject):
             return  # there would be nothing to show
         timebase = clock_of(content.recording, content.video, read.mesh, radar)
         self.content = replace(content, mesh=read.mesh, timebase=timebase, offers=read.offers)
+        self._surround()
         self.same_recording = True
         self.opened.emit()
         self.changed.emit()
         self._offer(read.offers)
+
+    def _surround(self) -> None:
+        """Put the recording's things around its mesh."""
+        content = self.content
+        if content is None or content.mesh is None:
+            return
+        around, things = content.mesh.surroundings, content.recording.things
+        if things == (() if around is None else around.things):
+            return
+        try:
+            self.content = replace(content, mesh=with_things(content.mesh, things))
+        except Sd2Error as error:
+            self.failed.emit(str(error))
 
     def set_clutter(self, clutter: Clutter) -> None:
         """Remove static echoes another way."""

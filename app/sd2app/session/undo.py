@@ -15,6 +15,7 @@ from sd2app.session.document import DocumentModel
 from sd2app.session.mesh_reading import ReadMesh
 from sd2app.session.sensor import SensorModel
 from sd2core.errors import Cure
+from sd2core.mesh.things import Thing
 from sd2core.options.synthesis import HowCounted
 from sd2core.placements.placements import Placements
 from sd2core.radar_config import Clutter
@@ -122,6 +123,36 @@ class Edits:
         if "sensor" in rest:
             self.place_sensor(rest.pop("sensor"), "Restore sensor")
         self._change("Restore settings", rest)
+
+    # --- things -----------------------------------------------------------------------------
+
+    def add_thing(self, thing: Thing) -> None:
+        """Put one more thing into the scene."""
+        self._set_things("Add", thing, (*self._things, thing))
+
+    def change_thing(self, number: int, thing: Thing, text: str = "Change") -> None:
+        """Replace a thing by another, or by itself at another place."""
+        things = self._things
+        self._set_things(text, thing, (*things[:number], thing, *things[number + 1 :]))
+
+    def move_thing(self, number: int, by_m: Vector) -> None:
+        """Move a thing."""
+        thing = self._things[number]
+        x, y, z = (round(a + b, 3) for a, b in zip(thing.position_m, by_m, strict=True))
+        self.change_thing(number, replace(thing, position_m=(x, y, z)), "Move")
+
+    def remove_thing(self, number: int) -> None:
+        """Take a thing out of the scene."""
+        things = self._things
+        self._set_things("Remove", things[number], things[:number] + things[number + 1 :])
+
+    def _set_things(self, text: str, thing: Thing, things: tuple[Thing, ...]) -> None:
+        self._change(f"{text} {thing.name}", {"things": things})
+
+    @property
+    def _things(self) -> tuple[Thing, ...]:
+        recording = self._document.recording
+        return () if recording is None else recording.things
 
     # --- inertial sensors -----------------------------------------------------------------
 

@@ -26,7 +26,7 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
         "recover_labels", "-", "quit",
     ),
     "Edit": (
-        "undo", "redo", "-", "sensor_to_camera", "aim_sensor", "placements", "-",
+        "undo", "redo", "-", "sensor_to_camera", "aim_sensor", "placements", "things", "-",
         "place_inertial", "-", "align",
     ),
     "View": (

@@ -26,6 +26,7 @@ class Document(QObject):
     """A recording with a mesh, or none."""
 
     opened = Signal()
+    changed = Signal()
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,0 +1,50 @@
+"""Edges of things, what a ray meets of them, and a drag on a level."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from vtkmodules.vtkRenderingCore import vtkRenderer
+
+from sd2app.scene.camera import EyePose, drag_level
+from sd2app.scene.things import Things, sharp_edges
+from sd2core.mesh.things import SHELF, Thing
+
+
+@pytest.mark.parametrize(("shape", "boxes"), [("box", 1), ("table", 5), ("doorway", 3)])
+def test_a_box_has_twelve_edges_and_no_diagonals(shape: str, boxes: int) -> None:
+    vertices, faces = Thing(shape, (0, 1, 2), 30.0).placed()
+    edges = sharp_edges(vertices, faces)
+    assert len(edges) == 12 * boxes
+    assert len(SHELF[shape][1]) == boxes
+
+
+def test_an_open_surface_ends_in_edges() -> None:
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    assert sharp_edges(square, faces).tolist() == [[0, 1], [0, 3], [1, 2], [2, 3]]
+
+
+def test_a_ray_meets_the_nearest_thing_before_the_eye() -> None:
+    things = Things(vtkRenderer())
+    eye, ahead = np.zeros(3), np.array([0.0, 0.0, 1.0])
+    assert things.under(eye, ahead) is None
+    boxes = [Thing("box", (0, 0.25, z)) for z in (5.0, 3.0, -2.0)]
+    things.set_surfaces([box.placed() for box in boxes])
+    found = things.under(eye, ahead)
+    assert found is not None
+    assert found[0] == 1
+    np.testing.assert_allclose(found[1], [0, 0, 2.75])
+    assert things.under(eye, np.array([0.5, 0.0, 1.0])) is None
+
+
+def test_a_level_drag_stays_under_the_pointer() -> None:
+    pose = EyePose(azimuth_deg=-30, elevation_deg=-20)
+    start = np.array([0.2, 1.0, 2.0])
+    x, y, _ = pose.project(start)[0]
+    np.testing.assert_allclose(drag_level(start, pose, x, y), start)
+    moved = drag_level(start, pose, x + 25, y + 10)
+    assert moved is not None
+    assert moved[1] == pytest.approx(1.0)
+    np.testing.assert_allclose(pose.project(moved)[0, :2], [x + 25, y + 10])
+    assert drag_level(start, pose, x, -5000.0) is None  # above the horizon
