@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_file
 from sd2core.io.video import VideoReader, open_video
 from sd2core.io.video_writing import HEADS_COVERED, write_video
 from sd2core.progress import Progress, silent
@@ -76,13 +77,12 @@ def _cover(recording: Recording, progress: Progress) -> bool:
     with recording.open_video() as video:
         if video.metadata.get("comment") == HEADS_COVERED:
             return False
-        part = video.path.with_name(f".{video.path.name}.part")
         camera, _ = camera_of(video, recording.focal_px(video.width, video.height))
         mesh = recording.load_mesh()
         size = (video.width // 2 * 2, video.height // 2 * 2)
         covered = _covered(video, mesh, head_circles(mesh, camera), size, progress)
         clock = video.timebase
-        try:
+        with atomic_file(video.path) as part:  # there is no moment with both, or with neither
             write_video(
                 part, covered, max(round(clock.frames_per_s), 1), size,
                 times_s=clock.times_s, crf=_CRF, preset=_PRESET, comment=HEADS_COVERED,
@@ -91,10 +91,6 @@ def _cover(recording: Recording, progress: Progress) -> bool:
                 found_s = written.timebase.times_s
             if len(found_s) != len(clock) or np.abs(found_s - clock.times_s).max() > _SAME_S:
                 raise Sd2Error(f"{part} has other times than {video.path}", "the same times")
-        except BaseException:
-            part.unlink(missing_ok=True)
-            raise
-    part.replace(video.path)  # in one step: there is no moment with both, or with neither
     recording.save()
     return True
 

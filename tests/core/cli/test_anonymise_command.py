@@ -15,7 +15,7 @@ from sd2core.body.model import Body
 from sd2core.errors import Sd2Error
 from sd2core.files.recording_json import CameraEntry
 from sd2core.io.mesh import save_mesh
-from sd2core.io.video import open_video
+from sd2core.io.video import VideoReader, open_video
 from sd2core.io.video_writing import write_video
 from sd2core.live.videos import hide_person
 from sd2core.mesh.sequence import MeshSequence
@@ -144,3 +144,25 @@ def test_what_cannot_be_covered_stays_and_is_said(recording: Recording, tmp_path
         with pytest.raises(Sd2Error, match="has no body"):
             hide_person(recording.folder, how)
     assert (recording.folder / "video.mp4").read_bytes() == original
+
+
+def test_two_who_cover_the_same_video_at_once_leave_a_whole_one(
+    recording: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    others: list[bool] = []
+
+    def while_another_does(path: Path) -> VideoReader:
+        if not others:
+            others.append(False)  # the other one does not wait for a third
+            others[0] = hide_person(recording.folder, "blur")
+        return open_video(path)
+
+    _, times_s = _pictures(recording.folder)
+    monkeypatch.setattr("sd2core.live.videos.open_video", while_another_does)
+    assert hide_person(recording.folder, "blur")
+    assert others == [True]
+    after, found_s = _pictures(recording.folder)
+    assert len(after) == len(times_s)
+    np.testing.assert_allclose(found_s, times_s, atol=1e-4)
+    kept = {path.name for path in recording.folder.iterdir()}
+    assert kept == {"recording.json", "video.mp4", "fit.zarr"}
