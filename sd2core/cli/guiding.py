@@ -14,6 +14,7 @@ from typing import Any, Literal
 from sd2core.cli.keys import pressed_keys
 from sd2core.cli.output import counted, print_event, print_rows
 from sd2core.errors import Sd2Error
+from sd2core.files.lock import FileLock
 from sd2core.files.paths import remove
 from sd2core.files.tables import capitalised
 from sd2core.labels.spans import Span
@@ -29,6 +30,7 @@ from sd2core.runs.control import stop_signals
 UNFINISHED = "unfinished"
 """Folder for the take that is being made."""
 
+_LOCK = ".session.lock"
 _LETTERS = 80
 """In a line of the text that is agreed to."""
 _WAIT_S = 0.05
@@ -58,6 +60,25 @@ def guide(
     if not folder.parent.is_dir():
         raise Sd2Error(f"The folder {folder.parent} does not exist", "an existing folder")
     folder.mkdir(exist_ok=True)
+    lock = FileLock(folder / _LOCK)
+    if not lock.take():  # two would write over each other's takes, and what people agreed to
+        raise Sd2Error(
+            f"A session goes on in {folder} already", "one at a time in a folder", "End that first"
+        )
+    try:
+        _guide(protocol, folder, open_take, as_json=as_json)
+    finally:
+        lock.release(delete=True)
+
+
+def _guide(
+    protocol: Protocol,
+    folder: Path,
+    open_take: Callable[[Path], JointRecording],
+    *,
+    as_json: bool,
+) -> None:
+    """Record what is missing in a folder that is this process's alone."""
     there = [path.stem for path in folder.glob(f"*{SUFFIX}") if is_recording(path)]
     consent = Consent(folder, protocol.consent_text)
     session = Session(protocol, there, consent.agreements)

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from sd2core.cli import build_parser, run
 from sd2core.datasets.reading import open_dataset
+from sd2core.files.lock import FileLock
 from sd2core.files.resources import resource_path
 from sd2core.io.video_writing import HEADS_COVERED
 from sd2core.live.clocks import Clocks
@@ -207,6 +208,22 @@ def test_what_cannot_be_is_refused_before_anything_is_made(tmp_path: Path, capsy
         assert run(build_parser(typed=words)[0], [*words, *more]) != 0
         assert said in capsys.readouterr().err
     assert not (tmp_path / "some").exists()
+
+
+def test_a_session_that_goes_on_elsewhere_is_not_joined(tmp_path: Path) -> None:
+    protocol, folder = tmp_path / "try.toml", tmp_path / "session"
+    protocol.write_text(PROTOCOL, encoding="utf-8")
+    folder.mkdir()
+    held = FileLock(folder / ".session.lock")
+    assert held.take()
+    words = ["record", "--camera", "test", "--radar", "test", "--out", str(folder)]
+    command = [*SD2, *words, "--protocol", str(protocol)]
+    refused = subprocess.run(command, capture_output=True, text=True, check=False, input="q")
+    assert refused.returncode == 1
+    assert f"A session goes on in {folder} already" in refused.stderr
+    held.release()
+    assert subprocess.run(command, capture_output=True, check=False, input=b"q").returncode == 0
+    assert [*folder.iterdir()] == []
 
 
 @pytest.mark.parametrize("kept", ["keep", "drop", "blur"])
