@@ -219,6 +219,8 @@ def _view(moved: Sequence[Moved]) -> Answer:
     if left < _EDGE or right > 1.0 - _EDGE:
         words += ", up to its edge. Step back, or turn the camera."
         return Answer("view", False, words, numbers)
+    if abs(aside_deg) < 0.5:
+        return Answer("view", True, f"{words}, straight ahead: point the radar there.", numbers)
     side = "right" if aside_deg > 0 else "left"
     words += (
         f", {abs(aside_deg):.0f}° to the {side} if the camera sees"

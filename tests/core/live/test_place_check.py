@@ -133,6 +133,10 @@ def test_somebody_whom_both_see(walked: tuple[list[Seen], list[Moved]]) -> None:
     assert told["far_m"] == pytest.approx(np.quantile(far_m, 0.9), abs=0.1)
     assert abs(findings["agreement"].numbers["video_late_s"]) < 0.1
     assert abs(findings["view"].numbers["azimuth_deg"]) < 3.0
+    middle = [one._replace(left=0.4, right=0.6) for one in walked[1]]
+    assert (
+        "60 % of the picture's width, straight ahead" in found(walked[0], middle)["view"].sentence
+    )
 
 
 def failures(seen: list[Seen], moved: list[Moved]) -> dict[str, str]:
