@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from sd2core.cli.output import picked, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import is_pattern, plain_path
+from sd2core.options.bounds import AZIMUTH_DEG, ELEVATION_DEG
 from sd2core.options.records import given_flags
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from sd2core.sensor import VelocityAxis, VirtualSensor
 
 
+_AIM = "AZ,EL in degrees (up to ±360 and ±90), or body"
 _OF_ESTIMATORS = ("person", "image_size", "focal_px", "body_model")
 _OF_THE_MESH = ("faces", "fps", "scale", "distance_m", "turn", *_OF_ESTIMATORS)
 
@@ -68,7 +70,9 @@ def looking(
         try:
             azimuth_deg, elevation_deg = map(float, options.aim.split(","))
         except ValueError:
-            raise Sd2Error(f"--aim is {options.aim!r}", "AZ,EL in degrees, or body") from None
+            raise Sd2Error(f"--aim is {options.aim!r}", _AIM) from None
+        if azimuth_deg not in AZIMUTH_DEG or elevation_deg not in ELEVATION_DEG:
+            raise Sd2Error(f"--aim is {options.aim!r}", _AIM)
         sensor = replace(sensor, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
     return sensor
 

@@ -30,7 +30,7 @@ def find_beam(text: str) -> Beam | None:
     try:
         azimuth, elevation = map(float, text.split(","))
     except ValueError:
-        if Path(text).is_file():
+        if Path(text).is_file() or Path(text).suffix:
             return read_beam(Path(text))
         raise Sd2Error(
             f"The beam is {text!r}",

@@ -29,15 +29,28 @@ def one_way(beam: Beam, across_deg: ArrayLike, up_deg: ArrayLike) -> NDArray[np.
     across_deg, up_deg : float or ndarray
         Angles to the right of the boresight and above it.
     """
+    across, up = by_plane(beam, across_deg, up_deg)
+    return across * up
+
+
+def by_plane(
+    beam: Beam, across_deg: ArrayLike, up_deg: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Power one way by each angle alone, of which the product counts."""
+    given = np.asarray(across_deg, np.float64), np.asarray(up_deg, np.float64)
     if not beam.cuts:
-        width = beam.azimuth_width_deg, beam.elevation_width_deg
-        off = (np.asarray(across_deg) / width[0]) ** 2 + (np.asarray(up_deg) / width[1]) ** 2
-        power: NDArray[np.float64] = np.exp(-4.0 * math.log(2.0) * off)
-        return power
-    angles, azimuth, elevation = np.array(beam.cuts).T
-    across_db = np.interp(np.asarray(across_deg, np.float64), angles, azimuth)
-    up_db = np.interp(np.asarray(up_deg, np.float64), angles, elevation)
-    return np.asarray(10.0 ** (0.1 * (across_db + up_db)))
+        widths_deg = beam.azimuth_width_deg, beam.elevation_width_deg
+        across, up = (
+            np.exp(-4.0 * math.log(2.0) * (angle / width) ** 2)
+            for angle, width in zip(given, widths_deg, strict=True)
+        )
+        return across, up
+    angles_deg, *levels_db = np.array(beam.cuts).T
+    across, up = (
+        np.asarray(10.0 ** (0.1 * np.interp(angle, angles_deg, level_db)))
+        for angle, level_db in zip(given, levels_db, strict=True)
+    )
+    return across, up
 
 
 def two_way_gain(

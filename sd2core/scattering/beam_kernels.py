@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.numerics.compiled import compiled
-from sd2core.scattering.beam import one_way, sensor_axes
+from sd2core.scattering.beam import by_plane, sensor_axes
 from sd2core.sensor import Beam, VirtualSensor
 
 _PER_DEGREE = 64
@@ -43,9 +43,8 @@ def beam_tables(sensor: VirtualSensor | None) -> BeamTables:
 @lru_cache(maxsize=8)
 def _two_way(beam: Beam) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     angles_deg = np.arange(-180 * _PER_DEGREE, 180 * _PER_DEGREE + 2) / _PER_DEGREE
-    across, up = one_way(beam, angles_deg, 0.0), one_way(beam, 0.0, angles_deg)
-    middle = one_way(beam, 0.0, 0.0)
-    return (across**2).astype(np.float32), ((up / middle) ** 2).astype(np.float32)
+    across, up = by_plane(beam, angles_deg, angles_deg)
+    return (across**2).astype(np.float32), (up**2).astype(np.float32)
 
 
 @compiled

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
-import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from sd2app.session.session import Session
@@ -36,16 +37,16 @@ class BeamForm(QWidget):
         tip = "How the antennas, transmitter and receiver alike, weigh directions"
         self._kind = Choice(tip, self, _TEXTS, self._choose)
         self._widths = [
-            NumberBox(1.0, 360.0, "°", f"Full width at half power, {plane}", decimals=1, step=1.0)
-            for plane in ("across", "in height")
+            NumberBox(1.0, 360.0, unit, f"Full width at half power, {plane}", decimals=1, step=1.0)
+            for plane, unit in (("across", "° across"), ("in height", "° high"))
         ]
         self._aims = [
-            NumberBox(-low, low, "°", f"Direction of the boresight, {way}", decimals=1, step=1.0)
-            for low, way in ((180.0, "to the right"), (90.0, "upwards"))
+            NumberBox(-low, low, unit, f"Direction of the boresight, {way}", decimals=1, step=1.0)
+            for low, way, unit in ((180.0, "to the right", "° right"), (90.0, "upwards", "° up"))
         ]
         for boxes, typed in ((self._widths, self._widen), (self._aims, self._turn)):
-            for box in boxes:
-                box.valueChanged.connect(typed)
+            for plane, box in zip(("azimuth", "elevation"), boxes, strict=True):
+                box.valueChanged.connect(partial(typed, plane))
         widths, aims = (
             pane(row_of(*boxes, spacing_px=6, margins_px=0)) for boxes in (self._widths, self._aims)
         )
@@ -73,15 +74,15 @@ class BeamForm(QWidget):
                 self._warn(str(error))
         self._place(replace(sensor, beam=beam), "Set beam")
 
-    def _widen(self) -> None:
-        across, up = (box.value() for box in self._widths)
-        self._place(replace(self._session.sensor.sensor, beam=Beam(across, up)), "Set beam")
-
-    def _turn(self) -> None:
-        across, up = (box.value() for box in self._aims)
+    def _widen(self, plane: str, width_deg: float) -> None:
         now = self._session.sensor.sensor
-        if not np.allclose((across, up), (now.azimuth_deg, now.elevation_deg), rtol=0, atol=0.05):
-            self._place(replace(now, azimuth_deg=across, elevation_deg=up), "Turn sensor")
+        assert now.beam is not None
+        typed: dict[str, Any] = {f"{plane}_width_deg": width_deg}
+        self._place(replace(now, beam=replace(now.beam, **typed)), "Set beam")
+
+    def _turn(self, plane: str, angle_deg: float) -> None:
+        typed: dict[str, Any] = {f"{plane}_deg": angle_deg}
+        self._place(replace(self._session.sensor.sensor, **typed), "Turn sensor")
 
     def _place(self, sensor: VirtualSensor, text: str) -> None:
         self._session.edits.place_sensor(sensor, text)
@@ -102,5 +103,6 @@ class BeamForm(QWidget):
         ):
             box.show_value(width)
             box.setEnabled(not beam.cuts)
-        for box, angle in zip(self._aims, (sensor.azimuth_deg, sensor.elevation_deg), strict=True):
+        azimuth_deg = (sensor.azimuth_deg + 180.0) % 360.0 - 180.0
+        for box, angle in zip(self._aims, (azimuth_deg, sensor.elevation_deg), strict=True):
             box.show_value(angle)

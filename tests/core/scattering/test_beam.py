@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sd2core.cli.reading import looking
 from sd2core.doppler.options import PRESETS, SynthesisOptions
 from sd2core.doppler.reference import reference_stretch
 from sd2core.doppler.synthesizer import Synthesizer
@@ -21,6 +22,7 @@ from sd2core.fmcw.wave import WaveScene
 from sd2core.io.beam_files import find_beam, read_beam
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.options.shared import Looking
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.scattering.beam import (
     beam_of_cuts,
@@ -112,6 +114,27 @@ def test_beams_are_named_typed_or_refused() -> None:
             find_beam(text)
     with pytest.raises(Sd2Error, match="elevation_width_deg is 0"):
         find_beam("56,0")
+    with pytest.raises(Sd2Error, match=r"nowhere\.csv does not exist"):
+        find_beam("nowhere.csv")
+
+
+@pytest.mark.parametrize("aim", ["", "10", "nan,0", "361,0", "10,91", "forwards"])
+def test_a_direction_that_is_none_is_refused(aim: str) -> None:
+    with pytest.raises(Sd2Error, match=f"--aim is '{aim}'"):
+        looking(VirtualSensor(), Looking(aim=aim), pytest.fail)
+    assert looking(VirtualSensor(), Looking(aim="-190,90"), pytest.fail).azimuth_deg == -190.0
+
+
+@pytest.mark.parametrize("null_db", [-60.0, -250.0, -9000.0])
+def test_an_antenna_that_is_blind_ahead_is_weighed_to_the_sides(null_db: float) -> None:
+    sides = beam_of_cuts(np.array([[-10, 0, 0], [0, null_db, null_db], [10, 0, 0]], float))
+    sensor = VirtualSensor((0.0, 0.0, 0.0), beam=sides)
+    points = [towards(sensor, *way) for way in ((10, 10), (-10, -10), (0, 10), (10, 0), (0, 0))]
+    x, y, z = places = np.hstack(points)
+    weight = np.ones(places.shape[1], np.float32)
+    weigh_by_beam(x, y, z, 0.0, 0.0, 0.0, *beam_tables(sensor), weight)
+    np.testing.assert_allclose(weight, two_way_gain(sensor, places), rtol=0.01, atol=1e-6)
+    assert weight[0] == pytest.approx(1.0, abs=1e-3)
 
 
 def test_the_rim_has_half_the_power() -> None:

@@ -14,7 +14,7 @@ from sd2app.sensor.beam import BeamForm
 from sd2app.sensor.panel import SensorPanel
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2core.recording.recording import open_recording
-from sd2core.sensor import Beam
+from sd2core.sensor import Beam, VirtualSensor
 
 
 def form_of(window) -> BeamForm:
@@ -107,3 +107,17 @@ def test_a_beam_is_kept_in_the_recording(window, qtbot, tmp_path: Path):
     folder = tmp_path / "kept.sd2"
     models_of(window).document.save_as(folder)
     assert open_recording(folder).sensor.beam == Beam(33.0, 60.0)
+
+
+def test_a_direction_beyond_a_turn_is_shown_within_one_and_typed_alone(window, qtbot):
+    c = models_of(window)
+    over = VirtualSensor((0.0, 0.0, 0.0), 400.0, 12.34, Beam(60.04, 30.0))
+    c.session.edits.place_sensor(over)
+    shown = {box.accessibleName(): box.value() for box in form_of(window).findChildren(NumberBox)}
+    assert shown["Direction of the boresight, to the right"] == 40.0
+    type_into(window, "upwards", "-5")
+    type_into(window, "in height", "20")
+    sensor = c.sensor.sensor
+    # What was not typed is as it was, to all its digits.
+    assert (sensor.azimuth_deg, sensor.elevation_deg) == (400.0, -5.0)
+    assert sensor.beam == Beam(60.04, 20.0)
