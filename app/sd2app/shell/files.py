@@ -26,6 +26,7 @@ from sd2core.files.paths import plain_path
 from sd2core.files.recording_json import MeshReading
 from sd2core.files.resources import resource_path
 from sd2core.io.imu_columns import holds_inertial_signals
+from sd2core.io.mesh_models import is_estimate
 from sd2core.recording.divergence import Divergence
 from sd2core.recording.recording import GoneError, Recording, SavedElsewhereError
 from sd2core.recording.relinking import Role, role_words
@@ -181,7 +182,9 @@ class FilesFeature(Feature):
         known = None if base is None else base.mesh
         if made.video is None or made.mesh in (None, known) or not is_foreign(made.mesh):
             return None
-        return replace(made, faces=None, mesh_reading=MeshReading(), camera=None)
+        # Where an estimator's mesh lies depends on the focal length that it assumed.
+        camera = None if is_estimate(made.mesh) else made.camera
+        return replace(made, faces=None, mesh_reading=MeshReading(), camera=camera)
 
     def _ask(self, title: str) -> list[Path]:
         recent = self._session.settings.recent

@@ -21,6 +21,7 @@ from sd2app.foreign_mesh.dialog import MeshDialog
 from sd2app.foreign_mesh.model import MeshPreview, is_foreign
 from sd2app.palette import palette_for
 from sd2app.widgets.inputs import NumberBox
+from sd2core.files.recording_json import CameraEntry
 from sd2core.recording.recording import Recording
 from tests.core.io.body_models import model_arrays, write_model
 
@@ -224,6 +225,26 @@ def test_taken_in_the_window_it_is_made_smooth_and_undone(labelled, qtbot, files
     qtbot.waitUntil(lambda: c.document.recording.mesh != mesh, timeout=20_000)
     qtbot.waitUntil(lambda: c.document.mesh.vertex_count == before.vertex_count, timeout=20_000)
     assert not c.document.modified
+
+
+def test_the_camera_of_the_video_is_still_known_with_another_mesh(
+    labelled, qtbot, tmp_path, monkeypatch
+):
+    window, c = labelled, models_of(labelled)
+    known = CameraEntry(focal_px=900.0, source="user")
+    c.document.recording.camera = known
+    np.savez(tmp_path / "theirs.npz", vertices=ball(0.0, FRAMES) * [1, -1, -1])
+    monkeypatch.setattr("sd2app.shell.files.ask_to_open", lambda *_: [tmp_path / "theirs.npz"])
+
+    def take(dialog: MeshDialog) -> None:
+        settle(qtbot, dialog.preview)
+        assert dialog.preview.camera.focal_px == 900.0
+        QTest.keyClick(dialog.focusWidget(), Qt.Key.Key_Return)  # does not cancel
+
+    once_asked(MeshDialog, take)
+    window.action("add").trigger()
+    assert c.document.recording.mesh == tmp_path / "theirs.npz"
+    assert c.document.recording.camera == known
 
 
 def test_what_our_own_fit_made_is_not_foreign(tmp_path) -> None:
