@@ -69,7 +69,8 @@ def refined(mesh: MeshSequence, progress: Progress = silent) -> MeshSequence:
     Raises
     ------
     Sd2Error
-        If its uncertainty is known already: it is then smooth, too.
+        If its uncertainty is known already: it is then smooth, too. If nobody is there for so many
+        frames in a row that jitter can be told from motion.
 
     Examples
     --------
@@ -89,6 +90,14 @@ def refined(mesh: MeshSequence, progress: Progress = silent) -> MeshSequence:
             "a mesh that another tool made, frame by frame",
             "One of `sd2 fit` or `sd2 refine` is smooth already",
         )
+    presence = mesh.presence
+    lasts = np.where(presence.there, presence.last - presence.first + 1, 0)  # frames in a row
+    if lasts.max() < _FEWEST:
+        raise Sd2Error(
+            f"In {mesh.source or 'the mesh'} the longest time that somebody is there, in frames, is"
+            f" {lasts.max()}",
+            f"{_FEWEST} or more in a row, in which jitter can be told from motion",
+        )
     vertices = RefinedVertices(mesh)
     parts = body_parts(mesh)
     limbs = ("body",) if parts is None else parts.names
@@ -102,11 +111,14 @@ def refined(mesh: MeshSequence, progress: Progress = silent) -> MeshSequence:
         along[start:stop], across[start:stop] = sampled.along_and_across(smooth, sigma)
         taken_m += float(np.square(removed).sum())
     progress(mesh.frame_count, mesh.frame_count)
-    frames = max(int(mesh.presence.there.sum()), 1)
+    # Shorter stretches stay as they were: their velocities are no better known than any other.
+    for sigma in (along, across):
+        sigma[presence.there & (lasts < _FEWEST)] = sigma[lasts >= _FEWEST].max(axis=0)
+    frames = max(int(presence.there.sum()), 1)
     taken_m = (taken_m / (frames * len(sampled.columns))) ** 0.5
     note = (
         f"Made smooth in time: {1000 * taken_m:.1f} mm (RMS) of every vertex were taken for jitter."
-        f" Velocities are known to ±{np.median(along[mesh.presence.there]):.2f} m/s (median)."
+        f" Velocities are known to ±{np.median(along[presence.there]):.2f} m/s (median)."
     )
     uncertainty = VelocityUncertainty(limbs, which, along, across)
     return replace(mesh, vertices=vertices, uncertainty=uncertainty, notes=(*mesh.notes, note))

@@ -169,7 +169,19 @@ def test_stretches_with_a_person_are_smoothed_apart() -> None:
     # Five frames are too few to tell jitter from motion; frames without a person say nothing.
     np.testing.assert_allclose(smooth.read(40, 100), paths[40:], atol=1e-12)
     assert smooth.uncertainty is not None
-    assert not smooth.uncertainty.along_mps[40:].any()
+    known_mps = smooth.uncertainty.along_mps
+    assert not known_mps[~present].any()
+    assert (known_mps[50:55] == known_mps[:40].max(axis=0)).all()  # no better than any other
+
+
+def test_where_all_is_too_short_to_be_smoothed_nothing_is_promised() -> None:
+    paths = wobbling(60, 4)
+    present = np.zeros(60, bool)
+    present[:5] = present[55:] = True
+    with pytest.raises(Sd2Error, match="somebody is there, in frames, is 5"):
+        refined(replace(cloud(paths), present=present))
+    with pytest.raises(Sd2Error, match="somebody is there, in frames, is 1"):
+        refined(cloud(paths[:1]))
 
 
 def test_a_long_clip_is_smoothed_in_parts_without_seams(monkeypatch: pytest.MonkeyPatch) -> None:
