@@ -112,8 +112,9 @@ def refined(mesh: MeshSequence, progress: Progress = silent) -> MeshSequence:
         taken_m += float(np.square(removed).sum())
     progress(mesh.frame_count, mesh.frame_count)
     # Shorter stretches stay as they were: their velocities are no better known than any other.
-    for sigma in (along, across):
-        sigma[presence.there & (lasts < _FEWEST)] = sigma[lasts >= _FEWEST].max(axis=0)
+    short = presence.there & (lasts < _FEWEST)
+    for known in (along, across):
+        known[short] = known[lasts >= _FEWEST].max(axis=0)
     frames = max(int(presence.there.sum()), 1)
     taken_m = (taken_m / (frames * len(sampled.columns))) ** 0.5
     note = (
