@@ -61,6 +61,12 @@ def _style_sheet(c: Palette) -> str:
         background: {c.panel}; border: 1px solid {c.muted}; border-left: 3px solid {c.accent};
         border-radius: 6px;
     }}
+    /* Fusion's frame is darker than the window: on a dark one it is not seen. */
+    QCheckBox::indicator:unchecked {{
+        background: {c.panel}; border: 1px solid {c.muted}; border-radius: 2px;
+        width: 12px; height: 12px;
+    }}
+    QCheckBox::indicator:unchecked:disabled {{ border-color: {c.hatch}; }}
     QLabel#title {{ font-weight: 600; }}
     QLabel#muted, QLabel#unit {{ color: {c.muted}; }}
     QLabel#warning {{ color: {c.warning}; }}
