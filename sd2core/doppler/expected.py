@@ -178,5 +178,6 @@ def spread_over_bins(
     below = ndtr((edges - place[:, None]) / sigma[:, None])
     if counting.beyond == CLIP:
         below[:, 0], below[:, -1] = 0.0, 1.0
-    shares += np.diff(weight @ below).reshape(-1, bins).sum(axis=0)
+    # Of nearly equal sums the difference may be less than nothing by a rounding.
+    shares += np.maximum(np.diff(weight @ below), 0.0).reshape(-1, bins).sum(axis=0)
     return shares

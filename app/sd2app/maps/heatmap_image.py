@@ -66,7 +66,9 @@ class Columns:
         covered, filled = self.track.covered, self.filled.copy()
         if covered is not None:
             filled[filled] = covered[self.starts + self.begin]
-        return self._strongest(self.track.values[:, self.begin : self.end]), filled
+        values = self._strongest(self.track.values[:, self.begin : self.end])
+        values[:, ~filled] = 0.0  # what is not computed yet is no number
+        return values, filled
 
     def uncertain(self, levels: HeatmapLevels) -> NDArray[np.bool_] | None:
         """Mask of uncertain cells, bool (bins, columns); None where that is not known.

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer, expected
+from sd2core.doppler.expected import spread_over_bins
+from sd2core.doppler.histogram import counting_of
 from sd2core.doppler.options import chosen_options
 from sd2core.doppler.reference import reference_stretch
 from sd2core.errors import Sd2Error
@@ -142,6 +144,18 @@ def test_a_mesh_that_says_nothing_has_the_plain_map_bit_for_bit() -> None:
         plain = Synthesizer(mesh, replace(options, count="plain")).map(ASIDE)
         np.testing.assert_array_equal(spread.values, plain.values)
         assert spread.meta["count"] == "plain"
+
+
+@settings(max_examples=12)
+@given(st.integers(0, 1000), st.sampled_from(["drop", "wrap", "clip"]))
+def test_no_cell_is_below_nothing_by_a_rounding(seed: int, beyond: Any) -> None:
+    rng = np.random.default_rng(seed)
+    place, weight = rng.uniform(10.0, 22.0, 300), rng.uniform(0.0, 1e-3, 300)
+    sigma = rng.uniform(0.05, 0.5, 300)
+    counting = counting_of(replace(RAW, beyond=beyond))
+    shares = spread_over_bins(place, weight, sigma, counting)
+    assert (shares >= 0).all()
+    assert shares.sum() <= weight.sum() * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("visibility", ["none", "facing", "depth", "exact", "frozen"])
