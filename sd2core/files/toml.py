@@ -42,11 +42,15 @@ def section_lines(name: str, table: Mapping[str, Any], folder: Path) -> list[str
 
 
 def _text(value: str) -> str:
+    """Write a string of TOML, of several lines as it is."""
+    lines = [_line(line) for line in value.split("\n")]
+    return lines[0] if len(lines) == 1 else '"""\n' + "\n".join(one[1:-1] for one in lines) + '"""'
+
+
+def _line(value: str) -> str:
     """Write a basic string of TOML: JSON's, but for one character."""
-    if "\n" in value:
-        return '"""\n' + "\n".join(_text(line)[1:-1] for line in value.split("\n")) + '"""'
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _bare(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _text(key)
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _line(key)

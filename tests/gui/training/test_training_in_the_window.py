@@ -110,7 +110,7 @@ def test_a_trained_model_denoises_the_recording(
     c.training.setup.add(write_pairs(tmp_path / "campaign.zarr"))
     qtbot.waitUntil(lambda: not c.training.setup.problem)
     c.training.start()
-    qtbot.waitUntil(lambda: c.training.run.history.epoch == 1, timeout=15_000)
+    qtbot.waitUntil(lambda: c.training.run.history.epoch == 1, timeout=60_000)
     c.training.tell("stop")
     qtbot.waitUntil(lambda: c.training.run.phase == "stopped", timeout=15_000)
     window.side.bring_up("Train")
