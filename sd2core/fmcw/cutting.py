@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from sd2core.mesh.things import Surroundings
 
-_MOST_CUTS = 6
-_MOST_PIECES = 100_000
+_MAX_CUTS = 6
+_MAX_PIECES = 100_000
 """Some 50 MB; what is larger is cut less finely, and echoes as strongly."""
 
 
@@ -26,7 +26,7 @@ def pieces_of(surroundings: Surroundings, longest_m: float) -> NDArray[np.float6
     """Triangles (n, 3 corners, 3) of the surfaces of things, cut to edges of about this length."""
     corners = surroundings.vertices_m[surroundings.faces]
     edges_m = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    cuts = np.ceil(np.log2(np.maximum(edges_m / longest_m, 1.0))).clip(max=_MOST_CUTS).astype(int)
-    while (4**cuts).sum() > _MOST_PIECES and cuts.any():
+    cuts = np.ceil(np.log2(np.maximum(edges_m / longest_m, 1.0))).clip(max=_MAX_CUTS).astype(int)
+    while (4**cuts).sum() > _MAX_PIECES and cuts.any():
         cuts = np.maximum(cuts - 1, 0)
     return np.concatenate([subdivided(corners[cuts == one], one) for one in np.unique(cuts)])

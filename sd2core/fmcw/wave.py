@@ -59,7 +59,6 @@ class WaveScene:
                 f" {self.wave.beam_width_deg:g}°",
                 "one of the two",
             )
-        self._beam = sensor.beam
         self._seed = seed
         self._tables = beam_tables(sensor)
         self.paths = paths(sensor, config, self.wave)
@@ -242,8 +241,8 @@ class WaveScene:
             if self.wave.pattern_exponent > 0:
                 cosine = np.maximum(away @ antenna.axes[2] / near_m, 0.0)
                 strength *= cosine ** (0.5 * self.wave.pattern_exponent)
-            if self._beam is not None:
-                strength *= np.sqrt(one_way(self._beam, *angles_deg(antenna.axes, away.T)))
+            if (beam := self.scene.sensor.beam) is not None:
+                strength *= np.sqrt(one_way(beam, *angles_deg(antenna.axes, away.T)))
         if out.image or back.image:
             strength *= position @ self._plane[:3] + self._plane[3] > 0
         return Echoes(range_m, np.zeros(len(area)), strength.astype(np.complex128))

@@ -14,7 +14,7 @@ from sd2core.scattering.beam import beam_of_cuts
 from sd2core.sensor import Beam
 
 _TABLE = "a table of at least 3 lines: angle_deg, azimuth_db, elevation_db (one way)"
-_MOST_LINES = 100_000
+_MAX_LINES = 100_000
 
 
 def find_beam(text: str) -> Beam | None:
@@ -55,7 +55,7 @@ def read_beam(path: Path) -> Beam:
             row = []
         if not rows and not row and len(cells) == 3:
             continue  # The heading.
-        if len(row) != 3 or not all(map(math.isfinite, row)) or len(rows) == _MOST_LINES:
+        if len(row) != 3 or not all(map(math.isfinite, row)) or len(rows) == _MAX_LINES:
             raise Sd2Error(f"{path}: line {number} is {line[:60]!r}", _TABLE)
         rows.append(row)
     if len(rows) < 3:

@@ -11,9 +11,9 @@ import numpy as np
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh_files import read_surface
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.mesh.things import MOST_THINGS, Surface, Surroundings, Thing
+from sd2core.mesh.things import MAX_THINGS, Surface, Surroundings, Thing
 
-_MOST_FACES = 200_000
+_MAX_FACES = 200_000
 """Of a thing: each is looked at in every frame."""
 
 
@@ -38,8 +38,8 @@ def with_things(mesh: MeshSequence, things: Iterable[Thing]) -> MeshSequence:
     standing = tuple(things)
     if not standing:
         return replace(mesh, surroundings=None)
-    if len(standing) > MOST_THINGS:
-        raise Sd2Error(f"There are {len(standing)} things", f"up to {MOST_THINGS}")
+    if len(standing) > MAX_THINGS:
+        raise Sd2Error(f"There are {len(standing)} things", f"up to {MAX_THINGS}")
     surfaces = [one.placed(_read(Path(one.shape)) if one.is_file else None) for one in standing]
     return replace(mesh, surroundings=Surroundings.of(standing, surfaces))
 
@@ -53,10 +53,10 @@ def _read(path: Path) -> Surface:
             "Move it back, or say anew what stands there: `sd2 set RECORDING --thing`",
         )
     vertices, faces = read_surface(path)
-    if faces is None or len(faces) > _MOST_FACES:
+    if faces is None or len(faces) > _MAX_FACES:
         raise Sd2Error(
             f"{path} has {0 if faces is None else len(faces):,} triangles",
-            f"a surface of up to {_MOST_FACES:,}",
+            f"a surface of up to {_MAX_FACES:,}",
             "Export it with fewer" if faces is not None else "",
         )
     if not np.isfinite(vertices).all():

@@ -22,7 +22,7 @@ FARTHEST_THING_M = 1000.0
 SIZES_M = 1e-3, 100.0
 """Least and greatest width, height and depth of a thing."""
 
-MOST_THINGS = 100
+MAX_THINGS = 100
 """In one scene."""
 
 Surface = tuple[NDArray[np.float64], NDArray[np.int32]]

@@ -26,7 +26,6 @@ _DEFAULTS = {
     "way": "dca1000", "setup": "", "address": "", "replay": "", "beside": "", "camera": "",
     "protocol": "",
 }  # fmt: skip
-_FOR_THE_WINDOW = ("--json", "--columns", "--previews")
 _ENDINGS = {DCA1000: (".cfg", ".json"), TI: (".cfg",)}
 """Configurations of the radars that need one."""
 
@@ -44,18 +43,18 @@ class ListenRequest:
     protocol: str = ""  # of a guided session, likewise
     place: Place | None = None  # of the radar, as seen from the person
 
-    def words(self) -> list[str]:
-        """Words of the ``sd2`` command that does it."""
+    def words(self, *, steered: bool = True) -> list[str]:
+        """Words of the ``sd2`` command that does it; ``steered`` by another program, or typed."""
         if self.camera:
             take = Record(
                 camera=self.camera,
                 radar=self._named_radar,
                 setup=self.setup,
                 out=self.folder,
-                json=True,
+                json=steered,
                 protocol=self.protocol or None,
                 placement=None if self.place is None else astuple(self.place),
-                previews=not self.protocol,
+                previews=steered and not self.protocol,
             )
             return words_of("record", take)
         command = Listen(
@@ -64,8 +63,8 @@ class ListenRequest:
             radar=self.radar or None,
             setup=self.setup,
             out=self.folder,
-            json=True,
-            columns=True,
+            json=steered,
+            columns=steered,
         )
         return words_of("listen", command)
 
@@ -199,8 +198,7 @@ class ListenSetup(QObject):
     @property
     def line(self) -> str:
         """Command for a terminal that records the same."""
-        words = self.request().words()
-        return quoted([word for word in words if word not in _FOR_THE_WINDOW])
+        return quoted(self.request().words(steered=False))
 
     def request(self) -> ListenRequest:
         """What was chosen."""

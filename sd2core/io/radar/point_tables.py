@@ -21,7 +21,7 @@ from sd2core.io.radar.stored_arrays import MATLAB_SUFFIX, array_names, open_stor
 TEXT_SUFFIXES = (".csv", ".tsv")
 SUFFIXES = (*TEXT_SUFFIXES, ".npy", MATLAB_SUFFIX)
 EXPECTED = "a table of points with the columns frame and doppler"
-FEWEST, MOST = 3, 12
+MIN_COLUMNS, MAX_COLUMNS = 3, 12
 """Columns of a table."""
 
 
@@ -90,7 +90,7 @@ class _Array(Table):
         self._stored, self.names = stored, tuple(fields)
         dimensions = len(stored.shape) + bool(fields)
         self.width = len(fields) or (stored.shape[-1] if dimensions in (2, 3) else 0)
-        if not (dimensions in (2, 3) and FEWEST <= self.width <= MOST):
+        if not (dimensions in (2, 3) and MIN_COLUMNS <= self.width <= MAX_COLUMNS):
             raise Sd2Error(f"{path} has shape {stored.shape}", EXPECTED)
         if any(stored.dtype[name].kind not in "iuf" for name in fields) or (
             not fields and stored.dtype.kind not in "iuf"

@@ -28,8 +28,8 @@ from sd2core.io.radar.point_columns import (
 )
 from sd2core.io.radar.point_tables import (
     EXPECTED,
-    FEWEST,
-    MOST,
+    MAX_COLUMNS,
+    MIN_COLUMNS,
     SUFFIXES,
     Table,
     TextTable,
@@ -55,7 +55,7 @@ class PointsDescription(BaseModel):
 
     format: Literal["sd2-radar"] = "sd2-radar"
     version: Literal[1] = 1
-    columns: tuple[str, ...] = Field(min_length=2, max_length=MOST)
+    columns: tuple[str, ...] = Field(min_length=2, max_length=MAX_COLUMNS)
     dataset: str | None = None
     frame_repetition_s: float | None = Field(default=None, ge=1e-3, le=1e3)
     sign: Literal[1, -1] | None = None
@@ -114,7 +114,9 @@ def holds_unnamed_columns(path: Path) -> bool:
         table = open_table(path, None)
     except Sd2Error:
         return False
-    return not table.names and FEWEST <= table.width <= MOST and _recognised(table) is None
+    return (
+        not table.names and MIN_COLUMNS <= table.width <= MAX_COLUMNS and _recognised(table) is None
+    )
 
 
 def has_columns_told(path: Path) -> bool:

@@ -13,7 +13,7 @@ from hypothesis import strategies as some
 from sd2core.errors import Sd2Error
 from sd2core.io.things import with_things
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.mesh.things import MOST_THINGS, SHELF, Thing
+from sd2core.mesh.things import MAX_THINGS, SHELF, Thing
 from sd2core.scattering.visibility import encloses
 from sd2core.timebase import Timebase
 
@@ -106,4 +106,4 @@ def test_files_that_are_no_surface_are_refused(tmp_path: Path) -> None:
     with pytest.raises(Sd2Error, match="is not there"):
         with_things(MESH, [Thing(str(tmp_path / "gone.obj"), (0, 0, 1))])
     with pytest.raises(Sd2Error, match="101 things"):
-        with_things(MESH, [Thing("box", (0, 0, 1))] * (MOST_THINGS + 1))
+        with_things(MESH, [Thing("box", (0, 0, 1))] * (MAX_THINGS + 1))

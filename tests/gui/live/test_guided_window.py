@@ -9,7 +9,7 @@ import pytest
 from answering import once_asked
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QScrollArea, QToolButton, QWidget
+from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QScrollArea, QToolButton
 
 from sd2app.live.dialog import ListenDialog
 from sd2app.live.gesture_picture import has_picture
@@ -50,13 +50,6 @@ def protocol(tmp_path: Path) -> Path:
     path = tmp_path / "try.toml"
     path.write_text(PROTOCOL, encoding="utf-8")
     return path
-
-
-@pytest.fixture
-def parent(qtbot) -> QWidget:
-    widget = QWidget()
-    qtbot.addWidget(widget)
-    return widget
 
 
 @pytest.fixture

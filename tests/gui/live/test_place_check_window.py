@@ -27,13 +27,6 @@ LEFT = Qt.MouseButton.LeftButton
 
 
 @pytest.fixture
-def parent(qtbot) -> QWidget:
-    widget = QWidget()
-    qtbot.addWidget(widget)
-    return widget
-
-
-@pytest.fixture
 def check(parent) -> Iterator[PlaceCheck]:
     made = PlaceCheck(parent)
     yield made

@@ -32,13 +32,6 @@ LEFT = Qt.MouseButton.LeftButton
 
 
 @pytest.fixture
-def parent(qtbot) -> QWidget:
-    widget = QWidget()
-    qtbot.addWidget(widget)
-    return widget
-
-
-@pytest.fixture
 def dialog(parent) -> ProtocolDialog:
     made = ProtocolDialog(ProtocolDraft(PAPER, parent), parent)
     made.show()
