@@ -9,12 +9,15 @@ from typing import Literal
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import Emit, LatestRunner, ReportingModel
+from sd2app.background.quoting import quoted
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
+from sd2core.cli.labels.agree import Agree
 from sd2core.labels.agreement import Agreement, Disagreement, agreement, disagreements
 from sd2core.labels.formats import LabelReading, read_label_file
 from sd2core.labels.import_labels import Incoming
 from sd2core.labels.spans import Labels
+from sd2core.options.records import words_of
 
 Compared = tuple[Agreement, tuple[Disagreement, ...]]
 
@@ -29,7 +32,8 @@ class AgreementModel(ReportingModel):
 
     def __init__(self, session: Session, labels: LabelsModel, parent: QObject) -> None:
         super().__init__(parent)
-        self._labels, self._playback, self._span = labels, session.playback, session.span
+        self._labels, self._document = labels, session.document
+        self._playback, self._span = session.playback, session.span
         self.other = LabelsModel(self)
         self.path: Path | None = None  # of the other person's labels, while they are open
         self.sentence = ""  # on what was taken of their file, and what was not
@@ -51,6 +55,14 @@ class AgreementModel(ReportingModel):
     def name(self) -> str:
         """Name of the other person: that of the file."""
         return self.path.stem if self.path is not None else ""
+
+    @property
+    def line(self) -> str:
+        """Command for a terminal that compares the labels of the saved recording."""
+        content, other = self._document.content, self.path
+        assert content is not None
+        assert other is not None
+        return quoted(words_of("labels agree", Agree(a=content.recording.folder, b=other)))
 
     @property
     def current(self) -> int | None:

@@ -12,7 +12,15 @@ from sd2app.agreement.model import AgreementModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.widgets.inputs import action_button
 from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
-from sd2app.widgets.panel import ElidedLabel, FactRows, rule, sentence, show_words, title
+from sd2app.widgets.panel import (
+    ElidedLabel,
+    FactRows,
+    copy_button,
+    rule,
+    sentence,
+    show_words,
+    title,
+)
 from sd2app.widgets.text import counted
 from sd2core.labels.agreement import kappa_words
 
@@ -49,8 +57,9 @@ class AgreementPanel(QWidget):
 
     def _lay_out_result(self, action: Callable[[str], QAction]) -> QWidget:
         buttons = (("previous_disagreement", "Previous"), ("next_disagreement", "Next"))
+        copy = copy_button(lambda: self._model.line, self)
         parts = (
-            *(self._verdict, sentence(_MEANING), rule()),
+            *(self._verdict, sentence(_MEANING), row_of(copy, STRETCH), rule()),
             *(_row(title("Disagreements"), action, *buttons), self._where, rule()),
             *(self._facts, rule(), title("Kappa of each label"), self._labels),
         )

@@ -75,7 +75,7 @@ class FigureDialog(QDialog):
 
     def _more(self) -> tuple[QWidget, ...]:
         """Buttons beside those that end the dialog."""
-        return ()
+        return (copy_button(lambda: self._model.line, self),)
 
     def _refresh(self) -> None:
         model = self._model
@@ -91,6 +91,10 @@ class MapFigureDialog(FigureDialog):
 
     TITLE = "Export figure of the maps"
     USUAL_PX = 900, 720
+
+    def _more(self) -> tuple[QWidget, ...]:
+        tip = "These maps as a command for a terminal: with all labels, at the usual levels"
+        return (copy_button(lambda: self._model.line, self, tip),)
 
     def _choices(self) -> QLayout:
         model = self._model
@@ -125,9 +129,6 @@ class StripDialog(FigureDialog):
 
     TITLE = "Export strip of frames"
     USUAL_PX = 1040, 640
-
-    def _more(self) -> tuple[QWidget, ...]:
-        return (copy_button(lambda: self._model.line, self),)
 
     def _choices(self) -> QLayout:
         model = self._model

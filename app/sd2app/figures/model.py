@@ -16,6 +16,8 @@ from sd2app.background.quoting import quoted
 from sd2app.maps.difference import DifferenceModel
 from sd2app.session.content import UNTITLED, Content
 from sd2app.session.session import Session
+from sd2core.cli.labels.recording import DrawnLabels
+from sd2core.cli.recording_maps import MapName
 from sd2core.cli.strip import Strip
 from sd2core.errors import Sd2Error
 from sd2core.figures.maps import Levels, MapRow, draw_maps, save_maps
@@ -151,6 +153,12 @@ class MapFigure(DrawnFigure):
         super().__init__("figure", MapChoice(), parent)
         s, levels, clock = session, session.display.levels, session.playback.timebase
         notes = {s.maps.denoised: denoiser, s.maps.before: s.maps.before.status}
+        self._folder = Path() if (it := s.document.recording) is None else it.folder
+        self._named: dict[str, MapName] = {
+            s.maps.synthetic.title: "synthetic",
+            s.maps.denoised.title: "denoised",
+            s.maps.real.title: "radar",
+        }
         # By titles; those without a map are left out.
         self._rows = {
             track.title: MapRow(
@@ -185,6 +193,20 @@ class MapFigure(DrawnFigure):
     def titles(self) -> tuple[str, ...]:
         """Maps that can be shown."""
         return tuple(self._rows)
+
+    @property
+    def line(self) -> str:
+        """Command for a terminal that draws these maps of the saved recording."""
+        shown = [title for title in self._rows if title not in self.choice.left_out]
+        from_s, to_s = (None, None) if self.choice.whole else self._view_s
+        drawn = DrawnLabels(
+            recording=self._folder,
+            out=Path("maps.png"),
+            maps=",".join(self._named[title] for title in shown if title in self._named) or None,
+            from_s=from_s,
+            to_s=to_s,
+        )
+        return quoted(words_of("labels figure", drawn))
 
     def set_shown(self, title: str, shown: bool) -> None:
         """Show a map, or leave it out."""

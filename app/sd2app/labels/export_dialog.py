@@ -9,6 +9,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QDialog, QWidget
 
 from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.quoting import quoted
 from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.manual.help import with_help
@@ -16,11 +17,14 @@ from sd2app.session.session import Session
 from sd2app.widgets.dialogs import ExportButtons, accepted, ask_new
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, form_of
-from sd2app.widgets.panel import rule, say, sentence
+from sd2app.widgets.panel import copy_button, rule, say, sentence
 from sd2app.widgets.text import counted
+from sd2core.cli.labels import Convert
 from sd2core.errors import Sd2Error
 from sd2core.labels.formats import LabelFormat, Loss, all_formats, would_lose, write_labels
 from sd2core.labels.spans import Labels
+from sd2core.options.records import words_of
+from sd2core.recording.recording import Recording
 from sd2core.timebase import Timebase
 
 
@@ -32,7 +36,7 @@ def export_labels(shell: Shell, session: Session, labels: LabelsModel) -> None:
     dialog = LabelExportDialog(
         labels.labels,
         session.playback.timebase,
-        content.recording.video,
+        content.recording,
         session.document.file_name(""),
         shell.dialog_parent,
     )
@@ -58,12 +62,13 @@ class LabelExportDialog(QDialog):
         self,
         labels: Labels,
         timebase: Timebase,
-        media: Path | None,
+        recording: Recording,
         name: str,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self._labels, self._timebase, self._media, self._name = labels, timebase, media, name
+        self._labels, self._timebase, self._name = labels, timebase, name
+        self._recording, self._media = recording, recording.video
         self.losses: tuple[Loss, ...] | None = None  # of the format; None while unknown
         self.problem = ""  # why the file cannot be written
         self.exporting = False
@@ -75,7 +80,8 @@ class LabelExportDialog(QDialog):
         self._format.currentIndexChanged.connect(self._look)
         self._about, self._said = sentence(""), sentence("")
         self._buttons = ExportButtons(self, self._ask)
-        form, foot = form_of(("For", self._format)), with_help("Export labels", self._buttons)
+        form = form_of(("For", self._format))
+        foot = with_help("Export labels", self._buttons, copy_button(lambda: self.line, self))
         parts = form, self._about, rule(), self._said, STRETCH, foot
         self.setLayout(column_of(*parts, spacing_px=8, margins_px=16))
         self._look()
@@ -85,6 +91,13 @@ class LabelExportDialog(QDialog):
     def format(self) -> LabelFormat:
         """Format chosen."""
         return self._formats[self._format.currentIndex()]
+
+    @property
+    def line(self) -> str:
+        """Command for a terminal that writes the labels of the saved recording."""
+        out = Path(f"{self._name}{self.format.suffixes[0]}")
+        file = self._recording.folder
+        return quoted(words_of("labels convert", Convert(file=file, out=out, to=self.format.name)))
 
     def export(self, path: Path) -> None:
         """Write the file, with the usual suffix where the name has none."""

@@ -13,6 +13,7 @@ from sd2app.labels.import_dialog import LabelImportDialog, is_label_file
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2core.labels.formats import read_labels, write_labels
 from sd2core.labels.spans import Labels, LabelTrack, Span
+from sd2core.recording.recording import Recording
 from sd2core.timebase import Timebase
 
 FRAMES = Timebase.regular(100, 10.0)
@@ -105,13 +106,14 @@ def test_what_is_a_label_file() -> None:
 
 
 def test_an_export_says_its_losses_before_and_after(qtbot, tmp_path) -> None:
-    model = LabelExportDialog(HERE, FRAMES, None, "mine")
+    model = LabelExportDialog(HERE, FRAMES, Recording(Path("walk.sd2")), "mine")
     qtbot.addWidget(model)
     qtbot.waitUntil(lambda: model.losses is not None, timeout=10_000)
     assert model.losses == ()
     model.findChild(Choice).setCurrentText("Audacity")
     qtbot.waitUntil(lambda: model.losses is not None, timeout=10_000)
     assert "notes" in {loss.what for loss in model.losses}
+    assert model.line == "sd2 labels convert walk.sd2 --out mine.txt --to audacity"
     with qtbot.waitSignal(model.written, timeout=10_000) as said:
         model.export(tmp_path / "mine")
     path, text = said.args

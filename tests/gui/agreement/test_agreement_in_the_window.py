@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
+from pathlib import Path
+
 import pytest
-from finding import words_in
+from finding import button_of, words_in
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QToolButton
 from window_models import models_of
 
@@ -44,6 +48,10 @@ def test_side_by_side_and_from_one_difference_to_the_next(compared, qtbot) -> No
     c.playback.seek_frame(59)
     qtbot.keyClick(compared, Qt.Key.Key_P, SHIFT)
     assert c.playback.frame == 30
+    qtbot.mouseClick(button_of(panel, "Copy command"), LEFT)
+    line = shlex.split(QGuiApplication.clipboard().text())
+    assert line[:3] == ["sd2", "labels", "agree"]
+    assert [Path(file).name for file in line[3:]] == [c.document.recording.folder.name, "ben.eaf"]
 
 
 def test_a_file_that_holds_no_labels_is_said(window, qtbot, monkeypatch, tmp_path) -> None:

@@ -9,8 +9,9 @@ import pytest
 from answering import once_asked
 from dropping import drop
 from fake_denoisers import fading
+from finding import button_of
 from PySide6.QtCore import QPoint, Qt, QTimer
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QPushButton
 from window_models import models_of
 
@@ -284,11 +285,15 @@ def test_map_and_figure_are_exported(denoised, qtbot, tmp_path, monkeypatch):
     qtbot.keyClick(denoised, Qt.Key.Key_X)
 
     def export(dialog: MapFigureDialog) -> None:
+        qtbot.mouseClick(button_of(dialog, "Copy command"), Qt.MouseButton.LeftButton)
         button = next(one for one in dialog.findChildren(QPushButton) if one.text() == "Export…")
         qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
 
     once_asked(MapFigureDialog, export)
     denoised.action("export_maps").trigger()
+    line = QGuiApplication.clipboard().text()
+    assert line.startswith("sd2 labels figure ")
+    assert "--maps synthetic,denoised,radar" in line
     text = name.read_text(encoding="utf-8")
     for words in (
         "Synthetic",
