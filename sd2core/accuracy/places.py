@@ -31,7 +31,7 @@ _CHOOSING_FRAMES, _CHECKING_FRAMES = 250, 30
 """Frames of the reference that choosing takes about as long as (how well that fits prints
 tests/benchmarks/test_tolerance_speed.py), and that are checked on."""
 
-_FEWEST_FRAMES = 1000
+_MIN_FRAMES = 1000
 """Of maps: fewer are made in the time that any estimate takes."""
 
 _RUN_FRAMES = 5
@@ -100,7 +100,7 @@ def choose_for_places(
     check_wish(tolerance)
     options = check_options(mesh, options)
     search = PlanSearch(mesh, places, tolerance, options, progress)
-    if frames < _FEWEST_FRAMES:
+    if frames < _MIN_FRAMES:
         return search.top(f"{frames:,} frames of maps are too few to choose a plan for")
     reference_s, top_s = search.reference_s(), search.frame_s(search.most_accurate)
     plain_s = search.frame_s(search.plain)

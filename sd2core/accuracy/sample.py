@@ -18,11 +18,11 @@ KEPT = 10
 """Frames of a run that are compared; more are read around them."""
 
 _CANDIDATES = 24
-_FEWEST_MARGIN = 5
+_MIN_MARGIN = 5
 _SMOOTHING_REACH = 5.0
 _PROBED_VERTICES = 500
 _SHORTEST_RUN = 5
-_FEWEST_STARTS = 2
+_MIN_STARTS = 2
 """One to choose on and one to check on."""
 
 
@@ -88,7 +88,7 @@ def take_sample(mesh: MeshSequence, options: SynthesisOptions, runs: int = 6) ->
     them is used whole. Smoothing of the vertices' paths widens the margins of the runs.
     """
     frames = mesh.frame_count
-    margin = _FEWEST_MARGIN
+    margin = _MIN_MARGIN
     if options.trajectory_smoothing_s > 0 and frames > 1:
         step_s = float(np.median(np.diff(mesh.times_s)))
         margin = max(margin, math.ceil(_SMOOTHING_REACH * options.trajectory_smoothing_s / step_s))
@@ -102,7 +102,7 @@ def take_sample(mesh: MeshSequence, options: SynthesisOptions, runs: int = 6) ->
     there = mesh.presence.there
     with_person = [bool(there[start : start + length].all()) for start in starts.tolist()]
     peopled = _apart(starts[with_person], length)
-    starts = peopled if len(peopled) >= _FEWEST_STARTS else _apart(starts, length)
+    starts = peopled if len(peopled) >= _MIN_STARTS else _apart(starts, length)
     speed = np.array([_speed(mesh, int(start) + length // 2) for start in starts])
     order = starts[np.argsort(-speed, kind="stable")]
     # From the liveliest down to those of middling liveliness.

@@ -22,7 +22,7 @@ _BINS = 8
 _STEPS, _GREY = (32, 8, 8), (0, 4, 4)
 """Width of a bin of lightness and of both colours, and the bins of grey."""
 _VISIBLE = 0.5
-_FEWEST = 4
+_MIN_PARTS = 4
 """Parts that have to be alike, unless fewer are known."""
 _PARTS = (
     (5, (("ear.L", "ear.R"),)),
@@ -81,7 +81,7 @@ def similarity(one: Signature, two: Signature) -> float:
 def alike(known: Signature, looks: Signature, least: float = ALIKE) -> bool:
     """True if looks are like those of a known person in every part that is seen."""
     parts = _similarities(known, looks)
-    enough = len(parts) >= min(_FEWEST, int(known.any(axis=1).sum()))
+    enough = len(parts) >= min(_MIN_PARTS, int(known.any(axis=1).sum()))
     return bool(enough and len(parts) and parts.min() >= least)
 
 

@@ -23,7 +23,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.progress import Progress, silent
 
-_FEWEST = 8
+_MIN_FRAMES = 8
 """Frames of a stretch below which jitter cannot be told from motion."""
 _MIN_JITTER_M = 1e-5
 _LASTING = 1.3
@@ -92,11 +92,11 @@ def refined(mesh: MeshSequence, progress: Progress = silent) -> MeshSequence:
         )
     presence = mesh.presence
     lasts = np.where(presence.there, presence.last - presence.first + 1, 0)  # frames in a row
-    if lasts.max() < _FEWEST:
+    if lasts.max() < _MIN_FRAMES:
         raise Sd2Error(
             f"In {mesh.source or 'the mesh'} the longest time that somebody is there, in frames, is"
             f" {lasts.max()}",
-            f"{_FEWEST} or more in a row, in which jitter can be told from motion",
+            f"{_MIN_FRAMES} or more in a row, in which jitter can be told from motion",
         )
     vertices = RefinedVertices(mesh)
     parts = body_parts(mesh)
@@ -112,9 +112,9 @@ def refined(mesh: MeshSequence, progress: Progress = silent) -> MeshSequence:
         taken_m += float(np.square(removed).sum())
     progress(mesh.frame_count, mesh.frame_count)
     # Shorter stretches stay as they were: their velocities are no better known than any other.
-    short = presence.there & (lasts < _FEWEST)
+    short = presence.there & (lasts < _MIN_FRAMES)
     for known in (along, across):
-        known[short] = known[lasts >= _FEWEST].max(axis=0)
+        known[short] = known[lasts >= _MIN_FRAMES].max(axis=0)
     frames = max(int(presence.there.sum()), 1)
     taken_m = (taken_m / (frames * len(sampled.columns))) ** 0.5
     note = (
@@ -224,7 +224,7 @@ def smooth_paths(times_s: Floats, paths_m: Floats) -> tuple[Floats, Floats]:
     """
     from scipy.ndimage import median_filter
 
-    if len(times_s) < _FEWEST:
+    if len(times_s) < _MIN_FRAMES:
         return paths_m, np.zeros(paths_m.shape)
     jitter_m = np.median(np.abs(np.diff(paths_m, 3, axis=0)), axis=0) / (_GAUSSIAN * _THIRD)
     jitter_m = np.maximum(jitter_m, _MIN_JITTER_M)  # (N,)

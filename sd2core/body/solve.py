@@ -372,8 +372,8 @@ def one_thread() -> AbstractContextManager[object]:
 
 _FIRST_ROTATION_RADPS2 = 60.0
 FIRST_TRANSLATION_MPS2 = 6.0
-_LEAST_ROTATION_RADPS2 = 0.3
-LEAST_TRANSLATION_MPS2 = 0.05
+_MIN_ROTATION_RADPS2 = 0.3
+MIN_TRANSLATION_MPS2 = 0.05
 _LIVELINESS = 0.7
 """Standard deviation of an acceleration over what was found around it."""
 _AROUND_S = 0.3
@@ -411,8 +411,8 @@ def solve(
             objective = Objective(rig, evidence, sd)
             pose = _descend(objective, pose, robust=number > 0, tick=partial(tick, number))
             if number < ROUNDS - 1:
-                least = np.full(rig.freedoms, _LEAST_ROTATION_RADPS2)
-                least[-3:] = LEAST_TRANSLATION_MPS2
+                least = np.full(rig.freedoms, _MIN_ROTATION_RADPS2)
+                least[-3:] = MIN_TRANSLATION_MPS2
                 sd = liveliness(objective.accelerations(pose), evidence.times_s, least)
     return pose
 

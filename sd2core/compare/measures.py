@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 _SAME_S = 1e-4
 """Frames nearer than this are the same frame: file formats round times."""
 
-_FEWEST = 4
+_MIN_FRAMES = 4
 
 
 def line_of_sight_velocity(
@@ -105,11 +105,11 @@ def common_times(meshes: Sequence[MeshSequence], reference: int = 0) -> NDArray[
     first = max(float(mesh.times_s[0]) for mesh in meshes) - _SAME_S
     last = min(float(mesh.times_s[-1]) for mesh in meshes) + _SAME_S
     within: NDArray[np.float64] = times[(times >= first) & (times <= last)]
-    if len(within) < _FEWEST:
+    if len(within) < _MIN_FRAMES:
         spans = ", ".join(f"{mesh.times_s[0]:.2f} to {mesh.times_s[-1]:.2f} s" for mesh in meshes)
         raise Sd2Error(
             f"The meshes have {len(within)} frames in common ({spans})",
-            f"{_FEWEST} or more",
+            f"{_MIN_FRAMES} or more",
             "Give meshes of the same video; --fps places the frames of a file that has no times",
         )
     return within

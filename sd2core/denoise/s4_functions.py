@@ -51,7 +51,7 @@ def causal_convolution(signal: Tensor, kernel: Tensor) -> Tensor:
     The signal and the result are (H, B, L), the kernel (H, L), all float32 or all float64.
     """
     _, signals, length = signal.shape
-    short = length < _LONGEST_PRODUCT and signals >= _FEWEST_SIGNALS
+    short = length < _LONGEST_PRODUCT and signals >= _MIN_SIGNALS
     return by_product(signal, kernel) if short else by_transform(signal, kernel)
 
 
@@ -70,7 +70,7 @@ def by_transform(signal: Tensor, kernel: Tensor) -> Tensor:
 # A matrix product does L² work per channel and signal but at the machine's full speed; measured
 # in tests/benchmarks/test_state_space_speed.py.
 _LONGEST_PRODUCT = 144
-_FEWEST_SIGNALS = 16
+_MIN_SIGNALS = 16
 
 
 def toeplitz(kernel: Tensor) -> Tensor:

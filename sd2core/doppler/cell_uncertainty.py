@@ -35,7 +35,7 @@ _REACH = 4.0
 """Half width at which the normal distribution is cut, in standard deviations."""
 
 _STEP_BINS = 0.25
-_FEWEST_STEPS, _MAX_STEPS = 16, 256
+_MIN_STEPS, _MAX_STEPS = 16, 256
 _FRAMES = 32
 """Frames computed together. Their products of matrices are too small for NumPy to divide among
 threads of its own, which would wait for those of the pieces: a hundred times as long on busy cores.
@@ -210,7 +210,7 @@ def _grid(most_bins: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     if most_bins == 0:
         return np.zeros(1), np.ones(1)
     wanted = math.ceil(2 * _REACH * most_bins / _STEP_BINS)
-    steps = min(max(_FEWEST_STEPS, wanted), _MAX_STEPS)
+    steps = min(max(_MIN_STEPS, wanted), _MAX_STEPS)
     nodes = np.linspace(-_REACH, _REACH, steps + 1)
     share = np.exp(-0.5 * nodes**2)
     return nodes, share / share.sum()

@@ -26,7 +26,7 @@ from sd2core.scattering.trajectory import Trajectory
 from sd2core.scattering.velocity import moments
 
 _BLOCK_BYTES = 16 << 20
-_FEWEST_FRAMES = 8
+_MIN_FRAMES = 8
 _KNOTS_AT_ONCE = 16
 
 
@@ -83,7 +83,7 @@ class PreparedMesh:
         per_frame = self.mesh.vertex_count * 12 * self.options.oversampling
         # Several blocks with their normals must fit, or each would push out the other.
         bytes_per_block = min(_BLOCK_BYTES, self.budget.limit_bytes // 8)
-        usual = max(_FEWEST_FRAMES, bytes_per_block // per_frame)
+        usual = max(_MIN_FRAMES, bytes_per_block // per_frame)
         self.block_frames = self.asked_frames or usual
 
     def shared(self, mesh: MeshSequence, options: SynthesisOptions) -> PreparedMesh | None:

@@ -37,7 +37,7 @@ FOCAL_NAMES = ("focal_length", "img_focal")
 _KEPT = (*ESTIMATED, *PARAMETER_NAMES, *RIG_NAMES, *CAMERA_NAMES, *FOCAL_NAMES)
 _SHARED = (*FACE_NAMES, *FOCAL_NAMES, "size")
 _FRAME_NUMBERS = ("frame_number", "frame_idx", "frame_id", "frame")
-_FEWEST_VERTICES = 100
+_MIN_VERTICES = 100
 """Fewer are points of a radar, or joints."""
 _PEOPLE = ("persons", "people", "outputs")
 
@@ -93,7 +93,7 @@ def holds_bodies(path: Path) -> bool:
             shape, _, kind = read_array_header(file)
     except (OSError, ValueError, EOFError):
         return False
-    is_surface = len(shape) == 3 and shape[1] >= _FEWEST_VERTICES and shape[2] == 3
+    is_surface = len(shape) == 3 and shape[1] >= _MIN_VERTICES and shape[2] == 3
     return bool(kind.hasobject or (kind.kind == "f" and is_surface))
 
 

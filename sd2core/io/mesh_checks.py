@@ -31,7 +31,7 @@ _POINTS = 128
 """Vertices of a frame whose motion is judged."""
 _STRETCH_FRAMES = 64
 _JUDGED_BYTES, _JUDGED_ON_DISK_BYTES = 512 * 2**20, 32 * 2**20
-_FEWEST = 3
+_MIN_VERTICES = 3
 """Of so few vertices nothing is judged: they are no body."""
 _CLOSED_SHARE = 0.95
 _MIXED_SHARE = 0.01
@@ -53,7 +53,7 @@ def mark_empty_frames(raw: RawMesh, source: str) -> None:
         return
     vertices: NDArray[Any] = np.asarray(raw.vertices)
     finite = np.isfinite(vertices).all(axis=2)  # (T, V)
-    if vertices.shape[1] > _FEWEST:
+    if vertices.shape[1] > _MIN_VERTICES:
         # Slots of an array that were never filled, or frames that were lost.
         lost = (vertices[:, 0] == vertices[:, -1]).all(axis=1)
         lost[lost] = (vertices[lost] == vertices[lost, :1]).all(axis=(1, 2))
@@ -188,14 +188,14 @@ def judge_body(raw: RawMesh, times_s: NDArray[np.float64]) -> None:
     if not seen:
         return
     numbers, points_m, extent_m = (np.concatenate(part) for part in zip(*seen, strict=True))
-    if points_m.shape[1] > _FEWEST:
+    if points_m.shape[1] > _MIN_VERTICES:
         empty = numbers[~extent_m.any(axis=1) & there[numbers]]
         if 0 < len(empty) < int(there[numbers].sum()):
             there[empty] = False
             raw.present = there
             raw.notes.append(_no_body(empty, "all vertices in one point"))
     raw.findings += judge_clock(times_s, there, of_a_mesh=True)
-    if points_m.shape[1] > _FEWEST:
+    if points_m.shape[1] > _MIN_VERTICES:
         body = BodyPoints(numbers, points_m, times_s[numbers], there[numbers], extent_m)
         raw.findings += [*judge_place(body), *judge_motion(body)]
 

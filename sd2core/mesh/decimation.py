@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence, VertexArray, refuse_missing
 
-_FEWEST_FACES = 4
+_MIN_FACES = 4
 """Least number of faces that enclose anything."""
 
 _SIZE = 100.0
@@ -108,10 +108,10 @@ def _simplify(
     number = np.full(len(points), -1)
     number[on_surface] = welded.ravel()
     triangles = _proper(number[faces])
-    if kept * len(triangles) < _FEWEST_FACES:
+    if kept * len(triangles) < _MIN_FACES:
         return None
     corners, triangles, merged = _collapse(places, triangles, kept)
-    if len(triangles) < _FEWEST_FACES:
+    if len(triangles) < _MIN_FACES:
         return None
     lost = merged < 0
     if lost.any():

@@ -18,7 +18,7 @@ _PER_DEGREE = 64
 
 _PER_RADIAN = np.float32(_PER_DEGREE * 180.0 / math.pi)
 _PI, _QUARTER = np.float32(math.pi), np.float32(math.pi / 2)
-_LEAST = np.float32(1e-30)
+_TINY = np.float32(1e-30)
 _RUN = 512
 
 
@@ -54,7 +54,7 @@ def _place(y, x):  # type: ignore[no-untyped-def]
     To 1e-7 rad: Abramowitz and Stegun, *Handbook of Mathematical Functions*, 4.4.49.
     """
     wide, high = abs(x), abs(y)
-    t = min(wide, high) / max(max(wide, high), _LEAST)
+    t = min(wide, high) / max(max(wide, high), _TINY)
     s = t * t
     p = np.float32(-0.0161657367) + s * np.float32(0.0028662257)
     p = np.float32(-0.0752896400) + s * (np.float32(0.0429096138) + s * p)

@@ -19,7 +19,7 @@ from sd2core.classify.data import UNKNOWN, ClipSet
 from sd2core.classify.metrics import gesture_runs
 from sd2core.classify.splitting import dealt, rarest
 from sd2core.errors import Sd2Error
-from sd2core.study.material import Movement
+from sd2core.study.data import Movement
 
 Group = str
 NOBODY: Group = ""

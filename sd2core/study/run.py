@@ -20,8 +20,8 @@ from sd2core.files.paths import make_folder
 from sd2core.files.texts import read_json
 from sd2core.progress import Progress, silent
 from sd2core.runs.folder import RunFolder
+from sd2core.study.data import Movement, StudyData, study_data_of
 from sd2core.study.denoisers import learn_denoiser
-from sd2core.study.material import Material, Movement, material_of
 from sd2core.study.plan import StudyPlan
 from sd2core.study.trial import Run, Task, all_tasks, drawn, run_task
 
@@ -107,19 +107,19 @@ def _made(
     plan: StudyPlan, folder: Path, processes: int, scheduler: str | None, progress: Progress
 ) -> Results:
     text = plan.model_dump_json()
-    material = material_of(plan)
-    known = dict.fromkeys([*material.real, *material.filmed, *material.others])
-    content = _digest(material, known)
-    tasks = {_run_path(folder, plan, content, one): one for one in all_tasks(plan, material)}
-    digest = _digest(material, material.real)  # Denoisers learn from nothing else.
-    learns = plan.learns_denoisers and material.pairs is not None
+    data = study_data_of(plan)
+    known = dict.fromkeys([*data.real, *data.filmed, *data.others])
+    content = _digest(data, known)
+    tasks = {_run_path(folder, plan, content, one): one for one in all_tasks(plan, data)}
+    digest = _digest(data, data.real)  # Denoisers learn from nothing else.
+    learns = plan.learns_denoisers and data.pairs is not None
     # Tasks of the same real groups have the same.
     places = {path: _model_folder(folder, plan, digest, one) for path, one in tasks.items()}
     models = {places[path]: one for path, one in tasks.items() if learns}
     total = len(models) + len(tasks)
     progress(0, total)
     with ThreadPoolExecutor(processes) as threads:
-        jobs = [threads.submit(_learn, place, plan, material, task)
+        jobs = [threads.submit(_learn, place, plan, data, task)
                 for place, task in models.items()]  # fmt: skip
         try:
             for done, job in enumerate(jobs, start=1):
@@ -145,23 +145,23 @@ def _made(
                 atomic_write_text(futures[future], text_of_run + "\n")
                 done += 1
                 progress(done, total)
-    subject_of = {one.title: one.clip.subject for one in material.real}
+    subject_of = {one.title: one.clip.subject for one in data.real}
     found = tuple(run for run in runs.values() if run is not None)
-    classes, others = material.known.classes, len(material.others)
-    return Results(plan, material.kind, classes, subject_of, others, found, material.lost_frames)
+    classes, others = data.known.classes, len(data.others)
+    return Results(plan, data.kind, classes, subject_of, others, found, data.lost_frames)
 
 
-def _learn(place: Path, plan: StudyPlan, material: Material, task: Task) -> None:
-    assert material.pairs is not None
-    real = drawn(plan, material, task.fold.real, task.share, task.seed)
+def _learn(place: Path, plan: StudyPlan, data: StudyData, task: Task) -> None:
+    assert data.pairs is not None
+    real = drawn(plan, data, task.fold.real, task.share, task.seed)
     takes = [one.take for one in real if one.take is not None]
-    learn_denoiser(place, plan.denoiser, material.pairs, takes, task.seed)
+    learn_denoiser(place, plan.denoiser, data.pairs, takes, task.seed)
 
 
-def _digest(material: Material, movements: Iterable[Movement]) -> str:
+def _digest(data: StudyData, movements: Iterable[Movement]) -> str:
     sums = hashlib.blake2b(digest_size=16)
-    known = material.known
-    head = [material.kind, known.classes, known.null_bins, known.axis.v_max_mps]
+    known = data.known
+    head = [data.kind, known.classes, known.null_bins, known.axis.v_max_mps]
     sums.update(json.dumps([*head, known.frame_rate_hz]).encode())
     for one in movements:
         sums.update(json.dumps([*one.clip.key, one.clip.placement, one.clip.kind]).encode())

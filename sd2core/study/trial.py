@@ -17,10 +17,10 @@ from sd2core.classify.metrics import Score, mean_recall, score
 from sd2core.denoise.files import load_model
 from sd2core.denoise.resample_to_model import SAME_RATE
 from sd2core.errors import Sd2Error
+from sd2core.study.data import Movement, StudyData, study_data_of
 from sd2core.study.denoisers import added_map, denoiser_in
 from sd2core.study.folds import Fold, folds_of, groups_of, share_of
 from sd2core.study.learners import Describe, describing, learnt
-from sd2core.study.material import Material, Movement, material_of
 from sd2core.study.plan import Learner, StudyPlan
 from sd2core.study.windows import Features, at_speed
 
@@ -81,14 +81,14 @@ class Run:
         return cls(Task.from_json(content), int(content["real_frames"]), takes, scores, missing)
 
 
-def drawn(plan: StudyPlan, material: Material, real: Sequence[str], share: float, seed: int
+def drawn(plan: StudyPlan, data: StudyData, real: Sequence[str], share: float, seed: int
           ) -> list[Movement]:  # fmt: skip
     """Return the real movements that are learnt from.
 
     Parameters
     ----------
     plan : StudyPlan
-    material : Material
+    data : StudyData
     real : sequence of str
         Groups whose radar is looked at.
     share : float
@@ -96,51 +96,49 @@ def drawn(plan: StudyPlan, material: Material, real: Sequence[str], share: float
     seed : int
         Of the parts and of the share.
     """
-    group = grouped(plan, material, seed)
-    own = [one for one in material.real if group[one.clip.key] in real]
-    return share_of(material.known, own, share, seed)
+    group = grouped(plan, data, seed)
+    own = [one for one in data.real if group[one.clip.key] in real]
+    return share_of(data.known, own, share, seed)
 
 
-def grouped(plan: StudyPlan, material: Material, seed: int) -> Mapping[tuple[str, str], str]:
+def grouped(plan: StudyPlan, data: StudyData, seed: int) -> Mapping[tuple[str, str], str]:
     """Return the group of every movement."""
     parts = None if plan.folds == "people" else plan.parts
-    return groups_of(material.known, material.real, parts, seed)
+    return groups_of(data.known, data.real, parts, seed)
 
 
 def run_task(plan_text: str, denoiser: str | None, task: Task) -> Run:
     """Judge all conditions of a task; ``denoiser`` is the folder of its own."""
     plan = StudyPlan.model_validate_json(plan_text)
-    material = material_of(plan)
-    group = grouped(plan, material, task.seed)
-    real = drawn(plan, material, task.fold.real, task.share, task.seed)
-    judged = [one for one in material.real if group[one.clip.key] == task.fold.judged]
+    data = study_data_of(plan)
+    group = grouped(plan, data, task.seed)
+    real = drawn(plan, data, task.fold.real, task.share, task.seed)
+    judged = [one for one in data.real if group[one.clip.key] == task.fold.judged]
     filmed = [
         one
-        for one in material.filmed
+        for one in data.filmed
         # Of a movement that no radar saw the person tells; of parts it is in none.
         if group.get(one.clip.key, one.clip.subject) == task.fold.video
     ]
-    model, reason = _denoiser(plan, material, denoiser)
+    model, reason = _denoiser(plan, data, denoiser)
     found: dict[str, dict[str, Score]] = {}
     missing: dict[str, str] = {}
     learner = plan.classifiers[0]
     describe = _kept(plan_text, learner)
     for condition in (REAL, *plan.wanted):
         try:
-            added = _added(plan, material, condition, filmed, model, reason, task.seed)
+            added = _added(plan, data, condition, filmed, model, reason, task.seed)
         except Sd2Error as error:
             missing[condition] = str(error)
             continue
         if condition != REAL and not added:
             missing[condition] = "the data hold no such maps to add"
             continue
-        found[condition] = _judged(
-            learner, plan, material, real, added, judged, task.seed, describe
-        )
+        found[condition] = _judged(learner, plan, data, real, added, judged, task.seed, describe)
     if task.share == max(plan.shares):
         for other in plan.classifiers[1:]:
             found[other.title] = _judged(
-                other, plan, material, real, [], judged, task.seed, _kept(plan_text, other)
+                other, plan, data, real, [], judged, task.seed, _kept(plan_text, other)
             )
     return Run(
         task,
@@ -153,7 +151,7 @@ def run_task(plan_text: str, denoiser: str | None, task: Task) -> Run:
 
 def _added(
     plan: StudyPlan,
-    material: Material,
+    data: StudyData,
     condition: str,
     filmed: Sequence[Movement],
     model: Any,
@@ -164,17 +162,17 @@ def _added(
     if condition == REAL:
         return []
     if condition == "radar":
-        own = {id(one) for one in material.real}
+        own = {id(one) for one in data.real}
         return [one.clip for one in filmed if id(one) in own]
     if condition == "simulated":
-        made = [one.clip for one in material.others if one.clip.kind == "simulated"]
+        made = [one.clip for one in data.others if one.clip.kind == "simulated"]
     else:
         made = [
             replace(one.clip, energies=added_map(condition, one.take, model, reason, (seed, at)))
-            for at, one in enumerate([*filmed, *material.others])
+            for at, one in enumerate([*filmed, *data.others])
             if one.take is not None
         ]
-    known = material.known
+    known = data.known
     return [*made, *(_played(one, known, speed) for speed in plan.speeds for one in made)]
 
 
@@ -188,7 +186,7 @@ def _played(clip: Clip, known: Any, speed: float) -> Clip:
 def _judged(
     learner: Learner,
     plan: StudyPlan,
-    material: Material,
+    data: StudyData,
     real: Sequence[Movement],
     added: Sequence[Clip],
     judged: Sequence[Movement],
@@ -196,7 +194,7 @@ def _judged(
     describe: Describe,
 ) -> dict[str, Score]:
     """Scores of all judged movements, by title; clips of one movement are taken together."""
-    known = material.known
+    known = data.known
     own = [one.clip for one in real]
     scores_of = learnt(learner, known, own, added, plan.added_weight, seed, describe)
     late_s = 0.0 if learner.model == "ridge" else learner.delay_s
@@ -218,9 +216,9 @@ def _of_take(found: Score) -> tuple[float, float | None]:
     )
 
 
-def _denoiser(plan: StudyPlan, material: Material, folder: str | None) -> tuple[Any, str]:
+def _denoiser(plan: StudyPlan, data: StudyData, folder: str | None) -> tuple[Any, str]:
     """The denoiser of a fold, or none and the reason."""
-    known = material.known
+    known = data.known
     if plan.denoiser.file is None:
         return (None, "no pairs to learn from") if folder is None else denoiser_in(Path(folder))
     model = load_model(plan.denoiser.file)
@@ -236,9 +234,9 @@ def _denoiser(plan: StudyPlan, material: Material, folder: str | None) -> tuple[
 @lru_cache(maxsize=8)
 def _kept(plan_text: str, learner: Learner) -> Describe:
     """Describe clips for ridge regression; what the radar saw of whole movements only once."""
-    material = material_of(StudyPlan.model_validate_json(plan_text))
-    describe = describing(learner, material.known)
-    whole = {id(one.clip) for one in material.real}
+    data = study_data_of(StudyPlan.model_validate_json(plan_text))
+    describe = describing(learner, data.known)
+    whole = {id(one.clip) for one in data.real}
     kept: dict[int, Features] = {}
 
     def described(clip: Clip) -> Features:
@@ -251,10 +249,10 @@ def _kept(plan_text: str, learner: Learner) -> Describe:
     return described
 
 
-def all_tasks(plan: StudyPlan, material: Material) -> list[Task]:
+def all_tasks(plan: StudyPlan, data: StudyData) -> list[Task]:
     """Return the tasks of a study, small shares first."""
-    groups = dict.fromkeys(grouped(plan, material, 0).values())
-    filmed = bool(material.filmed) and any(one != "simulated" for one in plan.wanted)
+    groups = dict.fromkeys(grouped(plan, data, 0).values())
+    filmed = bool(data.filmed) and any(one != "simulated" for one in plan.wanted)
     folds = folds_of(list(groups), filmed=filmed, turns=plan.turns)
     return [
         Task(fold, share, seed)

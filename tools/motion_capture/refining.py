@@ -30,7 +30,7 @@ limb; limbs smoothed about their middle. Limits on acceleration instead of jerk 
 """
 
 _WHITE_M, _LASTING_M = 0.006, 0.010
-_FEWEST, _MOST = 36, 300  # frames
+_MIN_FRAMES, _MAX_FRAMES = 36, 300
 _ABOVE_FLOOR_M = 1.0  # of the camera
 _NEAREST_M = 4.0
 
@@ -48,7 +48,7 @@ def measure_refining(folder: Path, progress: Progress = silent) -> dict[str, tup
     for done, path in enumerate(paths):
         progress(done, len(paths))
         motion = BodyMotion.load(path)
-        if motion.person not in TUNED_ON and len(motion) >= _FEWEST:
+        if motion.person not in TUNED_ON and len(motion) >= _MIN_FRAMES:
             errors[motion.trial] = _errors(_before_camera(motion, space, keypoints))
     progress(len(paths), len(paths))
     if not errors:
@@ -57,7 +57,7 @@ def measure_refining(folder: Path, progress: Progress = silent) -> dict[str, tup
 
 
 def _before_camera(motion: BodyMotion, space: ShapeSpace, keypoints: KeypointSpace) -> MeshSequence:
-    frames = min(len(motion), _MOST)
+    frames = min(len(motion), _MAX_FRAMES)
     pose = Pose(from_vector(motion.vectors[:frames]), motion.translation_m[:frames])
     body = space.load("low", motion.shape)
     posed = FittedVertices(body, keypoints.rig(motion.shape), frames, pose.at)[:].astype(np.float64)

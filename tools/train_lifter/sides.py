@@ -16,7 +16,7 @@ from sd2core.progress import Progress, silent
 from tools.train_lifter.examples import emulated
 from tools.train_lifter.network import TemporalNetwork, trained
 from tools.train_lifter.swaps import Known, known_of, spoilt, varied
-from tools.train_lifter.training import Material
+from tools.train_lifter.training import TrainingArrays
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class SidesRecipe:
 
 
 def train_sides(
-    known: Material,
+    known: TrainingArrays,
     recipe: SidesRecipe,
     progress: Progress = silent,
     log: Callable[[str], None] | None = None,

@@ -87,7 +87,7 @@ class Recipe:
 
 
 @dataclass(frozen=True, eq=False)
-class Material:
+class TrainingArrays:
     """What a lifter is trained and calibrated on."""
 
     takes: Sequence[Take]  # repaired
@@ -103,10 +103,10 @@ def material(
     kept: Sequence[Take],
     motions: Sequence[BodyMotion],
     recipe: Recipe,
-) -> Material:
+) -> TrainingArrays:
     """Drawn takes, and emulated motion whose errors follow them."""
     emulator = Emulator(takes)
-    return Material(
+    return TrainingArrays(
         takes,
         kept,
         emulator,
@@ -116,7 +116,7 @@ def material(
 
 
 def train(
-    known: Material,
+    known: TrainingArrays,
     recipe: Recipe,
     progress: Progress = silent,
     log: Callable[[str], None] | None = None,
@@ -164,7 +164,7 @@ def train(
 
 
 def _drawn(
-    rng: np.random.Generator, learnt: Sequence[Example], known: Material, recipe: Recipe
+    rng: np.random.Generator, learnt: Sequence[Example], known: TrainingArrays, recipe: Recipe
 ) -> Batch:
     chosen = []
     frames = int(rng.integers(recipe.frames // 2, recipe.frames + 1))

@@ -9,7 +9,7 @@ from typing import Any
 from PySide6.QtCore import QObject
 
 from sd2app.background.latest import Emit, LatestRunner
-from sd2app.session.content import Offer, camera_of, offers_of
+from sd2app.session.content import OfferedCure, camera_of, offers_of
 from sd2app.session.mesh_reading import ReadMesh, mesh_fields
 from sd2app.session.video_frames import VideoFrames
 from sd2core.body.camera import PinholeCamera
@@ -38,7 +38,7 @@ class MeshPreview(VideoFrames):
         self.persons: dict[str, int] = {}  # with their numbers of frames; empty while unknown
         self.mesh: MeshSequence | None = None  # as it is read now; None while it cannot be
         self.mesh_problem = ""
-        self.offers: tuple[Offer, ...] = ()
+        self.offers: tuple[OfferedCure, ...] = ()
         self._lister = LatestRunner("persons", self, self._take_persons)
         self._loader = LatestRunner("mesh to look at", self, self._take_mesh, self._refuse_mesh)
         path = recording.mesh
@@ -131,6 +131,6 @@ class MeshPreview(VideoFrames):
         self.mesh = None
         self._tell(str(error), offers_of([error]))
 
-    def _tell(self, problem: str, offers: tuple[Offer, ...]) -> None:
+    def _tell(self, problem: str, offers: tuple[OfferedCure, ...]) -> None:
         self.mesh_problem, self.offers = problem, offers
         self.changed.emit()

@@ -43,7 +43,7 @@ _TOLD: dict[str, tuple[str, str]] = {
 
 
 @dataclass(frozen=True)
-class Offer:
+class OfferedCure:
     """Something unlikely about the mesh in words, and how it can be read instead."""
 
     text: str
@@ -67,7 +67,7 @@ class Content:
     radar_labels: Labels | None = None
     notes: tuple[str, ...] = ()
     problems: tuple[str, ...] = ()
-    offers: tuple[Offer, ...] = ()
+    offers: tuple[OfferedCure, ...] = ()
 
     @property
     def saved(self) -> bool:
@@ -200,10 +200,10 @@ def load_content(recording: Recording, progress: Progress) -> Content:
     )
 
 
-def offers_of(unlikely: Iterable[Exception | Finding]) -> tuple[Offer, ...]:
+def offers_of(unlikely: Iterable[Exception | Finding]) -> tuple[OfferedCure, ...]:
     """What can be read another way, of errors and findings."""
     cured = ((str(one), getattr(one, "cure", None)) for one in unlikely)
-    return tuple(Offer(text, cure) for text, cure in cured if cure is not None)
+    return tuple(OfferedCure(text, cure) for text, cure in cured if cure is not None)
 
 
 def camera_of(recording: Recording, video: VideoReader | None) -> PinholeCamera:

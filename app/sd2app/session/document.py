@@ -16,7 +16,7 @@ from sd2app.session.content import (
     PARTS,
     UNTITLED,
     Content,
-    Offer,
+    OfferedCure,
     camera_of,
     clock_of,
     load_content,
@@ -62,7 +62,7 @@ class DocumentModel(QObject):
         self.count: HowCounted = "expected"  # of vertices whose mesh states its uncertainty
         self.same_recording = False  # as was open before, with other files
         self.growing = False  # a radar is listened to, and adds frames
-        self.offers: tuple[Offer, ...] = ()  # of reading the mesh another way
+        self.offers: tuple[OfferedCure, ...] = ()  # of reading the mesh another way
         self._base: Recording | None = None
         self._asked: list[Path] = []  # files that were opened last
         self._cured = False
@@ -206,7 +206,7 @@ class DocumentModel(QObject):
         """Leave the mesh as it was read."""
         self._offer(())
 
-    def _offer(self, offers: tuple[Offer, ...]) -> None:
+    def _offer(self, offers: tuple[OfferedCure, ...]) -> None:
         if offers != self.offers:
             self.offers = offers
             self.offered.emit()

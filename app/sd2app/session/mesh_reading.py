@@ -9,7 +9,7 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import Emit
-from sd2app.session.content import Offer, offers_of
+from sd2app.session.content import OfferedCure, offers_of
 from sd2app.session.tasks import ListedRunner, TaskList
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.edited import MESH
@@ -25,7 +25,7 @@ class ReadMesh:
 
     fields: dict[str, Any]
     mesh: MeshSequence | None
-    offers: tuple[Offer, ...] = ()
+    offers: tuple[OfferedCure, ...] = ()
 
 
 def mesh_fields(recording: Recording) -> dict[str, Any]:

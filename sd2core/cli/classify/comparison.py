@@ -125,10 +125,10 @@ def _learners(options: Table) -> tuple[Learner, ...]:
 
 def _fitting(plan: StudyPlan, same_people: bool) -> StudyPlan:
     """Leave out what the data do not hold; keep movements apart where there are too few people."""
-    from sd2core.study.material import material_of
+    from sd2core.study.data import study_data_of
 
-    material = material_of(plan)
-    added = plan.added if material.filmed else ()
+    data = study_data_of(plan)
+    added = plan.added if data.filmed else ()
     least = 3 if added else 2
-    folds = "files" if same_people or len(material.people) < least else "people"
+    folds = "files" if same_people or len(data.people) < least else "people"
     return plan.model_copy(update={"added": added, "folds": folds})

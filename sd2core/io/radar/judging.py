@@ -19,7 +19,7 @@ from sd2core.radar_config import RadarConfig
 _MAX_FRAMES, _MAX_SAMPLES = 32, 1 << 22
 _WHITE_LEVEL, _WHITE_CORRELATION = 0.3, 0.1
 """Even noise over all of a converter's range has 0.58 of full scale, and 0; echoes are tones."""
-_FEWEST_GATES = 16
+_MIN_GATES = 16
 _MIRRORED = 4.0
 """Ratio of powers: near echoes are the strongest, so that the far half has less."""
 
@@ -86,7 +86,7 @@ def _empty(signal: Signal, capture: RadarCapture) -> list[str]:
 
 def _is_white(signal: Signal) -> bool:
     parts = np.ascontiguousarray(signal).view(np.float32).reshape(*signal.shape, -1)
-    if parts.shape[3] < _FEWEST_GATES or float(parts.std()) < _WHITE_LEVEL:
+    if parts.shape[3] < _MIN_GATES or float(parts.std()) < _WHITE_LEVEL:
         return False
     power = float((parts * parts).mean())
     # A tone that is not like its next sample is like one soon after.
@@ -96,7 +96,7 @@ def _is_white(signal: Signal) -> bool:
 
 def _is_mirrored(signal: Signal, config: RadarConfig) -> bool:
     gates = signal.shape[3]
-    if config.sampling == "real" or not config.has_beat or gates < _FEWEST_GATES:
+    if config.sampling == "real" or not config.has_beat or gates < _MIN_GATES:
         return False
     window: NDArray[np.float32] = np.hanning(gates).astype(np.float32)
     power = (np.abs(np.fft.fft(signal * window, axis=3)) ** 2).mean(axis=(0, 1, 2))

@@ -98,7 +98,7 @@ def test_maps_are_those_of_synth_and_denoise(run: Runs) -> None:
 def test_a_tolerance_is_one_plan_per_mesh_for_all_its_places(
     run: Runs, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sd2core.accuracy.places._FEWEST_FRAMES", 1)
+    monkeypatch.setattr("sd2core.accuracy.places._MIN_FRAMES", 1)
     monkeypatch.setattr("sd2core.accuracy.places._Search.reference_s", lambda _: 0.0)
     paths = save_spheres(run.folder / "meshes", 2)
     end = run(MAPS + "tolerance = 0.1\n")

@@ -19,8 +19,8 @@ from sd2core.maps import mean_velocity_mps
 from sd2core.pairs.labelling import TakeLabel, label_pairs
 from sd2core.sensor import VelocityAxis
 from sd2core.study.certainty import adjusted, gain_of
+from sd2core.study.data import StudyData, study_data_of
 from sd2core.study.folds import folds_of, groups_of, share_of
-from sd2core.study.material import Material, material_of
 from sd2core.study.plan import StudyPlan, read_study, study_text
 from sd2core.study.report import write_report
 from sd2core.study.windows import Ridge, at_speed, window_features
@@ -40,8 +40,8 @@ def plan_of(store: Path, **more: object) -> StudyPlan:
 
 
 @pytest.fixture(scope="module")
-def material(store: Path) -> Material:
-    return material_of(plan_of(store))
+def data(store: Path) -> StudyData:
+    return study_data_of(plan_of(store))
 
 
 def test_everybody_is_judged_beside_everybody_else() -> None:
@@ -65,33 +65,33 @@ def test_everybody_is_judged_beside_everybody_else() -> None:
 @given(st.integers(2, 6), st.integers(0, 9))
 @settings(max_examples=20, deadline=None)
 def test_movements_are_dealt_into_parts_of_every_class(
-    material: Material, parts: int, seed: int
+    data: StudyData, parts: int, seed: int
 ) -> None:
-    group = groups_of(material.known, material.real, parts, seed)
-    assert set(group) == {one.clip.key for one in material.real}
+    group = groups_of(data.known, data.real, parts, seed)
+    assert set(group) == {one.clip.key for one in data.real}
     assert len(set(group.values())) == parts
     sizes = [list(group.values()).count(one) for one in set(group.values())]
     assert max(sizes) - min(sizes) <= 1
 
 
-def test_labels_become_classes_or_are_left_out(store: Path, material: Material) -> None:
-    assert material.known.classes == ("a", "b", "c")
-    assert len(material.real) == len(material.filmed) == 12
+def test_labels_become_classes_or_are_left_out(store: Path, data: StudyData) -> None:
+    assert data.known.classes == ("a", "b", "c")
+    assert len(data.real) == len(data.filmed) == 12
     # How often it is judged changes nothing of what is read.
-    assert material_of(plan_of(store, seeds=7)) is material_of(plan_of(store))
+    assert study_data_of(plan_of(store, seeds=7)) is study_data_of(plan_of(store))
     classes = {"a": "x", "c": "x", "b": "y"}
-    fewer = material_of(plan_of(store, classes=classes))
+    fewer = study_data_of(plan_of(store, classes=classes))
     assert fewer.known.classes == ("x", "y")
     assert (fewer.real[0].clip.label == 0).all()
     for classes, words in (({"nothing such": "x"}, "nothing such"), ({"a": "x"}, "two or more")):
         with pytest.raises(Sd2Error, match=words):
-            material_of(plan_of(store, classes=classes))
+            study_data_of(plan_of(store, classes=classes))
 
 
 def test_more_video_is_of_its_people_or_of_others(store: Path, tmp_path: Path) -> None:
     more = write_pairs(tmp_path / "more.zarr", ("s1", "stranger"), takes=1)
     label_pairs(more, [TakeLabel("*", "*", "b")])
-    found = material_of(plan_of(store, video=(str(more),)))
+    found = study_data_of(plan_of(store, video=(str(more),)))
     assert [one.title for one in found.others] == ["stranger/t0"]
     assert len(found.filmed) == 13
     assert all(one.clip.label.max() == 1 for one in found.others)
@@ -101,7 +101,7 @@ def test_more_video_is_of_its_people_or_of_others(store: Path, tmp_path: Path) -
 def test_frames_in_damaged_chunks_are_left_out_and_told(tmp_path: Path) -> None:
     damaged = write_pairs(tmp_path / "pairs.zarr", takes=6)
     lose(damaged / "radar" / "c" / "1" / "0")  # frames 2250 to 2699, the last ones of s3
-    found = material_of(plan_of(damaged))
+    found = study_data_of(plan_of(damaged))
     assert sum(len(one.clip) for one in found.real) == 2250
     assert found.lost_frames == 450
     results = replace(some_results(tmp_path), lost_frames=found.lost_frames)
@@ -112,7 +112,7 @@ def test_frames_in_damaged_chunks_are_left_out_and_told(tmp_path: Path) -> None:
 def test_radar_files_are_one_persons_movements(shared_data: Path, tmp_path: Path) -> None:
     folder = shared_data / "radar" / "kkt_gestures"
     plan = StudyPlan(title="t", out=str(tmp_path), data=(str(folder),), folds="files")
-    found = material_of(plan)
+    found = study_data_of(plan)
     assert found.known.classes[0] == "background"
     assert len(found.real) == 8
     assert (found.kind, found.pairs, found.filmed) == ("real", None, ())
@@ -125,13 +125,13 @@ def test_radar_files_are_one_persons_movements(shared_data: Path, tmp_path: Path
 @given(st.floats(0.01, 1.0), st.floats(0.01, 1.0), st.integers(0, 5))
 @settings(max_examples=25, deadline=None)
 def test_a_share_is_of_every_class_and_within_a_larger_one(
-    material: Material, one: float, other: float, seed: int
+    data: StudyData, one: float, other: float, seed: int
 ) -> None:
-    takes = material.real
+    takes = data.real
     low, high = sorted((one, other))
     held = []
     for share in (low, high):
-        found = share_of(material.known, takes, share, seed)
+        found = share_of(data.known, takes, share, seed)
         frames = {
             (each.title, float(time_s)): int(number)
             for each in found
@@ -273,13 +273,13 @@ def test_a_data_set_gives_what_the_radar_saw_with_its_synthetic_maps(
     out = tmp_path / "set.zarr"
     words = ["export", str(store), "--out", str(out), "--segment-frames", "30", "--kinds"]
     assert run(build_parser()[0], [*words, "synthetic,simulated", "--overlap-frames", "0"]) == 0
-    material = material_of(plan_of(store, folds="files"))
-    found = material_of(StudyPlan(title="t", out=str(tmp_path), data=(str(out),), folds="files"))
-    assert found.known.classes == material.known.classes
+    data = study_data_of(plan_of(store, folds="files"))
+    found = study_data_of(StudyPlan(title="t", out=str(tmp_path), data=(str(out),), folds="files"))
+    assert found.known.classes == data.known.classes
     assert {one.clip.subject for one in found.real} == {"s1", "s2", "s3"}
     for one in found.real:
         assert one.take is not None
         np.testing.assert_array_equal(one.take.radar, one.clip.energies)
-        (own,) = [each.take for each in material.real if each.title == one.title]
+        (own,) = [each.take for each in data.real if each.title == one.title]
         frames = len(one.clip)
         np.testing.assert_array_equal(one.take.synthetic, own.synthetic[:frames])

@@ -76,11 +76,11 @@ def test_sides_of_a_landmark_model_that_is_right_are_scored(right: list[Take]) -
 def test_training_repeats(right: list[Take]) -> None:
     pytest.importorskip("torch")
     from tools.train_lifter.sides import SidesRecipe, train_sides
-    from tools.train_lifter.training import Material
+    from tools.train_lifter.training import TrainingArrays
 
     recipe = SidesRecipe(width=8, dilations=(1, 2), steps=3, batch=3, frames=(12, 20))
-    one, meta = train_sides(Material(right, ()), recipe)
-    two, _ = train_sides(Material(right, ()), recipe)
+    one, meta = train_sides(TrainingArrays(right, ()), recipe)
+    two, _ = train_sides(TrainingArrays(right, ()), recipe)
     for name, array in one.arrays.items():
         np.testing.assert_array_equal(array, two.arrays[name])
     assert one.arrays["leave"].shape == (8, len(SIDED_PARTS))

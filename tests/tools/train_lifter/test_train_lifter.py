@@ -135,12 +135,12 @@ def test_emulated_people_look_like_the_takes(takes: list[Take]) -> None:
 
 def test_training_learns_and_repeats(takes: list[Take], tmp_path: Path) -> None:
     pytest.importorskip("torch")
-    from tools.train_lifter.training import Material, Recipe, save_lifter, train
+    from tools.train_lifter.training import Recipe, TrainingArrays, save_lifter, train
 
     recipe = Recipe(width=8, dilations=(1, 2), steps=30, batch=4, frames=24, dropout=0.0)
     logged: list[str] = []
-    one = train(Material(takes[1:], takes[:1]), recipe, log=logged.append)
-    two = train(Material(takes[1:], takes[:1]), recipe)
+    one = train(TrainingArrays(takes[1:], takes[:1]), recipe, log=logged.append)
+    two = train(TrainingArrays(takes[1:], takes[:1]), recipe)
     for name, array in one.network.arrays.items():
         np.testing.assert_array_equal(array, two.network.arrays[name])
     first, last = (float(text.split("root ")[1].split(",")[0]) for text in (logged[0], logged[-1]))

@@ -1,4 +1,4 @@
-"""Material of a study: what a radar saw, of which movements there is video, and the classes."""
+"""Data of a study: what a radar saw, of which movements there is video, and the classes."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Movement:
 
 
 @dataclass(frozen=True, eq=False)
-class Material:
+class StudyData:
     """Movements that share an axis, a frame rate and classes."""
 
     known: ClipSet  # Without its clips; the classes of all.
@@ -98,13 +98,13 @@ _READ_FOR = {"title", "out", "data", "video", "labels", "classes", "placements"}
 """Keys of a plan that tell what is read."""
 
 
-def material_of(plan: StudyPlan) -> Material:
-    """Read the material of a plan whose paths are absolute; once for plans of the same data."""
-    return _material_of(plan.model_dump_json(include=_READ_FOR))
+def study_data_of(plan: StudyPlan) -> StudyData:
+    """Read the data of a plan whose paths are absolute; once for plans of the same data."""
+    return _study_data_of(plan.model_dump_json(include=_READ_FOR))
 
 
 @lru_cache(maxsize=1)
-def _material_of(plan_text: str) -> Material:
+def _study_data_of(plan_text: str) -> StudyData:
     plan = StudyPlan.model_validate_json(plan_text)
     stores, sets, takes = _sources(plan)
     names = {name for one in sets for name in one.classes}
@@ -131,7 +131,7 @@ def _material_of(plan_text: str) -> Material:
     for path in plan.video:
         for one in _filmed(Path(path), plan, seen):
             (filmed if one.clip.subject in people else others).append(one)
-    return Material(
+    return StudyData(
         replace(seen, clips=()),
         tuple(one for one in found if first(one.clip)),
         tuple(filmed),
