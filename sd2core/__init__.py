@@ -24,11 +24,13 @@ if TYPE_CHECKING:
     from sd2core.errors import Sd2Error
     from sd2core.fmcw import doppler_map
     from sd2core.imu.virtual import virtual_imu
+    from sd2core.io.bodies import with_bodies
     from sd2core.io.mesh import load_mesh, save_mesh
     from sd2core.io.radar import RadarCapture, load_capture
     from sd2core.io.things import with_things
     from sd2core.io.video import VideoReader, open_video
     from sd2core.maps import DopplerMap
+    from sd2core.mesh.bodies import Body
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.mesh.things import Thing
     from sd2core.radar_config import PAPER_RADAR, RadarConfig
@@ -40,6 +42,7 @@ __all__ = [
     "PAPER_RADAR",
     "PRESETS",
     "Beam",
+    "Body",
     "DopplerMap",
     "MeshSequence",
     "RadarCapture",
@@ -64,10 +67,12 @@ __all__ = [
     "open_video",
     "save_mesh",
     "virtual_imu",
+    "with_bodies",
     "with_things",
 ]
 
 _HOME = {
+    "Body": "mesh.bodies",
     "PAPER_RADAR": "radar_config",
     "PRESETS": "doppler",
     "Beam": "sensor",
@@ -94,6 +99,7 @@ _HOME = {
     "open_video": "io.video",
     "save_mesh": "io.mesh",
     "virtual_imu": "imu.virtual",
+    "with_bodies": "io.bodies",
     "with_things": "io.things",
 }
 

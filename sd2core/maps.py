@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 FORMAT_VERSION = 1
 
+_OF = ": "
+"""Between the name of a person and a part, in a scene of several."""
+
 _NOTHING, _MUTED = "#e9ebee", "#5a6370"
 """Colours of what is not known."""
 
@@ -87,10 +90,33 @@ class LimbMaps:
         object.__setattr__(self, "parts", tuple(str(part) for part in self.parts))
         object.__setattr__(self, "values", values)
 
+    @classmethod
+    def of_persons(cls, each: Sequence[LimbMaps], persons: Sequence[str]) -> LimbMaps:
+        """Join those of several persons, with their names in front; kinematics are of the first."""
+        parts = [
+            f"{person}{_OF}{part}"
+            for person, one in zip(persons, each, strict=True)
+            for part in one.parts
+        ]
+        return cls(tuple(parts), np.concatenate([m.values for m in each]), each[0].kinematics)
+
+    @property
+    def persons(self) -> tuple[str, ...]:
+        """Names of the persons of a scene of several; empty of one alone."""
+        return tuple(dict.fromkeys(one.rpartition(_OF)[0] for one in self.parts if _OF in one))
+
+    def shown(self, part: str) -> NDArray[np.float32] | None:
+        """Map (bins, frames) of a part, or of all parts of a person; None if there is none."""
+        if part in self.parts:
+            return self.values[self.parts.index(part)]
+        rows = [one.startswith(f"{part}{_OF}") for one in self.parts]
+        return self.values[rows].sum(axis=0) if any(rows) else None
+
     def inputs(self, parts: Sequence[str]) -> NDArray[np.float32]:
         """Energies by frame, part and bin, (frames, len(parts) · bins), or the map and kinematics.
 
-        A part without a side (``forearm``) is the sum of both. For
+        A part without a side (``forearm``) is the sum of both; of several persons parts are those
+        of the first. For
         :data:`~sd2core.mesh.vertex_parts.KINEMATICS` alone columns are those of the map, all
         quantities of all joints, and the root of what is seen of each part. Raises Sd2Error if a
         part is missing.
@@ -101,7 +127,7 @@ class LimbMaps:
         for part in parts:
             rows = [
                 number
-                for number, name in enumerate(self.parts)
+                for number, name in enumerate(self._of_first)
                 if part in (name, name.partition(".")[0])
             ]
             if not rows:
@@ -111,6 +137,12 @@ class LimbMaps:
             found.append(self.values[rows].sum(axis=0))
         return np.ascontiguousarray(np.concatenate(found).T)
 
+    @property
+    def _of_first(self) -> tuple[str, ...]:
+        """Parts of the first person, without the name."""
+        first = f"{self.persons[0]}{_OF}" if self.persons else ""
+        return tuple(one[len(first) :] for one in self.parts if one.startswith(first))
+
     def _moving(self) -> NDArray[np.float32]:
         """The map, and kinematics below it."""
         if self.kinematics is None:
@@ -119,7 +151,7 @@ class LimbMaps:
                 "limb maps with kinematics",
                 "Make the map or the pairs again with --limbs",
             )
-        seen = np.sqrt(self.values.sum(axis=1))
+        seen = np.sqrt(self.values[: len(self._of_first)].sum(axis=1))
         joints = self.kinematics.reshape(-1, seen.shape[1])
         return np.concatenate([self.values.sum(axis=0), joints, seen])
 

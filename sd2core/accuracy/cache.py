@@ -68,9 +68,14 @@ def scene_fingerprint(
     }
     if mesh.surroundings is not None:
         what["surroundings"] = mesh.surroundings.digest
-    if options.count == "expected" and (known := mesh.uncertainty) is not None:
-        stated = known.vertex_limb, known.along_mps, known.across_mps
-        what["uncertainty"] = [hashlib.sha256(one.tobytes()).hexdigest() for one in stated]
+    if mesh.others:
+        what["others"] = [clip_fingerprint(body) for body in mesh.others]
+    known = [body.uncertainty for body in mesh.bodies if body.uncertainty is not None]
+    if options.count == "expected" and known:
+        stated = [
+            values for one in known for values in (one.vertex_limb, one.along_mps, one.across_mps)
+        ]
+        what["uncertainty"] = [hashlib.sha256(values.tobytes()).hexdigest() for values in stated]
     return hashlib.sha256(repr(what).encode()).hexdigest()[:16]
 
 

@@ -78,6 +78,7 @@ class Sample:
             uncertainty=None
             if mesh.uncertainty is None
             else mesh.uncertainty.of_frames(self.frames),
+            others=tuple(self.of(body) for body in mesh.others),
         )
 
 

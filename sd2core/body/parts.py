@@ -23,7 +23,7 @@ from sd2core.body.rotations import Floats
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.mesh.vertex_parts import PARTS, VertexParts, other_side
+from sd2core.mesh.vertex_parts import PARTS, WHOLE, VertexParts, other_side
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 
@@ -54,7 +54,8 @@ def body_parts(mesh: MeshSequence) -> VertexParts | None:
 
     Those of the bundled body's surfaces are known, and those of any closed surface that has a
     body's five tips (SMPL's, say), by its first frame with a person. A point cloud has none.
-    A mesh is searched once.
+    A mesh is searched once. In a scene of several bodies somebody whose parts are not known is one
+    part.
 
     Examples
     --------
@@ -65,7 +66,15 @@ def body_parts(mesh: MeshSequence) -> VertexParts | None:
     'trunk'
     """
     if mesh not in _FOUND:
-        _FOUND[mesh] = _find_parts(mesh)
+        found = _find_parts(mesh)
+        if mesh.others:
+            each = [found, *map(body_parts, mesh.others)]
+            first, *others = (
+                VertexParts((WHOLE,), np.zeros(body.vertex_count, np.uint8)) if one is None else one
+                for body, one in zip(mesh.bodies, each, strict=True)
+            )
+            found = replace(first, others=tuple(others))
+        _FOUND[mesh] = found
     return _FOUND[mesh]
 
 

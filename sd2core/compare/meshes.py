@@ -17,7 +17,6 @@ from sd2core.compare.measures import (
     jitter,
     line_of_sight_velocity,
     map_l1,
-    resample_mesh,
     rms,
     synthesize_alike,
 )
@@ -26,6 +25,7 @@ from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
+from sd2core.scattering.resampling import resample_mesh
 from sd2core.sensor import VirtualSensor
 
 Floats = NDArray[np.float64]
@@ -143,7 +143,7 @@ def compare_meshes(
             notes.append(f"{label}: interpolated to the frame times of {labels[reference]}.")
         elif len(times_s) < mesh.frame_count:
             notes.append(f"{label}: {len(times_s)} of {mesh.frame_count} frames are compared.")
-        placed.append(moved)
+        placed.append(moved.between(0, moved.frame_count))
     patches = _patches(placed, labels, notes)
     joints = tuple(
         one.positions(np.asarray(mesh.vertices)) for one, mesh in zip(patches, placed, strict=True)

@@ -180,7 +180,8 @@ def _write_one(
         start, end = source.mesh.timebase.frames_between(span.start_s, span.end_s)
         if end > start:
             mesh = source.mesh.between(start, end)
-            save_mesh(replace(mesh, timebase=mesh.timebase.shifted(-zero_s)), made / "mesh.zarr")
+            shifted = replace(mesh, timebase=mesh.timebase.shifted(-zero_s), others=())
+            save_mesh(shifted, made / "mesh.zarr")
     label = {"label": span.label, "track": span.track, "start_s": span.start_s, "end_s": span.end_s}
     for name, doppler in source.maps.items():
         start, end = doppler.timebase.frames_between(span.start_s, span.end_s)

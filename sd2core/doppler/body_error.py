@@ -44,7 +44,7 @@ def body_error(
     progress : Progress
         Counts the stretches; may raise Cancelled.
     """
-    if maker.mesh.uncertainty is None:
+    if all(body.uncertainty is None for body in maker.mesh.bodies):
         return None
     start, stop = frames or (0, maker.mesh.frame_count)
     spans = [(start, stop)]

@@ -15,7 +15,7 @@ from sd2core.doppler.histogram import Counting, Paths
 from sd2core.doppler.prepared import Block, PreparedMesh
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering import depth_plain, exact_plain
-from sd2core.scattering.behind_things import hide_behind
+from sd2core.scattering.behind_things import hide_behind, may_hide
 from sd2core.scattering.depth import depth_visibility_kernel
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.scattering.visibility import facing_kernel, facing_mask
@@ -50,8 +50,9 @@ class VisibilityMasks:
     """Visibility of a mesh from any place; masks are kept in the mesh's byte budget.
 
     Calls may come from several threads. All visibility but none needs faces. ``counting``
-    determines the vertices that cannot change the map. What stands around the mesh hides
-    vertices in depth and exact visibility; ``none`` and ``facing`` know nothing of it.
+    determines the vertices that cannot change the map. What stands around the mesh, and
+    ``others`` beside it, hide vertices in depth and exact visibility; ``none`` and ``facing`` know
+    nothing of them.
     """
 
     def __init__(self, prepared: PreparedMesh, counting: Counting) -> None:
@@ -64,6 +65,7 @@ class VisibilityMasks:
         # but the share that is reported of them is to be right.
         self._live = live
         self._stride = prepared.options.mask_stride
+        self.others: tuple[PreparedMesh, ...] = ()  # bodies of the scene that may hide this one
         # Newest first, per block.
         self._kept_at: dict[int, tuple[tuple[Occlusion, Position], ...]] = {}
 
@@ -171,7 +173,7 @@ class VisibilityMasks:
         pixels = options.depth_resolution if occlusion == "depth" else None
         needed = options.axis, options.null_bins, options.beyond, self._prepared.spreads
         around = self._prepared.mesh.surroundings
-        hiding = None if around is None else around.digest
+        hiding = None if around is None else around.digest, *(one.number for one in self.others)
         return ("mask", occlusion, pixels, self._stride, needed, hiding, index, position_m)
 
     def _frames(self, index: int, rows: slice) -> NDArray[np.intp]:
@@ -263,7 +265,8 @@ class VisibilityMasks:
 
     def _view(self, block: Block, rows: slice, place: NDArray[np.float64]) -> _View:
         points, around_m = self._prepared.near_points(block, rows)
-        return _View(points, place - around_m, self._prepared.origin_m + around_m)
+        first = block.start + rows.start
+        return _View(points, place - around_m, self._prepared.origin_m + around_m, first)
 
     def _counted(self, index: int) -> Block:
         return self._prepared.counted(index, self._counting, points=True)
@@ -306,14 +309,26 @@ class VisibilityMasks:
         visible: NDArray[np.uint8],
         occlusion: Occlusion,
     ) -> None:
-        """Set ``visible`` of the needed vertices, and to 0 of those that a thing hides."""
+        """Set ``visible`` of the needed vertices, and to 0 of those that others hide."""
         self._test_body(view, needed, visible, occlusion)
-        around = self._prepared.mesh.surroundings
-        if around is None:
-            return
-        # Of all vertices: few large faces are soon looked at, and the share that is seen is right.
-        for t, seen in enumerate(visible):
-            hide_behind(around, view.points[t], view.origins_m[t], view.places_m[t], seen)
+        # Of all vertices: what hides them is soon looked at, and the share that is seen is right.
+        if (around := self._prepared.mesh.surroundings) is not None:
+            for t, seen in enumerate(visible):
+                view.hide(t, *around.surface, seen)
+        for other in self.others:
+            self._hide_behind_body(other, view, visible)
+
+    def _hide_behind_body(
+        self, other: PreparedMesh, view: _View, visible: NDArray[np.uint8]
+    ) -> None:
+        """Set ``visible`` to 0 where another body hides a vertex."""
+        assert other.faces is not None  # MeshSequence refuses others without
+        start, count = view.first, len(view.points)
+        there = other.mesh.presence.there[start : start + count]
+        boxes_m = other.boxes(start, start + count)
+        near = there & may_hide(boxes_m, view.boxes_m, view.places_m + view.origins_m)
+        for t in np.flatnonzero(near).tolist():
+            view.hide(t, other.frame_m(start + t), other.faces, visible[t])
 
     def _test_body(
         self,
@@ -353,6 +368,23 @@ class _View:
     points: NDArray[np.float32]
     places_m: NDArray[np.float64]
     origins_m: NDArray[np.float64]  # these points, in the camera frame, (n, 3)
+    first: int  # number of the first frame in the clip
+
+    @property
+    def boxes_m(self) -> NDArray[np.float64]:
+        """Lowest and highest corner in the camera frame, (n, 2, 3)."""
+        ends = np.stack([self.points.min(axis=2), self.points.max(axis=2)], axis=1)
+        return ends + self.origins_m[:, None]
+
+    def hide(
+        self,
+        t: int,
+        vertices_m: NDArray[np.float64],
+        faces: NDArray[np.int32],
+        seen: NDArray[np.uint8],
+    ) -> None:
+        """Set ``seen`` (V,) to 0 in a frame where a surface in the camera frame hides it."""
+        hide_behind(vertices_m, faces, self.points[t], self.origins_m[t], self.places_m[t], seen)
 
     def stretches(self) -> list[tuple[int, int]]:
         """Half-open runs of frames in which the sensor does not move."""

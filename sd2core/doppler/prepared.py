@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import math
 import threading
 from collections.abc import Callable, Hashable
@@ -28,6 +29,7 @@ from sd2core.scattering.velocity import moments
 _BLOCK_BYTES = 16 << 20
 _MIN_FRAMES = 8
 _KNOTS_AT_ONCE = 16
+_NUMBERS = itertools.count()
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +55,11 @@ class PreparedMesh:
     block_frames: int = field(init=False)
     reach_m: float = field(init=False)  # largest coordinate in the first frame
     origin_m: NDArray[np.float64] = field(init=False)  # of the prepared positions
+    number: int = field(init=False)  # the same for all that share its blocks, and for no other
 
     def __post_init__(self) -> None:
         self._reading = threading.Lock()
+        self.number = next(_NUMBERS)
         self._compatible = self.options.velocity == "vid2doppler"
         self._trajectory = Trajectory(
             self.mesh.times_s,
@@ -191,6 +195,23 @@ class PreparedMesh:
             place_m = 0.5 * (points.min(axis=2) + points.max(axis=2))
             points = points - place_m[:, :, None]
         return np.ascontiguousarray(points, np.float32), place_m
+
+    def frame_m(self, frame: int) -> NDArray[np.float64]:
+        """Vertices in the middle of a frame of the clip, in the camera frame, (V, 3)."""
+        index, local = divmod(frame, self.block_frames)
+        return self.points(self.block(index))[local].T + self.origin_m
+
+    def boxes(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Lowest and highest corner of some frames of the clip in the camera frame, (n, 2, 3)."""
+
+        def ends(block: Block) -> NDArray[np.float64]:
+            points = self.points(block)
+            return np.stack([points.min(axis=2), points.max(axis=2)], axis=1) + self.origin_m
+
+        size = self.block_frames
+        first, last = start // size, (stop - 1) // size
+        found = [self._kept("boxes", self.block(at), ends) for at in range(first, last + 1)]
+        return np.concatenate(found)[start - first * size : stop - first * size]
 
     def normals(self, block: Block, moving: MovingVertices | None = None) -> NDArray[np.int8]:
         """Vertex normals of a block's frames, int8 (n, 3, V).

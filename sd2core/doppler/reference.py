@@ -17,6 +17,7 @@ from sd2core.doppler.expected import SIGMA_FACTOR, sigma_bins, spread_over_bins
 from sd2core.doppler.histogram import counting_of
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.things import Surface
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.numerics.precision import keeps_shape
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
@@ -51,22 +52,38 @@ def reference_stretch(
         Half-open range of frames.
     """
     place = np.asarray(sensor.position_m, np.float64)
-    first = mesh.frame(0).astype(np.float64)
-    middle = 0.5 * (first.min(axis=0) + first.max(axis=0))
-    middle = middle.astype(mesh.vertices.dtype).astype(np.float64)
     raw = np.zeros((options.axis.bins, stop - start))
-    for column, (velocities, points) in enumerate(at_frames(mesh, place, options, start, stop)):
-        weight, total = _weights(mesh, options, points, place)
-        if total == 0 or not len(velocities):
-            continue
-        weight = weight * _range_law(mesh, options, points, place) * two_way_gain(sensor, points)
-        seen = _visible(mesh, points, place, middle)
-        weights = np.broadcast_to(weight, velocities.shape)[:, seen]
-        sigma = _sigma_bins(mesh, options, points, sensor, start + column)[seen]
-        counted = _counted(velocities[:, seen], weights, sigma, options)
-        raw[:, column] = counted / (len(velocities) * total)
+    walks = [at_frames(body, place, options, start, stop) for body in mesh.bodies]
+    middles = [_middle(body) for body in mesh.bodies]
+    for column, moving in enumerate(zip(*walks, strict=True)):
+        there = [bool(body.presence.there[start + column]) for body in mesh.bodies]
+        for number, (body, (velocities, points)) in enumerate(
+            zip(mesh.bodies, moving, strict=True)
+        ):
+            weight, total = _weights(body, options, points, place)
+            if total == 0 or not len(velocities):
+                continue
+            law = _range_law(body, options, points, place)
+            weight = weight * law * two_way_gain(sensor, points)
+            around = [] if mesh.surroundings is None else [mesh.surroundings.surface]
+            for other, (_, its_points) in enumerate(moving):
+                faces = mesh.bodies[other].faces
+                if other != number and there[other] and faces is not None:
+                    around.append((its_points.T, faces))
+            seen = _visible(body, points, place, middles[number], around)
+            weights = np.broadcast_to(weight, velocities.shape)[:, seen]
+            sigma = _sigma_bins(body, options, points, sensor, start + column)[seen]
+            counted = _counted(velocities[:, seen], weights, sigma, options)
+            raw[:, column] += counted / (len(velocities) * total)
     raw[list(options.null_bins)] = 0
     return raw
+
+
+def _middle(mesh: MeshSequence) -> NDArray[np.float64]:
+    """Middle of the first frame, as a number that the mesh's own precision has."""
+    first = mesh.frame(0).astype(np.float64)
+    middle = 0.5 * (first.min(axis=0) + first.max(axis=0))
+    return np.asarray(middle.astype(mesh.vertices.dtype), np.float64)
 
 
 def _counted(
@@ -212,8 +229,11 @@ def _visible(
     points: NDArray[np.float64],
     place: NDArray[np.float64],
     middle: NDArray[np.float64],
+    around: list[Surface],
 ) -> NDArray[np.bool_]:
     """Exact visibility of every vertex, decided in double precision on single coordinates.
+
+    Things and other bodies ``around`` it are taken as if they were more of the body.
 
     They are taken around the clip's own middle, as everywhere, or around the frame's
     where single precision would spoil the shape so far out.
@@ -226,9 +246,9 @@ def _visible(
         origin = 0.5 * (low + high)
     count = points.shape[1]
     faces = np.array(mesh.faces, np.int32)
-    if (around := mesh.surroundings) is not None:  # as if it were more of the body
-        points = np.concatenate([points, around.vertices_m.T], axis=1)
-        faces = np.concatenate([faces, around.faces + np.int32(count)])
+    for vertices_m, more in around:
+        faces = np.concatenate([faces, more + np.int32(points.shape[1])])
+        points = np.concatenate([points, vertices_m.T], axis=1)
     single = (points - origin[:, None]).astype(np.float32)
     needed = np.zeros((1, points.shape[1]), np.uint8)
     needed[0, :count] = 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -27,7 +27,7 @@ from sd2core.numerics.byte_budget import ByteBudget
 from sd2core.numerics.compiled import compile_in_background, kernels_ready
 from sd2core.numerics.parallel import Ticket, run_jobs, run_light_jobs
 from sd2core.numerics.precision import SHARE_OF_A_BIN, stored_velocity_error_mps
-from sd2core.progress import Progress, silent
+from sd2core.progress import Progress, part_of, silent
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
 from sd2core.scattering.velocity import radial_velocity
 from sd2core.sensor import VirtualSensor
@@ -65,10 +65,8 @@ class FrameScattering:
     quality: Quality  # visibility that was used
 
 
-def _map_notes(
-    prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: int, quality: Quality
-) -> list[str]:
-    """Sentences about frames without a person, things not looked at, and single precision.
+def _body_notes(prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: int) -> list[str]:
+    """Sentences about frames without a person, and about limits of single precision.
 
     There are none in ordinary scenes.
     """
@@ -79,8 +77,6 @@ def _map_notes(
             runs(~measured), mesh.times_s[start:stop], mesh.timebase.frame_duration_s
         )
         notes.append(f"Without a person: {share}. Those columns are empty.")
-    if mesh.surroundings is not None and quality in ("none", "facing"):
-        notes.append(f"Things in the scene hide nothing in visibility {quality}.")
     if np.dtype(mesh.vertices.dtype) == np.float32:
         duration_s = 2.0 * mesh.timebase.frame_duration_s / options.oversampling
         error_mps = stored_velocity_error_mps(prepared.reach_m, duration_s)
@@ -112,7 +108,10 @@ _A_SENSOR = "Make one with sd2.VirtualSensor(position_m=(0.0, 0.0, 0.0))"
 
 
 class Synthesizer:
-    """Doppler maps of one mesh for any sensor position.
+    """Doppler maps of one mesh, or of a scene of several, for any sensor position.
+
+    A scene's map is the sum over its bodies of each one's own share: somebody whom nobody hides
+    has the same part in it as alone.
 
     Data that do not depend on the sensor are prepared once, in blocks of frames that
     are kept under a byte budget; a long recording is streamed. Calls may come
@@ -172,11 +171,31 @@ class Synthesizer:
         self.mesh = mesh
         self.options = options
         self._threads = threads
-        shared = blocks_of.prepared.shared(mesh, options) if blocks_of is not None else None
-        if shared is None:
-            shared = PreparedMesh(mesh, options, ByteBudget(memory_budget_bytes), block_frames)
-        self.prepared: PreparedMesh = shared
-        self._frames = FrameCounts(shared)
+        share_bytes = memory_budget_bytes // len(mesh.bodies)
+        like = () if blocks_of is None else blocks_of._bodies
+        found = (one.prepared.shared(mesh, options) for one in like)
+        self.prepared: PreparedMesh = next(
+            (one for one in found if one is not None), None
+        ) or PreparedMesh(mesh, options, ByteBudget(share_bytes), block_frames)
+        self._frames = FrameCounts(self.prepared)
+        # One for each body of the scene, this one first; each counts its own.
+        self._bodies: tuple[Synthesizer, ...] = (
+            self,
+            *(
+                Synthesizer(
+                    replace(body, surroundings=mesh.surroundings),
+                    options,
+                    memory_budget_bytes=share_bytes,
+                    threads=threads,
+                    block_frames=block_frames,
+                    blocks_of=blocks_of,
+                )
+                for body in mesh.others
+            ),
+        )
+        every = [one.prepared for one in self._bodies] if mesh.others else []
+        for one in self._bodies if mesh.others else ():
+            one._frames.masks.others = tuple(other for other in every if other is not one.prepared)
 
     @property
     def unit(self) -> str:
@@ -206,6 +225,8 @@ class Synthesizer:
         Of ``frames``, half-open, or as much of the clip as the budget holds.
         """
         prepared, occluded = self.prepared, self.options.visibility in ("depth", "exact")
+        for one in self._bodies[1:]:
+            one.prepare(progress, frames)
         if frames is None:
             of_block = prepared.block_frames * self.mesh.vertex_count * self._bytes_per_vertex
             fitting = max(1, prepared.budget.limit_bytes // of_block)
@@ -250,7 +271,8 @@ class Synthesizer:
             version, how vertices were counted (``count``), the quality of the
             visibility, how many frames share a mask,
             per frame ``visible_share`` and ``beyond_share``, in ``things`` what
-            stood around, if anything did, and in ``notes`` where single precision
+            stood around, and in ``bodies`` who was in a scene of several, if anything or
+            anybody was, and in ``notes`` where single precision
             limits what the map says and how much of it is empty. ``present`` is
             False in frames without a person, and in one that stands alone: what
             moves how fast is not known there.
@@ -274,12 +296,14 @@ class Synthesizer:
         Parameters
         ----------
         parts : VertexParts
-            Parts of the body by vertex, as :func:`sd2core.body.parts.body_parts` finds them.
+            Parts of the body by vertex, as :func:`sd2core.body.parts.body_parts` finds them, for
+            each of the bodies.
 
         Returns
         -------
         DopplerMap
-            With ``limbs``.
+            With ``limbs``; in a scene of several bodies with the persons' names in front, and
+            kinematics of the first.
 
         Raises
         ------
@@ -296,10 +320,12 @@ class Synthesizer:
         >>> maps.limbs.values.shape
         (9, 32, 6)
         """
-        if len(parts.numbers) != self.mesh.vertex_count:
+        given = [len(one.numbers) for one in (parts, *parts.others)]
+        has = [body.vertex_count for body in self.mesh.bodies]
+        if given != has:
             raise Sd2Error(
-                f"The parts of the body are of {len(parts.numbers)} vertices",
-                f"{self.mesh.vertex_count}, as {self.mesh.source or 'the mesh'} has",
+                f"The parts of the body are of {' and '.join(map(str, given))} vertices",
+                f"{' and '.join(map(str, has))}, as {self.mesh.source or 'the mesh'} has",
             )
         return self._map(sensor, parts, visibility, frames, progress)
 
@@ -318,7 +344,9 @@ class Synthesizer:
         assert stretch.beyond_share is not None
         options = self.options
         unshared = stretch.quality in ("none", "facing")
-        around = self.mesh.surroundings
+        around, several = self.mesh.surroundings, len(self._bodies) > 1
+        spreads = any(one.prepared.spreads for one in self._bodies)
+        measured = [body.presence.measured[start:stop] for body in self.mesh.bodies]
         return DopplerMap(
             values=stretch.values,
             axis=options.axis,
@@ -329,19 +357,40 @@ class Synthesizer:
             meta={
                 "sensor": sensor.as_dict(),
                 "options": asdict(options),
-                "count": "expected" if self.prepared.spreads else "plain",
+                "count": "expected" if spreads else "plain",
                 "visibility": stretch.quality,
                 "mask_stride": 1 if unshared else options.mask_stride,
                 "source": self.mesh.source,
                 "version": __version__,
                 "visible_share": _rounded(stretch.visible_share),
                 "beyond_share": _rounded(stretch.beyond_share),
-                "notes": _map_notes(self.prepared, sensor, start, stop, stretch.quality),
+                "notes": self._notes(sensor, start, stop, stretch.quality),
                 **({} if around is None else {"things": around.as_list()}),
+                **({"bodies": self._described()} if several else {}),
             },
-            present=self.mesh.presence.measured[start:stop],
+            present=np.logical_or.reduce(measured),
             limbs=stretch.limbs,
         )
+
+    def _notes(self, sensor: VirtualSensor, start: int, stop: int, quality: Quality) -> list[str]:
+        """Notes on what hides nothing, and on each of the bodies."""
+        notes = []
+        if quality in ("none", "facing"):
+            if self.mesh.surroundings is not None:
+                notes.append(f"Things in the scene hide nothing in visibility {quality}.")
+            if self.mesh.others:
+                notes.append(f"Nobody hides anybody else in visibility {quality}.")
+        for person, one in zip(self.mesh.persons, self._bodies, strict=True):
+            of = f"{person}: " if self.mesh.others else ""
+            notes += [of + note for note in _body_notes(one.prepared, sensor, start, stop)]
+        return notes
+
+    def _described(self) -> list[dict[str, str]]:
+        """Persons of the scene and the origins of their meshes, for provenance."""
+        return [
+            {"person": person, "source": body.source}
+            for person, body in zip(self.mesh.persons, self.mesh.bodies, strict=True)
+        ]
 
     def stretch(
         self,
@@ -377,6 +426,45 @@ class Synthesizer:
         """
         if not 0 <= start < stop <= self.mesh.frame_count:
             raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
+        by_body = (None,) * len(self._bodies) if parts is None else (parts, *parts.others)
+        of, each = len(self._bodies), []
+        for number, (one, its) in enumerate(zip(self._bodies, by_body, strict=True)):
+            counting = progress if of == 1 else part_of(progress, number, number + 1, of)
+            each.append(one._own_stretch(sensor, start, stop, visibility, counting, its, shares))
+        return each[0] if of == 1 else self._joined(each)
+
+    def _joined(self, each: list[Stretch]) -> Stretch:
+        """Sum of the stretches of all bodies."""
+        members = np.array([[body.represented_count] for body in self.mesh.bodies], np.float64)
+        visible = beyond = None
+        if each[0].visible_share is not None:
+            seen = members * [one.visible_share for one in each]
+            visible = (seen.sum(axis=0) / members.sum()).astype(np.float32)
+            outside = (seen * [one.beyond_share for one in each]).sum(axis=0)
+            beyond = (outside / np.maximum(seen.sum(axis=0), 1)).astype(np.float32)
+        limbs = [one.limbs for one in each if one.limbs is not None]
+        qualities = {one.quality for one in each}
+        return Stretch(
+            np.asarray(np.sum([one.values for one in each], axis=0), np.float32),
+            np.sum([one.raw for one in each], axis=0),
+            visible,
+            beyond,
+            "facing" if "facing" in qualities else each[0].quality,
+            LimbMaps.of_persons(limbs, self.mesh.persons) if limbs else None,
+            sum(one.processor_s for one in each),
+        )
+
+    def _own_stretch(
+        self,
+        sensor: VirtualSensor,
+        start: int,
+        stop: int,
+        visibility: Visibility | None,
+        progress: Progress,
+        parts: VertexParts | None,
+        shares: bool,
+    ) -> Stretch:
+        """Stretch of this body alone, among the others."""
         options, times_s = self.options, self.mesh.times_s
         first, last = frames_within_reach(times_s, start, stop, options.time_sigma_s)
         counts, totals, quality, processor_s = self._count(
@@ -412,7 +500,7 @@ class Synthesizer:
     def frame(
         self, sensor: VirtualSensor, index: int, visibility: Visibility | None = None
     ) -> FrameScattering:
-        """Velocity, range and visibility of every vertex of one frame.
+        """Velocity, range and visibility of every vertex of the first body in one frame.
 
         Without a person nothing moves and nothing is seen.
         """
@@ -456,6 +544,8 @@ class Synthesizer:
     ) -> CellUncertainty:
         """Uncertainty of the cells of :meth:`map` that follows from that of the mesh's velocities.
 
+        In a scene of several, a body whose velocities nothing is said of is taken to be known.
+
         Model and limits are those of :mod:`sd2core.doppler.cell_uncertainty`.
 
         Parameters
@@ -473,8 +563,22 @@ class Synthesizer:
         start, stop = frames or (0, self.mesh.frame_count)
         if not 0 <= start < stop <= self.mesh.frame_count:
             raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
-        chosen = self._choose(visibility)
-        return cell_uncertainty(self._frames, sensor, start, stop, chosen, progress, self._threads)
+        chosen, of = self._choose(visibility), len(self._bodies)
+        known = any(body.uncertainty is not None for body in self.mesh.bodies)
+        each = []
+        for number, one in enumerate(self._bodies):
+            counting = progress if of == 1 else part_of(progress, number, number + 1, of)
+            if known and one.mesh.uncertainty is None:  # what is not said is taken to be right
+                values = one._own_stretch(sensor, start, stop, chosen, counting, None, False).values
+                each.append(CellUncertainty(values, np.zeros_like(values)))
+                continue
+            frames_of, threads = one._frames, self._threads
+            each.append(cell_uncertainty(frames_of, sensor, start, stop, chosen, counting, threads))
+        if of == 1:
+            return each[0]
+        # People move independently of each other.
+        variance = np.sum([np.square(one.sd, dtype=np.float64) for one in each], axis=0)
+        return CellUncertainty(np.sum([one.expected for one in each], axis=0), np.sqrt(variance))
 
     def _choose(self, visibility: Visibility | None) -> Visibility:
         chosen: Visibility = self.options.visibility if visibility is None else visibility

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence, refuse_missing
 from sd2core.radar_config import RadarConfig
-from sd2core.scattering.facets import facets_before_things, visible_facets
+from sd2core.scattering.facets import facets_before, visible_facets
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
@@ -104,7 +104,7 @@ class MeshScene:
             seen = visible_facets(self._frame(frame), self._faces, place)
         if around is None:
             return seen
-        return seen & facets_before_things(self._frame(frame), self._faces, place, around)
+        return seen & facets_before(self._frame(frame), self._faces, place, around.surface)
 
     def between(self, times_s: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.float64], ...]]:
         """Interpolate vertices and velocity at some times, on a smooth path through the frames.

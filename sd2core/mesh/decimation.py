@@ -81,10 +81,11 @@ def decimate(mesh: MeshSequence, kept: float, *, frame: int | None = None) -> Me
     frame = mesh.frame_count // 2 if frame is None else frame
     points = mesh.frame(frame).astype(np.float64)
     refuse_missing(points[None], frame, mesh.source)
+    others = tuple(decimate(body, kept, frame=frame) for body in mesh.others)
     simplified = _simplify(points, mesh.faces, kept)
     if simplified is None:
         note = "not decimated: fewer than four faces would be left"
-        return replace(mesh, notes=(*mesh.notes, note))
+        return replace(mesh, others=others, notes=(*mesh.notes, note))
     columns, group, faces = simplified
     counts = np.bincount(group, mesh.vertex_counts, len(columns)).astype(np.int64)
     done = f"decimated to {len(columns)} of {mesh.vertex_count} vertices"
@@ -96,6 +97,7 @@ def decimate(mesh: MeshSequence, kept: float, *, frame: int | None = None) -> Me
         uncertainty=None if mesh.uncertainty is None else mesh.uncertainty.of_vertices(columns),
         source=f"{mesh.source}, {done}" if mesh.source else done,
         notes=(*mesh.notes, done),
+        others=others,
     )
 
 

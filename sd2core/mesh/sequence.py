@@ -60,6 +60,11 @@ class MeshSequence:
         What the reader found unlikely; in words it is among the notes.
     surroundings : Surroundings, optional
         Things that stand still around it; see :func:`sd2core.io.things.with_things`.
+    others : tuple of MeshSequence
+        Other bodies in the same scene, at the same times, with faces; see
+        :func:`sd2core.io.bodies.with_bodies`.
+    person : str
+        Name of the person in a scene of several.
 
     Examples
     --------
@@ -87,6 +92,8 @@ class MeshSequence:
     uncertainty: VelocityUncertainty | None = None
     findings: tuple[Finding, ...] = ()
     surroundings: Surroundings | None = None
+    others: tuple[MeshSequence, ...] = ()
+    person: str = ""
 
     def __post_init__(self) -> None:
         shape = tuple(self.vertices.shape)
@@ -123,6 +130,14 @@ class MeshSequence:
                 )
         if self.faces is not None and not np.size(self.faces):
             object.__setattr__(self, "faces", None)
+        for body in self.bodies if self.others else ():
+            if body.faces is None or not np.array_equal(body.times_s, self.times_s):
+                raise Sd2Error(
+                    f"{body.source or 'A body'} of a scene of {len(self.bodies)} has"
+                    + (" no faces" if body.faces is None else " frames at other times"),
+                    "surfaces in frames at the same times",
+                    "Put them together with sd2core.io.bodies.with_bodies",
+                )
         if self.faces is None:
             return
         faces = np.ascontiguousarray(self.faces, dtype=np.int32)
@@ -176,6 +191,20 @@ class MeshSequence:
         """Frames with a person."""
         return Presence.of(self.present, self.frame_count)
 
+    @property
+    def bodies(self) -> tuple[MeshSequence, ...]:
+        """Bodies of the scene, this one first."""
+        return self, *self.others
+
+    @property
+    def persons(self) -> tuple[str, ...]:
+        """Name of each of the bodies: its own, or ``person 2`` by its number; each once."""
+        names: list[str] = []
+        for number, body in enumerate(self.bodies, 1):
+            name = body.person.strip() or f"person {number}"
+            names.append(f"{name} ({number})" if name in names else name)
+        return tuple(names)
+
     def read(self, start: int, stop: int) -> NDArray[Any]:
         """Vertices of frames ``start`` to ``stop`` (exclusive) in memory, (n, V, 3)."""
         if not 0 <= start < stop <= self.frame_count:
@@ -191,6 +220,7 @@ class MeshSequence:
             timebase=Timebase(self.times_s[start:stop]),
             present=None if self.present is None else self.present[start:stop],
             uncertainty=None if known is None else known.of_frames(slice(start, stop)),
+            others=tuple(body.between(start, stop) for body in self.others),
         )
 
     def frame(self, index: int) -> NDArray[Any]:

@@ -160,11 +160,14 @@ class Thing:
                 vertices = vertices * np.divide(
                     self.size_m, extent_m, out=np.ones(3), where=extent_m > 0
                 )
-        turn = math.radians(self.turn_deg)
-        cos, sin = math.cos(turn), math.sin(turn)
-        x, y, z = vertices.T
-        turned = np.stack([cos * x + sin * z, y, cos * z - sin * x], axis=1)
-        return turned + self.position_m, faces
+        return vertices @ turn_matrix(self.turn_deg).T + self.position_m, faces
+
+
+def turn_matrix(turn_deg: float) -> NDArray[np.float64]:
+    """Matrix (3, 3) of a turn about the vertical, seen from above clockwise."""
+    turn = math.radians(turn_deg)
+    cos, sin = math.cos(turn), math.sin(turn)
+    return np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,6 +188,11 @@ class Surroundings:
         joined = np.ascontiguousarray(np.concatenate(faces), np.int32)
         vertices_m = np.concatenate([vertices for vertices, _ in surfaces])
         return cls(things, tuple(surfaces), vertices_m, joined)
+
+    @property
+    def surface(self) -> Surface:
+        """Surface of all things."""
+        return self.vertices_m, self.faces
 
     @cached_property
     def digest(self) -> str:

@@ -27,6 +27,7 @@ class VelocityUncertainty:
     vertex_limb: NDArray[np.uint8]  # Limb that each vertex follows, (V,).
     along_mps: NDArray[np.float32]  # Along the line from the camera to the limb, (T, L).
     across_mps: NDArray[np.float32]  # In any direction at right angles to that line, (T, L).
+    camera_m: tuple[float, float, float] = (0.0, 0.0, 0.0)  # Of a body that was moved, its own.
 
     def __post_init__(self) -> None:
         limbs = tuple(str(name) for name in self.limbs)
@@ -84,7 +85,9 @@ class VelocityUncertainty:
         frames from ``start`` on, are in the camera frame.
         """
         place = np.asarray(limbs_m, np.float64)
-        to_camera, to_sensor = -place, np.asarray(sensor_m, np.float64) - place
+        to_camera, to_sensor = (
+            np.asarray(at, np.float64) - place for at in (self.camera_m, sensor_m)
+        )
         lengths = np.linalg.norm(to_camera, axis=2) * np.linalg.norm(to_sensor, axis=2)
         # On camera or sensor there is no line; the worse of the two is then taken.
         product = (to_camera * to_sensor).sum(axis=2)

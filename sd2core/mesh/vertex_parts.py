@@ -34,6 +34,9 @@ JOINTS: tuple[str, ...] = (
 )
 """Joints and ends in the order of kinematics; L and R are the person's own sides."""
 
+WHOLE = "body"
+"""The one part of somebody whose parts are not known."""
+
 KINEMATICS = "kinematics"
 """Input that a denoiser may take: how joints move, and how much is seen of each part."""
 
@@ -75,6 +78,7 @@ class VertexParts:
 
     names: tuple[str, ...]
     numbers: NDArray[np.uint8]  # (V,), into names
+    others: tuple[VertexParts, ...] = ()  # of the other bodies of a scene
 
     def __post_init__(self) -> None:
         numbers = np.ascontiguousarray(self.numbers, np.uint8)

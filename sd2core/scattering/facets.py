@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sd2core.mesh.things import Surroundings
+from sd2core.mesh.things import Surface
 from sd2core.scattering.behind_things import hide_behind
 from sd2core.scattering.exact import exact_visibility_kernel
 
@@ -32,17 +32,20 @@ def visible_facets(
     return seen[0, len(vertices) :].astype(bool)
 
 
-def facets_before_things(
+def facets_before(
     vertices_m: NDArray[np.floating],
     faces: NDArray[np.int32],
     sensor_m: ArrayLike,
-    surroundings: Surroundings,
+    hiding: Surface,
 ) -> NDArray[np.bool_]:
-    """Facets (F,) of one frame whose centre no thing hides, whatever the body itself hides."""
+    """Facets (F,) of one frame whose centre another surface does not hide, whatever its own does.
+
+    ``hiding`` are the other one's vertices (W, 3) and faces.
+    """
     centres = np.asarray(vertices_m, np.float64)[faces].mean(axis=1)
     origin = np.rint(centres[0])
     seen = np.ones(len(faces), np.uint8)
     hide_behind(
-        surroundings, (centres - origin).T, origin, np.asarray(sensor_m, np.float64) - origin, seen
+        *hiding, (centres - origin).T, origin, np.asarray(sensor_m, np.float64) - origin, seen
     )
     return seen > 0

@@ -17,7 +17,6 @@ from sd2core.compare.measures import (
     correlation,
     line_of_sight_velocity,
     map_l1,
-    resample_mesh,
     rms,
     synthesize_alike,
 )
@@ -27,6 +26,7 @@ from sd2core.errors import Sd2Error
 from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
+from sd2core.scattering.resampling import resample_mesh
 from sd2core.sensor import VirtualSensor
 from tools.fitting.measures import EDGE_FRAMES, medium_in_high, peak_kept, speed_mps
 from tools.fitting.real_score import reprojection

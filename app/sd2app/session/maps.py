@@ -82,12 +82,11 @@ class MapModel(QObject):
 
     @property
     def values(self) -> NDArray[np.float32]:
-        """Values on screen, (bins, frames): the map's, or those of one part of the body."""
+        """Values on screen, (bins, frames): the map's, or of one part of the body or person."""
         assert self.map is not None
         limbs = self.map.limbs
-        if limbs is None or self.part not in limbs.parts:
-            return self.map.values
-        return limbs.values[limbs.parts.index(self.part)]
+        shown = None if limbs is None or not self.part else limbs.shown(self.part)
+        return self.map.values if shown is None else shown
 
     @property
     def known(self) -> NDArray[np.bool_]:

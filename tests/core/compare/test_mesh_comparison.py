@@ -11,11 +11,12 @@ from sd2core.body.model import Body
 from sd2core.body.rotations import about
 from sd2core.compare.figure import draw_comparison
 from sd2core.compare.joints import JOINTS, rows_of
-from sd2core.compare.measures import common_times, map_l1, resample_mesh
+from sd2core.compare.measures import common_times, map_l1
 from sd2core.compare.meshes import compare_meshes
 from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import save_figure
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.scattering.resampling import resample_mesh
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 from tools.build_sample.posing import posed

@@ -1,0 +1,144 @@
+"""Several moving bodies in one scene, on one clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.errors import Sd2Error
+from sd2core.io.mesh import load_mesh
+from sd2core.mesh.bodies import MAX_BODIES, Body
+from sd2core.mesh.made_vertices import MadeVertices
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.things import turn_matrix
+from sd2core.scattering.resampling import resample_mesh
+
+
+def load_scene(
+    path: Path | str, *, bodies: Iterable[Body] = (), called: str = "", **reading: Any
+) -> MeshSequence:
+    """Read a mesh, and the bodies that move beside it.
+
+    Parameters
+    ----------
+    path : path
+        Of the mesh.
+    bodies : iterable of Body
+        As for :func:`with_bodies`.
+    called : str
+        Name of the person whom the mesh is of.
+    **reading
+        Arguments of :func:`sd2core.load_mesh`.
+    """
+    return with_bodies(load_mesh(path, **reading), bodies, person=called)
+
+
+def with_bodies(
+    mesh: MeshSequence, bodies: Iterable[Body], *, person: str | None = None
+) -> MeshSequence:
+    """Put other bodies into the scene of a mesh, in place of those that were there.
+
+    They are brought to the times of the mesh: a file of the same times is taken as it is, another
+    is interpolated, and nobody is there before its first frame and after its last one. Maps are
+    sums over all bodies; each hides what is behind it.
+
+    Parameters
+    ----------
+    mesh : MeshSequence
+        The first body, with faces.
+    bodies : iterable of Body
+    person : str, optional
+        Name of the first one; by default as it was.
+
+    Raises
+    ------
+    Sd2Error
+        For a file that is no surface, or too many bodies.
+
+    Examples
+    --------
+    Somebody who does the same 1 m behind and half a second later:
+
+    >>> import sd2core as sd2
+    >>> from sd2core.files.resources import resource_path
+    >>> path = resource_path("swipes.sd2") / "mesh.zarr"
+    >>> behind = sd2.Body(str(path), moved_m=(0.8, 0, 1), start_s=0.5, person="anna")
+    >>> scene = sd2.with_bodies(sd2.load_mesh(path).between(30, 60), [behind])
+    >>> scene.persons, scene.others[0].frame_count
+    (('person 1', 'anna'), 30)
+    """
+    named = tuple(bodies)
+    first = replace(mesh, others=(), person=mesh.person if person is None else person)
+    if not named:
+        return first
+    if len(named) > MAX_BODIES:
+        raise Sd2Error(f"There are {len(named)} more bodies", f"up to {MAX_BODIES}")
+    if mesh.faces is None:
+        raise _no_surface(mesh.source or "The mesh")
+    return replace(first, others=tuple(_placed(body, mesh) for body in named))
+
+
+def _placed(body: Body, first: MeshSequence) -> MeshSequence:
+    """Body of a file, in its place and at the times of the first."""
+    path = Path(body.path)
+    try:
+        own = load_mesh(path, **body.reading)
+    except Sd2Error as error:
+        if path.exists():
+            raise
+        raise Sd2Error(
+            f"The mesh {path} of a body is not there",
+            "the file where the recording or the command says",
+            "Move it back, find it with `sd2 relink RECORDING FOLDER`, or say anew who is there:"
+            " `sd2 set RECORDING --body`",
+        ) from error
+    if own.faces is None:
+        raise _no_surface(str(path))
+    if body.start_s:
+        own = replace(own, timebase=own.timebase.shifted(body.start_s))
+    on_clock, _ = resample_mesh(own, first.times_s)
+    if on_clock.present is not None and not on_clock.present.any():
+        spans = [f"{one.times_s[0]:.2f} to {one.times_s[-1]:.2f} s" for one in (own, first)]
+        raise Sd2Error(
+            f"{body.name} is never there: its frames are from {spans[0]}",
+            f"some within those of the first body, {spans[1]}",
+            "Shift it in time",
+        )
+    return replace(moved(on_clock, own, body), person=body.person, surroundings=None)
+
+
+def moved(mesh: MeshSequence, own: MeshSequence, body: Body) -> MeshSequence:
+    """Mesh where a body is put; ``own`` is as its file has it, whose first frame it turns about."""
+    if not any(body.moved_m) and not body.turn_deg:
+        return mesh
+    turn = turn_matrix(body.turn_deg)
+    points = own.frame(int(np.argmax(own.presence.there))).astype(np.float64)
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    by_m = middle + body.moved_m - turn @ middle
+    x, y, z = by_m.tolist()
+
+    def made(rows: NDArray[np.intp]) -> NDArray[Any]:
+        low, high = int(rows.min()), int(rows.max()) + 1
+        placed: NDArray[Any] = mesh.read(low, high)[rows - low].astype(np.float64) @ turn.T + by_m
+        return placed
+
+    known = mesh.uncertainty
+    return replace(
+        mesh,
+        vertices=MadeVertices((mesh.frame_count, mesh.vertex_count, 3), mesh.vertices.dtype, made),
+        # What is known badly is so along the line from where the camera was.
+        uncertainty=None if known is None else replace(known, camera_m=(x, y, z)),
+    )
+
+
+def _no_surface(what: str) -> Sd2Error:
+    return Sd2Error(
+        f"{what} has no faces, it is a point cloud",
+        "surfaces: in a scene of several bodies one hides another",
+        "Give the faces (--faces)",
+    )

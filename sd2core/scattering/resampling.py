@@ -1,0 +1,70 @@
+"""A mesh at times of another clock."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.mesh.made_vertices import MadeVertices
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.scattering.trajectory import cubic_weights
+from sd2core.timebase import Timebase
+
+SAME_S = 1e-4
+"""Frames nearer than this are the same frame: file formats round times."""
+
+
+def resample_mesh(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[MeshSequence, bool]:
+    """A mesh at other times, read as they are asked for, and whether anything is interpolated.
+
+    Interpolation is by the cubic through two frames with the tangents of their neighbours.
+    The vertices of frames without a person, or beyond the mesh's own, mean nothing, nor do those
+    interpolated next to them; the mesh that is returned says which these are.
+    """
+    own, presence = mesh.times_s, mesh.presence
+    right = np.searchsorted(own, times_s).clip(1, max(len(own) - 1, 1))
+    left, right = right - 1, right.clip(max=len(own) - 1)
+    nearest = np.where(times_s - own[left] <= own[right] - times_s, left, right)
+    within = (times_s >= own[0] - SAME_S) & (times_s <= own[-1] + SAME_S)
+    interpolated = bool((np.abs(own[nearest] - times_s)[within] > SAME_S).any())
+    frames = np.searchsorted(own, times_s, side="right").clip(1, max(len(own) - 1, 1)) - 1
+    following = (frames + 1).clip(max=len(own) - 1)
+    # Between two frames there is a person where both of them have one.
+    there = presence.there[frames] & presence.there[following] & within
+
+    def picked(rows: NDArray[np.intp]) -> NDArray[Any]:
+        low, high = int(nearest[rows].min()), int(nearest[rows].max()) + 1
+        return mesh.read(low, high)[nearest[rows] - low]
+
+    def made(rows: NDArray[np.intp]) -> NDArray[Any]:
+        ends = frames[rows]
+        low = int(max(presence.first[ends].min(), ends.min() - 1))
+        high = int(min(presence.last[ends].max(), ends.max() + 2)) + 1
+        block = mesh.read(low, high).astype(np.float64)
+        found = np.empty((len(rows), mesh.vertex_count, 3))
+        for at, (time_s, frame) in enumerate(
+            zip(times_s[rows].tolist(), ends.tolist(), strict=True)
+        ):
+            # Only frames of the same stretch: past its end a person is somewhere else.
+            begin, end = int(presence.first[frame]), int(presence.last[frame]) + 1
+            inside = min(max(time_s, float(own[begin])), float(own[end - 1]))
+            first, weights = cubic_weights(own[begin:end], inside, frame - begin)
+            first += begin - low
+            found[at] = np.tensordot(weights, block[first : first + len(weights)], 1)
+        return found
+
+    known = None if mesh.uncertainty is None else mesh.uncertainty.of_frames(nearest)
+    shape = len(times_s), mesh.vertex_count, 3
+    return replace(
+        mesh,
+        vertices=MadeVertices(shape, np.float64, made)
+        if interpolated
+        else MadeVertices(shape, mesh.vertices.dtype, picked),
+        timebase=Timebase(times_s),
+        present=there if interpolated else presence.there[nearest] & within,
+        uncertainty=known,
+        others=(),
+    ), interpolated
