@@ -316,19 +316,26 @@ class VisibilityMasks:
             for t, seen in enumerate(visible):
                 view.hide(t, *around.surface, seen)
         for other in self.others:
-            self._hide_behind_body(other, view, visible)
+            self._hide_behind_body(other, view, needed, visible)
 
     def _hide_behind_body(
-        self, other: PreparedMesh, view: _View, visible: NDArray[np.uint8]
+        self,
+        other: PreparedMesh,
+        view: _View,
+        needed: NDArray[np.uint8],
+        visible: NDArray[np.uint8],
     ) -> None:
-        """Set ``visible`` to 0 where another body hides a vertex."""
+        """Set ``visible`` of the needed vertices to 0 where another body hides them."""
         assert other.faces is not None  # MeshSequence refuses others without
-        start, count = view.first, len(view.points)
-        there = other.mesh.presence.there[start : start + count]
-        boxes_m = other.boxes(start, start + count)
-        near = there & may_hide(boxes_m, view.boxes_m, view.places_m + view.origins_m)
+        start, stop = view.first, view.first + len(view.points)
+        boxes_m = (one.boxes(start, stop) for one in (other, self._prepared))
+        near = may_hide(*boxes_m, view.places_m + view.origins_m)
+        asked = visible & needed
+        near &= other.mesh.presence.there[start:stop] & asked.any(axis=1)
         for t in np.flatnonzero(near).tolist():
-            view.hide(t, other.frame_m(start + t), other.faces, visible[t])
+            seen = asked[t].copy()
+            view.hide(t, other.frame_m(start + t), other.faces, seen)
+            visible[t][asked[t] > seen] = 0
 
     def _test_body(
         self,
@@ -369,12 +376,6 @@ class _View:
     places_m: NDArray[np.float64]
     origins_m: NDArray[np.float64]  # these points, in the camera frame, (n, 3)
     first: int  # number of the first frame in the clip
-
-    @property
-    def boxes_m(self) -> NDArray[np.float64]:
-        """Lowest and highest corner in the camera frame, (n, 2, 3)."""
-        ends = np.stack([self.points.min(axis=2), self.points.max(axis=2)], axis=1)
-        return ends + self.origins_m[:, None]
 
     def hide(
         self,

@@ -45,19 +45,20 @@ def hide_behind(
     seen : uint8 array, shape (V,)
         Written where it is 1; others are not tested.
     """
-    if not seen.any():
+    asked = np.flatnonzero(seen)
+    if not len(asked):
         return
-    count = points.shape[1]
-    both = np.concatenate([points, (vertices_m - origin_m).T], axis=1).astype(np.float32)
+    count = len(asked)
+    both = np.concatenate([points[:, asked], (vertices_m - origin_m).T], axis=1).astype(np.float32)
     faces = faces + np.int32(count)
     needed = np.zeros((1, both.shape[1]), np.uint8)
-    needed[0, :count] = seen
+    needed[0, :count] = 1
     if not kernels_ready():
-        seen[:] = exact_visibility(both, faces, sensor, needed[0] > 0)[:count]
+        seen[asked] = exact_visibility(both, faces, sensor, needed[0] > 0)[:count]
         return
     visible = np.zeros_like(needed)
     exact_visibility_kernel(both[None], faces, sensor, needed, 0, 1, visible)
-    seen[:] = visible[0, :count]
+    seen[asked] = visible[0, :count]
 
 
 def may_hide(
