@@ -40,8 +40,8 @@ def all_actions() -> tuple[Action, ...]:
 
 
 def menu_of(window: MainWindow, title: str) -> QMenu:
-    """Menu of a window by its title, whichever letter of it is underlined."""
-    menus = window.menuBar().findChildren(QMenu)
+    """Menu of a window or of a place in it by its title, whichever letter of it is underlined."""
+    menus = window.findChildren(QMenu)
     return next(one for one in menus if one.title().replace("&", "") == title.replace("&", ""))
 
 

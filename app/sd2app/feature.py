@@ -21,7 +21,7 @@ def always() -> bool:
 
 @dataclass(frozen=True)
 class Action:
-    """Command of the user in a menu, with its usual keys.
+    """Command of the user, with its usual keys; ``menu`` has others of its subject.
 
     ``checked`` makes it checkable and tells if it is on; ``why_not`` gives the reason why it is
     disabled, shown in place of the tip, or nothing. Its place in the menus is the shell's matter.
@@ -70,6 +70,9 @@ class Shell(Protocol):
 
     def action(self, name: str) -> QAction:
         """Action by its id, of any feature."""
+
+    def place_menu(self, place: str) -> QMenu:
+        """Menu of the actions that stand at a place of their own, such as spans."""
 
     def note(self, text: str) -> None:
         """Tell the user about something that was done."""

@@ -76,7 +76,7 @@ class Settings:
         return None if self._store.value("dark") is None else self.flag("dark", False)
 
     @dark.setter
-    def dark(self, dark: bool) -> None:
+    def dark(self, dark: bool | None) -> None:
         self._store.setValue("dark", dark)
 
     @property

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 
-from PySide6.QtGui import QAction, QActionGroup, QKeySequence
-from PySide6.QtWidgets import QInputDialog, QMenu, QWidget
+from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.feature import Action
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.loop import SpanLoop
-from sd2app.labels.marking import LONGEST_MS, OFFERED_MS, LabelMarking, Reaction
+from sd2app.labels.marking import LabelMarking
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.key_text import canonical, native
 from sd2core.labels.label_set import Label, LabelSet
@@ -84,48 +84,6 @@ def _tip(label: Label) -> str:
         "Begin a span with this frame, or end the one that has begun; with a span selected,"
         f" give it this label{keys}"
     )
-
-
-class ReactionMenu(QMenu):
-    """Choice of the reaction time."""
-
-    def __init__(self, reaction: Reaction, menu: QMenu, window: QWidget) -> None:
-        super().__init__("Reaction time", menu)
-        self.setToolTipsVisible(True)
-        self._reaction, self._window = reaction, window
-        self._group = QActionGroup(self)
-        self._offered: dict[int, QAction] = {}
-        for offered_ms in OFFERED_MS:
-            entry = self._offered[offered_ms] = self._entry(offered_ms)
-            entry.setText(f"{offered_ms} ms" if offered_ms else "None")
-            entry.setToolTip("Marks made while it plays begin and end earlier by so much")
-        self._other = self._entry(None)
-        self._follow()
-
-    def _entry(self, offered_ms: int | None) -> QAction:
-        entry = self.addAction("")
-        entry.setCheckable(True)
-        entry.triggered.connect(lambda _=False: self._choose(offered_ms))
-        self._group.addAction(entry)
-        return entry
-
-    def _ask_ms(self) -> int:
-        asked = "Marks made while it plays begin and end earlier by so many milliseconds."
-        before_ms = self._reaction.reaction_ms
-        chosen_ms, accepted = QInputDialog.getInt(
-            self._window, "Reaction time", asked, before_ms, 0, LONGEST_MS, 10
-        )
-        return chosen_ms if accepted else before_ms
-
-    def _choose(self, offered_ms: int | None) -> None:
-        self._reaction.set_reaction_ms(self._ask_ms() if offered_ms is None else offered_ms)
-        self._follow()
-
-    def _follow(self) -> None:
-        chosen_ms = self._reaction.reaction_ms
-        other = chosen_ms not in self._offered
-        self._other.setText(f"Other: {chosen_ms} ms…" if other else "Other…")
-        (self._other if other else self._offered[chosen_ms]).setChecked(True)
 
 
 def fill_place_menu(

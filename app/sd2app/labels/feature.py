@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, QPointF
 from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.feature import Action, Drop, Feature, Shell, report
-from sd2app.labels.actions import LabelActions, ReactionMenu, editing, fill_place_menu
+from sd2app.labels.actions import LabelActions, editing, fill_place_menu
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.cut_out import CutOutModel, ask_about_others, ask_for_cut_outs
 from sd2app.labels.dragging import LabelDragging, SpanDragger
@@ -145,36 +145,36 @@ class LabelsFeature(Feature):
         tracks = self.tracks
         return (
             Action(
-                "spans_up", "Tracks", "Put selected spans on the track above", ("Alt+Up",),
+                "spans_up", "Labels", "Put selected spans on the track above", ("Alt+Up",),
                 "At the times that they have", lambda: tracks.put_spans(-1), self._can_put,
             ),
             Action(
-                "spans_down", "Tracks", "Put selected spans on the track below", ("Alt+Down",),
+                "spans_down", "Labels", "Put selected spans on the track below", ("Alt+Down",),
                 "At the times that they have", lambda: tracks.put_spans(1), self._can_put,
             ),
             Action(
-                "add_track", "Tracks", "Add track…", (), "A row of spans below the others",
+                "add_track", "Labels", "Add track…", (), "A row of spans below the others",
                 tracks.ask_to_add, self._session.has_content,
             ),
             Action(
-                "rename_track", "Tracks", "Rename track…", (),
+                "rename_track", "Labels", "Rename track…", (),
                 "The one on which new spans come", tracks.rename, self._has_track,
             ),
             Action(
-                "overlap", "Tracks", "Spans of the track may overlap", (),
+                "overlap", "Labels", "Spans of the track may overlap", (),
                 "Several at once, drawn one below the other",
                 tracks.toggle_overlap, self._has_track, lambda: tracks.free,
             ),
             Action(
-                "track_up", "Tracks", "Move track up", (), "Above the one before it",
+                "track_up", "Labels", "Move track up", (), "Above the one before it",
                 lambda: tracks.move(-1), self._has_tracks,
             ),
             Action(
-                "track_down", "Tracks", "Move track down", (), "Below the one after it",
+                "track_down", "Labels", "Move track down", (), "Below the one after it",
                 lambda: tracks.move(1), self._has_tracks,
             ),
             Action(
-                "remove_track", "Tracks", "Remove track", (),
+                "remove_track", "Labels", "Remove track", (),
                 "With its spans; undo brings them back", tracks.remove, self._has_track,
             ),
         )  # fmt: skip
@@ -222,11 +222,11 @@ class LabelsFeature(Feature):
                 lambda: edits.step(-1), self._has_spans,
             ),
             Action(
-                "previous_track", "Tracks", "Previous track", ("Shift+Up",),
+                "previous_track", "Labels", "Previous track", ("Shift+Up",),
                 "New spans come on the track above", lambda: tracks.step(-1), self._has_tracks,
             ),
             Action(
-                "next_track", "Tracks", "Next track", ("Shift+Down",),
+                "next_track", "Labels", "Next track", ("Shift+Down",),
                 "New spans come on the track below", lambda: tracks.step(1), self._has_tracks,
             ),
             Action(
@@ -306,13 +306,10 @@ class LabelsFeature(Feature):
             self.model.select(())
 
     def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
-        """Labels with their keys, tracks, reaction times."""
+        """Labels with their keys, and tracks."""
         return {
             "label keys": self._fill_keys,
             "tracks": lambda menu: TrackMenu(menu, self.model),
-            "reaction": lambda menu: menu.addMenu(
-                ReactionMenu(self.reaction, menu, self._shell.dialog_parent)
-            ),
         }
 
     def _fill_keys(self, menu: QMenu) -> None:
@@ -340,8 +337,9 @@ class LabelsFeature(Feature):
         buttons = SpanButtons(self.model, decisions)
         timeline = LabelTimeline(s, self.edits, self.dragging, self.loop, buttons)
         self._offer_places(timeline)
-        exports = [shell.action(name) for name in ("export_labels", "cut_out")]
-        timeline.menu_parts = (*timeline.menu_parts, lambda menu, _: menu.addActions(exports))
+        more = [shell.place_menu(name).menuAction() for name in ("Spans", "Tracks")]
+        more += [shell.action(name) for name in ("export_labels", "cut_out")]
+        timeline.menu_parts = (*timeline.menu_parts, lambda menu, _: menu.addActions(more))
         area = LabelArea(timeline, self.model)
         return {"Labels": panel, "labels": pane(TargetLine(self.model), area)}
 

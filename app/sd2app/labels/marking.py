@@ -9,11 +9,10 @@ from sd2core.labels import edits
 from sd2core.labels.free_time import LONGEST_REACTION_S, seen_at
 
 LONGEST_MS = round(1000 * LONGEST_REACTION_S)
-OFFERED_MS = (0, 100, 150, 200, 250, 300, 400)
 _NAME = "reaction_ms"
 
 
-_NO_TRACK = "There is no track to mark on. Add one: Labels → Tracks → Add track…"
+_NO_TRACK = "There is no track to mark on. Add one: Labels → Add track…"
 
 
 class Reaction:

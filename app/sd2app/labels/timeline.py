@@ -288,7 +288,7 @@ class TargetLine(QLabel):
 
     def _follow(self) -> None:
         labels = self._labels
-        target = labels.track or "no track – add one with Labels → Tracks → Add track…"
+        target = labels.track or "no track – add one with Labels → Add track…"
         self.setText(f"Marking on: {target}")
         self.setVisible(len(labels.labels.tracks) > 1 or not labels.track)
 

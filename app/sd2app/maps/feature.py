@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 
 from PySide6.QtCore import QObject, QPointF
 from PySide6.QtGui import QAction, QGuiApplication
@@ -81,7 +81,11 @@ class MapsFeature(Feature):
 
     def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
         """The parts of the body to choose from."""
-        return {"limbs": lambda menu: menu.addMenu(LimbMenu(self.limbs, menu))}
+        return {"limbs": lambda menu: menu.addMenu(self._limb_menu)}
+
+    @cached_property
+    def _limb_menu(self) -> LimbMenu:
+        return LimbMenu(self.limbs, self._shell.dialog_parent)
 
     def _export(self) -> None:
         name = self._session.document.file_name("-synthetic.npz")
@@ -97,13 +101,18 @@ class MapsFeature(Feature):
         maps = self._session.maps
         for signal in (self._session.sensor.changed, maps.synthetic.changed, maps.real.changed):
             signal.connect(lambda: badge.follow() and stack.real.redraw())
-        exports = {stack.synthetic: "export_map", stack.denoised: "export_denoised"}
+        action = self._shell.action
+        models = [action(name) for name in ("texture", "compare_models", "export_denoised")]
+        limbs = [self._limb_menu.menuAction(), action("export_map")]
+        own = {stack.synthetic: limbs, stack.denoised: models}
         for view in stack.views:
-            export = self._shell.action(exports.get(view, "export_maps"))
-            view.menu_parts = (partial(self._fill_menu, view, export), *view.menu_parts)
+            actions = own.get(view, [action("export_maps")])
+            view.menu_parts = (partial(self._fill_menu, view, actions), *view.menu_parts)
         return stack
 
-    def _fill_menu(self, view: HeatmapView, export: QAction, menu: QMenu, place: QPointF) -> None:
+    def _fill_menu(
+        self, view: HeatmapView, own: Sequence[QAction], menu: QMenu, place: QPointF
+    ) -> None:
         """What can be done with a map, and with the cell at a place of it."""
         reading, span = view.reading_at(place), self._session.span
         copy = menu.addAction("Copy &value")
@@ -116,7 +125,7 @@ class MapsFeature(Feature):
             zero.triggered.connect(lambda: view.track.set_reference(reading.value))
         play = self._session.playback.play_stretch
         menu.addAction("Play what is in view in a &loop", lambda: play(span.start_s, span.end_s))
-        menu.addAction(export)
+        menu.addActions(own)
 
     def panels(self) -> Mapping[str, QWidget]:
         """The spectra of this frame over the levels of all maps."""

@@ -1,13 +1,22 @@
-"""Search of all that the menus offer: some words of it, and Return does it."""
+"""Search of all that the window offers: some words of it, and Return does it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeyEvent, QKeySequence, QPalette
-from PySide6.QtWidgets import QDialog, QHeaderView, QMenu, QMenuBar, QTreeWidget, QTreeWidgetItem
+from PySide6.QtWidgets import (
+    QDialog,
+    QHeaderView,
+    QMainWindow,
+    QMenu,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QWidget,
+)
 
 from sd2app.widgets.inputs import SearchLine
 from sd2app.widgets.layouts import column_of
@@ -19,7 +28,7 @@ _SIZE_PX = 640, 480
 
 @dataclass(frozen=True)
 class MenuEntry:
-    """Entry of a menu."""
+    """What can be done, and where else."""
 
     menus: tuple[str, ...]  # those that it stands in, the outermost first
     text: str
@@ -43,12 +52,15 @@ class MenuEntry:
         return rank
 
 
-def entries_of(bar: QMenuBar) -> list[MenuEntry]:
-    """Entries of all menus, in their order, as they stand now."""
-    return list(_entries(bar, ()))
+def entries_of(window: QMainWindow) -> list[MenuEntry]:
+    """Entries of the menu bar, and of menus of the window besides, each once, as they are now."""
+    entries: dict[QAction, MenuEntry] = {}
+    for one in chain(_entries(window.menuBar(), ()), _entries(window, ())):
+        entries.setdefault(one.action, one)
+    return list(entries.values())
 
 
-def _entries(menu: QMenuBar | QMenu, menus: tuple[str, ...]) -> Iterator[MenuEntry]:
+def _entries(menu: QWidget, menus: tuple[str, ...]) -> Iterator[MenuEntry]:
     if isinstance(menu, QMenu):
         menu.aboutToShow.emit()  # what it lists may be others by now
     for entry in menu.actions():
@@ -76,15 +88,15 @@ def found(entries: Iterable[MenuEntry], text: str) -> list[MenuEntry]:
 class ActionSearch(QDialog):
     """A line to type in, and what is found; an entry that is disabled says why."""
 
-    def __init__(self, bar: QMenuBar) -> None:
-        super().__init__(bar.window())
+    def __init__(self, window: QMainWindow) -> None:
+        super().__init__(window)
         self.setWindowTitle("Find an action")
-        self._entries = entries_of(bar)
+        self._entries = entries_of(window)
         self.chosen: QAction | None = None
         self._line = SearchLine("What do you want to do?", self)
         self._list = QTreeWidget(self)
         self._list.setAccessibleName("Actions found")
-        self._list.setHeaderLabels(["Action", "Menu", "Keys"])
+        self._list.setHeaderLabels(["Action", "Where", "Keys"])
         self._list.setRootIsDecorated(False)
         self._list.setUniformRowHeights(True)
         self._list.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -127,7 +139,7 @@ class ActionSearch(QDialog):
 
     def _explain(self) -> None:
         if self.current is None:
-            self._about.setText("" if self._found else "Nothing in the menus has all these words.")
+            self._about.setText("" if self._found else "Nothing has all these words.")
             return
         role = "muted" if self.current.action.isEnabled() else "warning"
         say(self._about, self.current.tip, role)

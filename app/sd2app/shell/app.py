@@ -16,9 +16,9 @@ from PySide6.QtWidgets import QApplication
 
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
-from sd2app.shell.window import MainWindow, is_dark
+from sd2app.shell.window import MainWindow
 from sd2app.widgets.picture import write_picture
-from sd2app.widgets.theme import apply_theme
+from sd2app.widgets.theme import apply_theme, is_dark
 from sd2core.processes import keep_little_free_memory
 
 ICON = Path(__file__).with_name("sd2-studio.svg")
@@ -48,7 +48,7 @@ def run(
     application.setApplicationName("SD² Studio")
     application.setDesktopFileName("sd2-studio")
     settings = Settings() if screenshot is None else Settings.forgetful()
-    apply_theme(application, is_dark(settings))
+    apply_theme(application, is_dark(settings.dark))
     # A picture takes no lock on labels.
     aside = None if screenshot is None else TemporaryDirectory()
     recovery = None if aside is None else Path(aside.name)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from functools import partial
 
 from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QMainWindow, QMenu, QMenuBar
+from PySide6.QtWidgets import QMainWindow, QMenu, QWidget
 
 from sd2app.feature import Action
 from sd2app.session.session import Session
@@ -15,102 +15,102 @@ from sd2app.widgets.icons import transport_icon
 from sd2app.widgets.key_text import native
 
 _LINE = "-"
-_FILLED, _SUBMENU = "@", ">"
+_FILLED = "@"
 
 LAYOUT: Mapping[str, tuple[str, ...]] = {
     "File": (
         "new_from_video", "listen", "open", "@recent", "add", "read_mesh",
         "refine_mesh", "compare", "relink", "-", "save",
-        "save_as", "export_map", "export_denoised", "export_maps", "export_inertial",
-        "export_strip", "export_dataset", "-", "batch", "any_command", "-",
-        "recover_labels", "-", "quit",
+        "save_as", "export_map", "export_maps", "export_strip", "export_dataset", "-", "batch",
+        "any_command", "-", "recover_labels", "-", "quit",
     ),
     "Edit": (
-        "undo", "redo", "-", "sensor_to_camera", "aim_sensor", "placements", "things", "-",
-        "place_inertial", "-", "align",
+        "undo", "redo", "-", "placements", "things", "place_inertial", "align", "-",
+        "preferences",
     ),
     "View": (
-        "colour_velocity", "colour_range", "colour_visibility", "colour_plain", "dots", "overlay",
-        "overlay_dots", "draw_placements", "-", "view_three_quarter", "view_camera", "view_sensor",
-        "view_side", "view_top", "-", "zoom_in", "zoom_out", "zoom_fit", "reset_reference",
-        "uncertain", "@limbs", "-", "show_sensor", "show_trade", "show_train", "show_labels",
-        "show_agree", "side_panel", "measure", "-",
-        "messages", "dark",
+        "zoom_in", "zoom_out", "zoom_fit", "-", "reset_reference", "uncertain", "-",
+        "side_panel", "messages",
     ),
-    "Play": (
-        "play", "previous_frame", "next_frame", "back_second", "on_second", "first_frame",
-        "last_frame", "-", "slower", "faster", "loop",
-    ),
+    "Play": ("play", "back_second", "on_second", "loop"),
     "Labels": (
-        ">Mark", ">Edit spans", ">Go to spans", ">Tracks", ">Suggestions", ">Compare", "-",
-        "label_set", "import_labels", "export_labels", "cut_out", "-", "restore_labels",
-        "edit_labels_here",
-    ),
-    "Mark": ("@label keys", "-", "end_marks", "carve_marks", "@reaction", "leave"),
-    "Edit spans": (
-        "span_starts_here", "span_ends_here", "nudge_back", "nudge_on", "-", "split_span",
-        "merge_spans", "meet_spans", "duplicate_spans", "delete_spans", "fill_gaps",
-    ),
-    "Go to spans": (
-        "next_span", "previous_span", "loop_span", "-", "find_spans", "select_all",
-    ),
-    "Tracks": (
-        "@tracks", "-", "previous_track", "next_track", "spans_up", "spans_down", "-", "add_track",
-        "rename_track", "overlap", "track_up", "track_down", "remove_track",
-    ),
-    "Suggestions": (
-        "suggest", "find_gestures", "-", "accept_suggestion", "reject_suggestion",
-        "accept_suggestions", "reject_suggestions",
-    ),
-    "Compare": (
-        "compare_labels", "next_disagreement", "previous_disagreement", "end_comparison",
+        "suggest", "find_gestures", "-", "end_marks", "fill_gaps", "add_track", "-", "next_span",
+        "previous_span", "find_spans", "-", "label_set", "import_labels", "export_labels",
+        "cut_out", "compare_labels", "-", "restore_labels", "edit_labels_here",
     ),
     "Model": (
-        "@denoisers", "-", "open_model", "model_card", "-", "difference", "texture",
-        "compare_models", "live", "-", "@classifiers", "open_classifier", "classifier_card",
-        "show_classes", "train_classifier", "study",
+        "@denoisers", "difference", "live", "-", "@classifiers", "show_classes",
+        "train_classifier", "study",
     ),
     "Help": ("first_five_minutes", "manual", "find_action", "keys", "-", "sample", "-", "about"),
 }  # fmt: skip
-"""Order of the menus: ids of actions, ``-`` lines, ``@`` places that a feature fills, ``>`` menus
-within a menu."""
+"""Menus of the menu bar: ids of actions, ``-`` lines, ``@`` places that a feature fills."""
 
-_AROUND = {
-    entry[1:]: menu
-    for menu, entries in LAYOUT.items()
-    for entry in entries
-    if entry.startswith(_SUBMENU)
-}
-"""The menu that a menu stands in."""
+ELSEWHERE: Mapping[str, tuple[str, ...]] = {
+    "Scene": (
+        "colour_velocity", "colour_range", "colour_visibility", "colour_plain", "dots",
+        "draw_placements", "view_three_quarter", "view_camera", "view_sensor", "view_side",
+        "view_top",
+    ),
+    "Video": ("overlay", "overlay_dots"),
+    "Maps": ("@limbs", "export_denoised", "texture", "compare_models"),
+    "Models": ("open_model", "model_card", "open_classifier", "classifier_card"),
+    "Playing": (
+        "previous_frame", "next_frame", "first_frame", "last_frame", "slower", "faster",
+    ),
+    "Panels": (
+        "show_sensor", "show_trade", "show_train", "show_labels", "show_agree",
+        "sensor_to_camera", "aim_sensor", "measure", "export_inertial",
+    ),
+    "Mark": ("@label keys", "-", "carve_marks", "leave"),
+    "Spans": (
+        "span_starts_here", "span_ends_here", "nudge_back", "nudge_on", "-", "split_span",
+        "merge_spans", "meet_spans", "duplicate_spans", "delete_spans", "-", "loop_span",
+        "select_all", "spans_up", "spans_down",
+    ),
+    "Tracks": (
+        "@tracks", "-", "previous_track", "next_track", "-", "rename_track", "overlap",
+        "track_up", "track_down", "remove_track",
+    ),
+    "Suggestions": (
+        "accept_suggestion", "reject_suggestion", "accept_suggestions", "reject_suggestions",
+    ),
+    "Agreement": ("next_disagreement", "previous_disagreement", "end_comparison"),
+    "Preferences": ("dark",),
+}  # fmt: skip
+"""Likewise what is in no menu of the bar, because a button or a context menu has it: by its place.
+Its keys hold, and *Find an action* has it."""
 
 
 def in_order(actions: Iterable[Action]) -> tuple[Action, ...]:
-    """Actions in the order of the menus.
+    """Actions by their menus, in each as it stands there, and then those that stand elsewhere.
 
     Raises
     ------
     ValueError
-        Where an action stands in no menu or in another one than it says (its own or the one
-        around that), or a place of the menus has no action.
+        Where an action stands nowhere or in another menu than it says, or a place has no action.
     """
     known = {action.id: action for action in actions}
     places = {
         entry: menu
-        for menu, entries in LAYOUT.items()
+        for menu, entries in (*LAYOUT.items(), *ELSEWHERE.items())
         for entry in entries
-        if entry[0] not in (_LINE, _FILLED, _SUBMENU)
+        if entry[0] not in (_LINE, _FILLED)
     }
     differ = places.keys() ^ known.keys()
-    for name, menu in places.items():
-        if name in known and known[name].menu not in (menu, _AROUND.get(menu)):
+    for name in known.keys() - differ:
+        stands, says = places[name], known[name].menu
+        if says not in LAYOUT or (stands in LAYOUT and stands != says):
             differ.add(name)
     if differ:
         raise ValueError(f"Menus and actions differ: {sorted(differ)}")
-    return tuple(known[entry] for entry in places)
+    menus = list(LAYOUT)
+    rows = [known[name] for name in places]
+    return tuple(sorted(rows, key=lambda row: menus.index(row.menu)))
 
 
-def menus_in(bar: QMenuBar | QMenu) -> Iterator[QMenu]:
-    """Menus of a menu bar, and those within them."""
+def menus_in(bar: QWidget) -> Iterator[QMenu]:
+    """Menus of a menu bar, or of the window besides it, and those within them."""
     for entry in bar.actions():
         menu = QMenu.menuInAction(entry)
         if menu is not None:
@@ -165,29 +165,33 @@ class Menus:
     def __getitem__(self, name: str) -> QAction:
         return self._actions[name]
 
-    def fill_menu_bar(self, fillers: Mapping[str, Callable[[QMenu], object]]) -> None:
+    def fill(self, fillers: Mapping[str, Callable[[QMenu], object]]) -> None:
         """Make the menus; ``fillers`` fill the places that are a feature's own."""
-        bar = self._window.menuBar()
-        for name in LAYOUT:
-            if name not in _AROUND:
-                self._fill(bar.addMenu(f"&{name}"), name, fillers)
-        for menu in menus_in(bar):
+        window, bar = self._window, self._window.menuBar()
+        for name, entries in LAYOUT.items():
+            self._fill(bar.addMenu(f"&{name}"), entries, fillers)
+        self.elsewhere = {name: QMenu(name, window) for name in ELSEWHERE}
+        for name, menu in self.elsewhere.items():
+            self._fill(menu, ELSEWHERE[name], fillers)
+            window.addAction(menu.menuAction())  # so that keys of its entries hold
+        for menu in (*menus_in(bar), *menus_in(window)):
             # Again when it is opened: what it lists may be others by then.
             menu.aboutToShow.connect(partial(give_mnemonics, menu))
             menu.aboutToShow.connect(self.refresh)
             give_mnemonics(menu)
 
     def _fill(
-        self, menu: QMenu, name: str, fillers: Mapping[str, Callable[[QMenu], object]]
+        self,
+        menu: QMenu,
+        entries: Iterable[str],
+        fillers: Mapping[str, Callable[[QMenu], object]],
     ) -> None:
         menu.setToolTipsVisible(True)
-        for entry in LAYOUT[name]:
+        for entry in entries:
             if entry == _LINE:
                 menu.addSeparator()
             elif entry.startswith(_FILLED):
                 fillers[entry[1:]](menu)
-            elif entry.startswith(_SUBMENU):
-                self._fill(menu.addMenu(entry[1:]), entry[1:], fillers)
             else:
                 menu.addAction(self._actions[entry])
 

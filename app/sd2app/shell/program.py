@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from PySide6.QtWidgets import QMainWindow, QMessageBox
 
@@ -15,7 +16,9 @@ from sd2app.shell.action_search import ActionSearch
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.dialog import KeysDialog
 from sd2app.shell.keys.model import KeyListModel
+from sd2app.shell.preferences import PreferencesDialog
 from sd2app.widgets.dialogs import accepted
+from sd2app.widgets.theme import is_dark
 from sd2core.version import __version__
 
 MOUSE = (
@@ -74,6 +77,11 @@ class ProgramFeature(Feature):
                 stack.redo, lambda: stack.canRedo() and not dragging.dragging,
             ),
             Action(
+                "preferences", "Edit", "Preferences…", ("Ctrl+,",),
+                "Theme, keys, labels and the side panel, as you like them",
+                self._show_preferences,
+            ),
+            Action(
                 "dark", "View", "Dark theme", ("Ctrl+D",), "Dark or light",
                 lambda: self.set_dark(not display.dark), checked=lambda: display.dark,
             ),
@@ -99,7 +107,7 @@ class ProgramFeature(Feature):
             ),
             Action(
                 "find_action", "Help", "Find an action…", ("Ctrl+Shift+P", "Ctrl+K"),
-                "Everything the menus offer, by any of its words", self._find_action,
+                "Everything that can be done, by any of its words", self._find_action,
             ),
             Action(
                 "keys", "Help", "Keys…", ("?",), "All keys, to be found and changed",
@@ -110,10 +118,20 @@ class ProgramFeature(Feature):
             ),
         )  # fmt: skip
 
-    def set_dark(self, dark: bool) -> None:
-        """Choose the theme and remember it."""
+    def set_dark(self, dark: bool | None) -> None:
+        """Choose the theme and remember it; None follows the system."""
         self._session.settings.dark = dark
-        self._session.display.set_dark(dark)
+        self._session.display.set_dark(is_dark(dark))
+
+    def _show_preferences(self) -> None:
+        parent, shell = self._shell.dialog_parent, self._shell
+        labels = partial(shell.bring_up, "Labels", "Label set")
+        accepted(
+            PreferencesDialog(
+                self._session.settings, self._labels.reaction, self.set_dark, self._show_keys,
+                labels, parent,
+            )
+        )  # fmt: skip
 
     def _quit(self) -> None:
         self._shell.dialog_parent.close()
@@ -122,7 +140,7 @@ class ProgramFeature(Feature):
         self._shell.action("find_action")  # all actions follow the models before they are listed
         window = self._shell.dialog_parent
         assert isinstance(window, QMainWindow)
-        search = ActionSearch(window.menuBar())
+        search = ActionSearch(window)
         if accepted(search) and search.chosen is not None:
             search.chosen.trigger()
 

@@ -19,7 +19,7 @@ from PySide6.QtGui import (
     QDropEvent,
     QKeyEvent,
 )
-from PySide6.QtWidgets import QAbstractButton, QApplication, QMainWindow, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QMainWindow, QMenu, QWidget
 
 from sd2app.background.latest import LatestRunner, delayed
 from sd2app.settings import Settings
@@ -35,7 +35,7 @@ from sd2app.widgets.inputs import claims
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.notices import Notice, NoticeStack
 from sd2app.widgets.panel import fill, panel, replace_content, sentence, splitter
-from sd2app.widgets.theme import apply_theme
+from sd2app.widgets.theme import apply_theme, is_dark
 from sd2core.processes import return_free_memory
 
 if TYPE_CHECKING:
@@ -130,13 +130,13 @@ class MainWindow(QMainWindow):
         self._drops = DropOverlay(self._centre)
         self.messages = MessagesModel(self)
         self.session = s = build_session(self, self._settings)
-        s.display.set_dark(is_dark(self._settings))
+        s.display.set_dark(is_dark(self._settings.dark))
         self.features = Features(s, self, self._parts, self)
         self._offered = {feature: feature.actions() for feature in self.features}
         actions = in_order(chain.from_iterable(self._offered.values()))
         self.keys = KeyBindings(actions, self.features.labels.model, self._settings, self)
         self._menus = Menus(self, s, actions, self.keys)
-        self._menus.fill_menu_bar(
+        self._menus.fill(
             {name: fill for feature in self.features for name, fill in feature.menus().items()}
         )
         self._fill_panels()
@@ -271,6 +271,10 @@ class MainWindow(QMainWindow):
         self._follow_actions()
         return self._menus[name]
 
+    def place_menu(self, place: str) -> QMenu:
+        """Menu of the actions that stand at a place of their own, such as spans."""
+        return self._menus.elsewhere[place]
+
     def note(self, text: str) -> None:
         """Tell the user about something that was done."""
         self.messages.note(text)
@@ -392,11 +396,3 @@ class MainWindow(QMainWindow):
         self.session.playback.pause()
         features.close()
         event.accept()
-
-
-def is_dark(settings: Settings) -> bool:
-    """The user's choice of theme, or the system's."""
-    if settings.dark is not None:
-        return settings.dark
-    hints = QApplication.styleHints()
-    return hints.colorScheme() == Qt.ColorScheme.Dark

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import QApplication
 
@@ -121,3 +122,9 @@ def _style_sheet(c: Palette) -> str:
     QScrollArea > QWidget > QWidget#page {{ background: transparent; }}
     QFrame#rule {{ border: none; background: {c.border}; max-height: 1px; }}
     """
+
+
+def is_dark(chosen: bool | None) -> bool:
+    """The user's choice of theme, or (None) the system's."""
+    system = QApplication.styleHints().colorScheme()
+    return system == Qt.ColorScheme.Dark if chosen is None else chosen

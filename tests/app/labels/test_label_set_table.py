@@ -77,7 +77,7 @@ def test_a_name_changes_with_the_spans_that_have_it(edited) -> None:
 @pytest.mark.parametrize(
     ("key", "words"),
     [
-        ("n", "N belongs to “Next span” in the menu Labels"),
+        ("n", "N belongs to “Next span” (Labels)"),
         ("1", "1 belongs to the label “left-to-right”"),
     ],
 )

@@ -79,8 +79,8 @@ def test_usual_keys_until_others_are_chosen(bindings) -> None:
 @pytest.mark.parametrize(
     ("key", "words"),
     [
-        ("Space", "Space belongs to “Play” in the menu Play. Expected: a free key for “Next span”"),
-        ("f1", "F1 belongs to “Keys…” in the menu Help"),
+        ("Space", "Space belongs to “Play” (Play). Expected: a free key for “Next span”"),
+        ("f1", "F1 belongs to “Keys…” (Help)"),
         ("1", "1 belongs to the label “left-to-right”"),
         ("Alt+P", "Alt+P belongs to the menu Play itself"),
         ("Tab", "Tab goes from field to field"),

@@ -136,7 +136,7 @@ def test_a_key_of_an_action_is_refused_in_the_cell(window, page) -> None:
     press(Qt.Key.Key_Return)
     QTest.keyClicks(QApplication.focusWidget(), "n")
     press(Qt.Key.Key_Return)
-    assert "N belongs to “Next span” in the menu Labels" in window.messages.text
+    assert "N belongs to “Next span” (Labels)" in window.messages.text
     assert models_of(window).labels.labels.label_set == GESTURES
 
 

@@ -30,7 +30,8 @@ def test_the_timeline_plays_and_labels_from_a_place_and_exports(labelled) -> Non
     c, view = models_of(labelled), hands.timeline(labelled)
     menu = menu_at(view, hands.at(labelled, 0.5))
     assert texts_of(menu) == [
-        *("Play “there” in a loop", "Label from here", "Export labels…", "Export cut-outs…"),
+        *("Play “there” in a loop", "Label from here", "Spans", "Tracks"),
+        *("Export labels…", "Export cut-outs…"),
         *PICTURE,
     ]
     pick(menu, "Play “there” in a loop")

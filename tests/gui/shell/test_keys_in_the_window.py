@@ -89,7 +89,7 @@ def test_buttons_beside_a_timeline_say_the_new_key(window, dialog) -> None:
 def test_a_key_that_is_taken_is_refused_by_name(window, dialog) -> None:
     search(dialog, "next span")
     for key, modifier, words in (
-        (Qt.Key.Key_P, NONE, "P belongs to “Previous span” in the menu Labels"),
+        (Qt.Key.Key_P, NONE, "P belongs to “Previous span” (Labels)"),
         (Qt.Key.Key_1, NONE, "1 belongs to the label “left-to-right”"),
         (Qt.Key.Key_Tab, NONE, "Tab goes from field to field"),
         (Qt.Key.Key_Return, NONE, "Return ends typing"),

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QKeySequence
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
-from window_models import models_of
+from window_models import menu_of, models_of
 
 from sd2app.shell.menus import menus_in
+from sd2app.widgets.inputs import Choice, NumberBox
 
 ALT, LEFT = Qt.KeyboardModifier.AltModifier, Qt.MouseButton.LeftButton
 LETTERS = 26
@@ -46,27 +47,50 @@ def test_letters_stay_when_the_menu_follows_the_window(labelled) -> None:
     assert labelled.action("undo").text() == "&Undo delete span"
 
 
-def test_the_menu_of_labels_is_short(window) -> None:
-    (labels,) = (menu for menu in menus_in(window.menuBar()) if menu.title() == "&Labels")
-    assert len(entries_of(labels)) <= 14
-    assert labels.sizeHint().height() < 480
-    for menu in menus_in(labels):
-        assert len(entries_of(menu)) <= 16, menu.title()
+def test_menus_have_at_most_80_entries_and_none_is_long(labelled) -> None:
+    menus = list(menus_in(labelled.menuBar()))
+    inner = {menu.menuAction() for menu in menus}
+    leaves = 0
+    for menu in menus:
+        entries = entries_of(menu)
+        assert len(entries) <= 20, menu.title()
+        leaves += len(entries) - len(inner.intersection(menu.actions()))
+    assert leaves <= 80
 
 
-def test_letters_lead_to_an_entry_two_menus_down(labelled, qtbot) -> None:
+def test_the_context_menu_of_the_labels_has_what_is_done_with_spans(labelled) -> None:
+    menu = menu_of(labelled, "Spans")
+    texts = [text.replace("&", "") for text in entries_of(menu)]
+    assert {"Split span here", "Merge selected spans", "Delete selected spans"} <= set(texts)
+    assert menu.menuAction() not in labelled.menuBar().actions()
+
+
+def test_preferences_hold_at_once_and_stay(labelled, qtbot) -> None:
+    display, settings = labelled.session.display, labelled.session.settings
+    before = display.dark
+
+    def choose() -> None:
+        dialog = QApplication.activeModalWidget()
+        theme = dialog.findChild(Choice)
+        theme.setCurrentIndex(theme.findData(not before))
+        dialog.findChild(NumberBox).setValue(200)
+        dialog.reject()
+
+    QTimer.singleShot(0, choose)
+    QTest.keyClick(labelled, Qt.Key.Key_Comma, Qt.KeyboardModifier.ControlModifier)
+    assert (display.dark, settings.dark) == (not before, not before)
+    assert models_of(labelled).reaction.reaction_ms == 200
+    labelled.features.program.set_dark(None)
+    assert settings.dark is None
+
+
+def test_letters_lead_to_an_entry(labelled, qtbot) -> None:
     labelled.activateWindow()
     qtbot.waitUntil(labelled.isActiveWindow, timeout=5000)
     (labels,) = (menu for menu in menus_in(labelled.menuBar()) if menu.title() == "&Labels")
-    go_to = next(menu for menu in menus_in(labels) if "Go to" in menu.title().replace("&", ""))
     bar = labelled.menuBar()
     QTest.mouseClick(bar, LEFT, pos=bar.actionGeometry(labels.menuAction()).center())
     qtbot.waitUntil(labels.isVisible, timeout=5000)
-    for menu, text in (
-        (labels, go_to.title()),
-        (go_to, labelled.action("next_span").text()),
-    ):
-        qtbot.waitUntil(lambda menu=menu: QApplication.activePopupWidget() is menu, timeout=5000)
-        QTest.keyClick(menu, letter_of(text).lower())
+    QTest.keyClick(labels, letter_of(labelled.action("next_span").text()).lower())
     qtbot.waitUntil(lambda: bool(models_of(labelled).labels.selected), timeout=5000)
     assert QApplication.activePopupWidget() is None

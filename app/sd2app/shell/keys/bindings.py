@@ -72,7 +72,7 @@ class KeyBindings(QObject):
             return f"the label “{self._of_labels[key]}”"
         for action in self._actions.values():
             if action.id != besides and key in self._wanted(action.id):
-                return f"“{action.text}” in the menu {action.menu}"
+                return f"“{action.text}” ({action.menu})"
         for menu in dict.fromkeys(action.menu for action in self._actions.values()):
             if key == f"Alt+{menu[0]}":
                 return f"the menu {menu} itself"
