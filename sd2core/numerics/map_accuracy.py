@@ -15,7 +15,7 @@ _MIN_PERCENT = 1e-3
 
 @dataclass(frozen=True)
 class MapAccuracy:
-    """Relative L1 of a smoothed synthetic map: as text ``±38 %: body 37, arithmetic 7.5``.
+    """Relative L1 of a smoothed synthetic map: as text ``±38 % (body 37, arithmetic 7.5)``.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class MapAccuracy:
     --------
     >>> from sd2core.numerics.map_accuracy import MapAccuracy
     >>> print(MapAccuracy(body=0.37, arithmetic=0.075))
-    ±38 %: body 37, arithmetic 7.5
+    ±38 % (body 37, arithmetic 7.5)
     """
 
     body: float | None = None
@@ -56,7 +56,7 @@ class MapAccuracy:
             return words
         parts = {"body": self.body, "arithmetic": self.arithmetic}
         told = [f"{name} {percent(of)[:-2]}" for name, of in parts.items() if of is not None]
-        return f"{words}: {', '.join(told)}"
+        return f"{words} ({', '.join(told)})"
 
 
 def percent(share: float) -> str:

@@ -33,11 +33,6 @@ class InUse:
         """How far the map may be from the truth."""
         return f"{MapAccuracy(self.body, self.error)}{'…' if self.pending else ''}"
 
-    @property
-    def brief(self) -> str:
-        """Accuracy and plan in few words; it is read where there is no room for all."""
-        return f"{self.accuracy} · {short(self.plan)}"
-
     def __str__(self) -> str:
         text = f"{self.plan} · {self.accuracy} · {milliseconds(self.cost_ms)}/frame"
         return f"{text} (measured elsewhere)" if self.elsewhere else text
@@ -46,7 +41,7 @@ class InUse:
 def chosen_sentence(in_use: InUse, frames: int) -> str:
     """One sentence of the plan in use: its error, and its cost per frame and for the clip."""
     way = "Clicked" if in_use.origin == "clicked" else "Chosen"
-    body = "" if in_use.body is None else f" (with the body {in_use.accuracy})"
+    body = "" if in_use.body is None else f" – {in_use.accuracy} with the body –"
     return (
         f"{way}: {short(in_use.plan)}, whose map is {percent(in_use.error)} off the reference{body}"
         f" and costs {milliseconds(in_use.cost_ms)} per frame,"

@@ -34,9 +34,9 @@ class AgreementFeature(Feature):
         model = self.model
         return (
             Action(
-                "show_agree", "View", "Agree panel", ("Shift+A",),
+                "show_agree", "View", "Agreement panel", ("Shift+A",),
                 "How far another person's labels agree with these",
-                lambda: self._shell.bring_up("Agree"),
+                lambda: self._shell.bring_up("Agreement"),
             ),
             Action(
                 "compare_labels", "Labels", "Compare with another's labels…", ("Ctrl+Shift+K",),
@@ -64,13 +64,13 @@ class AgreementFeature(Feature):
         parent = self._shell.dialog_parent
         if path := ask_file(parent, "Compare with another's labels", label_files()):
             self.model.open(path)
-            self._shell.bring_up("Agree")
+            self._shell.bring_up("Agreement")
 
     def panels(self) -> Mapping[str, QWidget]:
         """The panel at the side, and the other person's labels below these."""
         s = self._session
         return {
-            "Agree": AgreementPanel(self.model, s.playback, self._shell.action),
+            "Agreement": AgreementPanel(self.model, s.playback, self._shell.action),
             "other labels": OtherTimeline(s, self.model),
         }
 

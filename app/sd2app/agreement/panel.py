@@ -1,4 +1,4 @@
-"""Agree panel: agreement of another person's labels with those of the recording."""
+"""Agreement panel: agreement of another person's labels with those of the recording."""
 
 from __future__ import annotations
 

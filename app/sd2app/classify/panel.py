@@ -37,7 +37,7 @@ _MAP_TIPS = {
     "denoised": "The synthetic ones, as the bundled denoiser makes them a radar's",
 }
 _FIELDS = (
-    Field(Train, "delay_s", "Answers", 0.1, decimals=2, suffix=" s late"),
+    Field(Train, "delay_s", "Waits", 0.1, decimals=2, suffix=" s to decide"),
     Field(Train, "width", "Width", 8),
     Field(Train, "steps", "Steps", 50),
     Field(Train, "seed", "Seed", 1),
@@ -101,7 +101,7 @@ class ClassSetupView(TrainingForm):
         names = {name: MODEL_WORDS.get(name, name) for name in model_names()}
         network = self.choice("model", "Kind of network", names)
         shown = self.choice("features", "What it is shown of each frame", FEATURE_WORDS)
-        for row, (text, choice) in enumerate((("Network", network), ("Shown", shown)), start=1):
+        for row, (text, choice) in enumerate((("Network", network), ("Sees", shown)), start=1):
             grid.addWidget(QLabel(text, self), row, 0)
             grid.addWidget(choice, row, 1, 1, 3)
         for number, field in enumerate(_FIELDS):

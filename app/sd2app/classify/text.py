@@ -11,7 +11,7 @@ from sd2app.widgets.run_text import PHASES
 from sd2core.classify.card import ClassifierCard
 
 MODEL_WORDS = {"lstm": "LSTM (the paper's)", "s4": "S4", "kernel": "kernel (few recordings)"}
-FEATURE_WORDS = {"columns": "whole columns", "peak": "strongest bin (the paper's)"}
+FEATURE_WORDS = {"columns": "all speeds", "peak": "strongest speed alone (the paper's)"}
 _KINDS = {
     "simulated": "simulated radar",
     "real": "real radar",

@@ -20,7 +20,7 @@ HELP = {
     "Study": "how-to/recognise-gestures.md",
     "Labels": "tutorials/label-fast.md#1-mark-with-keys",
     "Label set": "how-to/use-your-own-label-set.md",
-    "Agree": "tutorials/label-fast.md#3-compare-with-a-second-annotator",
+    "Agreement": "tutorials/label-fast.md#3-compare-with-a-second-annotator",
     "New from video": "tutorials/video-to-data-set.md#2-fit-a-body",
     "Mesh over the video": "how-to/compare-with-another-mesh.md#see-it-over-the-video",
     "Record": "how-to/record-a-live-radar.md",
@@ -38,6 +38,7 @@ HELP = {
     "Any command": "how-to/many-recordings.md",
     "Recover labels": "how-to/recover-after-a-crash.md",
     "Keys": "how-to/change-keys.md",
+    "Preferences": "how-to/find-your-way-in-the-window.md#what-is-in-no-menu",
 }
 """Panels and dialogs, and the heading of the manual that says most about each."""
 

@@ -150,7 +150,7 @@ def preview_quality(
     synthesizer = synthesizers.ready(dragging.plan) if dragging is not None else None
     parts_of = synthesizers.parts_of
     if dragging is not None and synthesizer is not None:
-        words, reuse_m = f"while dragging: {dragging.brief}", dragging.plan.mask_reuse_m
+        words, reuse_m = f"while dragging: {dragging.accuracy}", dragging.plan.mask_reuse_m
         if reuse_m == 0:
             return QualityLevel(lambda: synthesizer, PREVIEW, words, None, parts_of)
         if masks_of is not None and math.dist(masks_of.position_m, sensor.position_m) <= reuse_m:
@@ -181,7 +181,7 @@ def final_quality(
 def final_words(synthesizers: SynthesizerCache, in_use: InUse | None) -> str:
     """Text about the quality of a map of the plan in use."""
     if in_use is not None:
-        return in_use.brief
+        return in_use.accuracy
     return _ALL_WORDS if synthesizers.options.visibility == "none" else "exact visibility"
 
 

@@ -59,7 +59,7 @@ class SceneBar(QWidget):
         views = QMenu(self)
         views.addActions([action(name) for name, *_ in _VIEWS])
         look = outlined("Look from", "Where to look at the scene from", views, self, look="")
-        dots = action_button(action("dots"), "Dots")
+        dots = action_button(action("dots"), "As dots")
         parts = (title("Scene"), 8, QLabel("colour", self), colour, dots, STRETCH, look)
         self.setLayout(row_of(*parts, spacing_px=4, margins_px=(8, 2, 4, 2)))
         display.mesh_changed.connect(lambda: colour.show_value(display.mesh_colour))

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from PySide6.QtWidgets import QDialog, QWidget
 
 from sd2app.labels.marking import LONGEST_MS, Reaction
+from sd2app.manual.help import with_help
 from sd2app.settings import Settings
 from sd2app.widgets.dialogs import closing
 from sd2app.widgets.inputs import Choice, NumberBox
@@ -61,4 +62,4 @@ class PreferencesDialog(QDialog):
             ("Reaction time", reaction_ms),
             ("Keys and labels", side_by_side(keys, labels)),
         )
-        self.setLayout(column_of(rows, closing(self)))
+        self.setLayout(column_of(rows, with_help("Preferences", closing(self))))

@@ -1,6 +1,8 @@
-"""The last line of the window: what the pointer reads, the plan in use, what is under way."""
+"""The last line of the window: what the pointer reads, how exact the map is, what is under way."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 from PySide6.QtWidgets import QLabel, QToolButton, QWidget
 
@@ -9,22 +11,27 @@ from sd2app.background.latest import delayed
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
 from sd2app.widgets.layouts import STRETCH, row_of
-from sd2app.widgets.panel import ElidedLabel
+from sd2app.widgets.panel import outlined
 from sd2app.widgets.progress_bar import ProgressBar
 
 _QUIET_MS = 300
 
 
 class StatusLine(QWidget):
-    """Plan in use, and the oldest job with a cancel button on the right."""
+    """How far the map may be off, and the oldest job with a cancel button on the right."""
 
     def __init__(
-        self, session: Session, accuracy: AccuracyModel, synthesis: SynthesisModel, parent: QWidget
+        self,
+        session: Session,
+        accuracy: AccuracyModel,
+        synthesis: SynthesisModel,
+        show_accuracy: Callable[[], object],
+        parent: QWidget,
     ) -> None:
         super().__init__(parent)
         self._jobs = session.jobs
         self._accuracy, self._synthesis = accuracy, synthesis
-        self._plan = ElidedLabel(self, "muted")
+        self._plan = outlined("", "", show_accuracy, self, look="")
         self._title = QLabel(self)
         self._title.setObjectName("muted")
         self._bar = ProgressBar("", width_px=140)
@@ -47,10 +54,12 @@ class StatusLine(QWidget):
         """While the sensor moves the budget rules, at rest the tolerance does."""
         accuracy, moving = self._accuracy, self._synthesis.moving
         in_use = accuracy.while_dragging if moving else accuracy.in_use
-        text = ""
+        self._plan.setVisible(in_use is not None)
         if in_use is not None:
-            text = f"While dragging: {in_use}" if moving else f"Plan: {in_use}"
-        self._plan.setText(text)
+            when = "while dragging " if moving else ""
+            self._plan.setText(f"{when}{in_use.accuracy} · how?")
+            self._plan.setAccessibleName(self._plan.text())
+            self._plan.setToolTip(f"How far the map may be off. {in_use}")
 
     def _follow(self) -> None:
         """Show what goes on in a moment: each step of a bar paints the window at once."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from importlib import import_module
 from itertools import chain
 from pathlib import Path
@@ -153,7 +154,7 @@ class MainWindow(QMainWindow):
         self._notices = NoticeStack(beside, self._top, notices)
         accuracy, synthesis = self.features.accuracy.model, self.features.maps.synthesis
         transport = TransportBar(s.playback, self.features.labels.loop, self.action, self)
-        status = StatusLine(s, accuracy, synthesis, self)
+        status = StatusLine(s, accuracy, synthesis, partial(self.bring_up, "Accuracy"), self)
         self._column.addWidget(transport)
         self._lines.addWidget(status)
         self._regions = (*notices, *bars, *self._panels.values(), transport, status)

@@ -190,7 +190,7 @@ def side_pages(features: Features, views: Mapping[str, QWidget]) -> dict[str, QW
         InnerPage("Study", "Find out whether synthetic data help", features.study.panel()),
     )
     pages = {**views, "Train": train}
-    return {name: pages[name] for name in ("Sensor", "Accuracy", "Train", "Labels", "Agree")}
+    return {name: pages[name] for name in ("Sensor", "Accuracy", "Train", "Labels", "Agreement")}
 
 
 def track_stack(

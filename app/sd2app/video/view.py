@@ -113,7 +113,7 @@ class VideoBar(QWidget):
         )
         mesh, dots = (
             action_button(self._mesh, "Mesh"),
-            action_button(action("overlay_dots"), "Dots"),
+            action_button(action("overlay_dots"), "As dots"),
         )
         parts = (title("Video"), STRETCH, mesh, self._slider, dots)
         self.setLayout(row_of(*parts, spacing_px=4, margins_px=(8, 2, 4, 2)))

@@ -37,7 +37,7 @@ _DRAWN = {
     # spans on their tracks
     "Labels": '<path d="M2 3h9v3.4h-9zM8 8.3h10v3.4h-10zM4 13.6h7v3.4h-7z"/>',
     # what two people have in common
-    "Agree": f'<g {_LINE}><circle cx="7.2" cy="10" r="5.6"/>'
+    "Agreement": f'<g {_LINE}><circle cx="7.2" cy="10" r="5.6"/>'
     '<circle cx="12.8" cy="10" r="5.6"/></g>',
 }
 """Icons as SVG: those of the transport bar 16, those of panels 20 units large."""

@@ -29,13 +29,13 @@ def test_shares_have_two_digits_and_no_exponent(share, text):
 
 
 def test_the_accuracy_holds_the_body_where_it_is_known():
-    assert InUse(FACING, 0.031, 0.6).brief == "±3.1 % · visibility facing"
+    assert InUse(FACING, 0.031, 0.6).accuracy == "±3.1 %"
     known = InUse(FACING, 0.031, 0.6, body=0.37)
-    assert known.accuracy == "±37 %: body 37, arithmetic 3.1"
-    assert str(known) == f"{FACING} · ±37 %: body 37, arithmetic 3.1 · 0.6 ms/frame"
-    assert replace(known, pending=True).brief.startswith("±37 %: body 37, arithmetic 3.1… · ")
+    assert known.accuracy == "±37 % (body 37, arithmetic 3.1)"
+    assert str(known) == f"{FACING} · ±37 % (body 37, arithmetic 3.1) · 0.6 ms/frame"
+    assert replace(known, pending=True).accuracy == "±37 % (body 37, arithmetic 3.1)…"
     words = chosen_sentence(known, 100)
-    assert "3.1 % off the reference (with the body ±37 %: body 37, arithmetic 3.1) and" in words
+    assert "3.1 % off the reference – ±37 % (body 37, arithmetic 3.1) with the body – and" in words
 
 
 @pytest.mark.parametrize(

@@ -27,8 +27,8 @@ def ball(frames: int, sigma_mps: float) -> MeshSequence:
 @pytest.mark.parametrize(
     ("body", "arithmetic", "words"),
     [
-        (0.37, 0.075, "±38 %: body 37, arithmetic 7.5"),
-        (0.37, None, "±37 %: body 37"),
+        (0.37, 0.075, "±38 % (body 37, arithmetic 7.5)"),
+        (0.37, None, "±37 % (body 37)"),
         (None, 0.031, "±3.1 %"),
         (None, 0.0, "±0 %"),
         (None, 1e-6, "<0.001 %"),

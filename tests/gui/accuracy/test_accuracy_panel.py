@@ -5,11 +5,13 @@ from __future__ import annotations
 import pytest
 from fake_accuracy import COUNTING, EXACT, FACING, WAVES, measurement_of, result_of, stale
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QToolButton, QToolTip
 from window_models import models_of
 
 from sd2app.accuracy.panel import AccuracyPanel, ReasonList, ToleranceRow
 from sd2app.accuracy.plot import AccuracyPlot
+from sd2app.shell.status_bar import StatusLine
 from sd2app.widgets.inputs import Choice as ChoiceBox
 from sd2app.widgets.inputs import NumberBox
 from sd2app.widgets.panel import ElidedLabel
@@ -210,7 +212,7 @@ def test_a_click_uses_a_point_until_the_tolerance_rules_again(plot, panel, windo
     assert trade.in_use.plan == FACING
     assert "You clicked this point" in texts(panel)
     qtbot.waitUntil(lambda: done(window), timeout=10_000)
-    assert models_of(window).synthetic.status == "±13 % · visibility facing"
+    assert models_of(window).synthetic.status == "±13 %"
     qtbot.mouseClick(button(panel, "Choose by tolerance"), Qt.MouseButton.LeftButton)
     assert trade.in_use.plan == EXACT
     assert "You clicked" not in texts(panel)
@@ -290,18 +292,25 @@ def test_many_points_are_painted_in_both_themes(panel, window, fake, qtbot):
     assert len(pictures) == 2
 
 
-def test_the_status_line_names_the_plan_in_use(window, qtbot):
-    def shown():
-        return [label.text() for label in window.findChildren(ElidedLabel)][-1]
+def test_the_status_line_says_how_exact_the_map_is_and_a_click_says_why(window, qtbot):
+    button = next(
+        one
+        for one in window.findChild(StatusLine).findChildren(QToolButton)
+        if "how?" in one.text()
+    )
+    shown = button.text
 
     c = models_of(window)
-    assert shown() == f"Plan: {EXACT} · ±0 % · 0.6 ms/frame"
+    assert shown() == "±0 % · how?"
+    assert f"{EXACT} · ±0 % · 0.6 ms/frame" in button.toolTip()
     c.edits.begin_sensor_drag()
-    assert shown().startswith("Plan:")
+    assert shown() == "±0 % · how?"
     c.edits.drag_sensor((0.1, 0.0, 0.0))
-    assert shown() == f"While dragging: {FACING} · ±13 % · 0.02 ms/frame"
+    assert shown() == "while dragging ±13 % · how?"
     c.edits.end_sensor_drag()
-    assert shown().startswith("Plan:")
+    assert shown() == "±0 % · how?"
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+    assert window.side.shown == "Accuracy"
 
 
 def test_a_long_line_gives_way(qtbot):

@@ -38,7 +38,7 @@ def test_side_by_side_and_from_one_difference_to_the_next(compared, qtbot) -> No
     c = models_of(compared)
     below, panel = compared.findChild(OtherTimeline), compared.findChild(AgreementPanel)
     assert below.isVisible()
-    assert compared.side.shown == "Agree"
+    assert compared.side.shown == "Agreement"
     assert panel.isVisible()
     assert below.accessibleName() == "Labels of ben, read-only"
     assert [one.frames for one in c.agreement.disagreements] == [15]

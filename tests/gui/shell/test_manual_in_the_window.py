@@ -80,7 +80,7 @@ def test_every_panel_at_the_side_has_help(window, manual) -> None:
         ("Train", "Classifier", "Classifier"),
         ("Labels", "Spans", "Labels"),
         ("Labels", "Label set", "Label set"),
-        ("Agree", "", "Agree"),
+        ("Agreement", "", "Agreement"),
     )
     assert {row[0] for row in panels} == {one.name for one in window.side.findChildren(RailButton)}
     for panel, page, topic in panels:
@@ -99,7 +99,7 @@ def test_every_larger_dialog_has_help() -> None:
         if {*dialogs} - SMALL - {"OpenDialog"}:
             assert topics, file
     panels = {"Sensor", "Placements", "Accuracy", "Denoiser", "Classifier"}
-    panels |= {"Labels", "Label set", "Agree"}
+    panels |= {"Labels", "Label set", "Agreement"}
     assert named | panels == set(HELP)
 
 
@@ -147,3 +147,5 @@ def test_menus_that_the_guide_names_are_there(window) -> None:
             entries = {one.text().replace("&", ""): one.menu() for one in at.actions()}
             assert text in entries, (page, menu, path)
             at = entries[text]
+            if at is not None:
+                at.aboutToShow.emit()  # some list what there is then

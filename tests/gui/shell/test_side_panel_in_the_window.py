@@ -16,7 +16,7 @@ from sd2app.shell.status_bar import StatusLine
 from sd2app.shell.window import MainWindow
 
 LEFT = Qt.MouseButton.LeftButton
-NAMES = ("Sensor", "Accuracy", "Train", "Labels", "Agree")
+NAMES = ("Sensor", "Accuracy", "Train", "Labels", "Agreement")
 
 
 def place_of(widget: QWidget) -> QRect:
