@@ -48,6 +48,10 @@ class Settings:
         value = self._store.value(name)
         return default if value is None else str(value).lower() == "true"
 
+    def choice(self, name: str) -> bool | None:
+        """Boolean that the user chose; None where the user left it open."""
+        return None if self._store.value(name) is None else self.flag(name, False)
+
     def stored(self, name: str, default: T) -> T:
         """A value of the default's type; the default where what is stored is none."""
         value = self._store.value(name)
@@ -73,7 +77,7 @@ class Settings:
     @property
     def dark(self) -> bool | None:
         """Theme the user chose, or None to follow the system."""
-        return None if self._store.value("dark") is None else self.flag("dark", False)
+        return self.choice("dark")
 
     @dark.setter
     def dark(self, dark: bool | None) -> None:

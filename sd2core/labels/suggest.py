@@ -26,8 +26,6 @@ TRACK = "Suggestions"
 """Name of the track that suggestions stand on."""
 LABEL = "gesture"
 """Label of suggestions: energy shows that something moves, not what."""
-SURE_DB = 20.0
-"""A span that is found with this threshold as well has the confidence 1."""
 
 _QUIET_SHARE = 0.25
 """Share of the frames in which a bin does not exceed its quiet level."""
@@ -110,10 +108,10 @@ def suggest_spans(
     Returns
     -------
     tuple of Span
-        Of origin ``"suggestion"``; they do not overlap. The confidence is how far the
-        threshold could be raised before the span was lost: 0 where it only just reaches
-        ``high_db``, 1 from :data:`SURE_DB` on, linear in dB. It is no probability. The
-        note says how loud the span is.
+        Of origin ``"suggestion"``; they do not overlap. The confidence ranks them by the
+        share of their peak, in dB, that is above ``high_db``: 0 where a span only just
+        reaches it, and below 1 however loud it is. It is no probability. The note says how
+        loud the span is.
     """
     options = options or SuggestOptions()
     energy_db = motion_energy_db(doppler)
@@ -145,19 +143,13 @@ def suggest_spans(
             end_s=float(ends_s[stop - 1]),
             label=label,
             note=f"up to {peak_db:.0f} dB over the quiet level",
-            confidence=_confidence(peak_db, options.high_db),
+            confidence=1.0 - options.high_db / peak_db,
             origin="suggestion",
         )
         for number, ((start, stop), (_, peak_db)) in enumerate(
             zip(wider, kept, strict=True), start=1
         )
     )
-
-
-def _confidence(peak_db: float, high_db: float) -> float:
-    if peak_db >= SURE_DB:
-        return 1.0
-    return (peak_db - high_db) / (SURE_DB - high_db)
 
 
 def stretches(

@@ -27,7 +27,7 @@ class MeshRefining:
         """Reason why there is nothing to make smooth; empty where there is a mesh."""
         mesh = self.document.mesh
         if mesh is None:
-            return "There is no mesh to make smooth: add one first (File → Add…)"
+            return "There is no mesh to make smooth: add one first (File → Add to this recording…)"
         if mesh.uncertainty is not None:
             return "This mesh is smooth already: of `sd2 fit`, or made smooth before"
         return ""

@@ -38,7 +38,7 @@ class ImuFeature(Feature):
                 "place_inertial", "Edit", "Place inertial sensor…", ("I",),
                 "The next click on the body in the scene fixes a virtual accelerometer and"
                 " gyroscope there; Esc cancels",
-                self._place, lambda: not model.why_not, lambda: placing.active,
+                placing.toggle, lambda: not model.why_not, lambda: placing.active,
                 why_not=lambda: model.why_not,
             ),
             Action(
@@ -47,13 +47,6 @@ class ImuFeature(Feature):
                 self._save, lambda: model.signals is not None,
             ),
         )  # fmt: skip
-
-    def _place(self) -> None:
-        placing = self._session.placing
-        if placing.active:
-            placing.end()
-        else:
-            placing.begin()
 
     def _save(self) -> None:
         window, name = self._shell.dialog_parent, self.model.file_name
@@ -83,6 +76,7 @@ class ImuFeature(Feature):
         menu.addAction("Save signals &as…", self._save).setEnabled(model.signals is not None)
         menu.addSeparator()
         menu.addAction(self._shell.action("place_inertial"))
+        menu.addAction(self._shell.action("align_by_hand"))
         for place in model.places:
             if place != model.current or model.signals is None:
                 show = menu.addAction(f"Show sensor at {place_words(place)}")

@@ -115,7 +115,10 @@ class ImuModel(ReportingModel):
         """Reason why no sensor can be placed; empty if one can."""
         mesh = self._document.mesh
         if mesh is None:
-            return "There is no body to fix a sensor to: add its mesh first (File → Add…)"
+            return (
+                "There is no body to fix a sensor to: add its mesh first"
+                " (File → Add to this recording…)"
+            )
         return "" if mesh.faces is not None else "A point cloud has no surface to fix a sensor to"
 
     @property

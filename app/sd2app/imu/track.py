@@ -44,8 +44,7 @@ LANES = (Lane("acceleration_mps2", "m/s²"), Lane("turn_rate_radps", "rad/s"))
 class InertialTrack(TrackMouse):
     """Shows the current sensor, and the real one dashed.
 
-    Click or drag seeks, the wheel zooms, Shift and the wheel pan; a drag of the title moves the
-    real sensor in time.
+    Click or drag seeks, the wheel zooms, Shift and the wheel pan.
     """
 
     OFFSET = "imu_offset_s"
@@ -117,6 +116,7 @@ class InertialTrack(TrackMouse):
             if lines := reading_lines(self._model, time_s):
                 place = QPointF(scale.x_of(time_s), plot.top())
                 paint_readout(painter, plot, place, lines, self._display.palette)
+        self.paint_grip(painter)
 
     def _paint_track(self, painter: QPainter) -> None:
         colours = self._display.palette
@@ -243,13 +243,17 @@ class InertialTrack(TrackMouse):
         else:
             self._pointer.point_at(self.scale.time_of(place.x()))
 
+    @property
+    def measured_from_s(self) -> float | None:
+        """Offset of the real sensor, while it is on screen."""
+        shown = self._model.measured is not None and not self._model.folded
+        return self._model.offset_s if shown else None
+
     def use_of(self, place: QPointF) -> str:
-        """Use of the left button: the title folds, or drags the real sensor in time."""
+        """Use of the left button: the title folds at its left end."""
         if place.y() >= HEADER_PX:
-            return "seek"
-        if place.x() < HANDLE_PX:
-            return "fold"
-        return "offset" if self._model.measured is not None else ""
+            return super().use_of(place)
+        return "fold" if place.x() < HANDLE_PX else ""
 
 
 def _pen(colour: QColor, style: Qt.PenStyle) -> QPen:

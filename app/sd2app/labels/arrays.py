@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sd2core.labels.formats.lanes import apart
 from sd2core.labels.spans import Labels, Span
+from sd2core.labels.suggest import LABEL as UNNAMED
 
 WIDE_PX = 4.0
 """Smallest width of a span with a box of its own."""
@@ -78,6 +79,13 @@ class SpanArrays:
         """Lane of every span, counted over all tracks from the top."""
         before = np.concatenate([[0], np.cumsum(self.lanes_of_track, dtype=np.int64)])
         return before[self.tracks] + self.lanes
+
+    @cached_property
+    def ranks(self) -> Mapping[int, int]:
+        """Rank of every suggestion without a name, by its id: 1 is where most moves."""
+        unnamed = [one for one in self.spans if (one.label, one.origin) == (UNNAMED, "suggestion")]
+        surest_first = sorted(unnamed, key=lambda one: -(one.confidence or 0.0))
+        return {one.id: rank for rank, one in enumerate(surest_first, start=1)}
 
     def rows_of(self, ids: Collection[int]) -> NDArray[np.int64]:
         """Return the rows of the spans of some ids, in order."""

@@ -195,7 +195,8 @@ class SpanDragger(QObject):
         return None
 
     def _is_inside(self, place: QPointF) -> bool:
-        return self._view.plot_rect().contains(place)
+        view = self._view
+        return view.plot_rect().contains(place) and not view.grip_rect().contains(place)
 
     def _time_s(self, place: QPointF) -> float:
         return self._view.scale.time_of(place.x())

@@ -66,8 +66,9 @@ class LabelsFeature(Feature):
         report(shell, self.autosave, self.cut_out)
         session.document.changed.connect(self._follow_capture)
         shown = labels.changed, labels.selection_changed, labels.marks_changed
-        cancelled = self.dragging.changed, self.loop.changed, session.placing.changed
-        self.changing = *shown, *cancelled
+        self._modes = session.placing, session.aligning
+        cancelled = self.dragging.changed, self.loop.changed
+        self.changing = *shown, *cancelled, *(mode.changed for mode in self._modes)
         self.closing = (self.cut_out, self.autosave)
 
     # --- menus ----------------------------------------------------------------------------
@@ -200,8 +201,8 @@ class LabelsFeature(Feature):
         return (
             Action(
                 "leave", "Labels", "Cancel", ("Esc",),
-                "Let go of what is dragged; else place no sensor; else forget what is being marked;"
-                " else end the loop of a span; else select nothing",
+                "Let go of what is dragged; else place no sensor, or align no more; else forget"
+                " what is being marked; else end the loop of a span; else select nothing",
                 self._cancel, self._can_cancel,
             ),
             Action(
@@ -289,15 +290,15 @@ class LabelsFeature(Feature):
         return self._some_selected() and self._has_tracks()
 
     def _can_cancel(self) -> bool:
-        placing = self._session.placing.active
-        at_work = self.dragging.dragging or placing or self.loop.span is not None
+        mode = any(mode.active for mode in self._modes)
+        at_work = self.dragging.dragging or mode or self.loop.span is not None
         return at_work or bool(self.model.marks or self.model.selected_ids)
 
     def _cancel(self) -> None:
         if self.dragging.dragging:
             self.dragging.cancel_drag()
-        elif self._session.placing.active:
-            self._session.placing.end()
+        elif active := [mode for mode in self._modes if mode.active]:
+            active[0].end()
         elif self.model.marks:
             self.model.set_marks(())
         elif self.loop.span is not None:

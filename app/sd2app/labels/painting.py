@@ -238,7 +238,7 @@ def _paint_spans(
         paint_span(
             painter,
             lane_box(row, int(arrays.lanes[number]), left, right),
-            _text(span),
+            text_on(span, arrays),
             arrays.colours[arrays.tones[number]],
             palette,
             selected=model.is_selected(span.id),
@@ -255,8 +255,10 @@ def _ends_px(
     return zip(wide.tolist(), lefts.tolist(), rights.tolist(), strict=True)
 
 
-def _text(span: Span) -> str:
-    """Label of a span, after the confidence of a suggestion."""
+def text_on(span: Span, arrays: SpanArrays) -> str:
+    """Label of a span, after the confidence of a suggestion, or the rank of an unnamed one."""
+    if rank := arrays.ranks.get(span.id):
+        return f"#{rank} {span.label}"
     if span.origin == "suggestion" and span.confidence is not None:
         return f"{100 * span.confidence:.0f} % {span.label}"
     return span.label

@@ -125,6 +125,8 @@ class MapsFeature(Feature):
             zero.triggered.connect(lambda: view.track.set_reference(reading.value))
         play = self._session.playback.play_stretch
         menu.addAction("Play what is in view in a &loop", lambda: play(span.start_s, span.end_s))
+        if view.alignable:
+            menu.addAction(self._shell.action("align_by_hand"))
         menu.addActions(own)
 
     def panels(self) -> Mapping[str, QWidget]:

@@ -17,7 +17,7 @@ from sd2app.maps.arrangement import BELOW_PX, HEADER_PX
 from sd2app.maps.heatmap_image import MapWidget
 from sd2app.maps.limbs import title_of
 from sd2app.maps.readout import body_range_m, reading_lines
-from sd2app.maps.track_mouse import TrackMouse
+from sd2app.maps.track_mouse import TrackMouse, offset_text
 from sd2app.session.maps import UNCERTAIN_SHARE, MapModel, Reading
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, clipped
@@ -79,7 +79,7 @@ def paint_velocity_labels(
 class HeatmapView(TrackMouse, MapWidget):
     """Shows one track; click or drag seeks, wheel zooms, Shift+wheel pans.
 
-    A drag of the header of a track that is ``alignable`` moves the capture in time.
+    One that is ``alignable`` was measured, and has an offset in time.
     """
 
     OFFSET = "radar_offset_s"
@@ -164,6 +164,7 @@ class HeatmapView(TrackMouse, MapWidget):
         if self.track.map is not None and not self.folded:
             self.paint_kept(painter, self._paint_overlays)
             self._paint_cursors(painter, self.plot_rect())
+            self.paint_grip(painter)
 
     def _paint_map(self, painter: QPainter) -> None:
         colours = self._display.palette
@@ -234,6 +235,8 @@ class HeatmapView(TrackMouse, MapWidget):
         strongest_db, lowest_db = self.track.strongest_db, self._display.levels.low_db
         carrier_hz = None if self.track.map is None else self.track.map.carrier_hz
         parts = ["" if carrier_hz is None else f"{1e-9 * carrier_hz:.4g} GHz", self.track.status]
+        if self.alignable and self.track.offset_s:
+            parts.append(offset_text(self.track.offset_s))
         if gaps_s := self.track.gaps_s:
             parts.append(f"no person in {sum(end - start for start, end in gaps_s):.2f} s")
         if self.track.uncertainty is not None:
@@ -287,9 +290,11 @@ class HeatmapView(TrackMouse, MapWidget):
 
     # --- mouse ----------------------------------------------------------------------------
 
-    def use_of(self, place: QPointF) -> str:
-        """Use of the left button: the header of a measured map drags it in time."""
-        return "offset" if self.alignable and place.y() < HEADER_PX else "seek"
+    @property
+    def measured_from_s(self) -> float | None:
+        """Offset of a map that was measured, while it is on screen."""
+        shown = self.alignable and self.track.map is not None and not self.folded
+        return self.track.offset_s if shown else None
 
     def _cell_at(self, position: QPointF) -> tuple[float, float] | None:
         """Time and velocity at a pixel, None beside the map."""

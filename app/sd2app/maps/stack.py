@@ -269,7 +269,7 @@ class _Hands(QObject):
     def _part_at(self, place: QPointF) -> str:
         view = self._view
         if place.y() < HEADER_PX:
-            return "place" if place.x() < HANDLE_PX or not view.alignable else ""
+            return "place"
         at_border = place.y() >= view.height() - _BORDER_PX
         return "height" if at_border and not view.folded and not view.enlarged else ""
 

@@ -12,7 +12,7 @@ from sd2app.maps.arrangement import HEADER_PX
 from sd2app.session.session import Session
 from sd2app.session.undo import Offset
 from sd2app.widgets.canvas import Canvas, Overlay
-from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor
+from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, paint_cursor, signed_text
 
 _CURSORS = {
     "seek": Qt.CursorShape.CrossCursor,
@@ -21,6 +21,12 @@ _CURSORS = {
     "": Qt.CursorShape.ArrowCursor,
 }
 _ZOOM_PER_NOTCH = 0.8
+_GRIP_PX = 152, 24
+
+
+def offset_text(offset_s: float) -> str:
+    """Offset of what was measured, in words."""
+    return f"offset {signed_text(round(offset_s, 3))} s"
 
 
 class TimePlot(Canvas):
@@ -37,7 +43,8 @@ class TimePlot(Canvas):
         self._span, self._playback, self._pointer = session.span, session.playback, session.pointer
         self._display = session.display
         self._grab: tuple[str, float] | None = None  # what is dragged, and from which pixel
-        self.follow(self._playback.frame_changed)
+        self._dragged_px = 0.0  # how far a grip is from the middle
+        self.follow(self._playback.frame_changed, session.aligning.changed)
         self._display.theme_changed.connect(self.redraw)
         for overlay in self._overlays:
             for signal in overlay.changed:
@@ -60,6 +67,10 @@ class TimePlot(Canvas):
         """Rectangle of the plot, in pixels."""
         width, height = self.width() - GUTTER_PX - MARGIN_PX, self.height() - self.TOP_PX
         return QRectF(GUTTER_PX, self.TOP_PX, max(width, 1), max(height - self.BOTTOM_PX, 1))
+
+    def grip_rect(self) -> QRectF:
+        """Rectangle of what moves the plot in time; empty where nothing does."""
+        return QRectF()
 
     def paint_cursors(self, painter: QPainter, plot: QRectF, pointer_colour: QColor) -> None:
         """Paint the time under the pointer, dotted, and the time on screen."""
@@ -101,15 +112,41 @@ class SeekingPlot(TimePlot):
 class TrackMouse(ZoomedPlot):
     """Click or drag seeks, the middle button and the wheel move and scale the time axis.
 
-    A drag from where :meth:`use_of` says ``"offset"`` moves what was measured in time.
+    While the user aligns, what was measured has a grip in its middle that moves it in time.
     """
 
     OFFSET: ClassVar[Offset]
-    """What such a drag moves."""
+    """What the grip moves."""
+
+    @property
+    def measured_from_s(self) -> float | None:
+        """Offset of what was measured; None where nothing was."""
+        return None
+
+    def grip_rect(self) -> QRectF:
+        """Rectangle of the grip; empty where none is shown."""
+        plot = self.plot_rect()
+        if self.measured_from_s is None or not self._session.aligning.active or plot.height() <= 1:
+            return QRectF()
+        width, height = _GRIP_PX
+        grip = QRectF(0, 0, min(width, plot.width()), min(height, plot.height()))
+        grip.moveCenter(plot.center() + QPointF(self._dragged_px, 0))
+        return grip
+
+    def paint_grip(self, painter: QPainter) -> None:
+        """Paint the grip with the offset on it."""
+        grip, offset_s, colours = self.grip_rect(), self.measured_from_s, self._display.palette
+        if grip.isEmpty() or offset_s is None:
+            return
+        painter.setPen(QPen(QColor(colours.accent), 1.5))
+        painter.setBrush(QColor(colours.panel))
+        painter.drawRoundedRect(grip, 4, 4)
+        painter.setPen(QColor(colours.text))
+        painter.drawText(grip, Qt.AlignmentFlag.AlignCenter, f"◂  {offset_text(offset_s)}  ▸")
 
     def use_of(self, place: QPointF) -> str:
         """Use of the left button at a place: a key of the cursors."""
-        raise NotImplementedError
+        return "offset" if self.grip_rect().contains(place) else "seek"
 
     def point_at(self, place: QPointF) -> None:
         """Read what is under the pointer."""
@@ -144,12 +181,15 @@ class TrackMouse(ZoomedPlot):
             self._session.span.pan((start_x - place.x()) * self.scale.seconds_per_px)
             self._grab = ("pan", place.x())
         else:
-            self._session.edits.drag_offset((place.x() - start_x) * self.scale.seconds_per_px)
+            self._dragged_px = place.x() - start_x
+            self._session.edits.drag_offset(self._dragged_px * self.scale.seconds_per_px)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """End the drag."""
         if self._grab is not None and self._grab[0] == "offset":
             self._session.edits.end_offset_drag()
+            self._dragged_px = 0.0
+            self.update()
         self._grab = None
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:

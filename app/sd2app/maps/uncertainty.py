@@ -13,14 +13,16 @@ from sd2core.doppler.body_error import body_error
 from sd2core.maps import CellUncertainty, DopplerMap
 
 _SHOWN = "uncertain_cells"
+_LARGE_ERROR = 0.2
+"""Body's share of the map's error from which cells are marked unless the user chose otherwise."""
 
 
 class UncertaintyModel(ReportingModel):
     """Follows the synthetic map of a mesh that states its uncertainty.
 
     The body's share of the accuracy is found for every finished map, and stays as pending while
-    the sensor moves. The cells' uncertainty is found while it is shown, which is remembered;
-    another map has none until its own is known.
+    the sensor moves. The cells' uncertainty is found while it is shown: where the body's share is
+    large, or as the user chose, which is remembered. Another map has none until its own is known.
     """
 
     changed = Signal()
@@ -31,7 +33,8 @@ class UncertaintyModel(ReportingModel):
         super().__init__(parent)
         self._session, self._synthesis, self._accuracy = session, synthesis, accuracy
         self._track = session.maps.synthetic
-        self.shown = session.settings.flag(_SHOWN, False)  # the user wants uncertain cells marked
+        self._chosen = session.settings.choice(_SHOWN)  # by the user; None: as the body needs it
+        self._large = False  # the body's share of the error
         self._of: DopplerMap | None = None  # what the body's share is of
         self._runner = ListedRunner("uncertainty", session.jobs, self, self._take, self._fail)
         self._runner.cancelled.connect(lambda: self.set_shown(False))
@@ -53,11 +56,16 @@ class UncertaintyModel(ReportingModel):
             )
         return ""
 
+    @property
+    def shown(self) -> bool:
+        """True while uncertain cells are marked."""
+        return self._large if self._chosen is None else self._chosen
+
     def set_shown(self, shown: bool) -> None:
         """Show uncertain cells or not, and remember it."""
         if shown == self.shown:
             return
-        self.shown = shown
+        self._chosen = shown
         self._session.settings.set_value(_SHOWN, shown)
         if not shown:
             if self.busy:
@@ -98,4 +106,6 @@ class UncertaintyModel(ReportingModel):
             self._track.set_uncertainty(found)
         else:
             self._accuracy.set_body(found)
+            self._large = found is not None and found >= _LARGE_ERROR
             self._follow()
+            self.changed.emit()

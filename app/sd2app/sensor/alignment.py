@@ -47,11 +47,22 @@ class AlignmentModel(BackgroundModel):
     def why_not(self) -> str:
         """Reason why nothing can be aligned; empty if it can."""
         if self._session.maps.real.map is None:
-            return "There is no radar to align: add its recording first (File → Add…)"
+            return (
+                "There is no radar to align: add its recording first"
+                " (File → Add to this recording…)"
+            )
         if not self._session.has_mesh():
             return "There is no mesh to compare the radar with: fit one to the video first"
         if not self._synthesis.complete:
             return "Wait until the synthetic map is complete"
+        return ""
+
+    @property
+    def nothing_measured(self) -> str:
+        """Reason why there is nothing to move in time; empty if there is."""
+        recording = self._session.document.recording
+        if self._session.maps.real.map is None and (recording is None or recording.imu is None):
+            return "There is no radar and no real inertial sensor to align"
         return ""
 
     def search(self, within_s: float | None = None) -> None:

@@ -38,14 +38,15 @@ class SensorFeature(Feature):
         self.placements = PlacementsModel(session, accuracy, parent)
         self.placements.failed.connect(shell.warn)
         came = session.maps.real.came_or_went
-        self.changing = self.placements.changed, came, *synthesis.completeness
+        align = session.aligning.changed
+        self.changing = self.placements.changed, came, align, *synthesis.completeness
         self.alignment = AlignmentModel(session, synthesis, parent)
         self.closing = self.working = (self.placements, self.alignment)
 
     def actions(self) -> Sequence[Action]:
         """Sensor and placements."""
         edits, synthesis, placements = self._session.edits, self._synthesis, self.placements
-        alignment = self.alignment
+        alignment, aligning = self.alignment, self._session.aligning
         return (
             Action(
                 "sensor_to_camera", "Edit", "Sensor at the camera", ("Shift+Home",),
@@ -70,6 +71,13 @@ class SensorFeature(Feature):
                 "align", "Edit", "Align automatically…", (),
                 "Find the time offset of the radar by the motion that mesh and radar both show",
                 self._align, lambda: not alignment.why_not, why_not=lambda: alignment.why_not,
+            ),
+            Action(
+                "align_by_hand", "Edit", "Align by hand", (),
+                "Show a grip on the radar's map, and on a real inertial sensor, which moves it in"
+                " time; until this is chosen again, or Esc",
+                aligning.toggle, lambda: not alignment.nothing_measured, lambda: aligning.active,
+                why_not=lambda: alignment.nothing_measured,
             ),
             Action(
                 "draw_placements", "View", "Placements in the scene", (),

@@ -11,7 +11,7 @@ from sd2app.session.content import reference_of
 from sd2app.session.display import DisplayModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.maps import MapModel, PointerModel
-from sd2app.session.placing import PlacingModel
+from sd2app.session.mode import Mode
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
 from sd2app.session.tasks import TaskList
@@ -60,7 +60,8 @@ class Session:
     span: TimeWindow
     pointer: PointerModel
     maps: Maps
-    placing: PlacingModel
+    placing: Mode  # a click on the body places an inertial sensor
+    aligning: Mode  # grips on what was measured move it in time
     edits: Edits
     results: ByteBudget  # of places and models that were left, by :attr:`MapModel.key`
 
@@ -142,9 +143,11 @@ def build_session(parent: QObject, settings: Settings) -> Session:
             MapModel("Denoised before", parent),
             MapModel("Real", parent),
         ),
-        placing=PlacingModel(parent),
+        placing=Mode(parent),
+        aligning=Mode(parent),
         edits=Edits(document, sensor),
         results=ByteBudget(_RESULTS_BYTES),
     )
     document.grown.connect(session.extend)
+    document.opened.connect(session.aligning.end)
     return session

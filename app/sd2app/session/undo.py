@@ -25,8 +25,8 @@ from sd2core.sensor import Vector, VirtualSensor, aimed_at
 Offset = Literal["radar_offset_s", "imu_offset_s"]
 """Time on the recording's clock at which something measured begins."""
 _ALIGNED: Mapping[str, str] = {
-    "radar_offset_s": "Align radar",
-    "imu_offset_s": "Align inertial sensor",
+    "radar_offset_s": "Radar offset",
+    "imu_offset_s": "Inertial sensor offset",
 }
 
 

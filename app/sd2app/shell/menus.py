@@ -25,7 +25,8 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
         "any_command", "-", "recover_labels", "-", "quit",
     ),
     "Edit": (
-        "undo", "redo", "-", "placements", "things", "place_inertial", "align", "-",
+        "undo", "redo", "-", "placements", "things", "place_inertial", "align",
+        "align_by_hand", "-",
         "preferences",
     ),
     "View": (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QInputDialog, QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.actions import editing
@@ -14,6 +14,7 @@ from sd2app.session.session import Session
 from sd2app.suggestions.bar import SuggestionBar
 from sd2app.suggestions.finders import MotionFinder, SpanFinder
 from sd2app.suggestions.model import SuggestionsModel
+from sd2app.widgets.text import counted
 
 
 class SuggestionsFeature(Feature):
@@ -55,14 +56,29 @@ class SuggestionsFeature(Feature):
                 lambda: model.reject(), self._pending,
             ),
             Action(
-                "accept_suggestions", "Labels", "Accept all suggestions", ("Shift+Y",),
-                "Take all that there is room for", model.accept_all, self._pending,
+                "accept_suggestions", "Labels", "Accept all suggestions…", ("Shift+Y",),
+                "Take all that there is room for; which label those without a name get is asked",
+                self._accept_all, self._pending,
             ),
             Action(
                 "reject_suggestions", "Labels", "Reject all suggestions", ("Shift+W",),
                 "Let all go; they are not suggested again", model.reject_all, self._pending,
             ),
         )  # fmt: skip
+
+    def _accept_all(self) -> None:
+        model, labels = self.model, self._edits.labels
+        if not model.unnamed:
+            model.accept_all()
+            return
+        names = [label.name for label in labels.labels.label_set.labels] or [labels.label]
+        asked = f"Label of {counted(len(model.unnamed), 'span')} in which something moves:"
+        used_last = names.index(labels.label) if labels.label in names else 0
+        label, accepted = QInputDialog.getItem(
+            self._shell.dialog_parent, "Accept all suggestions", asked, names, used_last, False
+        )
+        if accepted:
+            model.accept_all(label)
 
     def _pending(self) -> bool:
         return bool(self.model.pending)

@@ -61,10 +61,14 @@ class SuggestionsModel(BackgroundModel):
         return self._thresholds[self.finder.title]
 
     @property
+    def unnamed(self) -> tuple[Span, ...]:
+        """Suggestions that say that something moves, but not what."""
+        return tuple(span for span in self.pending if span.label == LABEL)
+
+    @property
     def accepted_as(self) -> str:
         """Label for accepted spans without a known one; empty where all are known."""
-        unknown = any(span.label == LABEL for span in self.pending)
-        return self._labels.label if unknown else ""
+        return self._labels.label if self.unnamed else ""
 
     @property
     def text(self) -> str:
@@ -139,11 +143,11 @@ class SuggestionsModel(BackgroundModel):
 
     def accept(self, label: str | None = None) -> None:
         """Accept the current suggestion with a label, and go to the next."""
-        self._take(self.current(), label)
+        self._take(self.current(), label, keep_known=label is None)
 
-    def accept_all(self) -> None:
-        """Accept all."""
-        self._take(self.pending, None)
+    def accept_all(self, label: str | None = None) -> None:
+        """Accept all, the unnamed ones with a label, by default the one used last."""
+        self._take(self.pending, label, keep_known=True)
 
     def reject(self) -> None:
         """Reject the current suggestion, and go to the next."""
@@ -153,14 +157,14 @@ class SuggestionsModel(BackgroundModel):
         """Reject all."""
         self._reject(self.pending)
 
-    def _take(self, spans: Sequence[Span], label: str | None) -> None:
+    def _take(self, spans: Sequence[Span], label: str | None, *, keep_known: bool) -> None:
         if not spans:
             return
         ids = [span.id for span in spans]
         track = self._labels.track or Labels().tracks[0].name
         given = label or self._labels.label
         done = self._edits.apply(
-            lambda labels, base: take(labels, base, ids, track, given, keep_known=label is None)
+            lambda labels, base: take(labels, base, ids, track, given, keep_known=keep_known)
         )
         if done:
             self._go_on(spans[-1].start_s)

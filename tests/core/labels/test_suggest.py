@@ -19,12 +19,7 @@ from sd2core.files.resources import resource_path
 from sd2core.io.mesh import load_mesh
 from sd2core.io.radar.kkt import load_kkt
 from sd2core.labels.spans import Labels, LabelTrack, Span
-from sd2core.labels.suggest import (
-    SURE_DB,
-    TRACK,
-    motion_energy_db,
-    suggest_spans,
-)
+from sd2core.labels.suggest import TRACK, motion_energy_db, suggest_spans
 from sd2core.maps import DopplerMap
 from sd2core.options.suggesting import SuggestOptions
 from sd2core.recording.recording import open_recording
@@ -135,18 +130,12 @@ def test_confidence_is_how_far_the_threshold_could_be_raised(gain: float) -> Non
     doppler = doppler_map(pulses(100, (40, 60), gain=gain))
     (span,) = suggest_spans(doppler, PLAIN)
     assert span.confidence is not None
-    reached_db = PLAIN.high_db + span.confidence * (SURE_DB - PLAIN.high_db)
+    assert 0 <= span.confidence < 1
+    reached_db = PLAIN.high_db / (1 - span.confidence)
     below = replace(PLAIN, high_db=max(reached_db - 1e-3, PLAIN.low_db))
     assert len(suggest_spans(doppler, below)) == 1
-    if span.confidence < 1:
-        above = replace(PLAIN, high_db=reached_db + 1e-3)
-        assert suggest_spans(doppler, above) == ()
-
-
-def test_a_threshold_beyond_certainty_is_certain() -> None:
-    doppler = doppler_map(pulses(100, (40, 60), gain=1e3))
-    (span,) = suggest_spans(doppler, replace(PLAIN, high_db=25.0))
-    assert span.confidence == 1.0
+    above = replace(PLAIN, high_db=reached_db + 1e-3)
+    assert suggest_spans(doppler, above) == ()
 
 
 def test_two_thresholds_keep_a_span_whole() -> None:
@@ -344,7 +333,8 @@ def test_the_eight_swipes_of_the_sample_are_found() -> None:
     best = [max(spans, key=lambda span, swipe=swipe: overlap(span, swipe)) for swipe in swipes]
     assert len({span.id for span in best}) == 8
     assert min(overlap(span, swipe) for span, swipe in zip(best, swipes, strict=True)) > 0.8
-    assert min(span.confidence or 0.0 for span in best) == 1.0
+    surest = sorted(spans, key=lambda span: -(span.confidence or 0.0))[:8]
+    assert sum(span in best for span in surest) >= 7, "swipes come before what else moves"
 
 
 def test_real_gestures_are_met_and_backgrounds_mostly_left_alone(shared_data: Path) -> None:

@@ -246,10 +246,13 @@ def test_a_real_sensors_file_is_dropped_aligned_and_removed(
     assert "measured: wrist.csv" in track.accessibleName()
 
     step_s = track.scale.seconds_per_px
-    qtbot.mousePress(track, LEFT, pos=TITLE)
+    assert track.grip_rect().isEmpty()
+    pick(menu_at(track, TITLE), "Align by hand")
+    grip = track.grip_rect().center().toPoint()
+    qtbot.mousePress(track, LEFT, pos=grip)
     for moved in (10, 25, 40):
-        qtbot.mouseMove(track, TITLE + QPoint(moved, 0))
-    qtbot.mouseRelease(track, LEFT, pos=TITLE + QPoint(40, 0))
+        qtbot.mouseMove(track, grip + QPoint(moved, 0))
+    qtbot.mouseRelease(track, LEFT, pos=grip + QPoint(40, 0))
     assert models.document.recording.imu_offset_s == pytest.approx(0.5 + 40 * step_s, abs=1e-3)
     assert models.document.undo_stack.count() == 2
     qtbot.keyClick(window, Qt.Key.Key_Z, CTRL)

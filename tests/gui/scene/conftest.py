@@ -11,7 +11,7 @@ from PySide6.QtGui import QGuiApplication
 from scene_stage import Document, Drag, Inertial, Placements, Stage, Synthesis, two_plates
 
 from sd2app.session.display import DisplayModel
-from sd2app.session.placing import PlacingModel
+from sd2app.session.mode import Mode
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
 
@@ -29,7 +29,7 @@ def make_stage(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable
         monkeypatch.setenv("SD2_SCENE", backend)
         document, synthesis, placements = Document(), Synthesis(), Placements()
         playback, sensor, display = PlaybackModel(), SensorModel(), DisplayModel()
-        inertial, placing = Inertial(), PlacingModel(document)
+        inertial, placing = Inertial(), Mode(document)
         log: list[str] = []
 
         session = SimpleNamespace(

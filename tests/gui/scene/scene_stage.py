@@ -12,7 +12,7 @@ from PySide6.QtGui import QColor
 
 from sd2app.sensor.placements import Planned
 from sd2app.session.display import DisplayModel
-from sd2app.session.placing import PlacingModel
+from sd2app.session.mode import Mode
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
 from sd2core.mesh.sequence import MeshSequence
@@ -114,7 +114,7 @@ class Stage:
     synthesis: Synthesis
     placements: Placements
     inertial: Inertial
-    placing: PlacingModel
+    placing: Mode
     log: list[str]
 
     def open(self, mesh: MeshSequence | None) -> None:

@@ -110,7 +110,7 @@ def test_the_offset_is_found_shown_applied_and_taken_back(window, qtbot, motion)
     find(window, qtbot, apply)
     found_s = models.alignment.found.offset_s
     assert models.document.recording.radar_offset_s == models.real.offset_s == found_s
-    assert models.document.undo_stack.undoText() == "Align radar"
+    assert models.document.undo_stack.undoText() == "Radar offset"
     models.document.undo_stack.undo()
     assert models.document.recording.radar_offset_s == 0.0
 

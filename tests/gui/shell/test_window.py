@@ -163,17 +163,33 @@ def test_the_ruler_seeks(window, qtbot):
     assert models_of(window).playback.time_s == pytest.approx(1.5, abs=1 / 30)
 
 
-def test_dragging_the_title_of_the_radar_aligns_it_in_one_step(window, qtbot):
+def test_a_grip_aligns_the_radar_in_one_step_while_that_is_asked_for(window, qtbot):
     _, real = heatmaps(window)
-    recording = models_of(window).document.recording
-    start = QPoint(400, 10)
+    models = models_of(window)
+    recording = models.document.recording
+
+    def drag(start: QPoint, shift_px: int) -> None:
+        qtbot.mousePress(real, Qt.MouseButton.LeftButton, pos=start)
+        for step in (0.3, 0.7, 1.0):
+            qtbot.mouseMove(real, start + QPoint(round(step * shift_px), 0))
+        qtbot.mouseRelease(real, Qt.MouseButton.LeftButton, pos=start + QPoint(shift_px, 0))
+
     shift_px = round(0.25 / real.scale.seconds_per_px)
-    qtbot.mousePress(real, Qt.MouseButton.LeftButton, pos=start)
-    for step in (0.3, 0.7, 1.0):
-        qtbot.mouseMove(real, start + QPoint(round(step * shift_px), 0))
-    qtbot.mouseRelease(real, Qt.MouseButton.LeftButton, pos=start + QPoint(shift_px, 0))
+    drag(QPoint(400, 10), shift_px)  # the title: nothing moves in time
+    middle = real.plot_rect().center().toPoint()
+    drag(middle, shift_px)  # seeks, as on every map
+    assert (recording.radar_offset_s, models.document.undo_stack.count()) == (0.0, 0)
+    window.action("align_by_hand").trigger()
+    assert real.grip_rect().contains(middle)
+    seen_s = models.playback.time_s
+    drag(middle, shift_px)
+    assert models.playback.time_s == seen_s
     assert recording.radar_offset_s == pytest.approx(0.25, abs=0.005)
-    assert models_of(window).real.offset_s == recording.radar_offset_s
+    assert models.real.offset_s == recording.radar_offset_s
+    assert f"offset +{recording.radar_offset_s:g} s" in real.status()
+    assert "offset" in window.action("undo").text()
+    qtbot.keyClick(window, Qt.Key.Key_Escape)
+    assert real.grip_rect().isEmpty()
     qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     assert recording.radar_offset_s == 0.0
     assert models_of(window).real.offset_s == 0.0

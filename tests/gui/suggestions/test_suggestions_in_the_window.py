@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import label_hands as hands
 import numpy as np
 import pytest
+from answering import once_asked
 from kept_window import opened
 from PySide6.QtCore import QPoint, QRect, QRectF, Qt
-from PySide6.QtWidgets import QToolButton, QWidget
+from PySide6.QtWidgets import QInputDialog, QToolButton, QWidget
 from window_models import models_of
 
-from sd2app.labels.painting import lane_box
+from sd2app.labels.painting import lane_box, text_on
 from sd2app.labels.timeline import TargetLine
 from sd2app.suggestions.bar import SuggestionBar
 from sd2core.maps import DopplerMap
@@ -63,8 +65,27 @@ def test_found_by_a_key_and_decided_on_by_one_key_each(moving, qtbot) -> None:
         key(moving, qtbot, "Z", Qt.KeyboardModifier.ControlModifier)
     assert decided(moving) == [("gesture", "suggestion")] * 2
     c.labels.set_label("down-to-up")
+    offered: list[str] = []
+
+    def choose(dialog: QInputDialog) -> None:
+        offered.append(dialog.textValue())
+        dialog.setTextValue("right-to-left")
+        dialog.accept()
+
+    once_asked(QInputDialog, choose)
     key(moving, qtbot, "Y", Qt.KeyboardModifier.ShiftModifier)
-    assert decided(moving) == [("down-to-up", "person")] * 2
+    assert offered == ["down-to-up"], "the one used last comes first"
+    assert decided(moving) == [("right-to-left", "person")] * 2
+
+
+def test_nobody_says_that_a_suggestion_without_a_name_is_sure(moving, qtbot) -> None:
+    c = models_of(moving)
+    values = c.synthetic.map.values.copy()
+    values[:, 40:50] *= 100.0
+    c.synthetic.set_map(replace(c.synthetic.map, values=values))
+    asked(moving, qtbot)
+    arrays = c.labels.arrays
+    assert [text_on(span, arrays) for span in arrays.spans] == ["#2 gesture", "#1 gesture"]
 
 
 def test_the_bar_does_the_same(moving, qtbot) -> None:

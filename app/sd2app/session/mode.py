@@ -1,12 +1,12 @@
-"""Mode in which a click on the body places an inertial sensor."""
+"""Mode of the window, in which the mouse does something else until the user ends it."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QObject, Signal
 
 
-class PlacingModel(QObject):
-    """On from the user's request until the click, or until the user gives it up."""
+class Mode(QObject):
+    """On from the user's request until what was asked for is done, or is given up."""
 
     changed = Signal()
 
@@ -15,12 +15,16 @@ class PlacingModel(QObject):
         self.active = False
 
     def begin(self) -> None:
-        """Wait for the click."""
+        """Switch it on."""
         self._set(True)
 
     def end(self) -> None:
-        """Wait no more."""
+        """Switch it off."""
         self._set(False)
+
+    def toggle(self) -> None:
+        """Switch it on or off."""
+        self._set(not self.active)
 
     def _set(self, active: bool) -> None:
         if active != self.active:
