@@ -29,6 +29,7 @@ from typing import Literal
 from sd2core.errors import Sd2Error
 from sd2core.labels.free_time import (
     Frames,
+    NoRoom,
     TimeRange,
     clip_to_free,
     free_parts,
@@ -394,7 +395,7 @@ def _timed(span: Span, start_s: float, end_s: float, frames: Frames, *, alone: b
     if frames.held(start_s, end_s):
         return replace(span, start_s=start_s, end_s=end_s)
     if alone:
-        raise Sd2Error(
+        raise NoRoom(
             f"{span.words()} has no room for a frame",
             "room for one frame on its track, inside the recording",
             "Move or delete the spans beside it",

@@ -15,6 +15,11 @@ from sd2core.errors import Sd2Error
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
 
+
+class NoRoom(Sd2Error):
+    """An edit that is refused because what it would put somewhere finds no free frame there."""
+
+
 TimeRange = tuple[float, float]
 """Half-open ``[start_s, end_s)``."""
 
@@ -184,7 +189,7 @@ def clip_to_free(labels: Labels, track: str, wanted: TimeRange, frames: Frames) 
         return wanted
     parts = [one for one in free_parts(labels, track, wanted) if frames.held(*one)]
     if not parts:
-        raise Sd2Error(
+        raise NoRoom(
             f"From {wanted[0]:.3f} to {wanted[1]:.3f} s every frame has a span on {track!r}",
             "room for at least one frame on a track without overlaps",
             "Shorten or delete the span there, or take another track",

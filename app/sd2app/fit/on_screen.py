@@ -73,6 +73,13 @@ class FitOnScreen(QObject):
             return False
         return plain_path(recording.video) == request.video
 
+    @property
+    def under_way(self) -> str:
+        """Where the mesh of the video on screen is to come from; empty where none is made."""
+        if not (self._fit.busy and self.visible):
+            return ""
+        return "A body is being fitted to this video: its synthetic Doppler comes with it."
+
     def set_following(self, following: bool) -> None:
         """Follow the frame under way, or stop following."""
         if following != self.following:

@@ -16,6 +16,7 @@ from sd2core.errors import Sd2Error
 from sd2core.labels import edits, field_edits
 from sd2core.labels.comparison import changed_stretch
 from sd2core.labels.edits import Change, Edit, Side
+from sd2core.labels.free_time import NoRoom
 from sd2core.labels.spans import Labels, Span
 from sd2core.recording.divergence import State
 from sd2core.recording.edited import decoded_fields
@@ -53,13 +54,15 @@ class LabelEdits(QObject):
     Mouse drags (:class:`sd2app.labels.dragging.LabelDragging`) and marking during playback
     (:class:`sd2app.labels.marking.LabelMarking`) also end here. Each edit is on disk when it is
     made (see :class:`sd2app.labels.autosave.LabelAutosave`). Times are frames of the clock.
-    An impossible edit changes nothing, and ``failed`` says why. ``applying`` is emitted before an
+    An impossible edit changes nothing, and ``failed`` says why, or ``had_no_room`` where other
+    spans are in the way. ``applying`` is emitted before an
     edit, so that a drag in progress ends first; ``done_at`` after an edit, an undo or a redo, with
     the earliest start and latest end of changed spans; ``restoring`` with the other fields of the
     recording that are restored, or taken over, with the labels in the same step.
     """
 
     failed = Signal(str)
+    had_no_room = Signal(str)
     applying = Signal()
     restoring = Signal(dict)
     done_at = Signal(float, float)
@@ -229,6 +232,9 @@ class LabelEdits(QObject):
         before = self.labels.labels
         try:
             done = change(before, self.playback.timebase)
+        except NoRoom as error:
+            self.had_no_room.emit(str(error))
+            return False
         except Sd2Error as error:
             self.failed.emit(str(error))
             return False

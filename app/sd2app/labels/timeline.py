@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt, QTimer
+from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, QRect, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QResizeEvent
-from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QScrollBar, QSizePolicy
+from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QScrollBar, QSizePolicy, QToolTip
 
 from sd2app.labels.dragging import MOVED_PX, LabelDragging, attraction_s
 from sd2app.labels.edits import LabelEdits
@@ -21,6 +21,7 @@ from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, paint_cursor
 from sd2core.labels.spans import Span
 
 _EDGE_PX = 5.0
+_SAID_MS = 6000
 
 
 class HitTarget(NamedTuple):
@@ -78,6 +79,7 @@ class LabelTimeline(ZoomedPlot):
         for signal in (labels.changed, labels.marks_changed):
             signal.connect(self._follow)
         dragging.changed.connect(self._let_go)
+        edits.had_no_room.connect(self._say_here)
         for signal in (labels.selection_changed, loop.changed, session.span.changed):
             signal.connect(self.redraw)
         self._follow()
@@ -117,6 +119,13 @@ class LabelTimeline(ZoomedPlot):
         painter.setPen(QColor(self._session.display.palette.muted))
         hint = f"{pressed} to mark a gesture, again to end it – or drag here"
         painter.drawText(row.adjusted(GUTTER_PX + 8, 0, -MARGIN_PX, 0), AT_LEFT, hint)
+
+    def _say_here(self, why: str) -> None:
+        """Say at the cursor, once, why nothing comes there."""
+        row = self.rows.row_of(self._labels.track) if self._labels.track else self.rows.tracks[0]
+        x_px = min(max(self.scale.x_of(self._playback.time_s), GUTTER_PX), self.width())
+        place = QPoint(round(x_px), round(row.top_px + row.height_px))
+        QToolTip.showText(self.mapToGlobal(place), why, self, QRect(), _SAID_MS)
 
     def _follow(self) -> None:
         labels = self._labels

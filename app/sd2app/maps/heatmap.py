@@ -98,7 +98,7 @@ class HeatmapView(TrackMouse, MapWidget):
         self.setAccessibleName(f"{track.title} map")
         self.alignable = alignable
         self.folded = self.enlarged = False
-        self._hint = ""
+        self.hint = ""
         self._button: QWidget | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
@@ -115,8 +115,9 @@ class HeatmapView(TrackMouse, MapWidget):
 
     def set_hint(self, hint: str) -> None:
         """Text shown while there is no map."""
-        self._hint = hint
-        self.redraw()
+        if hint != self.hint:
+            self.hint = hint
+            self.redraw()
 
     def set_button(self, button: QWidget) -> None:
         """Put a button beside the title."""
@@ -172,7 +173,7 @@ class HeatmapView(TrackMouse, MapWidget):
         muted, centre = QColor(colours.muted), Qt.AlignmentFlag.AlignCenter
         if self.track.map is None and not self.track.awaited:
             painter.setPen(muted)
-            painter.drawText(self.rect(), centre, self._hint)
+            painter.drawText(self.rect(), centre, self.hint)
             return
         self._paint_header(painter)
         if self.folded:

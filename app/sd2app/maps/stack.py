@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
-from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal, SignalInstance
 from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QFrame, QMenu, QScrollArea, QScrollBar, QWidget
 
@@ -55,6 +55,7 @@ class MapStack(QScrollArea):
         self.arrangement = Arrangement(tuple(self._named), session.settings, self)
         self.overview = Overview(session, over_all)
         self._offer: QWidget | None = None
+        self._under_way: Callable[[], str] = str
         self._shown: object = None
         self._with_content: frozenset[str] = frozenset()
         self.setWidget(self._content)
@@ -133,16 +134,26 @@ class MapStack(QScrollArea):
             denoised = with_content["denoised"]
             self._offer.setVisible(maps.synthetic.map is not None and not denoised)
         self.overview.set_track(maps.synthetic if maps.synthetic.map is not None else maps.real)
-        self.synthetic.set_hint(
-            "Add a mesh to see its synthetic Doppler: File → Add to this recording…\n\n"
-            "From a video alone: File → New from video… fits a body to the person in it."
-            if document.content is not None
-            else "Drop a recording, video, mesh or radar capture here, or choose File → Open…\n\n"
-            "Help → Open the sample recording shows what it looks like."
-        )
+        self._show_hint()
         self._arrange()
         if before and (added := self._with_content - before):
             self.ensureWidgetVisible(self.view(min(added, key=self.arrangement.order.index)), 0, 0)
+
+    def set_under_way(self, under_way: Callable[[], str], *changed: SignalInstance) -> None:
+        """Take the words for a mesh that is on its way; they are asked for after these signals."""
+        self._under_way = under_way
+        for signal in changed:
+            signal.connect(self._show_hint)
+
+    def _show_hint(self) -> None:
+        self.synthetic.set_hint(
+            self._under_way()
+            or "Add a mesh to see its synthetic Doppler: File → Add to this recording…\n\n"
+            "From a video alone: File → New from video… fits a body to the person in it."
+            if self._session.has_content()
+            else "Drop a recording, video, mesh or radar capture here, or choose File → Open…\n\n"
+            "Help → Open the sample recording shows what it looks like."
+        )
 
     def toggle_enlarged(self, name: str) -> None:
         """Show a map alone, or all of them again."""

@@ -200,6 +200,8 @@ def track_stack(
     labels = features.labels
     maps = features.maps.stack((labels.over_maps,), (labels.over_all,))
     features.denoise.put_buttons(maps)
+    fit = features.fit.on_screen
+    maps.set_under_way(lambda: fit.under_way, fit.changed)
     inertial = features.imu.track((labels.over_maps,))
     labels.let_drag_on((*maps.views, inertial))
     below = [views[name] for name in ("classes", "suggestions", "labels", "other labels")]

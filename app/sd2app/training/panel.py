@@ -149,7 +149,7 @@ class TrainingGainView(QWidget):
 
     def _refresh(self) -> None:
         use = self._adoption
-        self._summary.setText(gain_summary(use.gain, use.has_radar))
+        self._summary.setText(gain_summary(use.gain, use.has_radar, is_old=use.is_old))
         self._table.show_facts(gain_rows(use.gain) if use.gain is not None else [])
         self._both.show_checked(use.denoise.comparing)
         self._both.setVisible(use.previous is not None)

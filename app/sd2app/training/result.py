@@ -62,11 +62,12 @@ class ModelAdoption(QObject):
         self._run: Path | None = None
         self.previous: Path | None = None  # model that was in use before
         self._gain: Improvement | None = None
-        self._before_mps: float | None = None
+        self._gain_of: object = None  # the maps that it compares
+        self._before: tuple[object, float] | None = None  # maps, and the earlier model's error
         # Maps change many times while one is denoised piece by piece.
         self._calm = delayed(self._compare, CALM_MS, self)
-        for one in (denoise, maps.denoised, maps.before, maps.real):
-            one.changed.connect(self._wait)
+        for changed in (denoise.changed, *(track.changed for track in maps.all)):
+            changed.connect(self._wait)
 
     # --- what is known --------------------------------------------------------------------
 
@@ -79,6 +80,11 @@ class ModelAdoption(QObject):
     def gain(self) -> Improvement | None:
         """Improvement over the earlier model; None while unknown or without a radar."""
         return self._gain if self.run is not None else None
+
+    @property
+    def is_old(self) -> bool:
+        """True while the gain is of other maps than those on screen."""
+        return self._gain is not None and self._gain_of != (*self._compared(), self._shown())
 
     @property
     def has_radar(self) -> bool:
@@ -102,7 +108,7 @@ class ModelAdoption(QObject):
         self._kept, self._run = kept, run.folder.path
         if previous != kept:
             self.previous = previous
-        self._gain = self._before_mps = None
+        self._gain = self._before = None
         if self.denoise.path != kept:
             self.noted.emit(
                 f"The model is kept as {kept.stem}. Open a recording to denoise it with that."
@@ -135,24 +141,37 @@ class ModelAdoption(QObject):
 
     # --- what it gains --------------------------------------------------------------------
 
+    def _compared(self) -> tuple[object, ...]:
+        """What models are compared on: the map to be denoised, and the radar's."""
+        plain, radar = self._maps.synthetic, self._maps.real
+        return plain.revision, radar.revision, radar.offset_s
+
+    def _shown(self) -> int:
+        return self._maps.denoised.revision
+
     def _wait(self) -> None:
         if self._kept is not None:
+            if self.is_old and not self._calm.isActive():
+                self.changed.emit()
             self._calm.start()
 
     def _compare(self) -> None:
         maps = self._maps
         plain, now, radar = maps.synthetic.map, maps.denoised.map, maps.real.map
-        ready = self.run is not None and not self.denoise.busy
+        whole = maps.synthetic.covered is None and maps.denoised.covered is None
+        ready = self.run is not None and not self.denoise.busy and whole
         if ready and plain is not None and now is not None and radar is not None:
             target = _radar_at(plain, radar, maps.real.offset_s)
-            before = maps.before.map
+            before, compared = maps.before.map, self._compared()
             if before is not None:
-                self._before_mps = _peak_error(before, *target)[0]
+                self._before = compared, _peak_error(before, *target)[0]
+            elif self._before is not None and self._before[0] != compared:
+                self._before = None
             plain_mps, frames = _peak_error(plain, *target)
             now_mps, _ = _peak_error(now, *target)
             gain = Improvement(
                 plain_mps,
-                self._before_mps,
+                None if self._before is None else self._before[1],
                 now_mps,
                 self.previous.stem if self.previous is not None else "",
                 frames,
@@ -160,13 +179,16 @@ class ModelAdoption(QObject):
             )
             # Without a frame in which the radar saw a movement there is nothing to tell.
             self._gain = gain if frames else None
-        elif radar is None:
+            self._gain_of = *compared, self._shown()
+        elif radar is None or now is None:
             self._gain = None
         self.changed.emit()
 
 
-def gain_summary(gain: Improvement | None, has_radar: bool) -> str:
+def gain_summary(gain: Improvement | None, has_radar: bool, *, is_old: bool = False) -> str:
     """Caption of the figures below, or the reason why there are none."""
+    if gain is not None and is_old:
+        return "Old: the figures are of the map before the one on screen."
     if gain is not None:
         radar = "the simulated radar's" if gain.simulated else "the radar's"
         worse = " Here it is worse than no denoising." if gain.now_mps > gain.plain_mps else ""

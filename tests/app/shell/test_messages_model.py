@@ -14,7 +14,7 @@ STEPS = st.lists(
 
 
 @given(STEPS)
-def test_failures_stay_each_once_until_dismissed_and_all_is_kept(steps) -> None:
+def test_failures_stand_together_each_once_the_newest_last_and_all_is_kept(steps) -> None:
     messages = MessagesModel()
     failures: list[str] = []
     for kind, text in steps:
@@ -25,9 +25,10 @@ def test_failures_stay_each_once_until_dismissed_and_all_is_kept(steps) -> None:
             continue
         getattr(messages, kind)(text)
         if kind == "warn":
-            failures += [line for line in text.splitlines() if line not in failures]
+            said = list(dict.fromkeys(reversed(text.splitlines())))[::-1]
+            failures = [line for line in failures if line not in said] + said
         if failures:
-            assert messages.lines == tuple(dict.fromkeys(failures))
+            assert messages.lines == tuple(failures)
             assert messages.failed
         else:
             assert messages.text == "\n".join(text.splitlines())
@@ -37,3 +38,11 @@ def test_failures_stay_each_once_until_dismissed_and_all_is_kept(steps) -> None:
     assert times == sorted(times)
     messages.forget()
     assert messages.history == ()
+
+
+def test_of_failures_that_differ_in_numbers_the_newest_stands_for_all() -> None:
+    messages = MessagesModel()
+    for text in ("Frame 7 is late by 0.25 s", "The disk is full", "Frame 12 is late by 1,031.5 s"):
+        messages.warn(text)
+    assert messages.lines == ("The disk is full", "Frame 12 is late by 1,031.5 s")
+    assert len(messages.history) == 3

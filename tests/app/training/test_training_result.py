@@ -119,6 +119,28 @@ def test_the_gain_is_told_against_the_radar(made, qtbot, run, tmp_path) -> None:
     use.close()
 
 
+def test_figures_of_another_map_are_marked_old_until_there_are_new_ones(made, qtbot, tmp_path):
+    use, tracks = made(FakeDenoising(tmp_path / "denoiser.safetensors"))
+    for name, peaks in (("radar", [3, 3, 3]), ("plain", [1, 1, 1]), ("now", [3, 3, 3])):
+        tracks[name].set_map(peaks_at(peaks))
+    tracks["before"].set_map(peaks_at([2, 2, 2]))
+    use.use()
+    qtbot.waitUntil(lambda: use.gain is not None)
+    assert (use.gain.now_mps, use.gain.before_mps, use.is_old) == (0.0, 0.5, False)
+    tracks["before"].set_map(None)  # not shown, but of the same maps
+    tracks["plain"].set_map(peaks_at([2, 2, 2]))  # the sensor moved
+    assert use.is_old
+    assert gain_summary(use.gain, True, is_old=True).startswith("Old")
+    use.denoise.busy = True  # its map comes in pieces
+    tracks["now"].set_map(peaks_at([2, 2, 2]), np.array([True, False, False]))
+    qtbot.wait(20)
+    assert use.is_old
+    use.denoise.busy = False
+    tracks["now"].set_map(peaks_at([2, 2, 2]))
+    qtbot.waitUntil(lambda: not use.is_old)
+    assert (use.gain.now_mps, use.gain.before_mps) == (0.5, None)
+
+
 def test_nothing_is_told_while_a_map_is_on_its_way_or_without_a_radar(made, qtbot) -> None:
     denoise = FakeDenoising(None)
     use, tracks = made(denoise)

@@ -89,9 +89,10 @@ def click(window, qtbot, text: str) -> None:
 def test_from_the_offer_to_the_recording(made, qtbot, video) -> None:
     window = made("--body")
     show(window, qtbot, video)
-    bar = window.findChild(FitBar)
+    bar, hinting = window.findChild(FitBar), window.maps.synthetic
     assert not bar.isVisible()
     assert window.findChild(FitOffer).isVisible()
+    assert "Add a mesh" in hinting.hint
     asked: list[FitRequest] = []
 
     def fill(dialog: NewFromVideoDialog) -> None:
@@ -121,6 +122,7 @@ def test_from_the_offer_to_the_recording(made, qtbot, video) -> None:
     assert (person.width, person.height) == pytest.approx((80, 80), abs=1)
     assert asked[0].stature_m == DEFAULT_STATURE_M
     assert fit.request == asked[0]
+    assert ("being fitted" in hinting.hint, "Add a mesh" in hinting.hint) == (True, False)
     with qtbot.waitSignal(models_of(window).document.opened, timeout=30_000):
         pass
     made_of = open_recording(video.with_name("walk.sd2"))

@@ -85,13 +85,13 @@ def test_nothing_moves_when_something_is_said(window, pointer_elsewhere) -> None
 
 
 def test_several_failures_are_one_notice_with_a_list(window, pointer_elsewhere) -> None:
-    for number in range(8):
-        window.warn(f"File {number} is missing.")
+    for name in "ABCDEFGH":
+        window.warn(f"File {name} is missing.")
         window.warn("The disk is full.")
     notice = shown(window, MessageNotice)
     said = notice.text.splitlines()
     assert said[0].startswith("9 things went wrong: ")
-    assert said[-2:] == ["• File 7 is missing.", "3 more: View → Messages"]
+    assert said[-3:] == ["• File H is missing.", "• The disk is full.", "3 more: View → Messages"]
     window.note("Something was done.")
     assert notice.text.splitlines() == said
     assert window.findChild(NoticeStack).rect().contains(notice.geometry())
@@ -110,20 +110,37 @@ def test_what_is_under_the_pointer_stays_there(window) -> None:
     assert c.document.undo_stack.count() == 0
 
 
-def test_a_remark_goes_by_itself_and_a_failure_stays(window, pointer_elsewhere) -> None:
+def test_what_is_said_goes_by_itself_a_failure_once_it_can_have_been_read(
+    window, pointer_elsewhere, qtbot, monkeypatch
+) -> None:
     window.note("Something was done.")
     notice = shown(window, MessageNotice)
     timer = notice.findChild(QTimer)
     assert timer.isActive()
+    remark_ms = timer.interval()
     timer.timeout.emit()
     assert window.messages.text == ""
     assert not notice.isVisible()
     window.warn("This cannot be read.")
-    assert not timer.isActive()
-    # Once it was closed the same is said again.
-    QTest.mouseClick(cross_of(shown(window, MessageNotice)), LEFT)
-    window.warn("This cannot be read.")
+    assert timer.isActive()
+    assert timer.interval() > 2 * remark_ms
+    monkeypatch.setattr(notice, "isActiveWindow", lambda: False)  # the user is elsewhere
+    timer.timeout.emit()
     assert shown(window, MessageNotice).text == "This cannot be read."
+    monkeypatch.undo()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow, timeout=5000)
+    timer.timeout.emit()
+    assert not notice.isVisible()
+    assert [one.text for one in window.messages.history[-2:]] == [
+        "Something was done.",
+        "This cannot be read.",
+    ]
+    # Once it is gone, or was closed, the same is said again.
+    for _ in range(2):
+        window.warn("This cannot be read.")
+        assert shown(window, MessageNotice).text == "This cannot be read."
+        QTest.mouseClick(cross_of(notice), LEFT)
 
 
 def test_everything_that_was_said_is_listed(window, qtbot, pointer_elsewhere) -> None:

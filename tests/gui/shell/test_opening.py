@@ -5,6 +5,8 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
 from answering import answer, once_asked, press_when_ready
 from dropping import drop, hover
@@ -214,3 +216,16 @@ def test_hovering_says_what_a_drop_would_do(empty_window, qtbot, small_recording
         drop(empty_window, small_recording / "radar", on=1)
     assert c.document.mesh is None
     assert c.document.capture is not None
+
+
+def test_a_file_of_the_sensor_before_the_a121_is_called_what_it_is(window, qtbot, tmp_path) -> None:
+    file = tmp_path / "hand.h5"
+    with h5py.File(file, "w") as made:
+        made["data"] = np.zeros((4, 1, 8, 5), np.uint16)
+        for name, text in (("mode", "sparse"), ("sensor_config_dump", "{}")):
+            made.create_dataset(name, data=text, dtype=h5py.string_dtype())
+    hover(window, file)
+    drop(window, file)
+    qtbot.waitUntil(lambda: bool(window.messages.text), timeout=10_000)
+    assert "A111" in window.messages.text
+    assert "K60168A" not in window.messages.text

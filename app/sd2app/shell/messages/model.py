@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import time
 from dataclasses import dataclass
 
 from PySide6.QtCore import QObject, Signal
 
 _KEPT = 500
+_NUMBER = re.compile(r"\d+(?:[.,:]\d+)*")
 
 
 @dataclass(frozen=True)
@@ -22,7 +24,8 @@ class Message:
 class MessagesModel(QObject):
     """Failures that wait to be read, or the newest remark; and everything that was said.
 
-    Failures stand together until they are dismissed, each once; a remark gives way to them.
+    Failures stand together until they are dismissed, the newest last; of those that differ in
+    numbers alone, the newest stands for all. A remark gives way to them.
     """
 
     changed = Signal()
@@ -40,8 +43,12 @@ class MessagesModel(QObject):
 
     def warn(self, text: str) -> None:
         """Say that something went wrong."""
-        before = self.lines if self.failed else ()
-        self.lines = tuple(dict.fromkeys([*before, *text.splitlines()]))
+        kept: dict[str, str] = {}
+        for line in (*(self.lines if self.failed else ()), *text.splitlines()):
+            kind = _NUMBER.sub("#", line)
+            kept.pop(kind, None)  # it comes again, as the newest
+            kept[kind] = line
+        self.lines = tuple(kept.values())
         self.failed = True
         self.keep(text, failed=True)
 

@@ -11,13 +11,13 @@ from sd2app.widgets.layouts import column_of
 from sd2app.widgets.notices import Notice
 from sd2app.widgets.text import clock_text
 
-_REMARK_MS = 12_000
+_REMARK_MS, _FAILURE_MS = 12_000, 30_000
 _MAX_LINES = 6
 _NOTHING = "Nothing was said yet."
 
 
 class MessageNotice(Notice):
-    """What is to be read now: failures until they are closed, a remark for a while."""
+    """What is to be read now, for a while: failures for longer, and not while nobody is there."""
 
     def __init__(self, messages: MessagesModel) -> None:
         super().__init__("Message", close=messages.dismiss)
@@ -39,12 +39,13 @@ class MessageNotice(Notice):
         self._closed = ("", "")  # the same may be said again
         self.show_words(head, "\n".join(shown), "warning" if messages.failed else "plain")
         self._timer.stop()
-        if lines and not messages.failed:
-            self._timer.start()
+        if lines:
+            self._timer.start(_FAILURE_MS if messages.failed else _REMARK_MS)
 
     def _time_out(self) -> None:
-        if self.underMouse():
-            self._timer.start()  # it is being read
+        unread = self._messages.failed and not self.isActiveWindow()
+        if unread or self.underMouse():
+            self._timer.start()
         else:
             self._messages.dismiss()
 
