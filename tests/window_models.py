@@ -91,7 +91,6 @@ def _named(session: Session, features: Features, **others: object) -> SimpleName
         denoised=s.maps.denoised,
         before=s.maps.before,
         real=s.maps.real,
-        reset_references=s.maps.reset_references,
         edits=s.edits,
         overlay=f.video.overlay,
         trade=f.accuracy.model,

@@ -107,7 +107,12 @@ class AccuracyModel(ReportingModel):
     def _of_choice(self, choice: Choice | None) -> InUse | None:
         if choice is None:
             return None
-        return InUse(choice.plan, choice.errors.l1, choice.cost_ms, "chosen", False, *self._body)
+        error, cost_ms = choice.errors.l1, choice.cost_ms
+        counting = self.measured.counting
+        # The figures that the plot shows of the same plan, where it was measured here.
+        if counting is not None and not counting.stale and (here := counting.of(choice.plan)):
+            error, cost_ms = here.errors.l1, here.cost.all_cores_ms.median
+        return InUse(choice.plan, error, cost_ms, "chosen", False, *self._body)
 
     @property
     def choosing(self) -> bool:
@@ -116,9 +121,11 @@ class AccuracyModel(ReportingModel):
 
     @property
     def current_point(self) -> PlanResult | None:
-        """Measured point of the plan at rest."""
+        """Measured point of the plan at rest; None where others were measured, or elsewhere."""
         measurement, in_use = self.measured.measurement, self.in_use
-        return measurement.of(in_use.plan) if measurement and in_use else None
+        if measurement is None or in_use is None or (measurement.stale and not self._clicked):
+            return None
+        return measurement.of(in_use.plan)
 
     def cost_at(self, tolerance: float) -> float | None:
         """Milliseconds per frame of the cheapest counting plan known to hold a tolerance.

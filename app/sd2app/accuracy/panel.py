@@ -43,8 +43,9 @@ class AccuracyPanel(QWidget):
         self._nothing = sentence(_NO_MESH)
         self._parts = (
             ToleranceRow(accuracy, self),
-            self._use_part(),
+            # Above what a click on it says, so that it stays where it is.
             self._plot_part(display, measure),
+            self._use_part(),
             self._reason_part(),
         )
         self.setLayout(

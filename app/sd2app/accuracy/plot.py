@@ -33,7 +33,7 @@ class AccuracyPlot(ChartView):
     """
 
     MARGINS_PX = (44, 20, 10, 36)
-    HEIGHTS_PX = (164, 164, 260)
+    HEIGHTS_PX = (200, 200, 200)
     REACH_PX = 8.0
     STEPS: ClassVar = {**ChartView.STEPS, **_UP_AND_DOWN}
     KEYS = ChartView.KEYS | _USE

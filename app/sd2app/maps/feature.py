@@ -49,6 +49,7 @@ class MapsFeature(Feature):
     def actions(self) -> Sequence[Action]:
         """Export, levels, uncertainty, difference."""
         uncertainty, difference = self.uncertainty, self.difference
+        edits, maps = self._session.edits, self._session.maps
         return (
             Action(
                 "export_map", "File", "Export synthetic map…", ("Ctrl+E",),
@@ -58,7 +59,8 @@ class MapsFeature(Feature):
             Action(
                 "reset_reference", "View", "Set 0 dB to what is shown", ("R",),
                 "Make the strongest bin of each map 0 dB",
-                self._session.maps.reset_references, self._session.has_content,
+                lambda: edits.set_references(maps.strongest(), by_hand=False),
+                self._session.has_content,
             ),
             Action(
                 "uncertain", "View", "Show uncertain cells", ("U",),
@@ -114,15 +116,17 @@ class MapsFeature(Feature):
         self, view: HeatmapView, own: Sequence[QAction], menu: QMenu, place: QPointF
     ) -> None:
         """What can be done with a map, and with the cell at a place of it."""
-        reading, span = view.reading_at(place), self._session.span
+        reading, span, edits = view.reading_at(place), self._session.span, self._session.edits
         copy = menu.addAction("Copy &value")
         copy.setEnabled(reading is not None)
-        zero = menu.addAction("&0 dB here")
+        level = "" if reading is None else f" (now {reading.level})"
+        zero = menu.addAction(f"&0 dB here{level}")
         zero.setEnabled(reading is not None and reading.value > 0 and not reading.text)
         if reading is not None:
             words = "\t".join(reading_lines(reading))
             copy.triggered.connect(lambda: QGuiApplication.clipboard().setText(words))
-            zero.triggered.connect(lambda: view.track.set_reference(reading.value))
+            here = {view.track: reading.value}
+            zero.triggered.connect(lambda: edits.set_references(here, by_hand=True))
         play = self._session.playback.play_stretch
         menu.addAction("Play what is in view in a &loop", lambda: play(span.start_s, span.end_s))
         if view.alignable:

@@ -243,6 +243,9 @@ class HeatmapView(TrackMouse, MapWidget):
         if self.track.uncertainty is not None:
             colour = "amber" if self._display.levels.colour_map == "gray" else "grey"
             parts.append(f"{colour}: ±{100 * UNCERTAIN_SHARE:.0f} % or worse")
+        if self.track.by_hand and self.track.map is not None:
+            value = f"{self.track.reference:.3g} {self.track.map.unit}".rstrip()
+            parts.append(f"0 dB set to {value}")
         if self.track.covered is None and -math.inf < strongest_db < lowest_db:
             level = f"{strongest_db:.0f}".replace("-", "−")
             parts.append(f"strongest bin {level} dB, below the scale: R sets 0 dB here")

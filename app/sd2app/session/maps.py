@@ -73,6 +73,7 @@ class MapModel(QObject):
         self.uncertainty: CellUncertainty | None = None  # None: unknown or switched off
         self.offset_s = 0.0  # start of the map's clock on the recording's clock
         self.reference = 1.0  # value shown as 0 dB
+        self.by_hand = False  # the user chose that value
         self.part = ""  # part of the body that is shown alone, where its map is known
         self.growing = False  # frames are being added at its end
         self.awaited = False  # is going to be made: its place is kept while it is not there
@@ -176,9 +177,9 @@ class MapModel(QObject):
             self.status = status
             self.status_changed.emit()
 
-    def set_reference(self, reference: float) -> None:
+    def set_reference(self, reference: float, *, by_hand: bool = False) -> None:
         """Choose the value shown as 0 dB."""
-        self.reference = reference if reference > 0 else 1.0
+        self.reference, self.by_hand = reference if reference > 0 else 1.0, by_hand
         self.changed.emit()
 
     def frame_at(self, time_s: float) -> int | None:

@@ -39,11 +39,13 @@ class Maps:
         """The maps from top to bottom."""
         return (self.synthetic, self.denoised, self.before, self.real)
 
-    def reset_references(self) -> None:
-        """Make the strongest bin of each map 0 dB."""
-        for track in self.all:
-            if track.map is not None:
-                track.set_reference(reference_of(track.map.values, track.map.null_bins))
+    def strongest(self) -> dict[MapModel, float]:
+        """Strongest bin of each map on screen."""
+        return {
+            track: reference_of(track.map.values, track.map.null_bins)
+            for track in self.all
+            if track.map is not None
+        }
 
 
 @dataclass(frozen=True)

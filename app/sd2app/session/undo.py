@@ -12,6 +12,7 @@ from PySide6.QtGui import QUndoCommand
 
 from sd2app.session.denoiser_choice import DenoiserChoice
 from sd2app.session.document import DocumentModel
+from sd2app.session.maps import MapModel
 from sd2app.session.mesh_reading import ReadMesh
 from sd2app.session.sensor import SensorModel
 from sd2core.errors import Cure
@@ -28,6 +29,11 @@ _ALIGNED: Mapping[str, str] = {
     "radar_offset_s": "Radar offset",
     "imu_offset_s": "Inertial sensor offset",
 }
+
+
+def _assign_references(references: Mapping[MapModel, tuple[float, bool]]) -> None:
+    for track, (reference, by_hand) in references.items():
+        track.set_reference(reference, by_hand=by_hand)
 
 
 class Assign(QUndoCommand):
@@ -240,6 +246,15 @@ class Edits:
     def choose_transmitter(self, number: int | None) -> None:
         """Show one transmitter of the radar, by its number from 1 on, or all together."""
         self._change("Choose transmitter", {"radar_transmitter": number})
+
+    # --- levels ---------------------------------------------------------------------------
+
+    def set_references(self, references: Mapping[MapModel, float], *, by_hand: bool) -> None:
+        """Show other values of maps as 0 dB."""
+        before = {track: (track.reference, track.by_hand) for track in references}
+        after = {track: (reference, by_hand) for track, reference in references.items()}
+        _assign_references(after)
+        self._push("0 dB", _assign_references, before, after)
 
     # --- denoising ------------------------------------------------------------------------
 

@@ -141,11 +141,14 @@ class Chart:
     scattered: bool = False  # marks stand above each other: the nearest is not just that across
 
 
+_ENDS = (Qt.Key.Key_Home, Qt.Key.Key_End)
+
+
 class ChartView(Canvas):
     """Curves with a legend.
 
-    Left and Right go from mark to mark, Home and End to the first and the last. Escape gives
-    the keyboard back. ``name`` is for screen readers.
+    Left and Right go from mark to mark, Home and End, where they do nothing in the window, to the
+    first and the last. Escape gives the keyboard back. ``name`` is for screen readers.
     """
 
     MARGINS_PX: ClassVar = (48, 26, 12, 38)
@@ -156,7 +159,7 @@ class ChartView(Canvas):
     """Distance up to which the pointer is at a scattered mark."""
     STEPS: ClassVar[Mapping[Qt.Key, int]] = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
     """Keys that go to a neighbouring mark."""
-    KEYS: ClassVar = frozenset({Qt.Key.Key_Home, Qt.Key.Key_End, Qt.Key.Key_Escape})
+    KEYS: ClassVar = frozenset({Qt.Key.Key_Escape})
     """Further keys that belong to the chart while it has the keyboard."""
 
     def __init__(self, display: Themed, name: str, chart: Chart) -> None:
@@ -387,7 +390,7 @@ class ChartView(Canvas):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Go from mark to mark."""
         key = Qt.Key(event.key())
-        if not self.marks or not (key in self.KEYS or key in self.STEPS):
+        if not self.marks or key not in {*self.KEYS, *self.STEPS, *_ENDS}:
             super().keyPressEvent(event)
         elif key == Qt.Key.Key_Escape:
             self.clearFocus()
@@ -398,7 +401,7 @@ class ChartView(Canvas):
     def _next(self, along: Sequence[Mark], key: Qt.Key) -> Mark | None:
         """The mark that a key goes to; from one that it does not go through, the nearest."""
         here = self.pointed
-        if key in (Qt.Key.Key_Home, Qt.Key.Key_End):
+        if key in _ENDS:
             return along[0 if key == Qt.Key.Key_Home else -1]
         if here is None:
             return self._arrival()

@@ -22,8 +22,6 @@ from sd2app.widgets.record_table import RecordTableModel
 
 ROW_PX = 22
 _OWN_KEYS = (
-    Qt.Key.Key_Home,
-    Qt.Key.Key_End,
     Qt.Key.Key_PageUp,
     Qt.Key.Key_PageDown,
     Qt.Key.Key_Up,
@@ -32,7 +30,7 @@ _OWN_KEYS = (
     Qt.Key.Key_Enter,
     Qt.Key.Key_F2,
 )
-"""Keys that move in a table; Left and Right keep stepping through frames."""
+"""Keys that move in a table; Left, Right, Home and End belong to the frames of a recording."""
 _Move = QAbstractItemView.CursorAction
 
 

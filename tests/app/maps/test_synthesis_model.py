@@ -174,7 +174,7 @@ def test_levels_keep_their_reference_until_asked(context, qtbot, ball):
     context.edits.end_sensor_drag()
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
     assert context.synthetic.reference == reference
-    context.reset_references()
+    context.edits.set_references(context.session.maps.strongest(), by_hand=False)
     assert context.synthetic.reference < reference
 
 

@@ -15,10 +15,12 @@ from sd2app.shell.status_bar import StatusLine
 from sd2app.widgets.inputs import Choice as ChoiceBox
 from sd2app.widgets.inputs import NumberBox
 from sd2app.widgets.panel import ElidedLabel
+from sd2app.widgets.text import milliseconds
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.sensor import VirtualSensor
 
 STRIDE = AccuracyPlan(mask_stride=5)
+EXACT_RESULT = COUNTING[3]
 
 
 @pytest.fixture
@@ -219,6 +221,25 @@ def test_a_click_uses_a_point_until_the_tolerance_rules_again(plot, panel, windo
     # Beside every point nothing happens.
     qtbot.mouseClick(plot, Qt.MouseButton.LeftButton, pos=QPoint(2, 2))
     assert trade.in_use.plan == EXACT
+
+
+def test_a_click_moves_nothing_and_text_and_plot_name_one_cost(plot, panel, window, qtbot):
+    def settled():
+        for _ in range(5):
+            QApplication.processEvents()
+        return plot.mapToGlobal(QPoint(0, 0)), plot.size(), [at(plot, one) for one in COUNTING]
+
+    trade, before = models_of(window).trade, settled()
+    for result in (EXACT_RESULT, COUNTING[0], COUNTING[1], EXACT_RESULT):
+        qtbot.mouseClick(plot, Qt.MouseButton.LeftButton, pos=at(plot, result))
+        assert settled() == before
+        assert f"costs {milliseconds(result.cost.all_cores_ms.median)} per frame" in texts(panel)
+    trade.choose_by_tolerance()
+    qtbot.waitUntil(lambda: done(window), timeout=10_000)
+    assert settled() == before
+    measured = trade.measured.counting.of(trade.in_use.plan)
+    assert trade.in_use.cost_ms == measured.cost.all_cores_ms.median
+    assert trade.choice.cost_ms != measured.cost.all_cores_ms.median, "the estimate differs"
 
 
 def test_keys_go_from_point_to_point_and_use_one(plot, window, qtbot):

@@ -10,6 +10,7 @@ from answering import menu_at, pick
 from full_disk import full_disk
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QCursor, QGuiApplication, QImage, QWheelEvent
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QScrollBar
 from window_models import models_of
 
@@ -197,9 +198,14 @@ def test_the_context_menu_reads_sets_and_plays(window, stack, qtbot):
     assert f"frame {frame}" in words
     assert "body at" in words
     before = c.synthetic.reference
-    pick(menu_at(view, place), "0 dB here")
+    assert "0 dB" not in view.status()
+    level = c.synthetic.read(time_s, velocity_mps).level
+    pick(menu_at(view, place), f"0 dB here (now {level})")
     assert c.synthetic.reference == pytest.approx(values.max())
-    c.synthetic.set_reference(before)
+    assert f"0 dB set to {values.max():.3g}" in view.status()
+    QTest.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert c.synthetic.reference == before
+    assert "0 dB" not in view.status()
     pick(menu_at(view, place), "Play what is in view in a loop")
     assert c.playback.playing
     assert c.playback.stretch_s == (window.session.span.start_s, window.session.span.end_s)

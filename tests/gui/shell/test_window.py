@@ -7,12 +7,19 @@ import pytest
 from finding import named
 from PySide6.QtCore import QPoint, QPointF, Qt, QTimer
 from PySide6.QtGui import QWheelEvent
-from PySide6.QtWidgets import QApplication, QMessageBox
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QAbstractSpinBox,
+    QApplication,
+    QLineEdit,
+    QMessageBox,
+)
 from window_models import all_actions, models_of
 
 from sd2app.maps.overview import Overview
 from sd2app.playback.views import TimeRuler
 from sd2app.shell.keys.dialog import KeysDialog
+from sd2app.shell.tab_order import controls_of
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VirtualSensor
@@ -47,6 +54,22 @@ def test_the_ball_is_where_it_should_be_in_the_map(window):
     for time_s, sign in ((0.5, 1), (1.0, -1), (1.5, 1)):
         velocity = mean[c.synthetic.map.timebase.nearest_frame(time_s)]
         assert velocity * sign == pytest.approx(peak, abs=0.2)
+
+
+def test_home_and_end_go_to_the_ends_wherever_the_keyboard_is(window, qtbot):
+    playback, tried = models_of(window).playback, set()
+    for page in ("Sensor", "Accuracy", "Train", "Labels", "Agree"):
+        window.bring_up(page)
+        for control in controls_of([window]):
+            if isinstance(control, (QAbstractSpinBox, QLineEdit)):
+                continue
+            control.setFocus()
+            for key, frame in ((Qt.Key.Key_End, 59), (Qt.Key.Key_Home, 0)):
+                qtbot.keyClick(control, key)
+                assert playback.frame == frame, control
+            tried.add(control)
+    assert any(isinstance(one, QAbstractItemView) for one in tried)
+    assert len(tried) > 20
 
 
 def test_keys_play_step_and_change_speed(window, qtbot):
