@@ -72,6 +72,11 @@ class Navigator:
         self._clicking: tuple[int, float, float] | None = None
 
     @property
+    def busy(self) -> bool:
+        """True while a button is held."""
+        return self._button is not None
+
+    @property
     def holds_sensor(self) -> bool:
         """True while the sensor is dragged."""
         return self._held is not None

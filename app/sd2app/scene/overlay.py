@@ -26,6 +26,7 @@ _VELOCITY_TITLE = "Radial velocity, m/s"
 _BAR_WIDTH = 10.0
 _PAD = 10.0
 _GAP = 6.0
+_ARROW_PX = 8.0
 _CENTRE = Qt.AlignmentFlag.AlignCenter
 
 
@@ -126,6 +127,8 @@ class Overlay(Canvas):
         body = QRectF() if box is None else QRectF(QPointF(*box[:2]), QPointF(*box[2:]))
         self._paint_metres(painter, [*names, self._legend], body)
         self._paint_axes(painter)
+        if not (self._scene.sensor_in_sight or self._navigator.holds_sensor):
+            self._paint_where_sensor_is(painter)
         position_m, marker = self._scene.sensor.position_m, self._navigator.marker
         if self._navigator.holds_sensor:
             x, y, z = position_m
@@ -298,6 +301,36 @@ class Overlay(Canvas):
         box.moveTop(min(max(box.top(), 8.0), self.height() - box.height() - 8.0))
         self._chip(painter, box)
         self._write(painter, box, text, colour=self._colours.text)
+
+    def _paint_where_sensor_is(self, painter: QPainter) -> None:
+        """Paint at the edge an arrow to a sensor beyond the picture, and how far off it is."""
+        scene, pose = self._scene, self._scene.pose
+        position_m = np.asarray(scene.sensor.position_m)
+        right, down, _ = pose.axes
+        away_m = float(np.linalg.norm(position_m - scene.extent.centre_m))
+        towards = np.array([(position_m - pose.position) @ axis for axis in (right, down)])
+        length = float(np.linalg.norm(towards))
+        # What is right behind the eye is below the picture.
+        towards = towards / length if length > 1e-6 else np.array([0.0, 1.0])
+        text = f"Sensor, {away_m:.1f} m from the body"
+        box = self._chip_box(painter, text)
+        box.setWidth(box.width() + 2 * _ARROW_PX)
+        room = QRectF(self.rect()).adjusted(8.0, 8.0, -8.0, -8.0)
+        free = np.array([room.width() - box.width(), room.height() - box.height()]) / 2
+        reach = float((free / np.maximum(np.abs(towards), 1e-9)).min())
+        box.moveCenter(room.center() + QPointF(*(reach * towards)))
+        if box.intersects(self._legend):
+            box.moveTop(self._legend.bottom() + 8.0)
+        self._chip(painter, box)
+        words = box.adjusted(2 * _ARROW_PX, 0.0, 0.0, 0.0)
+        self._write(painter, words, text, colour=self._colours.text)
+        middle, along = QPointF(box.left() + _ARROW_PX + 4.0, box.center().y()), QPointF(*towards)
+        across = QPointF(-along.y(), along.x())
+        painter.setBrush(QColor(self._colours.sensor))
+        painter.setPen(Qt.PenStyle.NoPen)
+        tip, back = middle + along * _ARROW_PX, middle - along * (0.6 * _ARROW_PX)
+        painter.drawPolygon([tip, back + across * 5.0, back - across * 5.0])
+        painter.setBrush(Qt.BrushStyle.NoBrush)
 
     def _paint_hint(self, painter: QPainter, text: str) -> None:
         """Paint a text at the lower edge, on a chip, where there is room."""

@@ -26,6 +26,8 @@ _CAMERA_M = 0.20
 _DOTS_PX = (1.4, 6.0)
 _INSIDE_M = 0.25
 _FAR_OFF_M = 30.0
+_EDGE_PX = 10.0
+"""Nearer than this to the edge of the picture, the sensor counts as outside."""
 _NOTHING = Extent.of_points(np.array([[-0.4, -0.6, 1.8], [0.4, 1.1, 2.6]]))
 
 
@@ -50,6 +52,7 @@ class Scene:
         self._stale_colours = False
         self._covered: shapes.GridRectangle | None = None
         self._framed: tuple[object, ...] | None = None
+        self._followed: tuple[EyePose, EyePose] | None = None  # poses before and after
         self._light_up()
         # One convex cone needs no sorting, which costs 4 ms on a CPU.
         renderer.SetUseOIT(False)
@@ -175,25 +178,58 @@ class Scene:
 
     def preset_pose(self, preset: Preset) -> EyePose:
         """Pose of one of the ready-made views in the present size."""
-        body, sensor = self.extent, np.asarray(self.sensor.position_m)
+        sensor = np.asarray(self.sensor.position_m)
         if preset == "camera":
             return self._looking_from(np.zeros(3), 0.0, 0.0)
         if preset == "sensor":
             return self._looking_from(sensor, self.sensor.azimuth_deg, self.sensor.elevation_deg)
-        points = [body.points_m]
-        if np.linalg.norm(body.centre_m) < _FAR_OFF_M:
-            points.append(_box(np.zeros(3), _CAMERA_M))
-        if np.linalg.norm(body.centre_m - sensor) < _FAR_OFF_M:
-            points.append(_box(sensor, 0.25))
-            points.append(np.array([[sensor[0], body.floor_m, sensor[2]]]))
-        points += [self._near(self.markers.positions_m), self._near(self.things.points_m)]
         azimuth, elevation = {
             "overview": (-52.0, -16.0),
             "side": (-90.0, 0.0),
             "top": (0.0, -89.5),
         }[preset]
         pose = EyePose(azimuth_deg=azimuth, elevation_deg=elevation, size_px=self.pose.size_px)
-        return pose.framed(np.concatenate(points), self.margins)
+        return pose.framed(self._everything_m(), self.margins)
+
+    def _everything_m(self) -> NDArray[np.float64]:
+        """Points (n, 3) around all that is to be seen and is not far off."""
+        body, sensor = self.extent, np.asarray(self.sensor.position_m)
+        points = [body.points_m]
+        if np.linalg.norm(body.centre_m) < _FAR_OFF_M:
+            points.append(_box(np.zeros(3), _CAMERA_M))
+        if self._sensor_away_m < _FAR_OFF_M:
+            points.append(_box(sensor, 0.25))
+            points.append(np.array([[sensor[0], body.floor_m, sensor[2]]]))
+        points += [self._near(self.markers.positions_m), self._near(self.things.points_m)]
+        return np.concatenate(points)
+
+    @property
+    def _sensor_away_m(self) -> float:
+        return float(np.linalg.norm(self.extent.centre_m - np.asarray(self.sensor.position_m)))
+
+    @property
+    def sensor_in_sight(self) -> bool:
+        """True if the picture shows the sensor, or is seen from within it."""
+        return not self.sensor_shown or self._shows_sensor(self.pose)
+
+    def _shows_sensor(self, pose: EyePose) -> bool:
+        x, y, depth = pose.project(self.sensor.position_m)[0]
+        right, bottom = np.subtract(pose.size_px, _EDGE_PX)
+        return bool(depth > 0 and _EDGE_PX <= x <= right and _EDGE_PX <= y <= bottom)
+
+    def keep_sensor_in_sight(self) -> None:
+        """Step back from a sensor that left the picture, so that it and the body are seen.
+
+        The direction of the view stays. Once the view of before would show the sensor again, that
+        one is back. The views from camera and sensor do not move, nor does one that it is far from.
+        """
+        before = self.pose
+        if self.sensor_in_sight:
+            if self._followed and self._followed[1] == before:
+                self.pose = self._followed[0] if self._shows_sensor(self._followed[0]) else before
+        elif self.preset not in ("camera", "sensor") and self._sensor_away_m < _FAR_OFF_M:
+            self.pose = before.framed(self._everything_m(), self.margins)
+            self._followed = before, self.pose
 
     def _looking_from(
         self, position: NDArray[np.float64], azimuth_deg: float, elevation_deg: float

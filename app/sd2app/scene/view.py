@@ -82,6 +82,7 @@ class SceneView(QWidget):
         self._frame: int | None = None
         self._stale_scattering = True
         self._planned: object = None
+        self._dragged = False
         self._around: Surroundings | None = None
         self._backend.widget.installEventFilter(self)
         self._followed = (
@@ -91,6 +92,7 @@ class SceneView(QWidget):
             (session.document.changed, self._follow_things),
             (session.playback.time_changed, self._follow_clock),
             (session.sensor.changed, self._follow_sensor),
+            (session.sensor.dragging_changed, self._follow_sensor),
             (synthesis.frame_changed, self._follow_scattering),
             (placements.changed, self._follow_placements),
             (inertial.changed, self._follow_inertial),
@@ -238,7 +240,12 @@ class SceneView(QWidget):
             self._follow_scattering()
 
     def _follow_sensor(self) -> None:
-        self.scene.set_sensor(self._session.sensor.sensor)
+        model, seen = self._session.sensor, self.scene.sensor_in_sight or self._dragged
+        self._dragged = model.dragging
+        self.scene.set_sensor(model.sensor)
+        # Not while the hand turns the view, and not for who looks at something else.
+        if seen and not model.dragging and not self.navigator.busy:
+            self.scene.keep_sensor_in_sight()
         self.navigator.look_again()
         self._follow_scattering()
 

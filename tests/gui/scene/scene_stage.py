@@ -93,6 +93,7 @@ class Drag:
 
     def begin_sensor_drag(self) -> None:
         self._log.append("begin")
+        self._sensor.set_dragging(True)
 
     def drag_sensor(self, position_m: tuple[float, float, float]) -> None:
         self._log.append("drag")
@@ -100,6 +101,7 @@ class Drag:
 
     def end_sensor_drag(self) -> None:
         self._log.append("end")
+        self._sensor.set_dragging(False)
 
 
 @dataclass

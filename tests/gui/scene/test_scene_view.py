@@ -315,6 +315,7 @@ def test_dragging_the_sensor_does_not_move_the_view(stage: Stage) -> None:
     stage.view.set_view("overview")
     stage.view.grab()
     pose = stage.view.scene.pose
+    stage.sensor.set_dragging(True)
     stage.sensor.set_sensor(VirtualSensor((1.0, 0.0, -3.0)))
     stage.view.grab()
     assert stage.view.scene.pose == pose

@@ -9,6 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QToolTip
 from window_models import models_of
 
+from sd2app.scene.view import SceneView
 from sd2app.sensor.panel import SensorPanel
 from sd2app.sensor.placement_fields import PlacementFields
 from sd2app.widgets.inputs import NumberBox, TypedLine
@@ -149,3 +150,12 @@ def test_signs_around_a_number_and_a_word_in_its_place(qtbot) -> None:
     assert box.text() == "never"
     type_into(box, "")
     assert box.value() == 0.0
+
+
+def test_a_range_typed_into_the_panel_keeps_it_in_sight(active) -> None:
+    scene = active.findChild(SceneView).scene
+    type_into(box_of(active, "Range"), "6")
+    assert range_m(active) == pytest.approx(6.0, abs=0.01)
+    assert scene.sensor_in_sight
+    active.action("undo").trigger()
+    assert scene.sensor_in_sight
