@@ -20,6 +20,7 @@ from sd2core.files.atomic import atomic_write_text
 from sd2core.files.digests import Digests, signature
 from sd2core.files.paths import files_at, is_there
 from sd2core.files.texts import read_json
+from sd2core.mesh.bodies import Body
 from sd2core.mesh.things import Thing
 from sd2core.sensor import Vector, VirtualSensor
 
@@ -193,6 +194,9 @@ class _Look:
         faces = reading.pop("faces", None)
         parts = [self._digest(file) for file in files_at(path)]
         parts += [self._digest(Path(one.shape)) for one in recording.things if one.is_file]
+        parts += [
+            self._digest(file) for one in recording.bodies for file in files_at(Path(one.path))
+        ]
         identity = [parts, {key: str(value) for key, value in reading.items()}]
         if faces is not None:
             identity.append(self._digest(faces))
@@ -253,8 +257,8 @@ class _Look:
 
 
 def open_mesh(path: Path, faces: str | None, reading: Mapping[str, Any]) -> MeshSequence:
-    """Open a mesh that can be streamed or is small enough for memory."""
-    from sd2core.io.mesh import load_mesh
+    """Open a mesh that can be streamed or is small enough for memory, and the scene around it."""
+    from sd2core.io.bodies import load_scene
 
     files = files_at(path)
     size = 0 if ".zarr" in path.name.lower() else sum(map(_bytes_in_memory, files))
@@ -269,7 +273,8 @@ def open_mesh(path: Path, faces: str | None, reading: Mapping[str, Any]) -> Mesh
         key: tuple(one) if isinstance(one, list) else one for key, one in reading.items()
     }
     things = (one if isinstance(one, Thing) else Thing(**one) for one in told.pop("things", ()))
-    return load_mesh(path, faces=faces, things=things, **told)
+    bodies = (one if isinstance(one, Body) else Body(**one) for one in told.pop("bodies", ()))
+    return load_scene(path, bodies=bodies, faces=faces, things=things, **told)
 
 
 def _bytes_in_memory(path: Path) -> int:

@@ -27,6 +27,7 @@ from sd2core.options.records import (
 from sd2core.options.shared import Channel, Json, Looking, MeshReading
 
 if TYPE_CHECKING:
+    from sd2core.mesh.bodies import Body
     from sd2core.mesh.things import Thing
     from sd2core.recording.recording import Recording
     from sd2core.sensor import VirtualSensor
@@ -38,6 +39,7 @@ _LEFT_OUT = {
     **{name: name for name in ("video", "mesh", "radar", "imu", "denoiser")},
     **{name: f"radar_{name}" for name in _CHANNEL},
     "things": "things",
+    "bodies": "bodies",
 }
 """What `sd2 set --without` names, and the fields that it empties."""
 
@@ -125,9 +127,13 @@ class Set(Content, SensorPlace, Json):
         what stands in the scene, in place of what did: a box, table, screen, doorway or mesh file,
         the middle of its foot, degrees about the vertical, and width, height, depth in metres;
         again for another
+    body : [NAME=]FILE[@X,Y,Z[,TURN[,LATER]]]
+        who else moves in the scene, in place of who did: a mesh or another recording's, how far
+        it is moved from where it is, degrees about the vertical, and seconds later; again for
+        another
     without : LIST
         take out what is named, some of video, mesh, radar, imu, denoiser, receiver, transmitter,
-        things
+        things, bodies
     anonymise : HOW
         after a fit, in the recording's own video: cover the head (blur), or delete it (drop); what
         is covered or deleted is gone
@@ -135,6 +141,7 @@ class Set(Content, SensorPlace, Json):
 
     recording: Annotated[Path, ARGUMENT]
     thing: Annotated[tuple[str, ...], Place(many="again")] = ()
+    body: Annotated[tuple[str, ...], Place(many="again")] = ()
     without: Names = ()
     anonymise: Literal["blur", "drop"] | None = None
 
@@ -286,6 +293,7 @@ def _set(options: Set) -> None:
       sd2 set walk.sd2 --without receiver,denoiser
       sd2 set walk.sd2 --anonymise blur
       sd2 set walk.sd2 --thing table@0,1.1,1.5,20 --thing chair.obj@0.8,1.1,2
+      sd2 set walk.sd2 --body anna=anna.npz@0.8,0,0.5,90 --body bert.sd2
     """
     from sd2core.cli.info.description import describe_parts, describe_recording, show
     from sd2core.cli.reading import mesh_reading, refuse_unused_mesh_options
@@ -297,7 +305,9 @@ def _set(options: Set) -> None:
     if is_bundled(recording.folder):
         raise Sd2Error(f"{recording.folder} comes with the program", "a recording of your own")
     for name in options.without:
-        setattr(recording, _LEFT_OUT[name], () if name == "things" else None)
+        setattr(recording, _LEFT_OUT[name], () if name in ("things", "bodies") else None)
+    if options.body:
+        recording.bodies = tuple(map(_body, options.body))
     if options.thing:
         recording.things = tuple(map(_thing, options.thing))
     for name, value in _content(options).items():
@@ -345,6 +355,36 @@ def _thing(text: str) -> Thing:
     path = shape if shape in SHELF or "." not in shape else str(plain_path(Path(shape)))
     x, y, z, turn_deg, *size = (*numbers, 0.0) if len(numbers) == 3 else numbers
     return Thing(path, (x, y, z), turn_deg, (size[0], size[1], size[2]) if size else None)
+
+
+def _body(text: str) -> Body:
+    """Body as it is typed."""
+    from sd2core.files.paths import is_there, plain_path
+    from sd2core.mesh.bodies import Body
+    from sd2core.recording.recording import is_recording, open_recording
+
+    what, _, place = text.rpartition("@")
+    try:
+        numbers = list(map(float, place.split(",")))
+    except ValueError:
+        what, numbers = text, []
+    if len(numbers) not in (0, 3, 4, 5):
+        expected = "[NAME=]FILE[@X,Y,Z[,TURN[,LATER]]], e.g. anna=anna.npz@0.8,0,0.5,90"
+        raise Sd2Error(f"--body is {text!r}", expected)
+    x, y, z, turn_deg, start_s = numbers + [0.0] * (5 - len(numbers))
+    person, _, file = ("", "", what) if Path(what).exists() else what.rpartition("=")
+    path, reading = plain_path(Path(file)), {}
+    if not is_there(path):
+        raise Sd2Error(f"The mesh {file} does not exist", "a file or folder")
+    if is_recording(path):
+        of = open_recording(path)
+        if of.mesh is None or of.faces is not None:
+            raise Sd2Error(
+                f"{path} holds no mesh that tells its own faces",
+                "a recording with a mesh of that kind",
+            )
+        path, person, reading = of.mesh, person or of.subject, of.mesh_reading.options()
+    return Body(str(path), (x, y, z), turn_deg, start_s, person, reading)
 
 
 def _anonymise(folder: Path, how: Literal["blur", "drop"]) -> None:

@@ -328,7 +328,7 @@ class VisibilityMasks:
         """Set ``visible`` of the needed vertices to 0 where another body hides them."""
         assert other.faces is not None  # MeshSequence refuses others without
         start, stop = view.first, view.first + len(view.points)
-        boxes_m = (one.boxes(start, stop) for one in (other, self._prepared))
+        boxes_m = other.boxes(start, stop), self._prepared.boxes(start, stop)
         near = may_hide(*boxes_m, view.places_m + view.origins_m)
         asked = visible & needed
         near &= other.mesh.presence.there[start:stop] & asked.any(axis=1)

@@ -123,6 +123,19 @@ class MeshReading(BaseModel):
         return self.model_copy(update={cure.setting: value})
 
 
+class BodyEntry(BaseModel):
+    """Fields of :class:`sd2core.mesh.bodies.Body`; its path is relative."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    path: StoredPath
+    moved_m: tuple[FiniteFloat, FiniteFloat, FiniteFloat] = (0.0, 0.0, 0.0)
+    turn_deg: FiniteFloat = 0.0
+    start_s: Time = 0.0
+    person: str = ""
+    reading: MeshReading = MeshReading()
+
+
 class CameraEntry(BaseModel):
     """The camera that took the video."""
 
@@ -167,6 +180,7 @@ class Document(BaseModel):
     sensor: SensorEntry = SensorEntry()
     placements: dict[str, Any] | None = None
     things: tuple[ThingEntry, ...] = ()
+    bodies: tuple[BodyEntry, ...] = ()
     spans: tuple[Span, ...] = ()
 
 

@@ -18,6 +18,7 @@ WORDS = {
     "sensor": "sensor",
     "placements": "plan of placements",
     "things": "set of things",
+    "bodies": "set of bodies",
     "radar_offset_s": "offset of the radar",
     "radar_receiver": "receiver of the radar",
     "radar_transmitter": "transmitter of the radar",

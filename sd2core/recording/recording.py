@@ -29,6 +29,7 @@ from sd2core.files.paths import (
 from sd2core.files.recording_json import (
     FILE_NAME,
     VERSION,
+    BodyEntry,
     CameraEntry,
     Document,
     MeshReading,
@@ -41,6 +42,7 @@ from sd2core.files.resources import resource_path
 from sd2core.files.texts import errors_in
 from sd2core.labels.files import FILE_NAME as LABELS_NAME
 from sd2core.labels.files import labels_of, read_labels, write_labels
+from sd2core.mesh.bodies import Body
 from sd2core.mesh.things import Thing
 from sd2core.placements.placements import Placements, placements_from_dict
 from sd2core.progress import Progress, silent
@@ -49,6 +51,7 @@ from sd2core.recording.relinking import (
     ROLES,
     Relinked,
     Role,
+    body_role,
     exists,
     find_again,
     is_many,
@@ -130,6 +133,8 @@ class Recording:
         Planned sensors around the body.
     things : tuple of Thing
         What stands still around the body; paths of their files are absolute.
+    bodies : tuple of Body
+        Other people in the same scene, on the same clock; paths of their meshes are absolute.
     spans : tuple of Span
         Labels in ``recording.json`` itself, of a recording that was not labelled here.
     labels : Labels or None
@@ -175,6 +180,7 @@ class Recording:
     sensor: VirtualSensor = field(default_factory=VirtualSensor)
     placements: Placements | None = None
     things: tuple[Thing, ...] = ()
+    bodies: tuple[Body, ...] = ()
     spans: tuple[Span, ...] = ()
     labels: Labels | None = None
     labels_elsewhere: bool = False
@@ -253,8 +259,9 @@ class Recording:
             made = replace(
                 self,
                 folder=folder,
-                **files,  # type: ignore[arg-type]
+                **{role: path for role, path in files.items() if role in ROLES},  # type: ignore[arg-type]
                 things=things,
+                bodies=_at_paths(self.bodies, files),
                 title=self.title or folder.stem,
                 labels_elsewhere=False,
                 _base=None,
@@ -308,8 +315,9 @@ class Recording:
         See :func:`~sd2core.recording.relinking.find_again`.
         """
         relinked = find_again(self.missing(), Path(folder), progress)
-        for role, path in relinked.found.items():
-            setattr(self, role, path)
+        for role in relinked.found.keys() & set(ROLES):
+            setattr(self, role, relinked.found[role])
+        self.bodies = _at_paths(self.bodies, relinked.found)
         if relinked.found and (self.folder / FILE_NAME).exists():
             self.save()
         return relinked
@@ -360,6 +368,12 @@ class Recording:
         document.things = tuple(
             ThingEntry.model_validate(asdict(one))
             for one in _with_files(self.things, lambda path: stored_path(Path(path), self.folder))
+        )
+        document.bodies = tuple(
+            BodyEntry.model_validate(
+                asdict(one) | {"path": stored_path(Path(one.path), self.folder)}
+            )
+            for one in self.bodies
         )
         document.spans = () if self._writes_labels else tuple(self.spans)
         stated = {"beam": None} | self.sensor.as_dict()
@@ -454,13 +468,16 @@ class Recording:
         return open_video(self._present("video"), progress)
 
     def load_mesh(self, progress: Progress = silent) -> MeshSequence:
-        """Load the mesh as :attr:`mesh_reading` says, placed by the video where that helps."""
-        from sd2core.io.mesh import load_mesh
+        """Load the mesh as :attr:`mesh_reading` says, placed by the video where that helps.
 
-        return load_mesh(self._present("mesh"), **self.mesh_options(), progress=progress)
+        Things and other bodies of the scene go along with it.
+        """
+        from sd2core.io.bodies import load_scene
+
+        return load_scene(self._present("mesh"), **self.mesh_options(), progress=progress)
 
     def mesh_options(self) -> dict[str, Any]:
-        """Arguments with which ``load_mesh`` reads the mesh."""
+        """Arguments with which :func:`sd2core.io.bodies.load_scene` reads the mesh."""
         from sd2core.io.mesh_models import is_estimate
 
         path = self._present("mesh")
@@ -469,6 +486,8 @@ class Recording:
             options["faces"] = self._present("faces")
         if self.things:
             options["things"] = self.things
+        if self.bodies:
+            options |= {"bodies": self.bodies, "called": self.subject}
         has_video = self.video is not None and self.video.exists()
         if has_video and "image_size" not in options and is_estimate(path):
             with self.open_video() as video:
@@ -515,6 +534,7 @@ class Recording:
 
     def _files(self) -> dict[Role, Path]:
         paths = {role: getattr(self, role) for role in ROLES}
+        paths |= {body_role(index): Path(one.path) for index, one in enumerate(self.bodies)}
         return {role: path for role, path in paths.items() if path is not None}
 
     def _present(self, role: Role) -> Path:
@@ -576,7 +596,7 @@ def open_recording(path: Path) -> Recording:
 def settings_of(document: Document, folder: Path) -> dict[str, Any]:
     """Fields of a recording by their names, but for labels, as its file holds them.
 
-    Raises Sd2Error where the sensor, the placements or a thing cannot be.
+    Raises Sd2Error where the sensor, the placements, a thing or a body cannot be.
     """
     planned = document.placements
     return {
@@ -589,7 +609,23 @@ def settings_of(document: Document, folder: Path) -> dict[str, Any]:
             (Thing(**entry.model_dump()) for entry in document.things),
             lambda path: located_path(path, folder),
         ),
+        "bodies": tuple(
+            Body(
+                **entry.model_dump(exclude={"path", "reading"}),
+                path=str(located_path(entry.path, folder)),
+                reading=entry.reading.options(),
+            )
+            for entry in document.bodies
+        ),
     }
+
+
+def _at_paths(bodies: tuple[Body, ...], files: Mapping[Role, Path]) -> tuple[Body, ...]:
+    """The same bodies with the paths of their roles."""
+    return tuple(
+        replace(one, path=str(files.get(body_role(index), one.path)))
+        for index, one in enumerate(bodies)
+    )
 
 
 def _with_files(things: Iterable[Thing], path_of: Callable[[str], object]) -> tuple[Thing, ...]:

@@ -5,21 +5,33 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
 
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import common_suffix_length, is_pattern, is_there, paths_named
 from sd2core.progress import Progress
 
-Role = Literal["video", "mesh", "faces", "radar", "denoiser", "imu"]
-"""Role of a file in a recording."""
+Role = str
+"""Role of a file in a recording: one of :data:`ROLES`, or ``body 2`` of a body beside the first."""
 
-ROLES: tuple[Role, ...] = get_args(Role)
+ROLES: tuple[Role, ...] = ("video", "mesh", "faces", "radar", "denoiser", "imu")
+
+_BODY = "body "
+
+
+def body_role(index: int) -> Role:
+    """Role of one of the other bodies, counted from 0; the mesh is of body 1."""
+    return f"{_BODY}{index + 2}"
 
 
 def role_words(role: Role) -> str:
     """Role of a file in a sentence, such as ``video`` or ``inertial sensor's file``."""
+    if role.startswith(_BODY):
+        return f"mesh of {role}"
     return "inertial sensor's file" if role == "imu" else role
+
+
+def _is_mesh(role: Role) -> bool:
+    return role == "mesh" or role.startswith(_BODY)
 
 
 @dataclass(frozen=True)
@@ -67,9 +79,9 @@ def find_again(missing: Mapping[Role, Path], folder: Path, progress: Progress) -
 
 def is_many(role: Role, path: Path) -> bool:
     """True if a path stands for many files; only a mesh is made of them."""
-    return role == "mesh" and is_pattern(path)
+    return _is_mesh(role) and is_pattern(path)
 
 
 def exists(role: Role, path: Path) -> bool:
     """True if the file or files of a path are there."""
-    return is_there(path) if role == "mesh" else path.exists()
+    return is_there(path) if _is_mesh(role) else path.exists()

@@ -66,6 +66,7 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
         "camera": None if recording.camera is None else recording.camera.model_dump(mode="json"),
         "sensor_position_m": [x, y, z],
         "things": [asdict(thing) for thing in recording.things],
+        "bodies": [asdict(body) for body in recording.bodies],
         "denoiser": None if recording.denoiser is None else str(recording.denoiser),
         "bundled_denoiser": recording.bundled_denoiser,
         "spans": [picked(span, *_SPAN) for span in recording.labelled.spans],
@@ -80,6 +81,7 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
         "camera": _camera(recording),
         "sensor": recording.sensor.words,
         "things": "; ".join(thing.words for thing in recording.things),
+        "other people": "; ".join(body.words for body in recording.bodies),
         "radar offset": f"{recording.radar_offset_s:g} s" if recording.radar else "",
         "radar channel": recording.channel_in_words,
         "inertial sensors": ", ".join(recording.imu_places),
@@ -96,12 +98,15 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
 
 def describe_parts(recording: Recording) -> list[Description]:
     """Open and describe each file of a recording, as far as it is there."""
+    from sd2core.recording.relinking import ROLES
+
     missing = recording.missing()
     parts: list[Description] = []
     if recording.video is not None and "video" not in missing:
         with recording.open_video() as video:
             parts.append(describe_video(recording.video, video))
-    if recording.mesh is not None and not missing.keys() & {"mesh", "faces"}:
+    bodies = {role for role in missing if role not in ROLES}
+    if recording.mesh is not None and not missing.keys() & {"mesh", "faces", *bodies}:
         with progress_bar("Reading the mesh") as progress:
             mesh = recording.load_mesh(progress)
         parts.append(describe_mesh(recording.mesh, mesh))

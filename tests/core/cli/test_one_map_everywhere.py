@@ -67,6 +67,22 @@ def test_everywhere_the_same_things_stand_before_it(sd2: Sd2, fitted: Path, tmp_
     _made_elsewhere(sd2, fitted, tmp_path, narrow)
 
 
+def test_everywhere_the_same_people_are_in_it(sd2: Sd2, fitted: Path, tmp_path: Path) -> None:
+    """Somebody beside who does the same counts as much, but for the law of range."""
+    assert sd2("synth", fitted, "--out", tmp_path / "alone.npz").code == 0
+    mesh_file = Path(shutil.copy2(fitted / "mesh.npz", tmp_path / "other.npz"))
+    assert sd2("set", fitted, "--body", f"anna={mesh_file}@1.2,0,0").code == 0
+    assert sd2("synth", fitted, "--out", tmp_path / "map.npz").code == 0
+    alone, made = (DopplerMap.load(tmp_path / name) for name in ("alone.npz", "map.npz"))
+    assert [body["person"] for body in made.meta["bodies"]][1:] == ["anna"]
+    assert made.values.sum() > 1.1 * alone.values.sum()
+    _made_elsewhere(sd2, fitted, tmp_path, made)
+    # What a batch keeps is of the file as it was.
+    mesh_file.unlink()
+    assert sd2("set", fitted, "--without", "bodies").code == 0
+    _made_elsewhere(sd2, fitted, tmp_path, alone)
+
+
 def _made_elsewhere(
     sd2: Sd2, fitted: Path, tmp_path: Path, made: DopplerMap, count: str | None = None
 ) -> None:

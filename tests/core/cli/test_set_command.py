@@ -96,9 +96,38 @@ def test_things_are_put_into_the_scene_and_taken_out(
     assert content(one) == before
 
 
+def test_people_are_put_beside_the_first_and_taken_out(
+    sd2: Sd2, one: Recording, tmp_path: Path
+) -> None:
+    before = content(one)
+    assert one.mesh is not None
+    outcome = sd2(
+        *("set", one.folder, "--body", f"anna={one.mesh}@0.8,0,0.5,90,0.1"),
+        *("--body", one.folder, "--body", f"{one.mesh}@0,0,1"),
+    )
+    assert outcome.code == 0, outcome.err
+    assert "moved by x 0.8, y 0, z 0.5 m, turned by 90°, 0.1 s later" in outcome.out
+    told = [
+        (body["person"], body["moved_m"], body["turn_deg"], body["start_s"])
+        for body in content(one)["bodies"]
+    ]
+    assert told == [
+        ("anna", [0.8, 0, 0.5], 90, 0.1),
+        (one.subject, [0, 0, 0], 0, 0),
+        ("", [0, 0, 1], 0, 0),
+    ]
+    scene = open_recording(one.folder).load_mesh()
+    assert len(scene.others) == 3
+    assert len(json.loads(sd2("info", one.folder, "--json").out)["bodies"]) == 3
+    assert sd2("set", one.folder, "--without", "bodies").code == 0
+    assert content(one) == before
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
+        (("--body", "gone.npz"), "gone.npz does not exist"),
+        (("--body", "anna.npz@1,2"), "[NAME=]FILE[@X,Y,Z"),
         (("--thing", "table@0,1"), "SHAPE@X,Y,Z"),
         (("--thing", "0,1,2"), "The thing is ''"),
         (("--thing", "sofa@0,1,2"), "one of box, table"),

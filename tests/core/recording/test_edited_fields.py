@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
 from sd2core.files.recording_json import CameraEntry, MeshReading
+from sd2core.mesh.bodies import Body
 from sd2core.mesh.things import Thing
 from sd2core.placements.placements import PlacementGrid
 from sd2core.recording.edited import decoded_fields, differing, edited_fields
@@ -50,6 +51,18 @@ recordings = st.builds(
             st.none() | st.just((1.0, 2.0, 0.1)),
         ),
         max_size=3,
+    ).map(tuple),
+    bodies=st.lists(
+        st.builds(
+            Body,
+            st.just(str(Path("anna.npz").absolute())),
+            st.tuples(metres, metres, metres),
+            angles,
+            st.floats(-9, 9),
+            st.sampled_from(["", "anna"]),
+            st.sampled_from([{}, {"scale": 0.001, "image_size": (640, 480)}]),
+        ),
+        max_size=2,
     ).map(tuple),
     radar_receiver=st.none() | st.integers(1, 8),
     radar_transmitter=st.none() | st.integers(1, 8),

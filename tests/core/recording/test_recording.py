@@ -18,6 +18,7 @@ from sd2core.files.recording_json import Document
 from sd2core.labels.files import write_labels
 from sd2core.labels.spans import Labels
 from sd2core.labels.spans import Span as LabelSpan
+from sd2core.mesh.bodies import Body
 from sd2core.mesh.things import Thing
 from sd2core.placements.placements import PlacementCloud, PlacementGrid
 from sd2core.recording.recording import (
@@ -657,3 +658,29 @@ def test_a_thing_that_cannot_be_is_named_with_its_file(tmp_path: Path) -> None:
         with pytest.raises(Sd2Error, match=FILE_NAME) as caught:
             open_recording(made.folder)
         assert said in str(caught.value)
+
+
+def test_bodies_go_with_a_copy_and_are_found_again(tmp_path: Path) -> None:
+    for name in ("walk.npz", "anna.npz"):
+        (tmp_path / name).write_text(name)
+    anna = Body(str(tmp_path / "anna.npz"), (1, 0, 0), 90, 0.5, "anna", {"scale": 0.01})
+    bert = Body(str(tmp_path / "walk.npz"))
+    made = Recording.create(tmp_path / "duo", mesh=tmp_path / "walk.npz", bodies=(anna, bert))
+    assert json.loads((made.folder / FILE_NAME).read_text())["bodies"][0]["path"] == "../anna.npz"
+    assert open_recording(made.folder).bodies == (anna, bert)
+    copied = made.save_as(tmp_path / "copied", copy=True)
+    moved = copied.folder.rename(tmp_path / "moved.sd2")
+    found = open_recording(moved)
+    assert not found.missing()
+    assert [Path(one.path).read_text() for one in found.bodies] == ["anna.npz", "walk.npz"]
+    assert all(Path(one.path).parent == moved for one in found.bodies)
+    # A file that was moved is missing, and found by its name.
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "anna.npz").rename(tmp_path / "elsewhere" / "anna.npz")
+    lost = open_recording(made.folder)
+    assert lost.missing() == {"body 2": tmp_path / "anna.npz"}
+    assert lost.relink(tmp_path / "elsewhere").found.keys() == {"body 2"}
+    again = open_recording(made.folder)
+    assert not again.missing()
+    assert again.bodies[0].moved_m == (1, 0, 0)
+    assert again.mesh == tmp_path / "walk.npz"
