@@ -92,6 +92,12 @@ def doppler_marginal(signal: BeatSignal) -> NDArray[np.float64]:
 
 def _cut(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) -> BeatSignal:
     """Beat signal with every facet in 4^cuts pieces, (receivers, chirps, samples)."""
+    each = [_cut_body(one, time_s, cuts, go_on) for one in scene.bodies]
+    return each[0] if len(each) == 1 else np.sum(each, axis=0)
+
+
+def _cut_body(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) -> BeatSignal:
+    """That of one body alone."""
     if not scene.scene.there(time_s):
         return scene.silence()
     visible = scene.scene.visible(time_s)

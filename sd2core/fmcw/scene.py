@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence, refuse_missing
+from sd2core.mesh.things import Surface
 from sd2core.radar_config import RadarConfig
+from sd2core.scattering.behind_things import may_hide
 from sd2core.scattering.facets import facets_before, visible_facets
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
@@ -38,7 +40,8 @@ class MeshScene:
 
     ``visibility``, (T, F), marks per mesh frame the facets that nothing hides from the sensor;
     ``"exact"`` finds them frame by frame as they are asked for, ``"facing"`` takes all whose normal
-    points towards it. What stands around the mesh hides facets in either case.
+    points towards it. What stands around the mesh, and ``others`` beside it, hide facets in either
+    case; of the mesh's own others it knows nothing (:class:`~sd2core.fmcw.wave.WaveScene` does).
     """
 
     def __init__(
@@ -64,6 +67,7 @@ class MeshScene:
         self.config = config
         self.sensor = sensor
         self.visibility = visibility
+        self.others: tuple[MeshScene, ...] = ()
         self._faces = mesh.faces
         self._first = 0
         self._block = np.empty((0, mesh.vertex_count, 3))
@@ -92,19 +96,41 @@ class MeshScene:
     def visible(self, time_s: float) -> NDArray[np.bool_] | None:
         """Mask of the facets that nothing hides, (F,); None if only the facing test applies."""
         around = self.mesh.surroundings
-        if around is None and isinstance(self.visibility, str) and self.visibility == "facing":
+        hiding = [] if around is None else [around.surface]
+        hiding += self._others_before(time_s)
+        if not hiding and isinstance(self.visibility, str) and self.visibility == "facing":
             return None
-        first, last = self._stretch(time_s)
-        frame = min(max(self.mesh.timebase.nearest_frame(time_s), first), last)
+        frame = self._nearest(time_s)
         place = self.sensor.position_m
         seen = np.ones(len(self._faces), np.bool_)
         if not isinstance(self.visibility, str):
             seen = np.asarray(self.visibility[frame])
         elif self.visibility == "exact":
             seen = visible_facets(self._frame(frame), self._faces, place)
-        if around is None:
-            return seen
-        return seen & facets_before(self._frame(frame), self._faces, place, around.surface)
+        for surface in hiding:
+            seen = seen & facets_before(self._frame(frame), self._faces, place, surface)
+        return seen
+
+    def _others_before(self, time_s: float) -> list[Surface]:
+        """Surfaces of the others that may hide some of this one at an instant."""
+        place_m = np.asarray(self.sensor.position_m, np.float64)[None]
+        own, found = None, []
+        for other in self.others:
+            if other.there(time_s):
+                own = _box(self.surface(time_s)) if own is None else own
+                surface = other.surface(time_s)
+                if may_hide(_box(surface), own, place_m)[0]:
+                    found.append(surface)
+        return found
+
+    def surface(self, time_s: float) -> Surface:
+        """Vertices (V, 3) and faces in the mesh frame nearest to an instant."""
+        return self._frame(self._nearest(time_s)), self._faces
+
+    def _nearest(self, time_s: float) -> int:
+        """Mesh frame nearest to an instant, of the part with a person that it lies in."""
+        first, last = self._stretch(time_s)
+        return min(max(self.mesh.timebase.nearest_frame(time_s), first), last)
 
     def between(self, times_s: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.float64], ...]]:
         """Interpolate vertices and velocity at some times, on a smooth path through the frames.
@@ -174,3 +200,8 @@ class MeshScene:
                 self._first, self._block = first, block
             frame: NDArray[np.float64] = self._block[index - self._first]
             return frame
+
+
+def _box(surface: Surface) -> NDArray[np.float64]:
+    """Lowest and highest corner, (1, 2, 3)."""
+    return np.stack([surface[0].min(axis=0), surface[0].max(axis=0)])[None]

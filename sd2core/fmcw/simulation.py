@@ -42,11 +42,12 @@ def simulate_radar(
     Parameters
     ----------
     mesh : MeshSequence
-        With faces. What stands around it hides facets, and echoes as static clutter.
+        With faces. What stands around it hides facets, and echoes as static clutter; of a scene
+        of several bodies the signal is the sum.
     sensor : VirtualSensor
         At the camera by default.
     visibility : bool array, shape (T, F), "facing" or "exact"
-        Per mesh frame, the facets that nothing hides from the sensor;
+        Per mesh frame, the facets (of the first body) that nothing hides from the sensor;
         ``facing`` takes all whose normal points towards it, ``exact`` finds those that
         nothing hides as it goes.
     frames : (int, int), optional
@@ -86,7 +87,7 @@ def simulate_radar(
     # by a 2^9th of a count of 16 bits.
     real = config.sampling == "real"
     signal = store(shape, np.float32 if real else np.complex64, memory_bytes)
-    there = np.array([scene.scene.there(time_s) for time_s in times_s.tolist()])
+    there = np.array([scene.there(time_s) for time_s in times_s.tolist()])
     power, peak = _fill(scene, times_s, scene.static(options.reflectors), signal, progress)
     samples = store(shape, np.uint16 if real else np.complex64, memory_bytes)
     mean_power = float(power[there].mean()) if there.any() else 0.0
@@ -106,6 +107,7 @@ def simulate_radar(
             "visibility": visibility if isinstance(visibility, str) else "exact",
             "wave": asdict(wave),
             **({} if mesh.surroundings is None else {"things": mesh.surroundings.as_list()}),
+            **({"bodies": list(mesh.persons)} if mesh.others else {}),
         },
         nobody=runs(~there),
     )

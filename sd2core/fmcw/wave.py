@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -34,11 +35,13 @@ _NO_PLANE = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 class WaveScene:
-    """Moving mesh, which has faces, and radar with the wave propagation between them.
+    """Moving meshes, which have faces, and radar with the wave propagation between them.
 
-    The sensor is the transmitter, with its boresight. ``visibility`` is as for
-    :class:`~sd2core.fmcw.scene.MeshScene`; ``seed`` is that of the random phases of a rough
-    surface.
+    In a scene of several bodies each is a scene of its own (``bodies``), this one the first; the
+    signal is the sum of all. The sensor is the transmitter, with its boresight. ``visibility`` is
+    as for :class:`~sd2core.fmcw.scene.MeshScene`; an array is of the first body, and what is seen
+    of the others is found. ``seed`` is that of the random phases of a rough surface, and
+    ``number`` that of a body in them.
     """
 
     def __init__(
@@ -49,6 +52,7 @@ class WaveScene:
         visibility: FacetsSeen = "facing",
         wave: WaveOptions | None = None,
         seed: int = 0,
+        number: int = 0,
     ) -> None:
         self.scene = MeshScene(mesh, config, sensor, visibility)
         self.config = config
@@ -69,14 +73,39 @@ class WaveScene:
         self._random: NDArray[np.complex128] | None = None
         if not self.wave.coherent:
             # Three words, so that no frame's noise has the same stream.
-            turns = np.random.default_rng([seed, 0, 1]).random(len(faces))
-            self._random = np.exp(2j * np.pi * turns)
+            words = [seed, 0, 1, *([number] if number else [])]
+            self._random = np.exp(2j * np.pi * np.random.default_rng(words).random(len(faces)))
+        others = "exact" if isinstance(visibility, np.ndarray) else visibility
+        self.bodies: tuple[WaveScene, ...] = (
+            self,
+            *(
+                WaveScene(
+                    replace(body, surroundings=mesh.surroundings),
+                    *(config, sensor, others, wave, seed, number),
+                )
+                for number, body in enumerate(mesh.others, 1)
+            ),
+        )
+        scenes = [one.scene for one in self.bodies]
+        for one in scenes if len(scenes) > 1 else ():
+            one.others = tuple(other for other in scenes if other is not one)
+
+    def there(self, time_s: float) -> bool:
+        """True if anybody is there in the mesh frames on both sides of an instant."""
+        return any(one.scene.there(time_s) for one in self.bodies)
 
     def frame(self, time_s: float, go_on: GoOn | None = None) -> BeatSignal:
         """Beat signal of the frame around a time, (receivers, chirps, samples).
 
         Zero where there is no person.
         """
+        signal = self._own_frame(time_s, go_on)
+        for one in self.bodies[1:]:
+            signal += one._own_frame(time_s, go_on)
+        return signal
+
+    def _own_frame(self, time_s: float, go_on: GoOn | None) -> BeatSignal:
+        """Beat signal of this body alone, among the others."""
         if not self.scene.there(time_s):
             return self.silence()
         visible = self.scene.visible(time_s)
