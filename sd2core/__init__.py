@@ -27,12 +27,13 @@ if TYPE_CHECKING:
     from sd2core.io.bodies import with_bodies
     from sd2core.io.mesh import load_mesh, save_mesh
     from sd2core.io.radar import RadarCapture, load_capture
-    from sd2core.io.things import with_things
+    from sd2core.io.things import with_things, with_walls
     from sd2core.io.video import VideoReader, open_video
     from sd2core.maps import DopplerMap
     from sd2core.mesh.bodies import Body
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.mesh.things import Thing
+    from sd2core.mesh.walls import Wall
     from sd2core.radar_config import PAPER_RADAR, RadarConfig
     from sd2core.recording.recording import Recording, Span, open_recording, open_sample
     from sd2core.sensor import Beam, VelocityAxis, VirtualSensor
@@ -57,6 +58,7 @@ __all__ = [
     "VelocityAxis",
     "VideoReader",
     "VirtualSensor",
+    "Wall",
     "__version__",
     "doppler_map",
     "load_capture",
@@ -69,6 +71,7 @@ __all__ = [
     "virtual_imu",
     "with_bodies",
     "with_things",
+    "with_walls",
 ]
 
 _HOME = {
@@ -90,6 +93,7 @@ _HOME = {
     "VelocityAxis": "sensor",
     "VideoReader": "io.video",
     "VirtualSensor": "sensor",
+    "Wall": "mesh.walls",
     "doppler_map": "fmcw",
     "load_capture": "io.radar",
     "load_mesh": "io.mesh",
@@ -101,6 +105,7 @@ _HOME = {
     "virtual_imu": "imu.virtual",
     "with_bodies": "io.bodies",
     "with_things": "io.things",
+    "with_walls": "io.things",
 }
 
 

@@ -29,6 +29,7 @@ from sd2core.maps import CellUncertainty
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.numerics.parallel import Ticket, run_jobs
 from sd2core.progress import Progress
+from sd2core.scattering.echo_paths import EchoPath
 from sd2core.sensor import VirtualSensor
 
 _REACH = 4.0
@@ -128,16 +129,21 @@ class _Piece:
     def moments(self, go_on: Callable[[], None]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Expected values and their variance, (bins, n) each."""
         options = self._counts.options
-        fine, sigma_bins = self._histograms(go_on)
+        counted = self._histograms(go_on)
         frames = self._stop - self._start
         expected = np.zeros((options.axis.bins, frames))
         variance = np.zeros((options.axis.bins, frames))
         over_time = self._smoothing_over_time()
-        for limb, deviation in zip(fine, sigma_bins.T, strict=True):
+        for limb in range(len(self._known.limbs)):
             go_on()
-            nodes, share = _grid(float(deviation.max()))
-            shifted = self._axis.shifted(limb, nodes[:, None] * deviation)  # (k, n, bins)
-            mapped = self._smoothed(shifted, over_time)
+            of_limb = [(fine[limb], sigma_bins[:, limb]) for fine, sigma_bins in counted]
+            nodes, share = _grid(max(float(deviation.max()) for _, deviation in of_limb))
+            # Paths by walls err with the direct one, as far as they run alike.
+            shifted = sum(
+                self._axis.shifted(fine, nodes[:, None] * deviation)  # (k, n, bins)
+                for fine, deviation in of_limb
+            )
+            mapped = self._smoothed(np.asarray(shifted), over_time)
             mean = np.tensordot(share, mapped, 1)
             expected += mean
             variance += np.tensordot(share, (mapped - mean) ** 2, 1)
@@ -171,28 +177,30 @@ class _Piece:
 
     def _histograms(
         self, go_on: Callable[[], None]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Shares on the fine axis (limbs, n, parts), and their deviations in bins (n, limbs)."""
+    ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Shares of each path on the fine axis (limbs, n, parts); deviations in bins (n, limbs)."""
         counts, known = self._counts, self._known
         frames = self._last - self._first
-        fine = np.zeros((len(known.limbs), frames, self._axis.parts))
-        sigma_bins = np.zeros((frames, len(known.limbs)))
-        for index, low, high in counts.blocks_between(self._first, self._last):
-            go_on()
-            block = counts.prepared.block(index)
-            rows = slice(low - block.start, high - block.start)
-            target = slice(low - self._first, high - self._first)
-            fine[:, target] = self._counted(block, rows)
-            sigma_bins[target] = counts.sigma_bins(block, rows, self._sensor.position_m)
-        return fine, sigma_bins
+        found = []
+        for path in counts.paths(self._sensor):
+            fine = np.zeros((len(known.limbs), frames, self._axis.parts))
+            sigma_bins = np.zeros((frames, len(known.limbs)))
+            for index, low, high in counts.blocks_between(self._first, self._last):
+                go_on()
+                block = counts.prepared.block(index)
+                rows = slice(low - block.start, high - block.start)
+                target = slice(low - self._first, high - self._first)
+                fine[:, target] = self._counted(block, rows, path)
+                sigma_bins[target] = counts.sigma_bins(block, rows, path)
+            found.append((fine, sigma_bins))
+        return found
 
-    def _counted(self, block: Block, rows: slice) -> NDArray[np.float64]:
+    def _counted(self, block: Block, rows: slice, path: EchoPath) -> NDArray[np.float64]:
         """Shares of some of a block's frames on the fine axis, (limbs, n, parts)."""
         counts, known = self._counts, self._known
-        position_m = self._sensor.position_m
-        place = counts.prepared.sensor(position_m)
+        place = counts.prepared.sensor(path.ends_m)
         visibility, limb = self._visibility, known.vertex_limb
-        scatterers, _ = counts.scatterers(block, rows, self._sensor, visibility, limb)
+        scatterers, _ = counts.scatterers(block, rows, path, visibility, limb)
         frames, velocity = block.frames.rows(rows), None
         if counts.options.velocity == "vid2doppler":
             velocity = counts.prepared.velocities_vid2doppler(block, rows, place)
@@ -200,7 +208,7 @@ class _Piece:
             frames, place, self._axis, scatterers, len(known.limbs), velocity
         ).transpose(1, 0, 2)
         total = counts.totals(block, rows)
-        law = counts.frame_law(block, rows, position_m)
+        law = path.share * counts.frame_law(block, rows, path)
         factor = np.divide(law, total, out=np.zeros_like(total), where=total > 0)
         return fine * factor[:, None]
 

@@ -41,7 +41,7 @@ _FRAMES = 16
 
 def sigma_bins(
     known: VelocityUncertainty,
-    sensor_m: tuple[float, float, float],
+    ends_m: NDArray[np.float64],
     limbs_m: NDArray[np.float64],
     start: int,
     axis: VelocityAxis,
@@ -54,8 +54,8 @@ def sigma_bins(
     ----------
     known : VelocityUncertainty
         As the mesh states it.
-    sensor_m : tuple of 3 float
-        Place of the sensor in the camera frame.
+    ends_m : float64 ndarray, (1 or 2, 3)
+        Of the path, in the camera frame.
     limbs_m : float64 ndarray, (n, limbs, 3)
         Places of the limbs in the camera frame.
     start : int
@@ -63,13 +63,13 @@ def sigma_bins(
     axis : VelocityAxis
         Of the map.
     """
-    sigma_mps = known.towards(sensor_m, limbs_m, start)
+    sigma_mps = known.towards(ends_m, limbs_m, start)
     return np.minimum(sigma_mps / axis.bin_width_mps, axis.bins)
 
 
 def count_expected(
     frames: Frames,
-    sensor: NDArray[np.float64],
+    ends: NDArray[np.float64],
     counting: Counting,
     scatterers: Scatterers,
     sigma_bins: NDArray[np.float64],
@@ -82,8 +82,8 @@ def count_expected(
     ----------
     frames : Frames
         The n frames with all vertices.
-    sensor : float64 ndarray, (3,)
-        In the frame of the positions.
+    ends : float64 ndarray, (1 or 2, 3)
+        Of the path, in the frame of the positions.
     counting : Counting
         Velocity axis and range law.
     scatterers : Scatterers
@@ -104,9 +104,9 @@ def count_expected(
     group = np.searchsorted(pairs, number)
     limb, part = pairs % sigma_bins.shape[1], pairs // sigma_bins.shape[1]
     if not kernels_ready():
-        _count_plain(frames, sensor, counting, scatterers, sigma_bins[:, vertex_limb], into)
+        _count_plain(frames, ends, counting, scatterers, sigma_bins[:, vertex_limb], into)
         return
-    place, axis = sensor.astype(frames.positions.dtype), counting.arguments()
+    place, axis = ends.astype(frames.positions.dtype), counting.arguments()
     count = len(frames)
     for first in range(0, count, _FRAMES):
         rows = slice(first, min(first + _FRAMES, count))
@@ -123,24 +123,24 @@ def count_expected(
 
 def _count_plain(
     frames: Frames,
-    sensor: NDArray[np.float64],
+    ends: NDArray[np.float64],
     counting: Counting,
     scatterers: Scatterers,
     sigma: NDArray[np.float64],
     into: Counts,
 ) -> None:
     """Count as :func:`count_expected` does, in NumPy, every vertex (n, V) by itself."""
-    histogram.count_plain(frames, sensor, counting, scatterers, into)
+    histogram.count_plain(frames, ends, counting, scatterers, into)
     part = scatterers.parts
     part = np.zeros(sigma.shape[1], np.uint8) if part is None else part
     for t, knot in enumerate(frames.centre):
         points = frames.positions[knot]
-        seen = scatterers.seen(t, points, sensor)
-        weight = seen * scatterers.weights(t, points, sensor, counting)
+        seen = scatterers.seen(t, points, ends)
+        weight = seen * scatterers.weights(t, points, ends, counting)
         samples = np.flatnonzero(frames.duration_s[t] > 0).tolist()
         into.histogram[t] = 0
         for sample in samples:
-            place = places_plain(frames, t, sample, sensor, counting)
+            place = places_plain(frames, t, sample, ends, counting)
             for number in range(into.histogram.shape[1]):
                 own = part == number
                 into.histogram[t, number] += spread_over_bins(

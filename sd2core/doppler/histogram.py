@@ -26,10 +26,9 @@ from sd2core.doppler.kernels import (
 )
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.scattering.amplitude import projected_areas, range_weight
-from sd2core.scattering.beam import two_way_gain
 from sd2core.scattering.beam_kernels import beam_tables
+from sd2core.scattering.echo_paths import EchoPath, mean_distance_m
 from sd2core.scattering.visibility import facing_mask
-from sd2core.sensor import VirtualSensor
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +45,7 @@ class Scatterers:
     """Shape (V,): number of vertices that each stands for; None: itself only."""
     parts: NDArray[np.uint8] | None = None
     """Shape (V,): part of the body of each vertex, to count apart; None: all together."""
-    sensor: VirtualSensor | None = None  # its beam weighs them
+    path: EchoPath | None = None  # whose beam weighs them
 
     @property
     def kinds(self) -> tuple[int, int]:
@@ -61,6 +60,8 @@ class Scatterers:
     def arguments(self) -> tuple[Any, ...]:
         """What kernels take: values as :class:`Paths` has places, empty where there are none."""
         normals, areas, vectors = self.normals, self.areas, self.area_vectors
+        beam = beam_tables(None if self.path is None else self.path.sensor)
+        axes = beam.axes[None] if self.path is None else self.path.axes
         return (
             _NO_NORMALS if normals is None else normals.reshape(-1),
             _NO_MASK if self.mask is None else self.mask,
@@ -69,7 +70,7 @@ class Scatterers:
             _NO_AREAS if self.vertex_counts is None else self.vertex_counts,
             _NO_PARTS if self.parts is None else self.parts,
             *self.kinds,
-            tuple(beam_tables(self.sensor)),
+            (axes, beam.across, beam.up),
         )
 
     def rows(self, rows: slice) -> Scatterers:
@@ -82,18 +83,17 @@ class Scatterers:
             area_vectors=None if self.area_vectors is None else self.area_vectors[rows],
         )
 
-    def seen(
-        self, row: int, points: NDArray[Any], sensor: NDArray[np.float64]
-    ) -> NDArray[np.bool_]:
+    def seen(self, row: int, points: NDArray[Any], ends: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Visible vertices of frame ``row``, bool (V,); ``points`` (3, V) are its vertices."""
         if self.mask is not None:
             return self.mask[row] > 0
         if self.normals is not None:
-            return facing_mask(points[None], self.normals[row : row + 1], sensor)[0] > 0
+            normals = self.normals[row : row + 1]
+            return np.all([facing_mask(points[None], normals, end)[0] for end in ends], axis=0)
         return np.ones(points.shape[1], bool)
 
     def weights(
-        self, row: int, points: NDArray[Any], sensor: NDArray[np.float64], counting: Counting
+        self, row: int, points: NDArray[Any], ends: NDArray[np.float64], counting: Counting
     ) -> NDArray[np.float64]:
         """Weight of each vertex of a frame, float64 (V,).
 
@@ -103,23 +103,23 @@ class Scatterers:
             Number of the frame.
         points : ndarray, (3, V)
             Its vertices.
-        sensor : float64 ndarray, (3,)
-            In the frame of the vertices.
+        ends : float64 ndarray, (1 or 2, 3)
+            Of the path, in the frame of the vertices.
         counting : Counting
             Gives the range law.
         """
         if self.area_vectors is not None:
-            weight = projected_areas(points, self.area_vectors[row], sensor)
+            areas = [projected_areas(points, self.area_vectors[row], end) for end in ends]
+            weight = np.mean(areas, axis=0)
         elif self.areas is not None:
             weight = self.areas[row].astype(np.float64)
         else:
             weight = self.multiplicity(points.shape[1])
         if counting.range_exponent:
-            distance = np.linalg.norm(points - sensor[:, None], axis=0)
             law = counting.range_exponent, counting.reference_range_m
-            weight = weight * range_weight(distance, *law)
-        if self.sensor is not None:
-            weight = weight * two_way_gain(self.sensor, points, sensor)
+            weight = weight * range_weight(mean_distance_m(points, ends), *law)
+        if self.path is not None:
+            weight = weight * self.path.gain(points, ends)
         return weight
 
     def multiplicity(self, vertices: int) -> NDArray[np.float64]:
@@ -276,7 +276,7 @@ def relative_range(positions: NDArray[Any], sensor: NDArray[np.float64]) -> NDAr
 
 
 def bins_plain(
-    frames: Frames, t: int, sample: int, sensor: NDArray[np.float64], counting: Counting
+    frames: Frames, t: int, sample: int, ends: NDArray[np.float64], counting: Counting
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Bin of every vertex (``bins`` where dropped), and a mask of those beyond the axis.
 
@@ -286,16 +286,16 @@ def bins_plain(
         With all vertices.
     t, sample : int
         Frame and velocity sample, which has something to measure.
-    sensor : float64 ndarray, (3,)
-        In the frame of the positions.
+    ends : float64 ndarray, (1 or 2, 3)
+        Of the path, in the frame of the positions.
     counting : Counting
         Axis, and what happens beyond it.
     """
-    return place_in_bins(places_plain(frames, t, sample, sensor, counting), counting)
+    return place_in_bins(places_plain(frames, t, sample, ends, counting), counting)
 
 
 def places_plain(
-    frames: Frames, t: int, sample: int, sensor: NDArray[np.float64], counting: Counting
+    frames: Frames, t: int, sample: int, ends: NDArray[np.float64], counting: Counting
 ) -> NDArray[Any]:
     """Position of every vertex (V,) on the velocity axis, in the precision of the frames.
 
@@ -305,14 +305,17 @@ def places_plain(
         With all vertices.
     t, sample : int
         Frame and velocity sample, which has something to measure.
-    sensor : float64 ndarray, (3,)
-        In the frame of the positions.
+    ends : float64 ndarray, (1 or 2, 3)
+        Of the path, in the frame of the positions.
     counting : Counting
         Its axis runs from 0 to ``bins``.
     """
-    closer = relative_range(frames.positions[frames.before[t, sample]], sensor) - relative_range(
-        frames.positions[frames.after[t, sample]], sensor
-    )
+
+    def range_at(knot: int) -> NDArray[Any]:
+        each = [relative_range(frames.positions[knot], end) for end in ends]
+        return each[0] if len(each) == 1 else np.float32(0.5) * (each[0] + each[1])
+
+    closer = range_at(frames.before[t, sample]) - range_at(frames.after[t, sample])
     precision = frames.positions.dtype
     per_bin = closer * counting.scale(frames.duration_s[t, sample : sample + 1], precision)
     places: NDArray[Any] = per_bin + np.float32(0.5 * counting.bins)
@@ -338,7 +341,7 @@ def place_in_bins(
 
 def count_plain(
     frames: Frames,
-    sensor: NDArray[np.float64],
+    ends: NDArray[np.float64],
     counting: Counting,
     scatterers: Scatterers,
     into: Counts,
@@ -350,8 +353,8 @@ def count_plain(
     ----------
     frames : Frames
         The n frames with all vertices.
-    sensor : float64 ndarray, (3,)
-        In the frame of the positions.
+    ends : float64 ndarray, (1 or 2, 3)
+        Of the path, in the frame of the positions.
     counting : Counting
         Velocity axis and range law.
     scatterers : Scatterers
@@ -364,7 +367,7 @@ def count_plain(
     if bins_of is None:
 
         def bins_of(t: int, sample: int) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-            return bins_plain(frames, t, sample, sensor, counting)
+            return bins_plain(frames, t, sample, ends, counting)
 
     _, parts, bins = into.histogram.shape
     multiplicity = scatterers.multiplicity(frames.positions.shape[2])
@@ -372,8 +375,8 @@ def count_plain(
     base = 0 if scatterers.parts is None else (bins + 1) * scatterers.parts.astype(np.intp)
     for t, knot in enumerate(frames.centre):
         points = frames.positions[knot]
-        seen = scatterers.seen(t, points, sensor)
-        weight = scatterers.weights(t, points, sensor, counting)
+        seen = scatterers.seen(t, points, ends)
+        weight = scatterers.weights(t, points, ends, counting)
         into.visible[t] = multiplicity[seen].sum()
         measured = max(1, int((frames.duration_s[t] > 0).sum()))
         for sample in np.flatnonzero(frames.duration_s[t] > 0).tolist():
@@ -387,7 +390,7 @@ def count(
     paths: Paths,
     start: int,
     duration_s: NDArray[np.float64],
-    sensor: NDArray[np.float64],
+    ends: NDArray[np.float64],
     counting: Counting,
     scatterers: Scatterers,
     into: Counts,
@@ -400,8 +403,8 @@ def count(
         Those that are counted: of what moves, bins that are not kept get less than their share.
     duration_s : float64 array, shape (n, samples)
         Of the n frames that are counted; so are mask and ``into``.
-    sensor : float64 array, shape (3,)
-        In the frame of the positions.
+    ends : float64 array, shape (1 or 2, 3)
+        The sensor, and its image by way of a wall, in the frame of the positions.
     scatterers : Scatterers
         Normals, areas and area vectors are those of all frames of the paths, in their order.
     """
@@ -411,7 +414,7 @@ def count(
         start,
         counting.scale(duration_s, precision),
         scatterers.arguments(),
-        sensor.astype(precision),
+        ends.astype(precision),
         counting.arguments(),
         into.histogram,
         into.visible,
@@ -423,7 +426,7 @@ def mark_needed(
     paths: Paths,
     start: int,
     duration_s: NDArray[np.float64],
-    sensor: NDArray[np.float64],
+    ends: NDArray[np.float64],
     counting: Counting,
     live: NDArray[np.uint8],
 ) -> NDArray[np.uint8]:
@@ -431,7 +434,7 @@ def mark_needed(
 
     Parameters
     ----------
-    paths, start, duration_s, sensor
+    paths, start, duration_s, ends
         As for :func:`count`.
     counting : Counting
         Axis, and what happens beyond it.
@@ -444,7 +447,7 @@ def mark_needed(
         tuple(paths),
         start,
         counting.scale(duration_s, precision),
-        sensor.astype(precision),
+        ends.astype(precision),
         counting.arguments(),
         live,
         needed,
@@ -453,7 +456,7 @@ def mark_needed(
 
 
 def mark_needed_plain(
-    frames: Frames, sensor: NDArray[np.float64], counting: Counting, live: NDArray[np.uint8]
+    frames: Frames, ends: NDArray[np.float64], counting: Counting, live: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
     """Mark vertices of all frames as :func:`mark_needed` does, in NumPy.
 
@@ -461,13 +464,13 @@ def mark_needed_plain(
     ----------
     frames : Frames
         The n frames with all vertices.
-    sensor, counting, live
+    ends, counting, live
         As for :func:`mark_needed`.
     """
     needed = np.zeros((len(frames.centre), frames.positions.shape[2]), np.uint8)
     for t in range(len(frames.centre)):
         for sample in range(frames.before.shape[1]):
             if frames.duration_s[t, sample] > 0:
-                number, _ = bins_plain(frames, t, sample, sensor, counting)
+                number, _ = bins_plain(frames, t, sample, ends, counting)
                 needed[t] |= live[number]
     return needed

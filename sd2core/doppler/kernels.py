@@ -47,17 +47,30 @@ def _relative_ranges(x, y, z, sx, sy, sz, distance, ranges):  # type: ignore[no-
 
 
 @compiled
-def distance_of(sensor):  # type: ignore[no-untyped-def]
-    """Distance of the sensor from the origin, in the sensor's precision."""
-    away = np.sqrt(
-        np.float64(sensor[0]) ** 2 + np.float64(sensor[1]) ** 2 + np.float64(sensor[2]) ** 2
-    )
-    return sensor.dtype.type(away)
+def _mean_ranges(x, y, z, sx, sy, sz, distance, ranges):  # type: ignore[no-untyped-def]
+    """Mean of ranges (n,) from a first end and :func:`_relative_ranges` from a second."""
+    other = np.empty_like(ranges)
+    _relative_ranges(x, y, z, sx, sy, sz, distance, other)
+    half = np.float32(0.5)
+    for v in range(ranges.shape[0]):
+        ranges[v] = half * (ranges[v] + other[v])
 
 
 @compiled
-def ranges_at(here, knot, sensor, distance, ranges, held):  # type: ignore[no-untyped-def]
+def distances_of(ends):  # type: ignore[no-untyped-def]
+    """Distances of the ends of a path from the origin, in their precision."""
+    away = np.empty(ends.shape[0], ends.dtype)
+    for end in range(ends.shape[0]):
+        x, y, z = np.float64(ends[end, 0]), np.float64(ends[end, 1]), np.float64(ends[end, 2])
+        away[end] = np.sqrt(x**2 + y**2 + z**2)
+    return away
+
+
+@compiled
+def ranges_at(here, knot, ends, distances, ranges, held):  # type: ignore[no-untyped-def]
     """Ranges (n,) of a group's vertices at one of its knots, computed when first asked for.
+
+    By way of a wall they are half the length of the path.
 
     Parameters
     ----------
@@ -65,8 +78,8 @@ def ranges_at(here, knot, sensor, distance, ranges, held):  # type: ignore[no-un
         Coordinates of the vertices, from :func:`group_of`.
     knot : int
         Number of the knot in the group.
-    sensor, distance
-        Place (3,), and its :func:`distance_of`, by which ranges are less.
+    ends, distances
+        Places (1 or 2, 3), and their :func:`distances_of`, by which ranges are less.
     ranges, held : (k, most) and int (k,)
         Keep those of the newest knots, and their numbers (-1: none); written.
     """
@@ -74,10 +87,10 @@ def ranges_at(here, knot, sensor, distance, ranges, held):  # type: ignore[no-un
     # Cut like this the compiler knows that they lie side by side.
     result = ranges[row][: here.shape[1]]
     if held[row] != knot:
-        _relative_ranges(
-            here[3 * knot], here[3 * knot + 1], here[3 * knot + 2],
-            sensor[0], sensor[1], sensor[2], distance, result,
-        )  # fmt: skip
+        x, y, z = here[3 * knot], here[3 * knot + 1], here[3 * knot + 2]
+        _relative_ranges(x, y, z, ends[0, 0], ends[0, 1], ends[0, 2], distances[0], result)
+        if ends.shape[0] > 1:
+            _mean_ranges(x, y, z, ends[1, 0], ends[1, 1], ends[1, 2], distances[1], result)
         held[row] = knot
     return result
 
@@ -186,6 +199,18 @@ def _squared_ratios(ranges, distance, reference, weight):  # type: ignore[no-unt
 
 
 @compiled
+def _squared_ratios_between(x, y, z, ends, reference, weight):  # type: ignore[no-untyped-def]
+    """Ratios R_ref² / (R₁ R₂) of a run of vertices on a path with two ends."""
+    ax, ay, az = ends[0, 0], ends[0, 1], ends[0, 2]
+    bx, by, bz = ends[1, 0], ends[1, 1], ends[1, 2]
+    for v in range(weight.shape[0]):
+        px, py, pz = x[v] - ax, y[v] - ay, z[v] - az
+        qx, qy, qz = x[v] - bx, y[v] - by, z[v] - bz
+        one = reference / max(np.sqrt(px * px + py * py + pz * pz), _NEAREST)
+        weight[v] = one * (reference / max(np.sqrt(qx * qx + qy * qy + qz * qz), _NEAREST))
+
+
+@compiled
 def raise_to(weight, exponent, spare):  # type: ignore[no-untyped-def]
     """Raise ratios, given squared, to the power of ``exponent``, in place."""
     if exponent != np.floor(exponent):
@@ -244,7 +269,7 @@ def multiplicity_seen(seen, multiplicity):  # type: ignore[no-untyped-def]
 @compiled
 def weigh_run(  # type: ignore[no-untyped-def]
     p, q, own, middle, away, numbers, multiplicity, normals, marks, areas, vectors, which,
-    weighting, beam, sensor, distance, exponent, reference, seen, weight, spare,
+    weighting, beam, ends, distances, exponent, reference, seen, weight, spare,
 ):  # fmt: skip
     """Return the visibility of a run of vertices of a frame and set their weights.
 
@@ -257,7 +282,7 @@ def weigh_run(  # type: ignore[no-untyped-def]
     middle : (3, n)
         Places of the vertices in the frame.
     away : (n,)
-        Their ranges, less ``distance``.
+        Their ranges, less the distance of the first end.
     numbers : int32 (n,)
         Their numbers among all V.
     multiplicity : float32 (n,)
@@ -269,9 +294,9 @@ def weigh_run(  # type: ignore[no-untyped-def]
     which, weighting : int
         Which vertices count, and what.
     beam : tuple
-        :class:`~sd2core.scattering.beam_kernels.BeamTables`.
-    sensor, distance
-        Place (3,), and its :func:`distance_of`.
+        :class:`~sd2core.scattering.beam_kernels.BeamTables`, with axes for every end.
+    ends, distances
+        Places (1 or 2, 3), and their :func:`distances_of`.
     exponent, reference : float
         Those of the range law; an exponent of 0 turns it off.
     seen : uint8 (q - p,)
@@ -284,18 +309,26 @@ def weigh_run(  # type: ignore[no-untyped-def]
     """
     count = numbers.shape[0]
     x, y, z = middle[0][p:q], middle[1][p:q], middle[2][p:q]
-    sx, sy, sz = sensor[0], sensor[1], sensor[2]
+    sx, sy, sz = ends[0, 0], ends[0, 1], ends[0, 2]
+    two = ends.shape[0] > 1
     if which == FACING:
         normal = normals[3 * own : 3 * (own + count)].reshape((3, count))
         nx, ny, nz = normal[0][p:q], normal[1][p:q], normal[2][p:q]
         facing_kernel(x, y, z, nx, ny, nz, sx, sy, sz, seen)
+        if two:
+            also = np.empty_like(seen)
+            facing_kernel(x, y, z, nx, ny, nz, ends[1, 0], ends[1, 1], ends[1, 2], also)
+            seen &= also
     elif which == MASK and count == marks.shape[0]:
         seen = marks[p:q]
     elif which == MASK:
         for i in range(q - p):
             seen[i] = marks[np.uint32(numbers[p + i])]
     if exponent != 0:
-        _squared_ratios(away[p:q], distance, reference, weight)
+        if two:
+            _squared_ratios_between(x, y, z, ends, reference, weight)
+        else:
+            _squared_ratios(away[p:q], distances[0], reference, weight)
         raise_to(weight, exponent, spare)
     if weighting == AREA:
         spare[:] = areas[own + p : own + q]
@@ -303,6 +336,11 @@ def weigh_run(  # type: ignore[no-untyped-def]
         vector = vectors[3 * own : 3 * (own + count)].reshape((3, count))
         ax, ay, az = vector[0][p:q], vector[1][p:q], vector[2][p:q]
         _projected(x, y, z, ax, ay, az, sx, sy, sz, spare)
+        if two:
+            turned = np.empty_like(spare)
+            _projected(x, y, z, ax, ay, az, ends[1, 0], ends[1, 1], ends[1, 2], turned)
+            for i in range(q - p):
+                spare[i] = np.float32(0.5) * (spare[i] + turned[i])
     elif weighting == MULTIPLICITY:
         spare[:] = multiplicity[p:q]
     axes, across, up = beam
@@ -313,8 +351,15 @@ def weigh_run(  # type: ignore[no-untyped-def]
             weight[i] *= spare[i]
     elif weighting != ONE:
         weight[:] = spare
-    if across.shape[0] > 0:
-        weigh_by_beam(x, y, z, sx, sy, sz, axes, across, up, weight)
+    if across.shape[0] > 0 and not two:
+        weigh_by_beam(x, y, z, sx, sy, sz, axes[0], across, up, weight)
+    elif across.shape[0] > 0:
+        gain = np.ones(q - p, np.float32)  # of two passages at each end
+        for end in range(2):
+            ex, ey, ez = ends[end, 0], ends[end, 1], ends[end, 2]
+            weigh_by_beam(x, y, z, ex, ey, ez, axes[end], across, up, gain)
+        for i in range(q - p):
+            weight[i] *= np.sqrt(gain[i])
     return seen
 
 
@@ -354,7 +399,7 @@ def _total(sums, total):  # type: ignore[no-untyped-def]
 
 @compiled
 def count_kernel(  # type: ignore[no-untyped-def]
-    paths, start, scale, scatterers, sensor, law, histogram, visible, outside
+    paths, start, scale, scatterers, ends, law, histogram, visible, outside
 ):
     """Compiled form of :func:`sd2core.doppler.histogram.count`.
 
@@ -369,8 +414,8 @@ def count_kernel(  # type: ignore[no-untyped-def]
         First of the n frames in the paths.
     scale : (n, samples)
         Bins per metre of range change; 0 where there is nothing to measure.
-    sensor : (3,)
-        In the frame and the precision of the positions.
+    ends : (1 or 2, 3)
+        The sensor, and its image behind a wall, in the frame and the precision of the positions.
     histogram : float64 (n, parts, bins)
         Written.
     visible, outside : float64 (n,)
@@ -380,7 +425,7 @@ def count_kernel(  # type: ignore[no-untyped-def]
     normals, mask, areas, vectors, every, part, which, weighting, beam = scatterers
     bins, beyond, exponent, reference = law
     samples, most = scale.shape[1], most_in_a_group(first)
-    offset, distance = np.float32(0.5 * bins), distance_of(sensor)
+    offset, distances = np.float32(0.5 * bins), distances_of(ends)
     ranges, held = np.empty((samples + 2, most), places.dtype), np.empty(samples + 2, np.int64)
     f, slot = np.empty(min(most, RUN), places.dtype), np.empty(min(most, RUN), np.uint8)
     weight, spare = np.ones(min(most, RUN), np.float32), np.empty(min(most, RUN), np.float32)
@@ -426,10 +471,10 @@ def count_kernel(  # type: ignore[no-untyped-def]
         while p < count:
             q = run_end(numbers, p)
             n = q - p
-            away = ranges_at(here, knot, sensor, distance, ranges, held)
+            away = ranges_at(here, knot, ends, distances, ranges, held)
             sight = weigh_run(
                 p, q, own, here[3 * knot : 3 * knot + 3], away, numbers, multiplicity, normals,
-                marks, areas, vectors, which, weighting, beam, sensor, distance, exponent,
+                marks, areas, vectors, which, weighting, beam, ends, distances, exponent,
                 reference, seen[:n], weight[:n], spare[:n],
             )  # fmt: skip
             if grouped:
@@ -440,8 +485,8 @@ def count_kernel(  # type: ignore[no-untyped-def]
             for sample in range(samples):
                 if scale[t, sample] <= 0:
                     continue
-                a = ranges_at(here, before[frame, sample], sensor, distance, ranges, held)
-                b = ranges_at(here, after[frame, sample], sensor, distance, ranges, held)
+                a = ranges_at(here, before[frame, sample], ends, distances, ranges, held)
+                b = ranges_at(here, after[frame, sample], ends, distances, ranges, held)
                 axis_positions(a[p:q], b[p:q], scale[t, sample], offset, f[:n])
                 if grouped:
                     outside_count += _multiplicity_beyond(f[:n], sight, multiplicity[p:q], bins)
@@ -463,13 +508,13 @@ def count_kernel(  # type: ignore[no-untyped-def]
 
 @compiled
 def needed_kernel(  # type: ignore[no-untyped-def]
-    paths, start, scale, sensor, law, live, needed
+    paths, start, scale, ends, law, live, needed
 ) -> None:
     """Compiled :func:`sd2core.doppler.histogram.mark_needed`.
 
     Parameters
     ----------
-    paths, start, scale, sensor, law
+    paths, start, scale, ends, law
         As for :func:`count_kernel`.
     live : uint8 (bins + 1,)
         1 for bins that are kept; the last entry is for velocities beyond the axis.
@@ -479,7 +524,7 @@ def needed_kernel(  # type: ignore[no-untyped-def]
     vertex, first, places, _, before, after, group_frames, _ = paths
     bins, beyond, _, _ = law
     samples, most = scale.shape[1], most_in_a_group(first)
-    offset, distance = np.float32(0.5 * bins), distance_of(sensor)
+    offset, distances = np.float32(0.5 * bins), distances_of(ends)
     ranges, held = np.empty((samples + 2, most), places.dtype), np.empty(samples + 2, np.int64)
     f, seen, slot = np.empty(most, places.dtype), np.ones(most, np.uint8), np.empty(most, np.uint8)
     group = start // group_frames - 1
@@ -494,8 +539,8 @@ def needed_kernel(  # type: ignore[no-untyped-def]
         for sample in range(samples):
             if scale[t, sample] <= 0:
                 continue
-            a = ranges_at(here, before[frame, sample], sensor, distance, ranges, held)
-            b = ranges_at(here, after[frame, sample], sensor, distance, ranges, held)
+            a = ranges_at(here, before[frame, sample], ends, distances, ranges, held)
+            b = ranges_at(here, after[frame, sample], ends, distances, ranges, held)
             axis_positions(a, b, scale[t, sample], offset, f[:n])
             _slots_of(f[:n], seen[:n], bins, beyond, slot[:n])
             for i in range(n):
@@ -506,14 +551,15 @@ def compile_kernels() -> None:
     """Call every kernel of this module once in single and once in double precision."""
     knots, first, numbers = np.zeros((1, 1), np.int64), np.array([0, 4]), np.arange(4, dtype="i4")
     marks, areas = np.zeros((1, 4), np.uint8), np.ones(12, np.float32)
-    beam = tuple(beam_tables(None))
+    tables = beam_tables(None)
+    beam = (tables.axes[None], tables.across, tables.up)
     scatterers = (np.zeros(12, np.int8), marks, areas, areas, areas[:4], marks[0], ALL, ONE, beam)
     for precision in (np.float32, np.float64):
         paths = (numbers, first, np.ones(12, precision), knots[0], knots, knots, 1, 4)
-        scale, sensor = np.ones((1, 1), precision), np.zeros(3, precision)
+        scale, ends = np.ones((1, 1), precision), np.zeros((1, 3), precision)
         law = (32, DROP, 4.0, np.float32(2.2))
         count_kernel(
-            paths, 0, scale, scatterers, sensor, law,
+            paths, 0, scale, scatterers, ends, law,
             np.zeros((1, 1, 32)), np.zeros(1), np.zeros(1),
         )  # fmt: skip
-        needed_kernel(paths, 0, scale, sensor, law, np.ones(33, np.uint8), marks.copy())
+        needed_kernel(paths, 0, scale, ends, law, np.ones(33, np.uint8), marks.copy())

@@ -74,7 +74,7 @@ class FineAxis:
 
 def fine_histograms(
     frames: Frames,
-    sensor: NDArray[np.float64],
+    ends: NDArray[np.float64],
     axis: FineAxis,
     scatterers: Scatterers,
     limbs: int,
@@ -84,8 +84,8 @@ def fine_histograms(
 
     Parameters
     ----------
-    sensor : float64 array, shape (3,)
-        In the frame of the positions.
+    ends : float64 array, shape (1 or 2, 3)
+        Of the path, in the frame of the positions.
     scatterers : Scatterers
         Their ``parts`` are the limbs.
     limbs : int
@@ -100,7 +100,7 @@ def fine_histograms(
     assert limb is not None
     if kernels_ready() and velocity_mps is None:
         both = np.zeros((len(frames), limbs, axis.parts, 2))
-        place = sensor.astype(frames.positions.dtype)
+        place = ends.astype(frames.positions.dtype)
         fine_kernel(
             tuple(frames.paths()), counting.scale(frames.duration_s, place.dtype),
             scatterers.arguments(), place, counting.arguments(), limb.astype(np.intp),
@@ -111,12 +111,12 @@ def fine_histograms(
     fine = np.zeros((len(frames), limbs, axis.parts))
     for t, knot in enumerate(frames.centre):
         points = frames.positions[knot]
-        seen = scatterers.seen(t, points, sensor)
-        weight = seen * scatterers.weights(t, points, sensor, counting)
+        seen = scatterers.seen(t, points, ends)
+        weight = seen * scatterers.weights(t, points, ends, counting)
         samples = np.flatnonzero(frames.duration_s[t] > 0).tolist()
         for sample in samples:
             if velocity_mps is None:
-                f = places_plain(frames, t, sample, sensor, counting)
+                f = places_plain(frames, t, sample, ends, counting)
             else:
                 f = counting.bins * (0.5 + 0.5 / counting.v_max_mps * velocity_mps[t])
             number = np.floor((f + axis.room_bins) * PARTS)

@@ -16,7 +16,7 @@ from sd2core.doppler.kernels import (
     RUN,
     WRAP,
     axis_positions,
-    distance_of,
+    distances_of,
     group_of,
     ranges_at,
     weigh_run,
@@ -42,14 +42,14 @@ _TABLE = (_TABLE - _TABLE[0]) / (_TABLE[-1] - _TABLE[0])
 
 @compiled
 def fine_kernel(  # type: ignore[no-untyped-def]
-    paths, scale, scatterers, sensor, law, limb, room, sigma, part, fine, histogram, visible,
+    paths, scale, scatterers, ends, law, limb, room, sigma, part, fine, histogram, visible,
     outside,
 ) -> None:  # fmt: skip
     """Count every limb on a fine axis, or spread its vertices at once.
 
     Parameters
     ----------
-    paths, scale, scatterers, sensor, law
+    paths, scale, scatterers, ends, law
         As for :func:`~sd2core.doppler.kernels.count_kernel`; the paths are those of all vertices.
     limb : intp (V,)
         Limb of each vertex, which takes the place of the scatterers' part.
@@ -74,7 +74,7 @@ def fine_kernel(  # type: ignore[no-untyped-def]
     numbers, here = group_of(vertex, first, places, 0)
     marks = np.empty(0, np.uint8)
     samples, most = scale.shape[1], numbers.shape[0]
-    offset, distance = np.float32(0.5 * bins), distance_of(sensor)
+    offset, distances = np.float32(0.5 * bins), distances_of(ends)
     ranges, held = np.empty((samples + 2, most), places.dtype), np.full(samples + 2, -1)
     f, seen = np.empty(min(most, RUN), places.dtype), np.ones(min(most, RUN), np.uint8)
     weight, spare = np.ones(min(most, RUN), np.float32), np.empty(min(most, RUN), np.float32)
@@ -89,10 +89,10 @@ def fine_kernel(  # type: ignore[no-untyped-def]
         for p in range(0, most, RUN):
             q = min(p + RUN, most)
             n = q - p
-            away = ranges_at(here, knot, sensor, distance, ranges, held)
+            away = ranges_at(here, knot, ends, distances, ranges, held)
             sight = weigh_run(
                 p, q, most * t, here[3 * knot : 3 * knot + 3], away, numbers, multiplicity, normals,
-                marks, areas, vectors, which, weighting, beam, sensor, distance, exponent,
+                marks, areas, vectors, which, weighting, beam, ends, distances, exponent,
                 reference, seen[:n], weight[:n], spare[:n],
             )  # fmt: skip
             for i in range(n):
@@ -101,8 +101,8 @@ def fine_kernel(  # type: ignore[no-untyped-def]
             for sample in range(samples):
                 if scale[t, sample] <= 0:
                     continue
-                a = ranges_at(here, before[t, sample], sensor, distance, ranges, held)
-                b = ranges_at(here, after[t, sample], sensor, distance, ranges, held)
+                a = ranges_at(here, before[t, sample], ends, distances, ranges, held)
+                b = ranges_at(here, after[t, sample], ends, distances, ranges, held)
                 axis_positions(a[p:q], b[p:q], scale[t, sample], offset, f[:n])
                 outside[t] += share * _tally(
                     f[:n], sight, weight[:n], share, limb[p:q], multiplicity[p:q], bins, room,
@@ -203,14 +203,15 @@ def compile_kernels() -> None:
     """Call every kernel of this module once in single and once in double precision."""
     knots, first, numbers = np.zeros((1, 1), np.int64), np.array([0, 4]), np.arange(4, dtype="i4")
     marks, areas = np.zeros((1, 4), np.uint8), np.ones(12, np.float32)
-    beam = tuple(beam_tables(None))
+    tables = beam_tables(None)
+    beam = (tables.axes[None], tables.across, tables.up)
     scatterers = (np.zeros(12, np.int8), marks, areas, areas, areas[:4], marks[0], ALL, ONE, beam)
     sigma, part = np.ones((1, 1)), np.zeros(1, np.intp)
     fine, coarse = np.zeros((1, 1, 256, 2)), np.zeros((1, 1, 32))
     for precision in (np.float32, np.float64):
         paths = (numbers, first, np.ones(12, precision), knots[0], knots, knots, 1, 4)
         fine_kernel(
-            paths, np.ones((1, 1), precision), scatterers, np.zeros(3, precision),
+            paths, np.ones((1, 1), precision), scatterers, np.zeros((1, 3), precision),
             (32, DROP, 4.0, np.float32(2.2)), part[[0, 0, 0, 0]], 0, sigma, part, fine, coarse,
             np.zeros(1), np.zeros(1),
         )  # fmt: skip

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.histogram import Counting, Paths
 from sd2core.doppler.prepared import Block, PreparedMesh
+from sd2core.mesh.walls import Wall
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering import depth_plain, exact_plain
 from sd2core.scattering.behind_things import hide_behind, may_hide
@@ -53,11 +54,19 @@ class VisibilityMasks:
     determines the vertices that cannot change the map. What stands around the mesh, and
     ``others`` beside it, hide vertices in depth and exact visibility; ``none`` and ``facing`` know
     nothing of them.
+
+    With a ``wall`` places are those of images behind it, and what lies on the way from the wall to
+    the sensor hides vertices, too. It does not tell those behind the wall.
     """
 
-    def __init__(self, prepared: PreparedMesh, counting: Counting) -> None:
+    def __init__(
+        self, prepared: PreparedMesh, counting: Counting, wall: Wall | None = None
+    ) -> None:
         self._prepared = prepared
         self._counting = counting
+        self._wall = wall
+        around = prepared.mesh.surroundings
+        self._walls = () if around is None else around.walls
         live = np.ones(counting.bins + 1, np.uint8)
         if not prepared.spreads:
             live[list(prepared.options.null_bins)] = 0
@@ -133,8 +142,13 @@ class VisibilityMasks:
         if quality == "none":
             return np.ones(self._prepared.mesh.vertex_count, bool), quality
         if mask is None:
-            mask = _facing(self._view(block, rows, place), self._prepared.normals(block)[rows])
+            mask = self.facing(block, rows, position_m)
         return mask[0] > 0, quality
+
+    def facing(self, block: Block, rows: slice, position_m: Position) -> NDArray[np.uint8]:
+        """Vertices of some of a block's frames that face a place, uint8 (n, V)."""
+        view = self._view(block, rows, self._prepared.sensor(position_m))
+        return _facing(view, self._prepared.normals(block)[rows])
 
     def kept(
         self, index: int, rows: slice, position_m: Position, occlusion: Occlusion
@@ -174,7 +188,10 @@ class VisibilityMasks:
         needed = options.axis, options.null_bins, options.beyond, self._prepared.spreads
         around = self._prepared.mesh.surroundings
         hiding = None if around is None else around.digest, *(one.number for one in self.others)
-        return ("mask", occlusion, pixels, self._stride, needed, hiding, index, position_m)
+        return (
+            *("mask", occlusion, pixels, self._stride, needed, hiding, self._wall),
+            *(index, position_m),
+        )
 
     def _frames(self, index: int, rows: slice) -> NDArray[np.intp]:
         """Numbers of some of a block's frames in the clip."""
@@ -286,21 +303,38 @@ class VisibilityMasks:
 
     def _needed(self, block: Block, rows: slice, place: NDArray[np.float64]) -> NDArray[np.uint8]:
         """Mark the vertices whose visibility can change the map, uint8 (n, V)."""
+        needed = [self._needed_on(block, rows, ends) for ends in self._ends(place)]
+        return needed[0] if len(needed) == 1 else np.bitwise_or.reduce(needed)
+
+    def _ends(self, place: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Ends of the paths, (1 or 2, 3), that the view from a place is of."""
+        place_m = place + self._prepared.origin_m
+
+        def with_image(wall: Wall) -> NDArray[np.float64]:
+            return np.stack([place, self._prepared.sensor(wall.mirrored(place_m))])
+
+        if self._wall is not None:
+            return [with_image(self._wall)]
+        before = [with_image(wall) for wall in self._walls if wall.before_m(place_m) > 0]
+        return [place[None], *before]
+
+    def _needed_on(self, block: Block, rows: slice, ends: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """Mark the vertices whose visibility can change what comes on one path, uint8 (n, V)."""
         options = self._prepared.options
         if options.velocity == "vid2doppler":
-            velocity = self._prepared.velocities_vid2doppler(block, rows, place)
+            velocity = self._prepared.velocities_vid2doppler(block, rows, ends)
             edges_mps = options.axis.edges_mps
             return self._live[vid2doppler.place_in_bins(velocity, edges_mps, self._counting)[0]]
         moving = self._prepared.moving(block, self._counting)
-        if moving is not None and moving.hold_from(place):
+        if moving is not None and moving.hold_from(ends):
             paths: Paths = moving
             start, duration_s = rows.start, block.frames.duration_s[rows]
         else:
             frames = self._prepared.whole(block).frames.rows(rows)
             if not kernels_ready():
-                return histogram.mark_needed_plain(frames, place, self._counting, self._live)
+                return histogram.mark_needed_plain(frames, ends, self._counting, self._live)
             paths, start, duration_s = frames.paths(), 0, frames.duration_s
-        return histogram.mark_needed(paths, start, duration_s, place, self._counting, self._live)
+        return histogram.mark_needed(paths, start, duration_s, ends, self._counting, self._live)
 
     def _test(
         self,
@@ -311,12 +345,40 @@ class VisibilityMasks:
     ) -> None:
         """Set ``visible`` of the needed vertices, and to 0 of those that others hide."""
         self._test_body(view, needed, visible, occlusion)
+        if self._wall is not None:
+            self._hide_by_way_of(self._wall, view, needed, visible)
+            return
         # Of all vertices: what hides them is soon looked at, and the share that is seen is right.
         if (around := self._prepared.mesh.surroundings) is not None:
             for t, seen in enumerate(visible):
                 view.hide(t, *around.surface, seen)
         for other in self.others:
             self._hide_behind_body(other, view, needed, visible)
+
+    def _hide_by_way_of(
+        self,
+        wall: Wall,
+        view: _View,
+        needed: NDArray[np.uint8],
+        visible: NDArray[np.uint8],
+    ) -> None:
+        """Set ``visible`` to 0 where something is in the way to a wall, or from it to the sensor.
+
+        Where visibility is not needed, too: no share is reported of what comes by a wall.
+        """
+        around, faces = self._prepared.mesh.surroundings, self._prepared.faces
+        assert around is not None
+        assert faces is not None
+        for t, seen in enumerate(visible):
+            frame = view.first + t
+            others = [
+                (other.frame_m(frame), other.faces)
+                for other in self.others
+                if other.faces is not None and other.mesh.presence.there[frame]
+            ]
+            own = view.points[t].T + view.origins_m[t], faces
+            seen &= needed[t]
+            view.hide(t, *around.by_way_of(wall, own, others), seen)
 
     def _hide_behind_body(
         self,
@@ -392,6 +454,12 @@ class _View:
         if (self.places_m == self.places_m[0]).all():
             return [(0, len(self.points))]
         return [(t, t + 1) for t in range(len(self.points))]
+
+
+def position_of(place_m: NDArray[np.float64]) -> Position:
+    """Place (3,) as plain numbers."""
+    x, y, z = place_m.tolist()
+    return x, y, z
 
 
 def _facing(view: _View, normals: NDArray[np.int8]) -> NDArray[np.uint8]:

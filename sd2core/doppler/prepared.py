@@ -11,13 +11,14 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sd2core.doppler import vid2doppler
 from sd2core.doppler.histogram import Counting, Frames
 from sd2core.doppler.moving import MovingVertices, find_moving, still_bins
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.sequence import MeshSequence, refuse_missing
+from sd2core.mesh.walls import Wall
 from sd2core.numerics.byte_budget import ByteBudget
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.numerics.precision import single_is_enough
@@ -124,8 +125,8 @@ class PreparedMesh:
         """Number of blocks in the clip."""
         return -(-self.mesh.frame_count // self.block_frames)
 
-    def sensor(self, position_m: tuple[float, float, float]) -> NDArray[np.float64]:
-        """Place of a sensor in the frame of the prepared positions."""
+    def sensor(self, position_m: ArrayLike) -> NDArray[np.float64]:
+        """Place of a sensor, or ends of a path (..., 3), in the frame of the prepared positions."""
         return np.asarray(position_m, np.float64) - self.origin_m
 
     def span(self, index: int) -> tuple[int, int]:
@@ -250,6 +251,20 @@ class PreparedMesh:
         """Mean vertex of every limb with an uncertainty, in the camera's frame, (n, L, 3)."""
         return self._kept("limb places", block, self._limb_places)
 
+    def before_wall(self, block: Block, wall: Wall) -> NDArray[np.uint8] | None:
+        """Vertices of a block's frames that are before a wall, uint8 (n, V); None: all are."""
+
+        def make() -> tuple[tuple[NDArray[np.uint8] | None], int]:
+            at_origin_m = float(wall.before_m(self.origin_m))
+            before = np.stack([at_origin_m > wall.outward @ one for one in self.points(block)])
+            return (None,) if before.all() else (before.astype(np.uint8),), before.size
+
+        plane = wall.distance_m, wall.azimuth_deg, wall.elevation_deg
+        kept: tuple[NDArray[np.uint8] | None] = self.budget.get_or_make(
+            ("before", plane, block.index), make
+        )
+        return kept[0]
+
     def moving(self, block: Block, counting: Counting) -> MovingVertices | None:
         """Vertices of a block that can enter a kept bin; None where counting all is as fast."""
         still = still_bins(counting.bins, self.options.null_bins)
@@ -278,19 +293,23 @@ class PreparedMesh:
         return what, "moving", self.options.axis.bins, self.options.null_bins, self.spreads, index
 
     def velocities_vid2doppler(
-        self, block: Block, rows: slice, sensor: NDArray[np.float64]
+        self, block: Block, rows: slice, ends: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Vid2Doppler's velocities of some of a block's frames, (n, V)."""
-        return vid2doppler.velocities(
-            block.frames.positions,
-            block.first_knot,
-            block.start + rows.start,
-            block.start + rows.stop,
-            self.mesh.frame_count,
-            sensor,
-            self.mesh.timebase.frames_per_s,
-            self.mesh.presence,
-        )
+        """Vid2Doppler's velocities of some of a block's frames on a path, (n, V)."""
+        each = [
+            vid2doppler.velocities(
+                block.frames.positions,
+                block.first_knot,
+                block.start + rows.start,
+                block.start + rows.stop,
+                self.mesh.frame_count,
+                end,
+                self.mesh.timebase.frames_per_s,
+                self.mesh.presence,
+            )
+            for end in ends
+        ]
+        return each[0] if len(each) == 1 else 0.5 * (each[0] + each[1])
 
     def _kept(
         self,

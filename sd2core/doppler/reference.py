@@ -20,8 +20,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.things import Surface
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.numerics.precision import keeps_shape
-from sd2core.scattering.amplitude import NEAREST_RANGE_M
-from sd2core.scattering.beam import two_way_gain
+from sd2core.scattering.echo_paths import EchoPath, echo_paths, mean_distance_m
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.scattering.exact_plain import exact_visibility
 from sd2core.scattering.trajectory import Trajectory
@@ -51,32 +50,58 @@ def reference_stretch(
     start, stop : int
         Half-open range of frames.
     """
-    place = np.asarray(sensor.position_m, np.float64)
-    raw = np.zeros((options.axis.bins, stop - start))
-    walks = [at_frames(body, place, options, start, stop) for body in mesh.bodies]
+    around = mesh.surroundings
+    paths = echo_paths(sensor, () if around is None else around.walls)
+    return np.sum([_on_path(mesh, path, options, start, stop) for path in paths], axis=0)
+
+
+def _on_path(
+    mesh: MeshSequence, path: EchoPath, options: SynthesisOptions, start: int, stop: int
+) -> NDArray[np.float64]:
+    """Shares (bins, n) of what comes from all bodies on one path."""
+    ends_m, raw = path.ends_m, np.zeros((options.axis.bins, stop - start))
+    walks = [_walk(body, path, options, start, stop) for body in mesh.bodies]
     middles = [_middle(body) for body in mesh.bodies]
+    things = mesh.surroundings
     for column, moving in enumerate(zip(*walks, strict=True)):
         there = [bool(body.presence.there[start + column]) for body in mesh.bodies]
         for number, (body, (velocities, points)) in enumerate(
             zip(mesh.bodies, moving, strict=True)
         ):
-            weight, total = _weights(body, options, points, place)
+            each = [_weights(body, options, points, end) for end in ends_m]
+            weight, total = np.mean([weight for weight, _ in each], axis=0), each[0][1]
             if total == 0 or not len(velocities):
                 continue
-            law = _range_law(body, options, points, place)
-            weight = weight * law * two_way_gain(sensor, points)
-            around = [] if mesh.surroundings is None else [mesh.surroundings.surface]
-            for other, (_, its_points) in enumerate(moving):
-                faces = mesh.bodies[other].faces
-                if other != number and there[other] and faces is not None:
-                    around.append((its_points.T, faces))
-            seen = _visible(body, points, place, middles[number], around)
+            weight = weight * _range_law(body, options, points, ends_m)
+            weight *= path.share * path.gain(points, ends_m)
+            others = [
+                (its_points.T, faces)
+                for other, (_, its_points) in enumerate(moving)
+                if other != number and there[other]
+                if (faces := mesh.bodies[other].faces) is not None
+            ]
+            around = others if things is None else [things.surface, *others]
+            seen = _visible(body, points, ends_m[0], middles[number], around)
+            if path.wall is not None and things is not None and body.faces is not None:
+                hiding = things.by_way_of(path.wall, (points.T, body.faces), others)
+                seen &= _visible(body, points, ends_m[1], middles[number], [hiding])
+            if path.wall is not None:
+                seen &= path.wall.before_m(points.T) > 0
             weights = np.broadcast_to(weight, velocities.shape)[:, seen]
-            sigma = _sigma_bins(body, options, points, sensor, start + column)[seen]
+            sigma = _sigma_bins(body, options, points, ends_m, start + column)[seen]
             counted = _counted(velocities[:, seen], weights, sigma, options)
             raw[:, column] += counted / (len(velocities) * total)
     raw[list(options.null_bins)] = 0
     return raw
+
+
+def _walk(
+    mesh: MeshSequence, path: EchoPath, options: SynthesisOptions, start: int, stop: int
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Yield what :func:`at_frames` does; velocities are the means of those towards both ends."""
+    walks = (at_frames(mesh, end, options, start, stop) for end in path.ends_m)
+    for ends in zip(*walks, strict=True):
+        yield np.mean([velocities for velocities, _ in ends], axis=0), ends[0][1]
 
 
 def _middle(mesh: MeshSequence) -> NDArray[np.float64]:
@@ -112,7 +137,7 @@ def _sigma_bins(
     mesh: MeshSequence,
     options: SynthesisOptions,
     points: NDArray[np.float64],
-    sensor: VirtualSensor,
+    ends_m: NDArray[np.float64],
     frame: int,
 ) -> NDArray[np.float64]:
     """Deviation of every vertex's velocity in bins (V,), 0 where each counts in one bin."""
@@ -122,7 +147,7 @@ def _sigma_bins(
     limb, limbs = known.vertex_limb, len(known.limbs)
     members = np.maximum(np.bincount(limb, minlength=limbs), 1)
     limbs_m = np.stack([np.bincount(limb, line, limbs) / members for line in points], axis=-1)
-    sigma = sigma_bins(known, sensor.position_m, limbs_m[None], frame, options.axis)
+    sigma = sigma_bins(known, ends_m, limbs_m[None], frame, options.axis)
     return SIGMA_FACTOR * sigma[0, limb]
 
 
@@ -175,13 +200,12 @@ def _range_law(
     mesh: MeshSequence,
     options: SynthesisOptions,
     points: NDArray[np.float64],
-    place: NDArray[np.float64],
+    ends_m: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """(R_ref / R)ⁿ of every vertex (V,), or of their mean (1,)."""
+    """(R_ref / R)ⁿ of every vertex (V,), or of their mean (1,), R² the product of both ends'."""
     if options.range_law == "frame":
         points = np.average(points, axis=1, weights=mesh.vertex_counts)[:, None]
-    range_m = np.linalg.norm(points - place[:, None], axis=0)
-    ratio = options.reference_range_m / np.maximum(range_m, NEAREST_RANGE_M)
+    ratio = options.reference_range_m / mean_distance_m(points, ends_m)
     law: NDArray[np.float64] = ratio**options.range_exponent
     return law
 

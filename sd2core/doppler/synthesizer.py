@@ -195,7 +195,7 @@ class Synthesizer:
         )
         every = [one.prepared for one in self._bodies] if mesh.others else []
         for one in self._bodies if mesh.others else ():
-            one._frames.masks.others = tuple(other for other in every if other is not one.prepared)
+            one._frames.hide_by(tuple(other for other in every if other is not one.prepared))
 
     @property
     def unit(self) -> str:
@@ -270,12 +270,12 @@ class Synthesizer:
             Of kind ``synthetic``. Its meta names sensor, options, source and
             version, how vertices were counted (``count``), the quality of the
             visibility, how many frames share a mask,
-            per frame ``visible_share`` and ``beyond_share``, in ``things`` what
-            stood around, and in ``bodies`` who was in a scene of several, if anything or
-            anybody was, and in ``notes`` where single precision
-            limits what the map says and how much of it is empty. ``present`` is
-            False in frames without a person, and in one that stands alone: what
-            moves how fast is not known there.
+            per frame ``visible_share`` and ``beyond_share``, both of the direct
+            echoes, in ``things`` and ``walls`` what stood around, and in ``bodies`` who
+            was in a scene of several, if anything or anybody was, and in ``notes`` where
+            single precision limits what the map says and how much of it is empty.
+            ``present`` is False in frames without a person, and in one that stands alone:
+            what moves how fast is not known there.
         """
         return self._map(sensor or VirtualSensor(), None, visibility, frames, progress)
 
@@ -365,7 +365,7 @@ class Synthesizer:
                 "visible_share": _rounded(stretch.visible_share),
                 "beyond_share": _rounded(stretch.beyond_share),
                 "notes": self._notes(sensor, start, stop, stretch.quality),
-                **({} if around is None else {"things": around.as_list()}),
+                **({} if around is None else around.as_dict()),
                 **({"bodies": self._described()} if several else {}),
             },
             present=np.logical_or.reduce(measured),
@@ -376,7 +376,7 @@ class Synthesizer:
         """Notes on what hides nothing, and on each of the bodies."""
         notes = []
         if quality in ("none", "facing"):
-            if self.mesh.surroundings is not None:
+            if (around := self.mesh.surroundings) is not None and around.things:
                 notes.append(f"Things in the scene hide nothing in visibility {quality}.")
             if self.mesh.others:
                 notes.append(f"Nobody hides anybody else in visibility {quality}.")
@@ -513,7 +513,7 @@ class Synthesizer:
         ray = points.astype(np.float64) - place[:, None]
         if self.options.velocity == "vid2doppler":
             rows = slice(local, local + 1)
-            velocity = self.prepared.velocities_vid2doppler(block, rows, place)[0]
+            velocity = self.prepared.velocities_vid2doppler(block, rows, place[None])[0]
         else:
             # The moment in the middle; of an even number the two that meet there.
             moments = frames.before.shape[1]

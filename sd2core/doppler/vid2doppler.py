@@ -106,7 +106,7 @@ def count(
     frames: Frames,
     velocity_mps: NDArray[np.float64],
     edges_mps: NDArray[np.float64],
-    sensor: NDArray[np.float64],
+    ends: NDArray[np.float64],
     counting: Counting,
     scatterers: Scatterers,
     into: Counts,
@@ -121,8 +121,8 @@ def count(
         From :func:`velocities`.
     edges_mps : float64 ndarray, (bins + 1,)
         Edges of the bins.
-    sensor : float64 ndarray, (3,)
-        In the frame of the positions.
+    ends : float64 ndarray, (1 or 2, 3)
+        Of the path, in the frame of the positions.
     counting : Counting
         Range law, and what happens beyond the axis.
     scatterers : Scatterers
@@ -132,5 +132,5 @@ def count(
     """
     numbers, beyond = place_in_bins(velocity_mps, edges_mps, counting)
     count_plain(
-        frames, sensor, counting, scatterers, into, lambda row, _: (numbers[row], beyond[row])
+        frames, ends, counting, scatterers, into, lambda row, _: (numbers[row], beyond[row])
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.link import LinkBudget
+from sd2core.mesh.walls import Wall
 from sd2core.radar_config import RadarConfig
 from sd2core.scattering.beam import sensor_axes
 from sd2core.sensor import Vector, VirtualSensor
@@ -40,6 +42,14 @@ class Mirror:
             )
         if not -1 <= self.reflection <= 1:
             raise Sd2Error(f"The reflection coefficient is {self.reflection}", "-1 to 1")
+
+    @classmethod
+    def of(cls, wall: Wall) -> Mirror:
+        """A wall of the scene."""
+        x, y, z = wall.outward.tolist()
+        away_m = wall.distance_m
+        amplitude = -(10.0 ** (-0.05 * wall.loss_db))
+        return cls((away_m * x, away_m * y, away_m * z), (x, y, z), amplitude)
 
     @classmethod
     def ground(cls, y_m: float, reflection: float = CONCRETE) -> Mirror:
@@ -92,7 +102,8 @@ class WaveOptions:
     mirror : Mirror or None
         Two-ray propagation: out and back each directly or by the image
         (Skolnik, *Introduction to Radar Systems*, propagation over a plane).
-        Facets hidden from the sensor count as hidden from its image.
+        Facets hidden from the sensor count as hidden from its image. A mesh with walls
+        has none.
     """
 
     model: Model = "nufft"
@@ -174,25 +185,36 @@ class Antenna:
     position_m: NDArray[np.float64]
     axes: NDArray[np.float64]
     gain: float = 1.0
-    image: bool = False
+    plane: NDArray[np.float64] | None = None
+    """Of an image: normal and offset of the mirror, (4,), positive on the antenna's own side."""
 
     def mirrored(self, mirror: Mirror) -> Antenna:
-        """The image behind a plane."""
+        """The image behind a plane; Sd2Error for an antenna in it."""
         normal = np.asarray(mirror.normal, dtype=np.float64)
         normal = normal / np.linalg.norm(normal)
-        above_m = (self.position_m - np.asarray(mirror.point_m)) @ normal
+        offset_m = -float(normal @ np.asarray(mirror.point_m))
+        above_m = float(self.position_m @ normal) + offset_m
+        if above_m == 0.0:
+            raise Sd2Error(
+                f"The sensor at {tuple(self.position_m.tolist())} lies in the reflecting plane",
+                "a sensor on one side of it",
+            )
         return Antenna(
             self.position_m - 2.0 * above_m * normal,
             self.axes - 2.0 * np.outer(self.axes @ normal, normal),
             self.gain * mirror.reflection,
-            image=True,
+            math.copysign(1.0, above_m) * np.array([*normal, offset_m]),
         )
 
 
+Pairs = list[tuple[Antenna, Antenna]]
+"""Transmitters and receivers, or their images, between which waves travel."""
+
+
 def paths(
-    sensor: VirtualSensor, config: RadarConfig, options: WaveOptions
-) -> list[list[tuple[Antenna, Antenna]]]:
-    """Pairs (transmitter, receiver) between which waves travel, for every receiver.
+    sensor: VirtualSensor, config: RadarConfig, options: WaveOptions, walls: Iterable[Wall] = ()
+) -> list[dict[Wall | None, Pairs]]:
+    """Ways of the waves for every receiver: without the walls, and out or back by each of them.
 
     Raises Sd2Error when receivers are placed, but not as many as the radar has.
     """
@@ -209,9 +231,16 @@ def paths(
     centre = np.asarray(sensor.position_m)
     transmitters = _with_image(Antenna(centre, axes), options.mirror)
     found = []
+    by_way_of = {wall: Mirror.of(wall) for wall in walls}
     for place in centre + offsets @ axes:
         receivers = _with_image(Antenna(place, axes), options.mirror)
-        found.append([(out, back) for out in transmitters for back in receivers])
+        ways: dict[Wall | None, Pairs] = {
+            None: [(out, back) for out in transmitters for back in receivers]
+        }
+        out, back = transmitters[0], receivers[0]
+        for wall, mirror in by_way_of.items():
+            ways[wall] = [(out.mirrored(mirror), back), (out, back.mirrored(mirror))]
+        found.append(ways)
     return found
 
 

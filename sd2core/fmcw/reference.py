@@ -100,26 +100,27 @@ def _cut_body(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) ->
     """That of one body alone."""
     if not scene.scene.there(time_s):
         return scene.silence()
-    visible = scene.scene.visible(time_s)
+    seen = scene.scene.seen(time_s)
     rows = []
     for (position, velocity), chirps in scene.bursts(time_s):
         shape = (len(scene.paths), chirps, scene.config.samples_per_chirp)
         total = np.zeros(shape)
         for receiver in range(shape[0]):
-            if not cuts:
-                echoes = scene.echoes(position, velocity, visible, receiver)
-                total[receiver] = scene.sampled(recurrent(echoes, scene.config, chirps))
-                continue
-            shown = scene.faces if visible is None else scene.faces[visible]
-            step = max(1, _FACETS_PER_STEP // 4**cuts)
-            for start in range(0, len(shown), step):
-                if go_on is not None:
-                    go_on()
-                some = shown[start : start + step]
-                corners = subdivided(position[some], cuts).reshape(-1, 3)
-                motion = subdivided(velocity[some], cuts).reshape(-1, 3)
-                loose = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
-                echoes = scene.echoes(corners, motion, None, receiver, loose)
-                total[receiver] += scene.sampled(recurrent(echoes, scene.config, chirps))
+            for wall, visible in seen.items():
+                if not cuts:
+                    echoes = scene.echoes(position, velocity, visible, receiver, wall=wall)
+                    total[receiver] += scene.sampled(recurrent(echoes, scene.config, chirps))
+                    continue
+                shown = scene.faces if visible is None else scene.faces[visible]
+                step = max(1, _FACETS_PER_STEP // 4**cuts)
+                for start in range(0, len(shown), step):
+                    if go_on is not None:
+                        go_on()
+                    some = shown[start : start + step]
+                    corners = subdivided(position[some], cuts).reshape(-1, 3)
+                    motion = subdivided(velocity[some], cuts).reshape(-1, 3)
+                    loose = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+                    echoes = scene.echoes(corners, motion, None, receiver, loose, wall)
+                    total[receiver] += scene.sampled(recurrent(echoes, scene.config, chirps))
         rows.append(total)
     return np.concatenate(rows, axis=1)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence, refuse_missing
 from sd2core.mesh.things import Surface
+from sd2core.mesh.walls import Wall
 from sd2core.radar_config import RadarConfig
 from sd2core.scattering.behind_things import may_hide
 from sd2core.scattering.facets import facets_before, visible_facets
@@ -42,6 +43,7 @@ class MeshScene:
     ``"exact"`` finds them frame by frame as they are asked for, ``"facing"`` takes all whose normal
     points towards it. What stands around the mesh, and ``others`` beside it, hide facets in either
     case; of the mesh's own others it knows nothing (:class:`~sd2core.fmcw.wave.WaveScene` does).
+    ``walls`` are those that the sensor is before.
     """
 
     def __init__(
@@ -68,6 +70,9 @@ class MeshScene:
         self.sensor = sensor
         self.visibility = visibility
         self.others: tuple[MeshScene, ...] = ()
+        around, place = mesh.surroundings, np.asarray(sensor.position_m)
+        every = () if around is None else around.walls
+        self.walls = tuple(wall for wall in every if wall.before_m(place) > 0)
         self._faces = mesh.faces
         self._first = 0
         self._block = np.empty((0, mesh.vertex_count, 3))
@@ -96,20 +101,43 @@ class MeshScene:
     def visible(self, time_s: float) -> NDArray[np.bool_] | None:
         """Mask of the facets that nothing hides, (F,); None if only the facing test applies."""
         around = self.mesh.surroundings
-        hiding = [] if around is None else [around.surface]
+        hiding = [around.surface] if around is not None and around.things else []
         hiding += self._others_before(time_s)
         if not hiding and isinstance(self.visibility, str) and self.visibility == "facing":
             return None
-        frame = self._nearest(time_s)
-        place = self.sensor.position_m
+        place, vertices_m = self.sensor.position_m, self._nearest(time_s)
         seen = np.ones(len(self._faces), np.bool_)
         if not isinstance(self.visibility, str):
-            seen = np.asarray(self.visibility[frame])
+            seen = np.asarray(self.visibility[self._number_of(time_s)])
         elif self.visibility == "exact":
-            seen = visible_facets(self._frame(frame), self._faces, place)
+            seen = visible_facets(vertices_m, self._faces, place)
         for surface in hiding:
-            seen = seen & facets_before(self._frame(frame), self._faces, place, surface)
+            seen = seen & facets_before(vertices_m, self._faces, place, surface)
         return seen
+
+    def seen(self, time_s: float) -> dict[Wall | None, NDArray[np.bool_] | None]:
+        """Masks of the facets that nothing hides: directly, and by way of each wall."""
+        direct = self.visible(time_s)
+        by_walls = {wall: self._seen_by_way_of(wall, time_s, direct) for wall in self.walls}
+        return {None: direct, **by_walls}
+
+    def _seen_by_way_of(
+        self, wall: Wall, time_s: float, direct: NDArray[np.bool_] | None
+    ) -> NDArray[np.bool_] | None:
+        """What of that which the sensor sees its image behind a wall sees, too."""
+        around = self.mesh.surroundings
+        others = [other.surface(time_s) for other in self.others if other.there(time_s)]
+        if around is None or (direct is None and not others):
+            return direct
+        seen = np.ones(len(self._faces), np.bool_) if direct is None else direct
+        vertices_m = self._nearest(time_s)
+        image_m = wall.mirrored(np.asarray(self.sensor.position_m))
+        body = None
+        if not (isinstance(self.visibility, str) and self.visibility == "facing"):
+            seen = seen & visible_facets(vertices_m, self._faces, image_m)
+            body = vertices_m, self._faces
+        surface = around.by_way_of(wall, body, others)
+        return seen & facets_before(vertices_m, self._faces, image_m, surface)
 
     def _others_before(self, time_s: float) -> list[Surface]:
         """Surfaces of the others that may hide some of this one at an instant."""
@@ -125,12 +153,7 @@ class MeshScene:
 
     def surface(self, time_s: float) -> Surface:
         """Vertices (V, 3) and faces in the mesh frame nearest to an instant."""
-        return self._frame(self._nearest(time_s)), self._faces
-
-    def _nearest(self, time_s: float) -> int:
-        """Mesh frame nearest to an instant, of the part with a person that it lies in."""
-        first, last = self._stretch(time_s)
-        return min(max(self.mesh.timebase.nearest_frame(time_s), first), last)
+        return self._nearest(time_s), self._faces
 
     def between(self, times_s: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.float64], ...]]:
         """Interpolate vertices and velocity at some times, on a smooth path through the frames.
@@ -170,6 +193,14 @@ class MeshScene:
         """First and last mesh frame of the part with a person that an instant lies in."""
         presence, frame = self.mesh.presence, next(iter(self._around(time_s)))
         return int(presence.first[frame]), int(presence.last[frame])
+
+    def _number_of(self, time_s: float) -> int:
+        """Number of the mesh frame nearest to an instant."""
+        first, last = self._stretch(time_s)
+        return min(max(self.mesh.timebase.nearest_frame(time_s), first), last)
+
+    def _nearest(self, time_s: float) -> NDArray[np.float64]:
+        return self._frame(self._number_of(time_s))
 
     def _around(self, time_s: float) -> dict[int, float]:
         """Interpolate linearly at an instant: one or two mesh frames and their weights."""

@@ -106,7 +106,7 @@ def simulate_radar(
         how={
             "visibility": visibility if isinstance(visibility, str) else "exact",
             "wave": asdict(wave),
-            **({} if mesh.surroundings is None else {"things": mesh.surroundings.as_list()}),
+            **({} if mesh.surroundings is None else mesh.surroundings.as_dict()),
             **({"bodies": list(mesh.persons)} if mesh.others else {}),
         },
         nobody=runs(~there),

@@ -16,10 +16,11 @@ from sd2core.fmcw.options import Antenna, Reflector, WaveOptions, paths
 from sd2core.fmcw.scene import NEAREST_M, FacetsSeen, MeshScene
 from sd2core.fmcw.sums import Echoes, direct, nufft
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.walls import Wall
 from sd2core.radar_config import RadarConfig
 from sd2core.scattering.beam import angles_deg, one_way
 from sd2core.scattering.beam_kernels import beam_tables
-from sd2core.scattering.facets import visible_facets
+from sd2core.scattering.facets import facets_before, visible_facets
 from sd2core.sensor import VirtualSensor
 
 GoOn = Callable[[], None]
@@ -65,11 +66,12 @@ class WaveScene:
             )
         self._seed = seed
         self._tables = beam_tables(sensor)
-        self.paths = paths(sensor, config, self.wave)
+        if self.scene.walls and self.wave.mirror is not None:
+            raise Sd2Error("Both the scene and the wave have a mirror", "one of the two")
+        self.paths = paths(sensor, config, self.wave, self.scene.walls)
         faces = mesh.faces
         assert faces is not None  # MeshScene refuses a mesh without
         self.faces = faces
-        self._plane = self._oriented_plane(sensor)
         self._random: NDArray[np.complex128] | None = None
         if not self.wave.coherent:
             # Three words, so that no frame's noise has the same stream.
@@ -108,9 +110,9 @@ class WaveScene:
         """Beat signal of this body alone, among the others."""
         if not self.scene.there(time_s):
             return self.silence()
-        visible = self.scene.visible(time_s)
+        seen = self.scene.seen(time_s)
         rows = [
-            self._signal(position, velocity, visible, chirps, go_on)
+            self._signal(position, velocity, seen, chirps, go_on)
             for (position, velocity), chirps in self.bursts(time_s)
         ]
         return rows[0] if len(rows) == 1 else np.concatenate(rows, axis=1)
@@ -144,8 +146,9 @@ class WaveScene:
         visible: NDArray[np.bool_] | None,
         receiver: int = 0,
         faces: NDArray[np.int32] | None = None,
+        wall: Wall | None = None,
     ) -> Echoes:
-        """Echoes of every facet on every path to one receiver.
+        """Echoes of every facet on the paths to one receiver, directly or by way of a wall.
 
         Parameters
         ----------
@@ -157,14 +160,16 @@ class WaveScene:
         faces : int32 array, shape (F, 3), optional
             Others than the mesh's own belong to other vertices, and are for a smooth surface: the
             phases of a rough one belong to its facets.
+        wall : Wall, optional
+            One of the scene's.
         """
         assert faces is None or self._random is None
         faces = self.faces if faces is None else faces
         parts = [
             self._facets(position_m, velocity_mps, faces, visible, out, back, self._random)
-            for out, back in self.paths[receiver]
+            for out, back in self.paths[receiver][wall]
         ]
-        return parts[0] if len(parts) == 1 else _joined(parts)
+        return _joined(parts)
 
     def static(self, reflectors: tuple[Reflector, ...]) -> BeatSignal:
         """Beat signal of static points and of things, (receivers, chirps, samples).
@@ -174,21 +179,31 @@ class WaveScene:
         """
         found = self.silence()
         if reflectors:
-            for receiver, pairs in enumerate(self.paths):
-                parts = [self._points(reflectors, out, back) for out, back in pairs]
+            for receiver, ways in enumerate(self.paths):
+                parts = [
+                    self._points(reflectors, *pair) for pairs in ways.values() for pair in pairs
+                ]
                 found[receiver] = self.sampled(direct(_joined(parts), self.config))
         around = self.scene.mesh.surroundings
-        if around is None:
+        if around is None or not around.things:
             return found
         longest_m = min(self.config.range_resolution_m, _LONGEST_PIECE_M)
         corners = pieces_of(around, longest_m).reshape(-1, 3)
         faces = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
-        visible = visible_facets(corners, faces, self.scene.sensor.position_m)
+        place_m = np.asarray(self.scene.sensor.position_m)
+        seen: dict[Wall | None, NDArray[np.bool_]] = {}
+        seen[None] = visible_facets(corners, faces, place_m)
+        for wall in self.scene.walls:
+            image_m, surface = wall.mirrored(place_m), around.by_way_of(wall)
+            also = visible_facets(corners, faces, image_m)
+            also &= facets_before(corners, faces, image_m, surface)
+            seen[wall] = seen[None] & also
         turns = np.random.default_rng([self._seed, 0, 2]).random(len(faces))
         phases, still = np.exp(2j * np.pi * turns), np.zeros_like(corners)
-        for receiver, pairs in enumerate(self.paths):
+        for receiver, ways in enumerate(self.paths):
             parts = [
-                self._facets(corners, still, faces, visible, out, back, phases)
+                self._facets(corners, still, faces, seen[wall], out, back, phases)
+                for wall, pairs in ways.items()
                 for out, back in pairs
             ]
             found[receiver] += self.sampled(nufft(_joined(parts), self.config))
@@ -198,7 +213,7 @@ class WaveScene:
         self,
         position_m: NDArray[np.float64],
         velocity_mps: NDArray[np.float64],
-        visible: NDArray[np.bool_] | None,
+        seen: dict[Wall | None, NDArray[np.bool_] | None],
         chirps: int,
         go_on: GoOn | None,
     ) -> BeatSignal:
@@ -206,7 +221,12 @@ class WaveScene:
         for receiver in range(len(self.paths)):
             if go_on is not None:
                 go_on()
-            echoes = self.echoes(position_m, velocity_mps, visible, receiver)
+            echoes = _joined(
+                [
+                    self.echoes(position_m, velocity_mps, visible, receiver, wall=wall)
+                    for wall, visible in seen.items()
+                ]
+            )
             if self.wave.model == "direct":
                 total = direct(echoes, self.config, chirps, go_on)
             else:
@@ -239,7 +259,7 @@ class WaveScene:
             visible,
             np.vstack([out.position_m, out.axes]),
             np.vstack([back.position_m, back.axes]),
-            self._plane if out.image or back.image else _NO_PLANE,
+            _plane_of(out, back),
             4.0 * np.pi / self.config.wavelength_m,
             self.wave.pattern_exponent,
             self._tables.across,
@@ -272,28 +292,20 @@ class WaveScene:
                 strength *= cosine ** (0.5 * self.wave.pattern_exponent)
             if (beam := self.scene.sensor.beam) is not None:
                 strength *= np.sqrt(one_way(beam, *angles_deg(antenna.axes, away.T)))
-        if out.image or back.image:
-            strength *= position @ self._plane[:3] + self._plane[3] > 0
+        plane = _plane_of(out, back)
+        strength *= position @ plane[:3] + plane[3] > 0
         return Echoes(range_m, np.zeros(len(area)), strength.astype(np.complex128))
 
-    def _oriented_plane(self, sensor: VirtualSensor) -> NDArray[np.float64]:
-        """The mirror as normal and offset, positive on the sensor's side."""
-        mirror = self.wave.mirror
-        if mirror is None:
-            return _NO_PLANE
-        normal = np.asarray(mirror.normal, dtype=np.float64)
-        normal = normal / np.linalg.norm(normal)
-        offset = -float(normal @ np.asarray(mirror.point_m))
-        side = float(normal @ np.asarray(sensor.position_m)) + offset
-        if side == 0.0:
-            raise Sd2Error(
-                f"The sensor at {sensor.position_m} lies in the reflecting plane",
-                "a sensor on one side of it",
-            )
-        return np.sign(side) * np.array([*normal, offset])
+
+def _plane_of(out: Antenna, back: Antenna) -> NDArray[np.float64]:
+    """Plane that the path between two antennas is before."""
+    image = out if out.plane is not None else back
+    return _NO_PLANE if image.plane is None else image.plane
 
 
 def _joined(parts: list[Echoes]) -> Echoes:
+    if len(parts) == 1:
+        return parts[0]
     return Echoes(
         np.concatenate([part.range_m for part in parts]),
         np.concatenate([part.rate_mps for part in parts]),

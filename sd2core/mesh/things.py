@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import product
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.mesh.walls import Wall
 from sd2core.sensor import Vector
 
 FARTHEST_THING_M = 1000.0
@@ -172,36 +173,70 @@ def turn_matrix(turn_deg: float) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """Things around a moving mesh, and their surfaces together in the camera frame."""
+    """Things and walls around a moving mesh, and the surfaces of things in the camera frame."""
 
     things: tuple[Thing, ...]
     surfaces: tuple[Surface, ...]  # of each
     vertices_m: NDArray[np.float64]  # of all, (V, 3)
     faces: NDArray[np.int32]  # (F, 3)
+    walls: tuple[Wall, ...] = ()
 
     @classmethod
-    def of(cls, things: tuple[Thing, ...], surfaces: list[Surface]) -> Surroundings:
-        """Join things and their surfaces, of which there is one at least."""
-        first = np.cumsum([0, *(len(vertices) for vertices, _ in surfaces)])
-        faces = [faces + number for (_, faces), number in zip(surfaces, first, strict=False)]
-        # Plain memory of this type, as compiled kernels take it.
-        joined = np.ascontiguousarray(np.concatenate(faces), np.int32)
-        vertices_m = np.concatenate([vertices for vertices, _ in surfaces])
-        return cls(things, tuple(surfaces), vertices_m, joined)
+    def of(
+        cls, things: tuple[Thing, ...], surfaces: tuple[Surface, ...], walls: tuple[Wall, ...] = ()
+    ) -> Surroundings | None:
+        """Join things, their surfaces and walls; None where there are none."""
+        if not things and not walls:
+            return None
+        return cls(things, surfaces, *joined(surfaces), walls)
 
     @property
     def surface(self) -> Surface:
-        """Surface of all things."""
+        """That of all things."""
         return self.vertices_m, self.faces
+
+    def by_way_of(
+        self, wall: Wall, own: Surface | None = None, others: Sequence[Surface] = ()
+    ) -> Surface:
+        """What can hide a body from the image of a sensor behind a wall, besides itself.
+
+        Things and other bodies before the wall, and their images and the body's own: the sensor's
+        image sees the latter as the sensor sees the former.
+        """
+        hiding = [
+            (vertices_m, faces[(wall.before_m(vertices_m)[faces] > 0).any(axis=1)])
+            for vertices_m, faces in (self.surface, *others)
+        ]
+        images = hiding if own is None else [*hiding, own]
+        return joined([*hiding, *((wall.mirrored(vertices), faces) for vertices, faces in images)])
 
     @cached_property
     def digest(self) -> str:
-        """Hash of the surfaces: all that a map depends on."""
-        return hashlib.sha256(self.vertices_m.tobytes() + self.faces.tobytes()).hexdigest()
+        """Hash of surfaces and walls: all that a map depends on."""
+        walls = repr(self.walls).encode() if self.walls else b""
+        surfaces = self.vertices_m.tobytes() + self.faces.tobytes()
+        return hashlib.sha256(surfaces + walls).hexdigest()
 
-    def as_list(self) -> list[dict[str, Any]]:
-        """Plain values of the things, for provenance."""
-        return [asdict(thing) for thing in self.things]
+    def as_dict(self) -> dict[str, list[dict[str, Any]]]:
+        """Plain values of ``things`` and ``walls``, for provenance; of which there are none, none.
+
+        >>> Surroundings.of((), (), (Wall(2.0, loss_db=6.0),)).as_dict()
+        {'walls': [{'distance_m': 2.0, 'azimuth_deg': 0.0, 'elevation_deg': 0.0, 'loss_db': 6.0}]}
+        """
+        things, walls = [asdict(one) for one in self.things], [asdict(one) for one in self.walls]
+        every = {"things": things, "walls": walls}
+        return {name: found for name, found in every.items() if found}
+
+
+def joined(surfaces: Sequence[Surface]) -> Surface:
+    """Several surfaces as one."""
+    first = np.cumsum([0, *(len(vertices) for vertices, _ in surfaces)])
+    faces = [faces + number for (_, faces), number in zip(surfaces, first, strict=False)]
+    # Plain memory of this type, as compiled kernels take it.
+    return (
+        np.concatenate([np.empty((0, 3)), *(vertices for vertices, _ in surfaces)]),
+        np.ascontiguousarray(np.concatenate([np.empty((0, 3), np.int32), *faces]), np.int32),
+    )
 
 
 def _box(low: Vector, high: Vector) -> NDArray[np.float64]:

@@ -82,19 +82,31 @@ class VelocityUncertainty:
 
         With the angle between the lines from the limb to the camera and to the sensor, σ² =
         σ_along² cos² + σ_across² sin². The sensor and the places of the limbs, (n, L, 3) in the
-        frames from ``start`` on, are in the camera frame.
+        frames from ``start`` on, are in the camera frame. Of two sensors (2, 3), the deviation
+        of the mean of the velocities towards them.
         """
         place = np.asarray(limbs_m, np.float64)
-        to_camera, to_sensor = (
-            np.asarray(at, np.float64) - place for at in (self.camera_m, sensor_m)
-        )
-        lengths = np.linalg.norm(to_camera, axis=2) * np.linalg.norm(to_sensor, axis=2)
+        to_camera = np.asarray(self.camera_m, np.float64) - place
+        lines = [end - place for end in np.atleast_2d(np.asarray(sensor_m, np.float64))]
         # On camera or sensor there is no line; the worse of the two is then taken.
-        product = (to_camera * to_sensor).sum(axis=2)
-        cosine = np.divide(product, lengths, out=np.ones_like(lengths), where=lengths > 0)
-        squared = np.clip(cosine, -1.0, 1.0) ** 2
+        cosines, lengths = zip(*(_cosine(to_camera, line) for line in lines), strict=True)
+        lengths = np.min(lengths, axis=0)
+        squared = np.clip(np.mean(cosines, axis=0), -1.0, 1.0) ** 2
+        # Square of the mean of unit vectors along these lines.
+        level = 1.0 if len(lines) == 1 else 0.5 + 0.5 * _cosine(*lines)[0]
         frames = slice(start, start + len(place))
         along = self.along_mps[frames].astype(np.float64)
         across = self.across_mps[frames].astype(np.float64)
-        sigma: NDArray[np.float64] = np.sqrt(squared * along**2 + (1.0 - squared) * across**2)
+        sigma: NDArray[np.float64] = np.sqrt(
+            squared * along**2 + np.maximum(level - squared, 0.0) * across**2
+        )
         return np.where(lengths > 0, sigma, np.maximum(along, across))
+
+
+def _cosine(
+    one: NDArray[np.float64], other: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Cosine between vectors (..., 3), 1 where one of them is zero, and the product of lengths."""
+    lengths = np.linalg.norm(one, axis=-1) * np.linalg.norm(other, axis=-1)
+    product = (one * other).sum(axis=-1)
+    return np.divide(product, lengths, out=np.ones_like(lengths), where=lengths > 0), lengths

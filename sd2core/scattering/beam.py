@@ -53,32 +53,6 @@ def by_plane(
     return across, up
 
 
-def two_way_gain(
-    sensor: VirtualSensor, points_m: NDArray[Any], place_m: NDArray[Any] | None = None
-) -> NDArray[np.float64]:
-    """Share of an echo's power that the sensor's beam lets pass, there and back, (V,).
-
-    Parameters
-    ----------
-    sensor : VirtualSensor
-        With its beam, or without: ones.
-    points_m : ndarray, (3, V)
-        Where the echoes come from.
-    place_m : ndarray, (3,), optional
-        Place of the sensor in the frame of the points; by default that in the camera frame.
-    """
-    if sensor.beam is None:
-        return np.ones(points_m.shape[1])
-    return np.asarray(one_way(sensor.beam, *_angles_of(sensor, points_m, place_m)) ** 2)
-
-
-def _angles_of(
-    sensor: VirtualSensor, points_m: NDArray[Any], place_m: NDArray[Any] | None = None
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    place = np.asarray(sensor.position_m if place_m is None else place_m, np.float64)
-    return angles_deg(sensor_axes(sensor), np.asarray(points_m, np.float64) - place[:, None])
-
-
 def angles_deg(
     axes: NDArray[np.float64], away: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -139,5 +113,6 @@ def share_in_beam(
     """
     if sensor.beam is None or not (total := float(np.sum(echo))) > 0:
         return None
-    power = one_way(sensor.beam, *_angles_of(sensor, points_m))
+    away = np.asarray(points_m, np.float64) - np.array(sensor.position_m)[:, None]
+    power = one_way(sensor.beam, *angles_deg(sensor_axes(sensor), away))
     return float(np.sum(echo[power >= 0.5]) / total)

@@ -92,7 +92,7 @@ def gain_towards(right, high, ahead, across, up):  # type: ignore[no-untyped-def
 
 @compiled
 def weigh_by_beam(x, y, z, sx, sy, sz, axes, across, up, weight):  # type: ignore[no-untyped-def]
-    """Multiply the weights of vertices by :func:`two_way_gain`, compiled.
+    """Multiply the weights of vertices by the two-way power of a beam.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ def hide_behind(
         Written where it is 1; others are not tested.
     """
     asked = np.flatnonzero(seen)
-    if not len(asked):
+    if not len(asked) or not len(faces):
         return
     count = len(asked)
     both = np.concatenate([points[:, asked], (vertices_m - origin_m).T], axis=1).astype(np.float32)

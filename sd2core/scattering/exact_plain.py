@@ -117,6 +117,8 @@ def _search(
     row = first[strip, 1] + _count_within(heights)
     begin = starts[row * columns + first[strip, 0]]
     lengths = starts[row * columns + last[strip, 0] + 1] - begin
+    if not lengths.any():
+        return
     cuts = np.searchsorted(
         np.cumsum(lengths), np.arange(0, int(lengths.sum()) + _PAIRS_AT_ONCE, _PAIRS_AT_ONCE)
     )

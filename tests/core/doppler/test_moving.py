@@ -163,7 +163,7 @@ def test_what_is_left_out_is_in_an_emptied_bin_from_any_place(data: Any, precisi
     moving = find_moving(frames, reach_m, counting, still_bins(32, null_bins))
     if moving is None:
         return
-    number, _ = bins_plain(frames, 0, 0, sensor, counting)
+    number, _ = bins_plain(frames, 0, 0, sensor[None], counting)
     left_out = np.setdiff1d(np.arange(400), moving.vertex)
     assert set(number[left_out]) <= set(null_bins)
 

@@ -298,7 +298,7 @@ def test_two_receivers_differ_by_the_angle_of_arrival() -> None:
     place = np.array(sensor.position_m) + 500.0 * towards
     scene = WaveScene(sheet(1.0, [[0, 0, 5.0]]), config, sensor, wave=wave)
     phase = []
-    for out, back in (pairs[0] for pairs in scene.paths):
+    for out, back in (ways[None][0] for ways in scene.paths):
         path_m = np.linalg.norm(place - out.position_m) + np.linalg.norm(place - back.position_m)
         phase.append(2 * np.pi / LAMBDA_M * path_m)
     signal = scene.static((Reflector(tuple(place), 1.0),))
@@ -322,7 +322,7 @@ def test_the_sensors_frame() -> None:
 
 def test_receivers_stand_half_a_wavelength_apart_unless_told() -> None:
     config = replace(PAPER_RADAR, receivers=3)
-    places = [pairs[0][1].position_m for pairs in paths(CAMERA, config, WaveOptions())]
+    places = [ways[None][0][1].position_m for ways in paths(CAMERA, config, WaveOptions())]
     np.testing.assert_allclose(np.diff(places, axis=0), [[0.5 * LAMBDA_M, 0, 0]] * 2)
     np.testing.assert_allclose(places[1], 0.0)
     with pytest.raises(Sd2Error, match="1 receivers are placed, and the radar has 3"):
@@ -361,7 +361,7 @@ def test_two_rays_make_the_fringe_of_the_textbook() -> None:
         )
         parts = [
             scene._points((Reflector(tuple(place), 1.0),), out, back)
-            for out, back in scene.paths[0]
+            for out, back in scene.paths[0][None]
         ]
         found = sum(at_the_middle(part) for part in parts)
         assert found == pytest.approx(one_way**2, abs=1e-9)

@@ -30,13 +30,19 @@ from sd2core.scattering.beam import (
     one_way,
     sensor_axes,
     share_in_beam,
-    two_way_gain,
 )
 from sd2core.scattering.beam_kernels import beam_tables, weigh_by_beam
+from sd2core.scattering.echo_paths import echo_paths
 from sd2core.sensor import Beam, VirtualSensor, aimed_at, direction_from_angles
 from sd2core.timebase import Timebase
 
 NARROW = Beam(40.0, 20.0)
+
+
+def two_way_gain(sensor: VirtualSensor, points_m: np.ndarray) -> np.ndarray:
+    return echo_paths(sensor)[0].gain(points_m, np.array([sensor.position_m]))
+
+
 angles = st.floats(-179.0, 179.0)
 
 
