@@ -118,8 +118,10 @@ class MeshScene:
     def seen(self, time_s: float) -> dict[Wall | None, NDArray[np.bool_] | None]:
         """Masks of the facets that nothing hides: directly, and by way of each wall."""
         direct = self.visible(time_s)
-        by_walls = {wall: self._seen_by_way_of(wall, time_s, direct) for wall in self.walls}
-        return {None: direct, **by_walls}
+        found: dict[Wall | None, NDArray[np.bool_] | None] = {None: direct}
+        for wall in self.walls:
+            found[wall] = self._seen_by_way_of(wall, time_s, direct)
+        return found
 
     def _seen_by_way_of(
         self, wall: Wall, time_s: float, direct: NDArray[np.bool_] | None
