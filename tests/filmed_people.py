@@ -82,6 +82,13 @@ def person_at(room: Picture, columns: int, *, red: bool = False, nearer: float =
     return np.where(moved[..., None], _shift(coloured, columns), room)
 
 
+def crossing() -> list[Picture]:
+    """Two people who go past each other, one of them in red."""
+    room = empty_room()
+    at = np.linspace(-95, 95, 24).round().astype(int).tolist()
+    return [person_at(person_at(room, -x), x, red=True) for x in at]
+
+
 def film(
     path: Path,
     pictures: Iterable[Picture],

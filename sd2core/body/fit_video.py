@@ -23,6 +23,7 @@ from sd2core.body.landmark_models import DEFAULT_MODEL, landmark_models
 from sd2core.body.landmarks import DEFAULT_MAX_GAP_S, SIGHTINGS, OnFrame, find_landmarks
 from sd2core.body.limbs import LIMB_LANDMARKS, LIMBS
 from sd2core.body.person_selection import Rectangle
+from sd2core.body.roi import Sightings
 from sd2core.body.shape import DEFAULT_STATURE_M, check_stature
 from sd2core.body.solve import one_thread
 from sd2core.body.track import LANDMARK, Landmarks, parts
@@ -53,7 +54,7 @@ _NEVER_SEEN = 0.02
 """Share of the frames below which a limb counts as never seen."""
 _DOUBTFUL_M = 0.07
 
-Stage = Literal["models", "find", "refine", "fit", "write"]
+Stage = Literal["models", "people", "find", "refine", "fit", "write"]
 
 STAGES: tuple[Stage, ...] = ("find", "refine", "fit", "write")
 """Stages of a fit, in order; ``models`` comes first if they are missing."""
@@ -117,6 +118,7 @@ def fit_video(
     models: Path | None = None,
     landmarks_out: Path | None = None,
     restart: bool = False,
+    sightings: Sightings | None = None,
 ) -> FittedVideo:
     """Fit a body to the person in a video and write it as a mesh.
 
@@ -135,6 +137,8 @@ def fit_video(
         File (.npz) for the landmarks.
     restart : bool
         Discard the results of a stopped fit.
+    sightings : Sightings, optional
+        Of the person, who is not looked for then.
 
     Raises
     ------
@@ -153,7 +157,7 @@ def fit_video(
             track = find_landmarks(
                 video,
                 found_models,
-                person=choices.person,
+                person=sightings or choices.person,
                 max_gap_s=choices.max_gap_s,
                 progress_of=report.progress_of,
                 on_frame=report.on_frame,

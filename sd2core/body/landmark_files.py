@@ -20,6 +20,7 @@ from sd2core.body.landmark_repair import repair_landmarks
 from sd2core.body.person_selection import Rectangle
 from sd2core.body.raw_track import RawTrack
 from sd2core.body.refining import RefinedFrames
+from sd2core.body.roi import Sightings
 from sd2core.body.track import PER_FRAME, Landmarks, LandmarkTrack, parts
 from sd2core.files.atomic import atomic_write
 from sd2core.files.texts import check_meta
@@ -101,7 +102,7 @@ def load_track(path: Path | str) -> LandmarkTrack:
 def search_store(
     folder: Path | None,
     video: VideoReader,
-    person: Rectangle | None,
+    person: Rectangle | Sightings | None,
     silhouettes: int | None,
     landmark_model: str,
 ) -> ArrayStore:
@@ -113,8 +114,8 @@ def search_store(
         Made where it is missing; None keeps the arrays in memory.
     video : VideoReader
         Known by path, size, time of change, number of frames and size of the picture.
-    person : Rectangle or None
-        Rectangle around the person, or None for the most prominent one.
+    person : Rectangle, Sightings or None
+        Rectangle around the person, or where they were seen; None for the most prominent one.
     silhouettes : int or None
         Number of frames whose mask is kept; None for all.
     landmark_model : str
@@ -127,11 +128,17 @@ def search_store(
         "version": _SEARCH_VERSION,
         "video": [str(video.path.resolve()), about.st_size, about.st_mtime_ns],
         "frames": [len(video), video.width, video.height],
-        "person": None if person is None else list(vars(person).values()),
+        "person": _key_of(person),
         "silhouettes": silhouettes,
         "landmark_model": landmark_model,
     }
     return ArrayStore(folder, hashlib.sha256(json.dumps(identity).encode()).hexdigest())
+
+
+def _key_of(person: Rectangle | Sightings | None) -> list[Any] | str | None:
+    if isinstance(person, Sightings):
+        return hashlib.sha256(person.rois.tobytes()).hexdigest()
+    return None if person is None else list(vars(person).values())
 
 
 def repaired_track(

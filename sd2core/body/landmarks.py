@@ -45,7 +45,7 @@ def find_landmarks(
     video: VideoReader,
     models: LandmarkModels,
     *,
-    person: Rectangle | None = None,
+    person: Rectangle | Sightings | None = None,
     max_gap_s: float = DEFAULT_MAX_GAP_S,
     silhouettes: int | None = DEFAULT_SILHOUETTES,
     threads: int | None = None,
@@ -63,8 +63,9 @@ def find_landmarks(
     ----------
     video : VideoReader
         Two frames or more.
-    person : Rectangle, optional
-        Around the person in one frame; otherwise the most prominent one.
+    person : Rectangle or Sightings, optional
+        Around the person in one frame, or all of their sightings, which are not looked for then;
+        otherwise the most prominent one.
     max_gap_s : float
         Longest gap without the person that is bridged; longer ones stay empty.
     silhouettes : int or None
@@ -94,7 +95,11 @@ def find_landmarks(
     if threads is None:
         threads = min(worker_count(), _MAX_THREADS)
     store = search_store(workspace, video, person, silhouettes, models.name)
-    sightings = _found(video, models, person, threads, progress_of("find"), on_frame, store)
+    if isinstance(person, Sightings):
+        sightings = person
+        store.write(SIGHTINGS, vars(sightings))
+    else:
+        sightings = _found(video, models, person, threads, progress_of("find"), on_frame, store)
     progress = progress_of("refine")
     refined = _refined(video, models, sightings, silhouettes, threads, progress, on_frame, store)
     if not refined.confidence.any():

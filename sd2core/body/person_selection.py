@@ -66,7 +66,7 @@ def find_prominent_person(
     looked: set[int] = set()
     for frames, part in _rounds(video):
         looked.update(frames)
-        squares = _parts(video.width, video.height, part)
+        squares = parts_of_picture(video.width, video.height, part)
         found: list[tuple[float, Start]] = []
         for frame in frames:
             picture = video.read(frame)
@@ -107,7 +107,7 @@ def _rounds(video: VideoReader) -> list[tuple[list[int], float]]:
     return [(chosen, 1.0), (chosen, 0.5), (many, 1.0), (chosen, 0.25)]
 
 
-def _parts(width: int, height: int, part: float) -> list[Roi | None]:
+def parts_of_picture(width: int, height: int, part: float) -> list[Roi | None]:
     """Squares of part of the longer side that cover the picture, each point two to four times."""
     if part == 1.0:
         return [None]

@@ -89,7 +89,7 @@ class PersonTracker:
         if not self.lost:
             pose = self._look(picture, self.trail.predicted(time_s))
         if pose is not None:
-            looks = None if _jumped(pose) else self._recognised(picture, pose, time_s)
+            looks = None if jumped(pose) else self._recognised(picture, pose, time_s)
         followed = looks is not None
         if not followed:
             people = self._seen(picture, self.trail.predicted(time_s))
@@ -363,7 +363,7 @@ def _beside(one: Roi, two: Roi) -> bool:
     return apart_px(one, two) < _BESIDE * two.size_px
 
 
-def _jumped(pose: Pose) -> bool:
+def jumped(pose: Pose) -> bool:
     """True if another person in the square, or none, was taken for the person."""
     ratio = pose.next_roi.size_px / pose.roi.size_px
     away_px = apart_px(pose.roi, pose.next_roi)

@@ -13,7 +13,7 @@ from sd2core.body.person_tracker import PersonTracker
 from sd2core.body.roi import PLACES, Floats, Pixels, Sightings, roi_numbers
 from sd2core.io.video import VideoReader
 
-_SEARCH_STEP_S = 1.0 / 10.0
+SEARCH_STEP_S = 1.0 / 10.0
 """Time between frames that are searched; the path in between is smooth."""
 _BLOCK_BYTES = 192 * 2**20
 
@@ -30,9 +30,9 @@ class Search:
         self._follower = follower
         self._start = start
         times = video.timebase.times_s
-        ahead = looked_at(times[start.frame :], _SEARCH_STEP_S) + start.frame
+        ahead = looked_at(times[start.frame :], SEARCH_STEP_S) + start.frame
         behind = start.frame - looked_at(
-            times[start.frame] - times[start.frame :: -1], _SEARCH_STEP_S
+            times[start.frame] - times[start.frame :: -1], SEARCH_STEP_S
         )
         self._order = np.concatenate([ahead, behind[1:]])
         self._turn = len(ahead)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,9 +16,11 @@ from sd2core.cli.output import (
     print_event,
     print_facts,
     print_json,
+    print_rows,
     progress_bar,
     progress_events,
 )
+from sd2core.cli.output_folders import refuse_existing
 from sd2core.options.fitting import FIT_CHOICES, Fitting
 from sd2core.options.kinds import Natural, Typed, joined
 from sd2core.options.records import ARGUMENT, OptionError, Place, given
@@ -28,8 +31,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sd2core.body.fit_video import FitChoices, FitReport, FittedVideo, Stage
+    from sd2core.body.people import SeenPerson
     from sd2core.io.video import VideoReader
     from sd2core.progress import Progress
+
+ALL, LIST = ("all",), ("list",)
+"""What is said of people to fit everybody, and to see who is there."""
 
 _FORMAT = "sd2-fit-progress"
 _VERSION = 1
@@ -39,6 +46,7 @@ _UNITS = {"models": "byte", "fit": "step"}
 
 _BARS = {
     "models": ("Fetching the landmark models", "B"),
+    "people": ("Following everybody", "frame"),
     "find": ("Finding the person", "frame"),
     "refine": ("Refining the landmarks", "frame"),
     "fit": ("Fitting the body", "step"),
@@ -58,6 +66,13 @@ def _rectangle(text: str) -> tuple[float, float, float, float]:
     return x, y, width, height
 
 
+def _people(text: str) -> tuple[str, ...]:
+    words = tuple(word.strip() for word in text.split(","))
+    if words not in (ALL, LIST) and not all(word.isdigit() and int(word) for word in words):
+        raise argparse.ArgumentTypeError(f"{text!r} is none of all, list, and numbers such as 1,3")
+    return words
+
+
 class Fit(Overwrite, Fitting, JsonAndProgress):
     """Options of ``sd2 fit``.
 
@@ -66,7 +81,9 @@ class Fit(Overwrite, Fitting, JsonAndProgress):
     video : VIDEO
         any video that FFmpeg reads
     out : FILE
-        the mesh to write (.zarr or .npz)
+        the mesh to write (.zarr or .npz); of several people NAME-1.zarr, NAME-2.zarr, …
+    people : WHO
+        follow everybody and fit `all`, or those with the numbers N,N that `list` shows
     person_box : X,Y,W,H
         a rectangle around the person, in pixels (default: who is seen best)
     person_frame : N
@@ -78,7 +95,8 @@ class Fit(Overwrite, Fitting, JsonAndProgress):
     """
 
     video: Annotated[Path, ARGUMENT]
-    out: Path
+    out: Path | None = None
+    people: Annotated[tuple[str, ...], Typed(_people, joined)] = ()
     person_box: Annotated[tuple[float, float, float, float] | None, Typed(_rectangle, joined)] = (
         None
     )
@@ -92,6 +110,10 @@ class Fit(Overwrite, Fitting, JsonAndProgress):
             raise OptionError(
                 "--person-frame is given without --person-box", "the rectangle in that frame"
             )
+        if self.people and self.person_box is not None:
+            raise OptionError("--people is given with --person-box", "one of them")
+        if self.out is None and self.people != LIST:
+            raise OptionError("--out is not given", "the mesh to write")
 
 
 def add_commands(commands: argparse._SubParsersAction) -> None:
@@ -111,12 +133,17 @@ def _fit(options: Fit) -> None:
     command goes on from there.
 
       sd2 fit walk.mp4 --out walk.zarr --stature-m 1.78
-      sd2 fit two.mp4 --out left.zarr --person-box 40,60,180,400 --person-frame 12
+      sd2 fit two.mp4 --people list
+      sd2 fit two.mp4 --out two.zarr --people all
       sd2 fit walk.mp4 --out walk.npz --field-of-view 68 --resolution low
     """
     from sd2core.body.fit_video import PARTIAL, check_fit_output, fit_video
     from sd2core.runs.pace import fit_kind, keep_pace
 
+    if options.people:
+        (_list if options.people == LIST else _fit_people)(options)
+        return
+    assert options.out is not None
     check_fit_output(options.out)
     continues = options.out.with_name(options.out.name + PARTIAL).exists() and not options.restart
     begun_s, begun_core_s = time.perf_counter(), time.process_time()
@@ -136,14 +163,121 @@ def _fit(options: Fit) -> None:
         core_s = time.process_time() - begun_core_s
         keep_pace(fit_kind(options.resolution), core_s, made.frames)
     if options.progress_json:
+        _tell_end(options, [(options.out, made)], seconds)
+    elif options.json:
+        print_json(_summary(options, options.out, made, seconds))
+    else:
+        _print(options, options.out, made, seconds)
+
+
+def _tell_end(options: Fit, meshes: list[tuple[Path, FittedVideo]], seconds: float) -> None:
+    """Lines of JSON about what was made."""
+    for _, made in meshes:
         for note in (*made.notes, *made.doubts):
             print_event("note", text=note)
-        out, seconds = str(options.out), round(seconds, 2)
-        print_event("done", out=out, frames=made.frames, present=made.present, seconds=seconds)
+    print_event(
+        "done",
+        out=str(options.out),
+        frames=max((made.frames for _, made in meshes), default=0),
+        present=max((made.present for _, made in meshes), default=0),
+        seconds=round(seconds, 2),
+    )
+
+
+def _fit_people(options: Fit) -> None:
+    """Fit everybody, or some."""
+    from sd2core.body.fit_people import fit_people, meshes_of, people_to_fit
+    from sd2core.body.fit_video import PARTIAL
+
+    assert options.out is not None
+    choices, begun_s = _choices(options), time.perf_counter()
+    numbers = () if options.people == ALL else tuple(map(int, options.people))
+    meshes, summaries = [], []
+    with ExitStack() as stack:
+        report = _lines(options) if options.progress_json else _bars(stack)
+        people = people_to_fit(options.video, numbers, choices, report, options.models)
+        outs = meshes_of(options.out, people)
+        stopped = any(mesh.with_name(mesh.name + PARTIAL).exists() for mesh in outs)
+        for mesh in outs:
+            refuse_existing(mesh, options.overwrite or (stopped and not options.restart))
+        found = [each.number for each in people]
+
+        def report_of(number: int) -> FitReport:
+            return (
+                _lines(options, number, found)
+                if options.progress_json
+                else _bars(stack, f", person {number}")
+            )
+
+        for person, mesh, made in fit_people(
+            options.video,
+            options.out,
+            people,
+            choices,
+            report_of,
+            models=options.models,
+            restart=options.restart,
+        ):
+            seconds = time.perf_counter() - begun_s
+            meshes.append((mesh, made))
+            about = {"person": person.number, "certainty": person.certainty}
+            summaries.append(about | _summary(options, mesh, made, seconds))
+            if not (options.progress_json or options.json):
+                _print(options, mesh, made, seconds)
+    if options.progress_json:
+        _tell_end(options, meshes, time.perf_counter() - begun_s)
     elif options.json:
-        print_json(_summary(options, made, seconds))
+        print_json({"people": summaries})
+
+
+def _list(options: Fit) -> None:
+    """Say who is in the video."""
+    from sd2core.body.landmark_models import landmark_models
+    from sd2core.body.people import find_people
+    from sd2core.io.video import open_video
+
+    with ExitStack() as stack:
+        report = _lines(options) if options.progress_json else _bars(stack)
+        models = landmark_models(options.models, report.progress_of("models"))
+        with open_video(options.video) as video:
+            people = [
+                _about(each) for each in find_people(video, models, report.progress_of("people"))
+            ]
+    if options.progress_json:
+        print_event("people", people=people)
+    elif options.json:
+        print_json({"video": str(options.video), "people": people})
     else:
-        _print(options, made, seconds)
+        print_rows(
+            [
+                ("person", "from", "to", "seen for", "certain", "best in frame", "there"),
+                *(_row(each) for each in people),
+            ],
+            right=range(6),
+        )
+
+
+def _about(person: SeenPerson) -> dict[str, Any]:
+    """What the list says of somebody."""
+    frame, roi = person.portrait
+    side = roi.size_px / 1.25
+    corner = roi.centre_x_px - side / 2.0, roi.centre_y_px - side / 2.0
+    return {
+        **picked(person, "number", "from_s", "to_s", "seen_s", "certainty", "may_be"),
+        "frame": frame,
+        "box": [round(value) for value in (*corner, side, side)],
+    }
+
+
+def _row(about: dict[str, Any]) -> tuple[str, ...]:
+    again = f"; may be person {about['may_be']}" if about["may_be"] else ""
+    return (
+        str(about["number"]),
+        *(f"{about[name]:.1f} s" for name in ("from_s", "to_s", "seen_s")),
+        f"{100.0 * about['certainty']:.0f} %",
+        str(about["frame"]),
+        ",".join(map(str, about["box"])) + again,
+    )
 
 
 def _choices(options: Fit) -> FitChoices:
@@ -157,7 +291,7 @@ def _choices(options: Fit) -> FitChoices:
     return FitChoices(person=person, **given(options, FIT_CHOICES))
 
 
-def _bars(stack: ExitStack) -> FitReport:
+def _bars(stack: ExitStack, of_whom: str = "") -> FitReport:
     """One bar after the other on standard error."""
     from sd2core.body.fit_video import FitReport
 
@@ -165,7 +299,8 @@ def _bars(stack: ExitStack) -> FitReport:
 
     def progress_of(stage: Stage) -> Progress:
         current.close()
-        return current.enter_context(progress_bar(*_BARS[stage]))
+        words, unit = _BARS[stage]
+        return current.enter_context(progress_bar(words + of_whom, unit))
 
     def started(video: Any, resumed: bool) -> None:
         if resumed and sys.stderr.isatty():
@@ -174,13 +309,16 @@ def _bars(stack: ExitStack) -> FitReport:
     return FitReport(progress_of, started, lambda *_: None)
 
 
-def _lines(options: Fit) -> FitReport:
-    """Lines of JSON for another program."""
+def _lines(options: Fit, number: int | None = None, numbers: Sequence[int] = ()) -> FitReport:
+    """Lines of JSON for another program, about the person of a number among several."""
     from sd2core.body.fit_video import STAGES, FitReport
 
     last_landmarks_s = -1.0
+    stages = [f"{stage} {each}" for each in numbers for stage in STAGES[1:]] or STAGES
 
     def started(video: VideoReader, resumed: bool) -> None:
+        if number is not None and number != numbers[0]:
+            return
         print_event(
             "start",
             format=_FORMAT,
@@ -191,12 +329,14 @@ def _lines(options: Fit) -> FitReport:
             width=video.width,
             height=video.height,
             frames_per_s=round(video.timebase.frames_per_s, 4),
-            stages=STAGES,
+            stages=stages,
             resumed=resumed,
         )
 
     def progress_of(stage: Stage) -> Progress:
-        return progress_events(_PROGRESS_EVERY_S, stage=stage, unit=_UNITS.get(stage, "frame"))
+        unit = _UNITS.get(stage, "frame")
+        named = stage if number is None or stage == "models" else f"{stage} {number}"
+        return progress_events(_PROGRESS_EVERY_S, stage=named, unit=unit)
 
     def landmarks(
         stage: Stage, frame: int, image_px: NDArray[np.float32], visibility: NDArray[np.float32]
@@ -217,23 +357,23 @@ def _lines(options: Fit) -> FitReport:
     return FitReport(progress_of, started, landmarks)
 
 
-def _summary(options: Fit, made: FittedVideo, seconds: float) -> dict[str, Any]:
+def _summary(options: Fit, out: Path, made: FittedVideo, seconds: float) -> dict[str, Any]:
     from sd2core.body.fit_video import provenance
 
     about = provenance(made, options.video, _choices(options))
     return about | {
-        "out": str(options.out),
+        "out": str(out),
         **picked(made, "frames", "frames_per_s", "present", "bridged", "residual_m", "quality"),
         "seconds": seconds,
     }
 
 
-def _print(options: Fit, made: FittedVideo, seconds: float) -> None:
-    about = _summary(options, made, seconds)
+def _print(options: Fit, out: Path, made: FittedVideo, seconds: float) -> None:
+    about = _summary(options, out, made, seconds)
     camera, sources = about["camera"], {"user": "as given", "metadata": "as the file says"}
     frames, present, bridged = about["frames"], about["present"], about["bridged"]
     print_facts(
-        f"Made {options.out}",
+        f"Made {out}",
         {
             "frames": f"{frames}, {present} with the person"
             + (f" ({bridged} of them interpolated)" if bridged else ""),

@@ -24,10 +24,8 @@ def output_folders(options: argparse.Namespace) -> Iterator[None]:
     outputs: list[Path] = [path for name in OUTPUTS if (path := getattr(options, name, None))]
     # Commands without the option go on with what is there.
     overwrite: bool | None = getattr(options, "overwrite", None)
-    there = [path for path in outputs if overwrite is not None and _holds_something(path)]
-    if there and not overwrite:
-        remedy = "Choose another name, or say --overwrite"
-        raise Sd2Error(f"{there[0]} exists", "a new name", remedy)
+    for output in outputs:
+        refuse_existing(output, overwrite is None or overwrite)
     made: list[Path] = []
     try:
         for output in outputs:
@@ -44,6 +42,13 @@ def output_folders(options: argparse.Namespace) -> Iterator[None]:
         for folder in sorted(made, key=lambda one: len(one.parts), reverse=True):
             with suppress(OSError):
                 folder.rmdir()
+
+
+def refuse_existing(path: Path, overwrite: bool) -> None:
+    """Refuse an output that holds something, unless it is to be overwritten."""
+    if not overwrite and _holds_something(path):
+        remedy = "Choose another name, or say --overwrite"
+        raise Sd2Error(f"{path} exists", "a new name", remedy)
 
 
 def check_output(path: Path, *endings: str) -> None:

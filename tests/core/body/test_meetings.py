@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from filmed_people import film
-from meeting_people import FRAMES_PER_S, OUT_M, Actor, Part, actor, pictures
 
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.landmarks import find_landmarks
@@ -16,6 +15,7 @@ from sd2core.body.person_selection import Rectangle
 from sd2core.body.track import LANDMARK, LandmarkTrack
 from sd2core.io.video import open_video
 from tools.fitting.cast import PEOPLE
+from tools.fitting.meetings import FRAMES_PER_S, OUT_M, Actor, Part, actor, pictures
 
 pytestmark = pytest.mark.slow
 

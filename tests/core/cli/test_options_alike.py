@@ -39,6 +39,7 @@ SEVERAL_MEANINGS = {
     "--from": {"PATH", "FILE|NAME"},  # where a folder was; a model to go on from
     "--imu": {"FILE", "LIST"},  # a real sensor's samples; places of virtual ones
     "--model": {"FILE", "FILE|NAME", "NAME"},  # one that was trained; kind of one to train
+    "--people": {"N", "WHO"},  # how many to simulate; whom of a video to fit
     "--placements": {"FILE", "FILE|planned", None},  # a plan; which of those in pairs are used
     "--protocol": {"FILE|paper", None},  # of a session; how simulated people swipe
     "--radar": {"CAPTURE", "NAME|CONFIG.json", "SOURCE"},  # recorded; to simulate; live

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from filmed_people import Picture
 from numpy.typing import NDArray
 
 from sd2core.body.model import Body
@@ -45,7 +44,7 @@ class Actor:
     """A person of a scene, ready to be drawn."""
 
     drawer: Renderer
-    vertices_m: Floats  # (T, V, 3)
+    vertices_m: NDArray[np.float32]  # (T, V, 3)
     points_px: Floats  # (T, 33, 2)
     away_m: float
 
@@ -86,7 +85,7 @@ def actor(part: Part, frames: int, room: str) -> Actor:
     return Actor(drawer, pose_vertices(body, transforms), points, part.away_m)
 
 
-def pictures(actors: Sequence[Actor]) -> Iterator[Picture]:
+def pictures(actors: Sequence[Actor]) -> Iterator[NDArray[np.uint8]]:
     """The scene, the nearest person in front."""
     layers = sorted(actors, key=lambda each: -each.away_m)
     for frame in range(len(actors[0].vertices_m)):

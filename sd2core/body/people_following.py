@@ -1,0 +1,219 @@
+"""Everybody in a video, followed picture by picture as far as it is sure who is who.
+
+The result are stretches: runs of looks that surely show one person. Whoever meets somebody they
+could be taken for begins another; :mod:`sd2core.body.people_joining` says whose the stretches are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.blazepose import Pose, PoseDetector, PoseLandmarker
+from sd2core.body.identity import Looks, Signature, Trail, signature
+from sd2core.body.person_selection import FOUND, parts_of_picture
+from sd2core.body.person_tracker import jumped
+from sd2core.body.roi import Floats, Pixels, Roi, apart_px, roi_numbers
+
+_SMALL_EVERY_S = 0.5
+"""Time between looks at parts of the picture, for small people."""
+_UNSEEN_S, _HIDDEN_S = 0.35, 1.5
+"""Time for which somebody who is not seen is looked for where they should be, and known at once."""
+_AWAY, _AWAY_PER_S = 0.03, 0.2
+_GREW, _GREW_PER_S = 0.06, 0.2
+_UNLIKE = 0.04
+"""Deviation of a person's place (squares) and size (logarithm) from those expected, and what is
+added each second; deviation of the similarity of their looks from 1."""
+_KNOWN_S = 1.5
+"""Time after which place and size are no less known."""
+_MOST = 8.0
+"""Most that one of place, size and looks can speak against somebody."""
+_SURELY = 3.0
+"""How much worse every other order of people has to be (logarithm of odds)."""
+_NOBODY = 6.0
+"""What has to speak against somebody for another person to be there, or nobody."""
+_BESIDE = 0.35
+"""Distance in squares within which colours of two are mixed up."""
+FEWEST = 3
+"""Looks from which on a stretch is somebody, and no slip."""
+_MAP_PX = 96
+"""Longer side of the small pictures in which bodies are compared."""
+_ONE_BODY = 0.6
+"""Share of the smaller of two bodies in the picture from which on they are one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """One body in one picture."""
+
+    pose: Pose
+    looks: Signature
+    body: NDArray[np.bool_]  # pixels of the picture made smaller
+    score: float  # best of the detections there; 0: none
+
+    @property
+    def roi(self) -> Roi:
+        """Square around the body."""
+        return self.pose.next_roi
+
+
+@dataclass(eq=False)
+class Stretch:
+    """Run of looks at one person."""
+
+    trail: Trail
+    looks: Looks
+    numbers: list[int] = field(default_factory=list)  # of the pictures
+    times_s: list[float] = field(default_factory=list)
+    rois: list[Floats] = field(default_factory=list)
+    confidence: list[float] = field(default_factory=list)
+    score: float = 0.0  # best of the detections
+
+    def add(self, number: int, time_s: float, sight: Sight, *, learn: bool = False) -> None:
+        """Take in the next look, and learn how the person looks unless others are too near."""
+        if self.numbers:
+            self.trail = self.trail.followed(sight.roi, time_s)
+        if learn:
+            self.looks.learn(sight.looks)
+        self.numbers.append(number)
+        self.times_s.append(time_s)
+        self.rois.append(roi_numbers(sight.roi))
+        self.confidence.append(sight.pose.confidence)
+        self.score = max(self.score, sight.score)
+
+    def unlikeness(self, sight: Sight, time_s: float) -> float:
+        """How much speaks against a body being this person, as the logarithm of odds."""
+        likeness = self.looks.likeness(sight.looks)
+        return against(self.trail, sight.roi, time_s, likeness)
+
+
+def against(trail: Trail, roi: Roi, time_s: float, likeness: float) -> float:
+    """How much speaks against somebody on a trail being in a square, as logarithm of odds."""
+    gap_s = min(time_s - trail.time_s, _KNOWN_S)
+    away = trail.away(roi, time_s) / (_AWAY + _AWAY_PER_S * gap_s)
+    grew = trail.growth(roi) / (_GREW + _GREW_PER_S * gap_s)
+    unlike = (1.0 - likeness) / _UNLIKE
+    return float(sum(min(each, _MOST) for each in (0.5 * away**2, 0.5 * grew**2, unlike)))
+
+
+class PeopleFollower:
+    """Follows everybody from picture to picture; times only ever increase."""
+
+    def __init__(self, detector: PoseDetector, landmarker: PoseLandmarker) -> None:
+        self._detector, self._landmarker = detector, landmarker
+        self._active: list[Stretch] = []
+        self._doubted: list[Roi] = []
+        self._searched_s = -np.inf
+        self.stretches: list[Stretch] = []
+        self.doubtful: list[int] = []
+        """Pictures in which it is not sure whom a body shows."""
+
+    def step(self, picture: Pixels, number: int, time_s: float) -> None:
+        """Find everybody in the next picture."""
+        self._active = [
+            each
+            for each in self._active
+            if time_s - each.trail.time_s
+            <= (_HIDDEN_S if len(each.numbers) >= FEWEST else _UNSEEN_S)
+        ]
+        sights = self._sights(picture, time_s)
+        costs = np.array(
+            [[each.unlikeness(sight, time_s) for sight in sights] for each in self._active]
+        ).reshape(len(self._active), len(sights))
+        order, doubtful = assigned(costs)
+        self._doubted = [sights[order[row]].roi for row in doubtful]
+        self.doubtful += [number] * bool(doubtful)
+        for row, column in order.items():
+            if row not in doubtful:
+                alone = self._is_alone(sights[column], self._active[row])
+                self._active[row].add(number, time_s, sights[column], learn=alone)
+        for column in set(range(len(sights))) - set(order.values()):
+            sight = sights[column]
+            new = Stretch(Trail(sight.roi, time_s, time_s), Looks(sight.looks))
+            new.add(number, time_s, sight)
+            self.stretches.append(new)
+            self._active.append(new)
+
+    def _is_alone(self, sight: Sight, stretch: Stretch) -> bool:
+        """True unless somebody else is so near that colours may be theirs."""
+        return all(
+            apart_px(each.trail.roi, sight.roi) > _BESIDE * sight.roi.size_px
+            for each in self._active
+            if each is not stretch
+        )
+
+    def _sights(self, picture: Pixels, time_s: float) -> list[Sight]:
+        """Every body in the picture, once."""
+        height, width = picture.shape[:2]
+        squares: list[Roi | None] = [None]
+        if time_s - self._searched_s >= _SMALL_EVERY_S - 1e-6:
+            self._searched_s = time_s
+            squares += parts_of_picture(width, height, 0.5)
+        people = [each for square in squares for each in self._detector.look(picture, square)[0]]
+        people.sort(key=lambda each: -each.score)
+        here = [each for each in self._active if time_s - each.trail.time_s <= _UNSEEN_S]
+        expected = [*self._doubted, *(each.trail.predicted(time_s) for each in here)]
+        poses = [self._landmarker.in_picture(picture, roi) for roi in expected]
+        poses = [each for each in poses if not jumped(each)]
+        looked = [each.next_roi for each in poses]
+        for person in people:
+            if not any(_same_square(person.roi, roi) for roi in looked):
+                looked.append(person.roi)
+                poses.append(self._landmarker.in_picture(picture, person.roi))
+        found: list[Sight] = []
+        for pose in sorted(poses, key=lambda each: -each.confidence):
+            body = _small_mask(pose, width, height)
+            if pose.confidence < FOUND or any(_one_body(body, each.body) for each in found):
+                continue
+            scores = [each.score for each in people if _same_square(each.roi, pose.next_roi)]
+            looks = signature(pose.roi.cut(picture), pose)
+            found.append(Sight(pose, looks, body, max(scores, default=0.0)))
+        return found
+
+
+def _small_mask(pose: Pose, width: int, height: int) -> NDArray[np.bool_]:
+    """Pixels of a body in the whole picture made smaller."""
+    import cv2
+
+    scale = _MAP_PX / max(width, height)
+    matrix = scale * pose.roi.matrix(len(pose.mask))
+    size = (round(scale * width), round(scale * height))
+    return np.asarray(cv2.warpAffine(pose.mask, matrix, size) > 0.5)
+
+
+def _one_body(one: NDArray[np.bool_], two: NDArray[np.bool_]) -> bool:
+    """True if two masks show one body; one that shows nothing is any."""
+    return bool((one & two).sum() >= _ONE_BODY * min(one.sum(), two.sum()))
+
+
+def assigned(costs: Floats) -> tuple[dict[int, int], set[int]]:
+    """Body of each stretch, and stretches of which it is not sure, by what speaks against each.
+
+    ``costs`` is (stretches, bodies).
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    rows, columns = costs.shape
+    # One column more for each stretch that may not be seen.
+    padded = np.hstack([costs, np.full((rows, rows), _NOBODY)])
+    order = linear_sum_assignment(padded)[1]
+    taken = {row: int(column) for row, column in enumerate(order) if column < columns}
+    doubtful = set()
+    for one in taken:
+        for other in range(rows):
+            if other == one:
+                continue
+            now = padded[one, order[one]] + padded[other, order[other]]
+            # The other one has this body instead, and this one theirs or none.
+            exchanged = padded[other, order[one]] + min(padded[one, order[other]], _NOBODY)
+            if exchanged - now < _SURELY:
+                doubtful |= {one, other}
+    return taken, doubtful & set(taken)
+
+
+def _same_square(one: Roi, two: Roi) -> bool:
+    """True if two squares surely show the same body."""
+    ratio = one.size_px / two.size_px
+    return apart_px(one, two) < 0.12 * two.size_px and 0.75 < ratio < 1.33

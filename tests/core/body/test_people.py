@@ -1,0 +1,160 @@
+"""Everybody in a video is followed and told apart; nobody is exchanged silently."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from filmed_people import crossing, empty_room, film
+
+from sd2core.body.identity import Looks, Trail
+from sd2core.body.landmark_models import LandmarkModels
+from sd2core.body.people import SeenPerson, chosen_people, find_people
+from sd2core.body.people_following import Stretch, assigned
+from sd2core.body.people_joining import joined
+from sd2core.body.roi import Roi, roi_numbers
+from sd2core.errors import Sd2Error
+from sd2core.io.video import open_video
+
+WIDTH_PX, SIZE_PX, STEP_S = 1200, 400.0, 0.1
+
+
+def looks_of(seed: int) -> np.ndarray:
+    """Clothes of three colours; other seeds, other colours."""
+    signature = np.zeros((6, 512), np.float32)
+    for part in signature:
+        part[np.random.default_rng(seed).choice(512, 3, replace=False)] = 1.0 / 3.0
+    return signature
+
+
+def stretch(
+    from_s: float, to_s: float, from_px: float, to_px: float, clothes: int = 0, size: float = 1.0
+) -> Stretch:
+    """Somebody who goes across the picture."""
+    times = np.arange(round(from_s / STEP_S), round(to_s / STEP_S) + 1) * STEP_S
+    places = np.interp(times, (from_s, to_s), (from_px, to_px))
+    rois = [Roi(float(x), 300.0, size * SIZE_PX) for x in places]
+    trail = Trail(rois[0], float(times[0]), float(times[0]))
+    for time_s, roi in zip(times[1:].tolist(), rois[1:], strict=True):
+        trail = trail.followed(roi, time_s)
+    return Stretch(
+        trail,
+        Looks(looks_of(clothes)),
+        numbers=np.rint(times / STEP_S).astype(int).tolist(),
+        times_s=times.tolist(),
+        rois=[roi_numbers(roi) for roi in rois],
+        confidence=[1.0] * len(times),
+        score=1.0,
+    )
+
+
+def whose(stretches: list[Stretch]) -> list[list[int]]:
+    """Numbers of the stretches of each person."""
+    return [
+        [stretches.index(each) for each in one.stretches] for one in joined(stretches, WIDTH_PX)
+    ]
+
+
+class TestJoining:
+    def test_who_goes_straight_on_behind_another_in_like_clothes_is_the_same(self) -> None:
+        right = [stretch(0.0, 1.5, 200.0, 500.0), stretch(2.2, 3.6, 640.0, 920.0)]
+        left = [stretch(0.0, 1.5, 1000.0, 700.0), stretch(2.2, 3.6, 560.0, 280.0)]
+        assert whose([right[0], left[0], right[1], left[1]]) == [[0, 2], [1, 3]]
+
+    def test_clothes_tell_who_turned_back(self) -> None:
+        before = [stretch(0.0, 1.5, 200.0, 500.0, 1), stretch(0.0, 1.5, 1000.0, 700.0, 2)]
+        after = [stretch(2.5, 4.0, 700.0, 1000.0, 2), stretch(2.5, 4.0, 500.0, 200.0, 1)]
+        assert whose([*before, *after]) == [[0, 3], [1, 2]]
+
+    def test_sizes_tell_too(self) -> None:
+        before = [stretch(0.0, 1.5, 400.0, 600.0), stretch(0.0, 1.5, 800.0, 600.0, size=1.6)]
+        after = [stretch(2.2, 4.0, 600.0, 600.0, size=1.6), stretch(2.2, 4.0, 600.0, 600.0)]
+        assert whose([*before, *after]) == [[0, 3], [1, 2]]
+
+    def test_who_cannot_be_told_is_another_person_who_may_be_the_same(self) -> None:
+        before = [stretch(0.0, 1.5, 590.0, 600.0), stretch(0.0, 1.5, 610.0, 600.0)]
+        after = [stretch(3.0, 4.5, 600.0, 500.0), stretch(3.0, 4.5, 600.0, 700.0)]
+        people = joined([*before, *after], WIDTH_PX)
+        assert [len(each.stretches) for each in people] == [1, 1, 1, 1]
+        assert {people.index(each.may_be) for each in people[2:]} == {0, 1}
+
+    def test_who_leaves_is_not_who_comes_next_in_like_clothes(self) -> None:
+        leaves, comes = stretch(0.0, 3.0, 600.0, 1180.0), stretch(6.0, 9.0, 1180.0, 600.0)
+        assert whose([leaves, comes]) == [[0], [1]]
+
+    def test_who_is_not_seen_for_a_while_amid_the_picture_is_the_same(self) -> None:
+        assert whose([stretch(0.0, 3.0, 600.0, 600.0), stretch(6.0, 9.0, 620.0, 600.0)]) == [[0, 1]]
+
+    def test_certainty_is_told_and_below_that_of_who_was_never_lost(self) -> None:
+        parts = [stretch(0.0, 1.5, 200.0, 500.0), stretch(2.2, 3.6, 640.0, 920.0)]
+        (person,) = joined(parts, WIDTH_PX)
+        assert 0.9 < person.certainty < 1.0
+        (whole,) = joined([stretch(0.0, 3.6, 200.0, 920.0)], WIDTH_PX)
+        assert whole.certainty == 1.0
+
+
+class TestAssigning:
+    def test_bodies_go_to_whom_least_speaks_against(self) -> None:
+        assert assigned(np.array([[0.5, 9.0], [8.0, 1.0]])) == ({0: 0, 1: 1}, set())
+
+    def test_two_who_may_be_exchanged_are_doubtful(self) -> None:
+        assert assigned(np.array([[1.0, 2.0], [1.5, 1.0]]))[1] == {0, 1}
+
+    def test_one_body_of_two_who_may_be_it_is_doubtful(self) -> None:
+        order, doubtful = assigned(np.array([[1.0], [2.0]]))
+        assert set(order) == doubtful == {0}
+
+    def test_nobody_is_put_into_a_body_unlike_theirs(self) -> None:
+        assert assigned(np.array([[20.0]])) == ({}, set())
+
+
+@pytest.fixture(scope="module")
+def people(
+    models: LandmarkModels, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, list[SeenPerson]]:
+    path = film(tmp_path_factory.mktemp("crossing") / "two.mp4", crossing(), frames_per_s=10)
+    with open_video(path) as video:
+        return path, find_people(video, models)
+
+
+class TestFinding:
+    def test_two_who_cross_are_two_and_go_on(self, people: tuple[Path, list[SeenPerson]]) -> None:
+        _, found = people
+        assert [each.number for each in found] == [1, 2]
+        ways = [each.sightings.rois[each.seen, 0] for each in found]
+        across = [way[-1] - way[0] for way in ways]
+        assert min(across) < -120.0
+        assert max(across) > 120.0
+        for way, side in zip(ways, np.sign(across), strict=True):
+            assert (side * np.diff(way) > -15.0).all()
+        assert all(0.9 < each.certainty <= 1.0 for each in found)
+
+    def test_each_knows_of_the_other(self, people: tuple[Path, list[SeenPerson]]) -> None:
+        _, (one, two) = people
+        both = one.seen & two.seen
+        assert both.sum() > 10
+        sides = [each.sightings.others[both, :2] for each in (one, two)]
+        assert (sides[0] == sides[1][:, ::-1]).all()
+
+    def test_what_was_found_is_kept(
+        self, people: tuple[Path, list[SeenPerson]], models: LandmarkModels
+    ) -> None:
+        path, found = people
+        with open_video(path) as video:
+            video.close()  # nothing is read again
+            again = find_people(video, models)
+        for one, two in zip(found, again, strict=True):
+            np.testing.assert_array_equal(one.sightings.rois, two.sightings.rois)
+
+    def test_only_who_is_there_can_be_chosen(self, people: tuple[Path, list[SeenPerson]]) -> None:
+        _, found = people
+        assert chosen_people(found, ()) == found
+        assert chosen_people(found, (2,)) == found[1:]
+        with pytest.raises(Sd2Error, match="no person 3"):
+            chosen_people(found, (3,))
+
+    def test_an_empty_room_is_refused(self, models: LandmarkModels, tmp_path: Path) -> None:
+        path = film(tmp_path / "empty.mp4", [empty_room()] * 4)
+        with open_video(path) as video, pytest.raises(Sd2Error, match="Nobody was found"):
+            find_people(video, models)

@@ -1,0 +1,69 @@
+"""``sd2 fit --people``: who is there, and a mesh of each."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from cli_outcome import Sd2
+from filmed_people import crossing, film
+
+from sd2core.body.landmark_models import LandmarkModels
+
+
+@pytest.fixture(scope="module")
+def video(models: LandmarkModels, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("crossing")
+    return film(folder / "two.mp4", crossing(), frames_per_s=10)
+
+
+def test_a_list_needs_no_output(video: Path, sd2: Sd2) -> None:
+    told = json.loads(sd2("fit", video, "--people", "list", "--json").out)["people"]
+    assert [each["number"] for each in told] == [1, 2]
+    assert all(each["to_s"] > each["from_s"] + 1.5 for each in told)
+    assert all(0 < each["box"][0] < 320 for each in told)
+    rows = sd2("fit", video, "--people", "list").out.splitlines()
+    assert len(rows) == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "--out is not given"),
+        (["--people", "all"], "--out is not given"),
+        (["--people", "everyone", "--out", "x.zarr"], "none of all, list"),
+        (["--people", "1", "--person-box", "1,1,9,9", "--out", "x.zarr"], "--person-box"),
+    ],
+)
+def test_what_cannot_be_is_refused(words: list[str], message: str, sd2: Sd2) -> None:
+    outcome = sd2("fit", "two.mp4", *words)
+    assert outcome.code != 0
+    assert message in outcome.err
+
+
+def test_each_gets_a_mesh(video: Path, sd2: Sd2, tmp_path: Path) -> None:
+    words = ["fit", video, "--people", "all", "--resolution", "low"]
+    words += ["--landmark-model", "full", "--out", tmp_path / "two.npz"]
+    lines = [json.loads(line) for line in sd2(*words, "--progress-json").out.splitlines()]
+    start = next(line for line in lines if line["event"] == "start")
+    stages = [f"{stage} {who}" for who in (1, 2) for stage in ("refine", "fit", "write")]
+    assert start["stages"] == stages
+    told = [line["stage"] for line in lines if line["event"] == "progress"]
+    assert [each for each in dict.fromkeys(told) if each in stages] == stages
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["two-1.npz", "two-2.npz"]
+    again = sd2(*words)
+    assert again.code == 1
+    assert "two-1.npz exists" in again.err
+
+
+def test_a_stopped_run_makes_what_is_left(video: Path, sd2: Sd2, tmp_path: Path) -> None:
+    words = ["fit", video, "--people", "all", "--resolution", "low"]
+    words += ["--landmark-model", "full", "--out", tmp_path / "two.npz"]
+    assert sd2(*words, "--people", "2").code == 0  # one alone has the name that was given
+    (tmp_path / "two.npz").rename(tmp_path / "two-1.npz")
+    (tmp_path / "two-2.npz.partial").mkdir()
+    written = (tmp_path / "two-1.npz").stat().st_mtime_ns
+    assert sd2(*words).code == 0
+    assert (tmp_path / "two-2.npz").exists()
+    assert (tmp_path / "two-1.npz").stat().st_mtime_ns == written
