@@ -17,6 +17,7 @@ from sd2app.batch.results import Result
 from sd2app.denoise.model import DenoiseModel
 from sd2app.feature import Shell
 from sd2app.sensor.placements import PlacementsModel
+from sd2app.session.saving import saved_first
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import ask_file, ask_folder, ask_new
 from sd2app.widgets.text import counted
@@ -176,7 +177,16 @@ class BatchQuestions(QObject):
             QApplication.clipboard().setText(quoted(self._batch.words(path)))
 
     def start(self) -> None:
-        """Start what is set up."""
+        """Start what is set up; what is open and part of it is saved first, if the user wants."""
+        document, recording = self._session.document, self._session.document.recording
+        paths = [plain_path(one.path) for one in self._batch.setup.data]
+        opened = None if recording is None else plain_path(recording.folder)
+        if (
+            opened is not None
+            and {opened, *opened.parents} & {*paths}
+            and not saved_first(document, self.shell, "A batch works on what is saved.")
+        ):
+            return
         self._attempt(self._batch.start)
 
     # --- a batch that is there ------------------------------------------------------------

@@ -9,8 +9,8 @@ from PySide6.QtCore import QObject, Qt
 from sd2app.dataset_export.dialog import ExportDialog
 from sd2app.dataset_export.model import ExportModel
 from sd2app.feature import Action, Feature, Shell, report
+from sd2app.session.saving import saved_first
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import Answer, confirmed
 
 
 class DatasetExportFeature(Feature):
@@ -36,14 +36,9 @@ class DatasetExportFeature(Feature):
     def _export(self) -> None:
         """Choose what a data set holds and have it written; the window can be used meanwhile."""
         document = self._session.document
+        if not saved_first(document, self._shell, "A data set is made of what is saved."):
+            return
         recording = document.recording
-        if recording is not None and (document.modified or not recording.folder.exists()):
-            changed = f"{document.title} has changes that are not saved."
-            words = f"{changed} A data set is made of what is saved."
-            window = self._shell.dialog_parent
-            if not confirmed(window, "Save changes?", words, Answer.Save) or not self._shell.save():
-                return
-            recording = document.recording
         opened = None if recording is None else recording.folder
         if not self.model.under_way:
             self.model.begin(opened)

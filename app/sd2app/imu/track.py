@@ -111,7 +111,7 @@ class InertialTrack(TrackMouse):
         plot, scale = self.plot_rect(), self.scale
         with clipped(painter, plot):
             self.paint_cursors(painter, plot, QColor(self._display.palette.muted))
-        if self.underMouse() and self._pointer.time_s is not None:
+        if self.underMouse() and self._pointer.time_s is not None and not self.still:
             time_s = self._pointer.time_s
             if lines := reading_lines(self._model, time_s):
                 place = QPointF(scale.x_of(time_s), plot.top())

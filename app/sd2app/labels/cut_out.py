@@ -195,7 +195,7 @@ class CutOutDialog(QDialog):
             box.setEnabled(has)
             box.show_checked(has)
         self._size = sentence("")
-        buttons, self._go = accepting(self, "Choose folder…")
+        buttons, self._go = accepting(self, "Export…")
         parts = side_by_side(*self._parts.values(), spacing_px=16)
         form = form_of(("Spans", self._which), ("Parts", parts))
         foot = with_help("Export cut-outs", buttons)

@@ -14,6 +14,7 @@ from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QPen
 
 from sd2app.labels.arrays import WIDE_PX, SpanArrays, SpanColumns
 from sd2app.labels.model import LabelsModel, Mark
+from sd2app.maps.arrangement import BELOW_PX
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import AT_RIGHT, Overlay, clipped, image_of
 from sd2app.widgets.time_axis import GUTTER_PX, TimeScale
@@ -26,8 +27,7 @@ _GAP_PX = 1.0
 _TINT, _SELECTED_TINT = 64, 136
 _NARROW_TINTS = 90, 255
 """Opacities of columns that narrow spans cover hardly and wholly."""
-_REGION_TINT, _SELECTED_REGION_TINT = 18, 54
-"""Faint: a map's colours are read as levels."""
+_REGION_TINT, _SELECTED_REGION_TINT = 140, 255
 _EDGES_FROM_PX = 12.0
 """On a map, which lines closer than that would hide."""
 _OVERVIEW_TINTS = 130, 255
@@ -265,14 +265,18 @@ def text_on(span: Span, arrays: SpanArrays) -> str:
 
 
 def map_overlay(model: LabelsModel) -> Overlay:
-    """Make the overlay of spans on a map: tinted, selected ones more, with edges where wide."""
+    """Make the overlay of spans on a map: a line below it, and edges where they are wide.
+
+    The map itself keeps its colours, which are its values.
+    """
 
     def paint(painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
         columns = _columns_in(painter, plot, scale, model, together=True, wide_px=math.inf)
         arrays = model.arrays
         tints = np.where(columns.selected, _SELECTED_REGION_TINT, _REGION_TINT) * columns.share
+        below = QRectF(plot.left(), plot.bottom() + 1.0, plot.width(), BELOW_PX - 1.0)
+        painter.drawImage(below, _coloured(columns, arrays.colours, tints))
         with clipped(painter, plot):
-            painter.drawImage(plot, _coloured(columns, arrays.colours, tints))
             edges: dict[tuple[int, bool], list[QLineF]] = {}
             wide = _columns_in(painter, plot, scale, model)
             for number, left, right in _ends_px(wide, scale, arrays):
@@ -286,7 +290,10 @@ def map_overlay(model: LabelsModel) -> Overlay:
                 painter.setPen(QPen(QColor(arrays.colours[tone]), 1.0, style))
                 painter.drawLines(lines)
 
-    return Overlay(paint, (model.changed, model.selection_changed))
+    def legend(start_s: float, end_s: float) -> dict[str, str]:
+        return {span.label: model.colour_of(span.label) for span in model.within(start_s, end_s)}
+
+    return Overlay(paint, (model.changed, model.selection_changed), legend)
 
 
 def strip_overlay(model: LabelsModel) -> Overlay:

@@ -144,6 +144,7 @@ class RecoverLabelsDialog(QDialog):
         self._discard = buttons.addButton("Discard", roles.ActionRole)
         self._list.itemActivated.connect(lambda *_: self._open.isEnabled() and self.accept())
         self._open.clicked.connect(self.accept)
+        self._open.setDefault(True)
         self._write.clicked.connect(self._write_file)
         self._discard.clicked.connect(self._give_up)
         foot = with_help("Recover labels", buttons)

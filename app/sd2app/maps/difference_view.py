@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter
 
@@ -58,6 +59,11 @@ class DifferenceView(HeatmapView):
     def _table(self) -> np.ndarray:
         colours = self._display.palette
         return signed_table(colours.real, colours.level, colours.denoised)
+
+    def colour_scale(self) -> tuple[NDArray[np.uint32], float, float, str]:
+        """Signed colours, from those where the other is stronger."""
+        full, unit = self._difference.full_scale(self._display.levels)
+        return self._table(), -full, full, unit
 
     def status(self) -> str:
         """What was done to the maps before they are compared."""

@@ -9,7 +9,7 @@ from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QPoint, QPointF, QRect, QRectF, QSize, Qt
 from PySide6.QtGui import QBrush, QColor, QPainter, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
@@ -20,7 +20,7 @@ from sd2app.maps.readout import body_range_m, reading_lines
 from sd2app.maps.track_mouse import TrackMouse, offset_text
 from sd2app.session.maps import UNCERTAIN_SHARE, MapModel, Reading
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, clipped
+from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, clipped, image_of
 from sd2app.widgets.colour_maps import lookup_table
 from sd2app.widgets.time_axis import (
     HANDLE_PX,
@@ -36,6 +36,11 @@ from sd2core.maps import DopplerMap
 BinMarks = tuple[QColor, QColor, Sequence[tuple[Sequence[int], Qt.BrushStyle]]]
 """Colour of zero, colour of hatching, and bins without information with their hatching."""
 
+
+_SCALE_PX, _TIMES_PX = 72, 44
+"""Room that a picture has more, for the scale of its colours and for its times and legend."""
+
+_UNCERTAIN = f"±{100 * UNCERTAIN_SHARE:.0f} % or worse"
 
 Velocity = TypeVar("Velocity", float, NDArray[np.float64])
 
@@ -69,11 +74,15 @@ def velocity_labels(
 def paint_velocity_labels(
     painter: QPainter, plot: QRectF, labels: Sequence[tuple[float, float]]
 ) -> None:
-    """Write :func:`velocity_labels` left of a plot."""
+    """Write :func:`velocity_labels` left of a plot, and their unit between the last two."""
     line_px = painter.fontMetrics().height()
-    for velocity, beside_px in labels:
+    written = [(signed_text(velocity), beside_px) for velocity, beside_px in labels]
+    lowest_px = sorted(beside_px for _, beside_px in labels)[-2:]
+    if lowest_px[-1] - lowest_px[0] >= 1.8 * line_px:
+        written.append(("m/s", 0.5 * sum(lowest_px)))
+    for text, beside_px in written:
         room = QRectF(0, plot.top() + beside_px - line_px / 2, plot.left() - 8, line_px)
-        painter.drawText(room, AT_RIGHT, signed_text(velocity))
+        painter.drawText(room, AT_RIGHT, text)
 
 
 class HeatmapView(TrackMouse, MapWidget):
@@ -193,11 +202,12 @@ class HeatmapView(TrackMouse, MapWidget):
         colours = self._display.palette
         # An enlarged map has an arrow back.
         to: Literal["down", "right", "left"] = "right" if self.folded else "down"
-        paint_handle(painter, HEADER_PX, "left" if self.enlarged else to, colours.muted)
+        if not self.still:
+            paint_handle(painter, HEADER_PX, "left" if self.enlarged else to, colours.muted)
         box = QRectF(HANDLE_PX, 0, self.width() - HANDLE_PX - 8, HEADER_PX)
         left = HANDLE_PX + paint_title(painter, box, self.title(), colours.text) + 12
         painter.setPen(QColor(colours.muted))
-        left += self._place_button(left)
+        left += 0 if self.still else self._place_button(left)
         room = self.width() - 16 - left - self._paint_corner(painter, box, left)
         status = painter.fontMetrics().elidedText(
             self.status(), Qt.TextElideMode.ElideRight, int(max(room - 16, 40))
@@ -241,8 +251,8 @@ class HeatmapView(TrackMouse, MapWidget):
         if gaps_s := self.track.gaps_s:
             parts.append(f"no person in {sum(end - start for start, end in gaps_s):.2f} s")
         if self.track.uncertainty is not None:
-            colour = "amber" if self._display.levels.colour_map == "gray" else "grey"
-            parts.append(f"{colour}: ±{100 * UNCERTAIN_SHARE:.0f} % or worse")
+            named = {"gray": "grey"}.get(self._uncertain_colour, "amber")
+            parts.append(f"{named}: {_UNCERTAIN}")
         if self.track.by_hand and self.track.map is not None:
             value = f"{self.track.reference:.3g} {self.track.map.unit}".rstrip()
             parts.append(f"0 dB set to {value}")
@@ -250,6 +260,11 @@ class HeatmapView(TrackMouse, MapWidget):
             level = f"{strongest_db:.0f}".replace("-", "−")
             parts.append(f"strongest bin {level} dB, below the scale: R sets 0 dB here")
         return " · ".join(filter(None, parts))
+
+    @property
+    def _uncertain_colour(self) -> str:
+        """Colour of uncertain cells, for a legend."""
+        return "#e0a030" if self._display.levels.colour_map == "gray" else "gray"
 
     def _paint_marked_bins(self, painter: QPainter, plot: QRectF) -> None:
         edges_px = y_of(plot, self._map.axis.edges_mps, self._map.axis.v_max_mps).tolist()
@@ -282,15 +297,66 @@ class HeatmapView(TrackMouse, MapWidget):
     def _paint_cursors(self, painter: QPainter, plot: QRectF) -> None:
         faint = QColor(255, 255, 255, 120)
         with clipped(painter, plot):
-            if self._pointer.velocity_mps is not None:
+            if self._pointer.velocity_mps is not None and not self.still:
                 painter.setPen(QPen(faint, 1, Qt.PenStyle.DotLine))
                 y = self.y_of(self._pointer.velocity_mps)
                 painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
             self.paint_cursors(painter, plot, faint)
-        if self.underMouse() and self._pointer.reading is not None:
+        if self.underMouse() and self._pointer.reading is not None and not self.still:
             reading = self._pointer.reading
             place = QPointF(self.scale.x_of(reading.time_s), self.y_of(reading.velocity_mps))
             paint_readout(painter, plot, place, reading_lines(reading), self._display.palette)
+
+    # --- pictures -------------------------------------------------------------------------
+
+    def picture_size(self) -> QSize:
+        """Size with the time axis and the colours' scale."""
+        return self.size() + QSize(_SCALE_PX, _TIMES_PX)
+
+    def paint_picture(self, painter: QPainter) -> None:
+        """Map with the axis of time below, the scale of its colours, and what is drawn over it."""
+        colours, plot = self._display.palette, self.plot_rect()
+        painter.fillRect(QRect(QPoint(), self.picture_size()), QColor(colours.panel))
+        super().paint_picture(painter)
+        if self.track.map is None or self.folded:
+            return
+        painter.setPen(QColor(colours.muted))
+        line_px = painter.fontMetrics().height()
+        top = plot.bottom() + BELOW_PX
+        for time_s in ticks(*self._span.span_s, max(int(plot.width() / 80), 1)):
+            x = self.scale.x_of(time_s)
+            painter.drawLine(QPointF(x, top), QPointF(x, top + 4))
+            box = QRectF(x - 40, top + 4, 80, line_px)
+            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, f"{time_s:g} s")
+        table, low, high, unit = self.colour_scale()
+        bar = QRectF(plot.right() + 16, plot.top(), 12, plot.height())
+        painter.drawImage(bar, image_of(table[::-1, None]))
+        painter.drawRect(bar)
+        for value in ticks(low, high, max(int(plot.height() / (2 * line_px)), 1)):
+            y = bar.bottom() - bar.height() * (value - low) / (high - low)
+            middle = min(max(y, bar.top() + line_px / 2), bar.bottom() - line_px / 2)
+            box = QRectF(bar.right() + 4, middle - line_px / 2, _SCALE_PX, line_px)
+            painter.drawText(box, AT_LEFT, f"{value:g} {unit}".replace("-", "−"))
+        self._paint_legend(painter, QPointF(plot.left(), top + 4 + line_px))
+
+    def colour_scale(self) -> tuple[NDArray[np.uint32], float, float, str]:
+        """Colours from the lowest on, the values of the first and the last, and their unit."""
+        levels = self._display.levels
+        return lookup_table(levels.colour_map), *levels.ends
+
+    def _paint_legend(self, painter: QPainter, place: QPointF) -> None:
+        """Name what lies over the map, as far as there is room."""
+        metrics, x = painter.fontMetrics(), place.x()
+        entries = {} if self.track.uncertainty is None else {_UNCERTAIN: self._uncertain_colour}
+        for overlay in self._overlays:
+            entries.update(overlay.legend(*self._span.span_s))
+        for name, colour in entries.items():
+            width = metrics.horizontalAdvance(name)
+            if x + 16 + width > self.width() + _SCALE_PX:
+                return
+            painter.fillRect(QRectF(x, place.y() + 5, 10, 8), QColor(colour))
+            painter.drawText(QRectF(x + 16, place.y(), width, metrics.height()), AT_LEFT, name)
+            x += width + 32
 
     # --- mouse ----------------------------------------------------------------------------
 

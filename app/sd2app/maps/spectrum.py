@@ -97,7 +97,7 @@ class SpectrumView(Canvas):
             for curve in curves:
                 if curve.frame is not None and not curve.nobody:
                     self._paint_curve(painter, plot, curve, curve.frame, v_max)
-            if self._pointer.velocity_mps is not None:
+            if self._pointer.velocity_mps is not None and not self.still:
                 y = y_of(plot, self._pointer.velocity_mps, v_max)
                 painter.setPen(QPen(QColor(colours.muted), 1, Qt.PenStyle.DotLine))
                 painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
@@ -112,9 +112,7 @@ class SpectrumView(Canvas):
                 QRectF(plot.left(), top, plot.width(), bottom - top),
                 QBrush(QColor(colours.border), Qt.BrushStyle.BDiagPattern),
             )
-        low, high, unit = levels.low_db, levels.high_db, "dB"
-        if levels.scale == "linear":
-            low, high, unit = 0.0, 100.0 * 10.0 ** (levels.high_db / 10.0), "%"
+        low, high, unit = levels.ends
         across = [
             (plot.left() + plot.width() * (level - low) / (high - low), f"{level:g}")
             for level in ticks(low, high, 4)

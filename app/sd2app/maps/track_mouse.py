@@ -74,6 +74,8 @@ class TimePlot(Canvas):
 
     def paint_cursors(self, painter: QPainter, plot: QRectF, pointer_colour: QColor) -> None:
         """Paint the time under the pointer, dotted, and the time on screen."""
+        if self.still:
+            return
         if self._pointer.time_s is not None:
             painter.setPen(QPen(pointer_colour, 1, Qt.PenStyle.DotLine))
             x = self.scale.x_of(self._pointer.time_s)
@@ -125,8 +127,8 @@ class TrackMouse(ZoomedPlot):
 
     def grip_rect(self) -> QRectF:
         """Rectangle of the grip; empty where none is shown."""
-        plot = self.plot_rect()
-        if self.measured_from_s is None or not self._session.aligning.active or plot.height() <= 1:
+        plot, shown = self.plot_rect(), self._session.aligning.active and not self.still
+        if not shown or self.measured_from_s is None:
             return QRectF()
         width, height = _GRIP_PX
         grip = QRectF(0, 0, min(width, plot.width()), min(height, plot.height()))

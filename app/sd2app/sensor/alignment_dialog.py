@@ -32,7 +32,7 @@ class AlignmentDialog(QDialog):
         self._within = option_box(Align, "within", " s", decimals=1)
         self._within.show_value(model.within_s)
         self._within.valueChanged.connect(model.search)
-        buttons, self._apply = accepting(self, "Apply")
+        buttons, self._apply = accepting(self, "Align")
         within = form_of(("Search within ±", side_by_side(self._within)))
         foot = with_help("Align automatically", buttons, copy_button(lambda: model.line, self))
         parts = sentence(_ABOUT), (self._chart, 1), self._result, self._problem, within, foot

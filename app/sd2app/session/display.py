@@ -29,6 +29,13 @@ class HeatmapLevels:
     high_db: float = 0.0
     colour_map: str = "viridis"
 
+    @property
+    def ends(self) -> tuple[float, float, str]:
+        """First and last value of the scale, and their unit; relative to the reference."""
+        if self.scale == "dB":
+            return self.low_db, self.high_db, "dB"
+        return 0.0, 100.0 * 10.0 ** (self.high_db / 10.0), "%"
+
 
 class DisplayModel(QObject):
     """Choices that change no data. Others read the attributes; the methods change them."""

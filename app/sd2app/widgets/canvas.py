@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import ClassVar, NamedTuple
 
@@ -52,6 +52,7 @@ class Canvas(QWidget):
         super().__init__(parent)
         self._kept: dict[Callable[[QPainter], None], QPixmap] = {}  # by what draws them
         self.menu_parts: Sequence[MenuPart] = ()
+        self.still = False  # a picture is made: without pointer, cursor, and what the mouse is for
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         """Offer what features add for this place, and the picture."""
@@ -78,6 +79,20 @@ class Canvas(QWidget):
         """Paint everything."""
         raise NotImplementedError
 
+    def picture_size(self) -> QSize:
+        """Size of the picture of it, in pixels."""
+        return self.size()
+
+    def paint_picture(self, painter: QPainter) -> None:
+        """Paint what a picture of it shows."""
+        self.still = True
+        self._kept.clear()
+        try:
+            self.paint(painter)
+        finally:
+            self.still = False
+            self._kept.clear()
+
     def paint_kept(self, painter: QPainter, draw: Callable[[QPainter], None]) -> None:
         """Paint the picture that is kept; ``draw`` makes a missing one, or one of another size."""
         ratio = self.devicePixelRatioF()
@@ -98,8 +113,17 @@ class Canvas(QWidget):
             self.paint(painter)
 
 
+def no_legend(start_s: float, end_s: float) -> Mapping[str, str]:
+    """Legend of what needs none."""
+    return {}
+
+
 class Overlay(NamedTuple):
-    """Painter of something over a map, such as labels, and the signals after which it differs."""
+    """Painter of something over a map, such as labels, and the signals after which it differs.
+
+    ``legend`` gives the names of what is drawn in a stretch of time, with their colours.
+    """
 
     paint: Callable[[QPainter, QRectF, TimeScale], None]
     changed: tuple[SignalInstance, ...] = ()
+    legend: Callable[[float, float], Mapping[str, str]] = no_legend

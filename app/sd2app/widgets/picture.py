@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QBuffer, QIODevice, QPoint, QPointF, QRect, Qt
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QGuiApplication, QPainter, QPixmap
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QMenu, QMessageBox, QWidget
 
+from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import ask_new
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
@@ -27,15 +28,35 @@ def copy_drawing(widget: QWidget) -> None:
 
 def _drawing(widget: QWidget) -> bytes:
     """The widget as SVG."""
+    size = widget.picture_size() if isinstance(widget, Canvas) else widget.size()
     buffer = QBuffer()
     buffer.open(QIODevice.OpenModeFlag.WriteOnly)
     drawing = QSvgGenerator()
     drawing.setOutputDevice(buffer)
-    drawing.setSize(widget.size())
-    drawing.setViewBox(QRect(QPoint(), widget.size()))
+    drawing.setSize(size)
+    drawing.setViewBox(QRect(QPoint(), size))
     drawing.setTitle(widget.accessibleName())
-    widget.render(drawing)
+    if isinstance(widget, Canvas):
+        with QPainter(drawing) as painter:
+            painter.setFont(widget.font())
+            widget.paint_picture(painter)
+    else:
+        widget.render(drawing)
     return bytes(buffer.data().data())
+
+
+def pixmap_of(widget: QWidget) -> QPixmap:
+    """The widget in pixels: what it shows, without what the mouse is for."""
+    if not isinstance(widget, Canvas):
+        return widget.grab()
+    ratio = widget.devicePixelRatioF()
+    pixmap = QPixmap(widget.picture_size() * ratio)
+    pixmap.setDevicePixelRatio(ratio)
+    pixmap.fill(widget.palette().window().color())
+    with QPainter(pixmap) as painter:
+        painter.setFont(widget.font())
+        widget.paint_picture(painter)
+    return pixmap
 
 
 def write_picture(widget: QWidget, path: Path) -> None:
@@ -45,7 +66,7 @@ def write_picture(widget: QWidget, path: Path) -> None:
     elif path.suffix.lower() == ".png":
         buffer = QBuffer()
         buffer.open(QIODevice.OpenModeFlag.WriteOnly)
-        widget.grab().save(buffer, "PNG")
+        pixmap_of(widget).save(buffer, "PNG")
         content = bytes(buffer.data().data())
     else:
         raise Sd2Error(
@@ -76,7 +97,7 @@ def picture_menu(
         part(menu, place)
         menu.addSeparator()
     clipboard = QGuiApplication.clipboard()
-    menu.addAction("&Copy picture", lambda: clipboard.setPixmap(widget.grab()))
+    menu.addAction("&Copy picture", lambda: clipboard.setPixmap(pixmap_of(widget)))
     menu.addAction("Copy as S&VG", lambda: copy_drawing(widget))
     menu.addAction("&Save picture…", lambda: save_picture(widget, _file_name(widget)))
     return menu

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from answering import answer
 from copied import copied_record
 from finding import named
 from PySide6.QtCore import QCoreApplication, QEvent, Qt
@@ -39,6 +40,7 @@ from sd2core.cli.batch import Batch
 from sd2core.mesh.vertex_parts import KINEMATICS
 from sd2core.placements.placements import PlacementGrid, write_placements
 from sd2core.recording.recording import open_recording
+from sd2core.sensor import VirtualSensor
 
 FAKE = Path(__file__).resolve().parents[2] / "fake_batch.py"
 
@@ -278,6 +280,26 @@ def test_a_batch_begins_with_planned_places_and_the_model_in_use(
         QTest.keyClick(choice, Qt.Key.Key_Down)
         assert choice.currentIndex() > before
     assert plan.plan().synthesise.limbs
+
+
+def test_unsaved_edits_are_asked_about_before_they_would_be_left_out(
+    opened, qtbot, recording_copy
+) -> None:
+    window = opened()
+    models = models_of(window)
+    dialog = begin(window)
+    ready(qtbot, models.batch)
+    models.edits.place_sensor(VirtualSensor(position_m=(0.5, 0.0, 0.0)))
+    asked: list[str] = []
+    answer(qtbot, "Cancel", asked)
+    click(dialog, "Start")
+    assert models.batch.run is None
+    answer(qtbot, "Save", asked)
+    click(dialog, "Start")
+    assert all("not saved" in one for one in asked)
+    assert len(asked) == 2
+    qtbot.waitUntil(lambda: models.batch.run is not None, timeout=20_000)
+    assert open_recording(recording_copy).sensor.position_m == (0.5, 0.0, 0.0)
 
 
 @pytest.mark.slow

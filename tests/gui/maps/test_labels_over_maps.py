@@ -36,6 +36,25 @@ def test_a_span_comes_and_goes_and_the_rest_stays(labelled) -> None:
     np.testing.assert_array_equal(picture(view), before)
 
 
+def test_labels_never_change_the_colours_of_a_map(labelled) -> None:
+    c = models_of(labelled)
+    view = next(one for one in labelled.findChildren(HeatmapView) if one.track is c.synthetic)
+    c.playback.seek(2.3)
+    c.labels.select([1])
+    plot = view.plot_rect().toRect()
+    rows = slice(plot.top() + 1, plot.bottom())
+    chosen = picture(view)
+    c.label_edits.delete()
+    without = picture(view)
+    columns = np.flatnonzero((chosen != without)[rows].any(axis=0))
+    edges_px = np.array([view.scale.x_of(time_s) for time_s in (0.2, 0.8)])
+    assert columns.size
+    assert (np.abs(columns[:, None] - edges_px) <= 1.5).any(axis=1).all(), "edges alone"
+    below = (chosen != without)[plot.bottom() + 1 : view.height()]
+    middle_px = round(edges_px.mean())
+    assert below[:, middle_px].any(), "the span is seen below the map"
+
+
 def test_a_map_that_changes_keeps_its_labels(labelled) -> None:
     c = models_of(labelled)
     view = next(one for one in labelled.findChildren(HeatmapView) if one.track is c.synthetic)

@@ -18,7 +18,7 @@ from sd2app.maps.arrangement import HEADER_PX, MIN_PX
 from sd2app.maps.radar_place import RadarPlaceBadge
 from sd2app.maps.spectrum import SpectrumView
 from sd2app.video.view import VideoView
-from sd2app.widgets.picture import write_picture
+from sd2app.widgets.picture import copy_drawing, pixmap_of, write_picture
 from sd2core.errors import Sd2Error
 from sd2core.sensor import VirtualSensor
 
@@ -215,6 +215,31 @@ def test_the_context_menu_reads_sets_and_plays(window, stack, qtbot):
     assert QGuiApplication.clipboard().image().width() >= view.width()
 
 
+def drawn_in(view) -> list[str]:
+    """Texts in the picture of a view as a drawing."""
+    copy_drawing(view)
+    root = ElementTree.fromstring(QGuiApplication.clipboard().text())
+    return [one.text for one in root.iter() if one.tag.endswith("text") and one.text]
+
+
+def test_a_picture_of_a_map_has_axes_with_units_a_scale_and_a_legend_and_no_read_out(
+    labelled, qtbot
+):
+    c, view = models_of(labelled), labelled.maps.synthetic
+    quiet = pixmap_of(view).toImage()
+    texts = drawn_in(view)
+    assert {"0 s", "1 s", "−30 dB", "0 dB", "there", "back"} <= set(texts)
+    # With the pointer on it, the clock elsewhere and a grip: the picture is the same.
+    qtbot.mouseMove(view, view.plot_rect().center().toPoint())
+    c.playback.seek_frame(40)
+    c.session.aligning.begin()
+    assert c.pointer.reading is not None
+    assert pixmap_of(view).toImage() == quiet
+    c.session.aligning.end()
+    c.display.set_levels(scale="linear")
+    assert "100 %" in drawn_in(view)
+
+
 def test_pictures_are_written(stack, tmp_path):
     for name in ("map.png", "map.svg"):
         write_picture(stack.synthetic, tmp_path / name)
@@ -224,7 +249,8 @@ def test_pictures_are_written(stack, tmp_path):
     copied = QGuiApplication.clipboard().mimeData()
     drawing = ElementTree.fromstring(bytes(copied.data("image/svg+xml").data()))
     assert drawing.tag.endswith("svg")
-    assert drawing.get("viewBox") == f"0 0 {stack.synthetic.width()} {stack.synthetic.height()}"
+    size = stack.synthetic.picture_size()
+    assert drawing.get("viewBox") == f"0 0 {size.width()} {size.height()}"
     assert ElementTree.fromstring(copied.text()).tag == drawing.tag
     with pytest.raises(Sd2Error, match=r"map\.bmp"):
         write_picture(stack.synthetic, tmp_path / "map.bmp")

@@ -105,7 +105,7 @@ def test_the_offset_is_found_shown_applied_and_taken_back(window, qtbot, motion)
         assert any(
             f"Best: {found_s:.3f} s" in mark.words for mark in dialog.findChild(ChartView).marks
         )
-        qtbot.mouseClick(button(dialog, "Apply"), Qt.MouseButton.LeftButton)
+        qtbot.mouseClick(button(dialog, "Align"), Qt.MouseButton.LeftButton)
 
     find(window, qtbot, apply)
     found_s = models.alignment.found.offset_s
@@ -133,7 +133,7 @@ def test_what_repeats_itself_cannot_be_applied(window, qtbot, motion):
 
     def look(dialog: AlignmentDialog) -> None:
         assert "No offset stands out" in words(dialog)
-        assert not button(dialog, "Apply").isEnabled()
+        assert not button(dialog, "Align").isEnabled()
 
     find(window, qtbot, look)
 
@@ -144,7 +144,7 @@ def test_farther_is_searched_when_it_is_typed(window, qtbot, motion):
 
     def type_more(dialog: AlignmentDialog) -> None:
         assert model.problem
-        assert not button(dialog, "Apply").isEnabled()
+        assert not button(dialog, "Align").isEnabled()
         box = dialog.findChild(NumberBox)
         qtbot.mouseClick(box.lineEdit(), Qt.MouseButton.LeftButton)
         box.selectAll()
@@ -153,7 +153,7 @@ def test_farther_is_searched_when_it_is_typed(window, qtbot, motion):
         qtbot.waitUntil(lambda: not model.busy and not model.problem, timeout=20_000)
         assert model.found.offset_s == pytest.approx(7.0, abs=0.01)
         assert dialog.isVisible()
-        qtbot.mouseClick(button(dialog, "Apply"), Qt.MouseButton.LeftButton)
+        qtbot.mouseClick(button(dialog, "Align"), Qt.MouseButton.LeftButton)
 
     find(window, qtbot, type_more)
     assert models_of(window).document.recording.radar_offset_s == pytest.approx(7.0, abs=0.01)

@@ -65,6 +65,7 @@ class MessagesDialog(QDialog):
         buttons = closing(self)
         clear = buttons.addButton("Clear", QDialogButtonBox.ButtonRole.ResetRole)
         clear.clicked.connect(messages.forget)
+        clear.setAutoDefault(False)
         self.setLayout(column_of(self.list, buttons))
         messages.changed.connect(self._refresh)
         self._refresh()
