@@ -42,7 +42,6 @@ class AlignmentDialog(QDialog):
         model.changed.connect(self._refresh)
         model.search()
         self._refresh()
-        self._apply.setFocus(Qt.FocusReason.OtherFocusReason)
         self.resize(560, 440)
 
     def _refresh(self) -> None:
@@ -50,7 +49,12 @@ class AlignmentDialog(QDialog):
         self._chart.show_chart(offset_chart(model))
         show_words(self._result, result_text(model))
         show_words(self._problem, model.problem)
-        self._apply.setEnabled(model.found is not None and not model.problem)
+        possible = model.found is not None and not model.problem
+        appears = possible and not self._apply.isEnabled()
+        self._apply.setEnabled(possible)
+        if appears and not self._within.hasFocus():
+            # While it could not be pressed, the keyboard went to Cancel.
+            self._apply.setFocus(Qt.FocusReason.OtherFocusReason)
 
 
 def offset_chart(model: AlignmentModel) -> Chart:

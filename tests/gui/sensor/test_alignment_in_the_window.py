@@ -105,7 +105,8 @@ def test_the_offset_is_found_shown_applied_and_taken_back(window, qtbot, motion)
         assert any(
             f"Best: {found_s:.3f} s" in mark.words for mark in dialog.findChild(ChartView).marks
         )
-        qtbot.mouseClick(button(dialog, "Align"), Qt.MouseButton.LeftButton)
+        assert button(dialog, "Align").isDefault()
+        qtbot.keyClick(dialog, Qt.Key.Key_Return)
 
     find(window, qtbot, apply)
     found_s = models.alignment.found.offset_s
