@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 FORMAT_VERSION = 1
 
-_OF = ": "
+OF = ": "
 """Between the name of a person and a part, in a scene of several."""
 
 _NOTHING, _MUTED = "#e9ebee", "#5a6370"
@@ -94,7 +94,7 @@ class LimbMaps:
     def of_persons(cls, each: Sequence[LimbMaps], persons: Sequence[str]) -> LimbMaps:
         """Join those of several persons, with their names in front; kinematics are of the first."""
         parts = [
-            f"{person}{_OF}{part}"
+            f"{person}{OF}{part}"
             for person, one in zip(persons, each, strict=True)
             for part in one.parts
         ]
@@ -103,13 +103,13 @@ class LimbMaps:
     @property
     def persons(self) -> tuple[str, ...]:
         """Names of the persons of a scene of several; empty of one alone."""
-        return tuple(dict.fromkeys(one.rpartition(_OF)[0] for one in self.parts if _OF in one))
+        return tuple(dict.fromkeys(one.rpartition(OF)[0] for one in self.parts if OF in one))
 
     def shown(self, part: str) -> NDArray[np.float32] | None:
         """Map (bins, frames) of a part, or of all parts of a person; None if there is none."""
         if part in self.parts:
             return self.values[self.parts.index(part)]
-        rows = [one.startswith(f"{part}{_OF}") for one in self.parts]
+        rows = [one.startswith(f"{part}{OF}") for one in self.parts]
         return self.values[rows].sum(axis=0) if any(rows) else None
 
     def inputs(self, parts: Sequence[str]) -> NDArray[np.float32]:
@@ -140,7 +140,7 @@ class LimbMaps:
     @property
     def _of_first(self) -> tuple[str, ...]:
         """Parts of the first person, without the name."""
-        first = f"{self.persons[0]}{_OF}" if self.persons else ""
+        first = f"{self.persons[0]}{OF}" if self.persons else ""
         return tuple(one[len(first) :] for one in self.parts if one.startswith(first))
 
     def _moving(self) -> NDArray[np.float32]:

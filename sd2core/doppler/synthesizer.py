@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -385,10 +386,14 @@ class Synthesizer:
             notes += [of + note for note in _body_notes(one.prepared, sensor, start, stop)]
         return notes
 
-    def _described(self) -> list[dict[str, str]]:
-        """Persons of the scene and the origins of their meshes, for provenance."""
+    def _described(self) -> list[dict[str, Any]]:
+        """Persons of the scene, origins and places of their meshes, for provenance."""
         return [
-            {"person": person, "source": body.source}
+            {
+                **({} if body.placed is None else asdict(body.placed)),
+                "person": person,
+                "source": body.source,
+            }
             for person, body in zip(self.mesh.persons, self.mesh.bodies, strict=True)
         ]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.files.digests import signature
+from sd2core.files.paths import files_at
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.bodies import MAX_BODIES, Body
 from sd2core.mesh.made_vertices import MadeVertices
@@ -42,6 +45,8 @@ def with_bodies(
     mesh: MeshSequence, bodies: Iterable[Body], *, person: str | None = None
 ) -> MeshSequence:
     """Put other bodies into the scene of a mesh, in place of those that were there.
+
+    One that is there already, in the same place, stays as it is.
 
     They are brought to the times of the mesh: a file of the same times is taken as it is, another
     is interpolated, and nobody is there before its first frame and after its last one. Maps are
@@ -80,14 +85,19 @@ def with_bodies(
         raise Sd2Error(f"There are {len(named)} more bodies", f"up to {MAX_BODIES}")
     if mesh.faces is None:
         raise _no_surface(mesh.source or "The mesh")
-    return replace(first, others=tuple(_placed(body, mesh) for body in named))
+    there = [other for other in mesh.others if other.placed is not None]
+    others = []
+    for body in named:
+        same = (other for other in there if other.placed == body)
+        others.append(next(same, None) or _placed(body, mesh))
+    return replace(first, others=tuple(others))
 
 
 def _placed(body: Body, first: MeshSequence) -> MeshSequence:
     """Body of a file, in its place and at the times of the first."""
     path = Path(body.path)
     try:
-        own = load_mesh(path, **body.reading)
+        own = _read(path, tuple(body.reading.items()), str(signature(files_at(path))))
     except Sd2Error as error:
         if path.exists():
             raise
@@ -109,7 +119,13 @@ def _placed(body: Body, first: MeshSequence) -> MeshSequence:
             f"some within those of the first body, {spans[1]}",
             "Shift it in time",
         )
-    return replace(moved(on_clock, own, body), person=body.person, surroundings=None)
+    return replace(moved(on_clock, own, body), person=body.person, surroundings=None, placed=body)
+
+
+@lru_cache(maxsize=4)
+def _read(path: Path, reading: tuple[tuple[str, Any], ...], _signature: str) -> MeshSequence:
+    """Mesh of a file, kept while it is moved about; another signature is of another content."""
+    return load_mesh(path, **dict(reading))
 
 
 def moved(mesh: MeshSequence, own: MeshSequence, body: Body) -> MeshSequence:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.mesh.bodies import Body
 from sd2core.mesh.presence import Presence, checked
 from sd2core.mesh.things import Surroundings
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
@@ -65,6 +66,8 @@ class MeshSequence:
         :func:`sd2core.io.bodies.with_bodies`.
     person : str
         Name of the person in a scene of several.
+    placed : Body, optional
+        Where one of the others comes from, and how it was put there.
 
     Examples
     --------
@@ -94,6 +97,7 @@ class MeshSequence:
     surroundings: Surroundings | None = None
     others: tuple[MeshSequence, ...] = ()
     person: str = ""
+    placed: Body | None = None
 
     def __post_init__(self) -> None:
         shape = tuple(self.vertices.shape)

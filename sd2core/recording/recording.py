@@ -285,6 +285,14 @@ class Recording:
         )
 
     @property
+    def bodies_there(self) -> tuple[Body, ...]:
+        """Those of the other bodies whose meshes are where the recording says."""
+        missing = self.missing()
+        return tuple(
+            one for index, one in enumerate(self.bodies) if body_role(index) not in missing
+        )
+
+    @property
     def labelled(self) -> Labels:
         """The labels, wherever they are stored."""
         return labels_of(self.spans) if self.labels is None else self.labels

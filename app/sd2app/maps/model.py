@@ -192,7 +192,7 @@ class SynthesisModel(QObject):
         self._follow()
 
     def _recount(self) -> None:
-        """Count another way or among other things, at the same 0 dB.
+        """Count another way or among other things and people, at the same 0 dB.
 
         What was made before stays until it is replaced.
         """
@@ -200,7 +200,8 @@ class SynthesisModel(QObject):
         if synthesizers is None or document.mesh is None:
             return
         before, mesh = synthesizers.mesh, document.mesh
-        moved = mesh.vertices is before.vertices and mesh.surroundings is not before.surroundings
+        around = [(one.surroundings, one.others) for one in (mesh, before)]
+        moved = mesh.vertices is before.vertices and around[0] != around[1]
         if synthesizers.options.count == document.count and not moved:
             return
         self._stop()

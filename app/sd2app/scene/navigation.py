@@ -64,7 +64,7 @@ class Navigator:
         self.hovers_sensor = False  # the pointer is over the sensor
         self.marker: int | None = None  # number of the planned place under the pointer
         self._button: Qt.MouseButton | None = None
-        self.thing: int | None = None  # number of the thing under the pointer
+        self.thing: int | None = None  # number of the thing or body under the pointer
         self._held: _Held | None = None
         self._held_thing: _HeldThing | None = None
         self._moving: Literal["orbit", "pan"] | None = None
@@ -96,11 +96,11 @@ class Navigator:
         return self._held_thing is not None
 
     def thing_at(self, x_px: float, y_px: float) -> tuple[int, Vector] | None:
-        """Number of the thing under the pointer, and where; not if the body is before it."""
+        """Number of the thing or other body under the pointer; not if the first is before it."""
         scene, pose = self._scene, self._scene.pose
-        if not scene.things.surfaces or self.sensor_at(x_px, y_px):
+        if self.sensor_at(x_px, y_px):
             return None
-        found = scene.things.under(pose.position, pose.ray(x_px, y_px))
+        found = scene.movable_under(x_px, y_px)
         if found is None or not scene.mesh_shown:
             return found
         x, y, depth = pose.project(scene.body.points).T
@@ -181,7 +181,7 @@ class Navigator:
             self._show_hot()
         if self._held_thing is not None:
             held, self._held_thing = self._held_thing, None
-            self._edits.move_thing(held.number, triple(held.moved_m))
+            self._edits.move_numbered(held.number, triple(held.moved_m))
             self._show_hot()
 
     def look_again(self) -> None:
@@ -232,7 +232,7 @@ class Navigator:
             at = drag_level(now, pose, x_px, y_px)
         if at is not None:
             held.moved_m = at - held.at_m
-            self._scene.things.shift(held.number, held.moved_m)
+            self._scene.shift_movable(held.number, held.moved_m)
             self._changed()
 
     def _look(self, x_px: float, y_px: float) -> None:
@@ -248,7 +248,7 @@ class Navigator:
     def _show_hot(self) -> None:
         self._scene.set_hot(self.hovers_sensor or self._held is not None)
         held = self._held_thing
-        self._scene.things.set_hot(self.thing if held is None else held.number)
+        self._scene.set_hot_movable(self.thing if held is None else held.number)
         self._changed()
 
 

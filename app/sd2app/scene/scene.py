@@ -15,6 +15,7 @@ from sd2app.scene.body import Extent
 from sd2app.scene.camera import EyePose, Margins, Preset, triple
 from sd2app.scene.colours import Colouring, SceneColours, fractions, mesh_colours, range_limits
 from sd2app.scene.parts import Body, GroundGrid, InertialMarkers, Markers, SensorGlyph, Shape
+from sd2app.scene.people import People
 from sd2app.scene.things import Things
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.things import Surface
@@ -64,6 +65,7 @@ class Scene:
         self.markers = Markers(renderer, self.colours)
         self.inertial = InertialMarkers(renderer)
         self.things = Things(renderer)
+        self.people = People(renderer)
         self._inertial_rows = np.zeros(0, np.intp)
         self._set_extent(_NOTHING)
         self.set_colours(self.colours)
@@ -147,6 +149,36 @@ class Scene:
         self._framed = None
         self._lay_ground()
 
+    def set_people(self, meshes: tuple[MeshSequence, ...], frame: int) -> None:
+        """Show the bodies beside the first one."""
+        self.people.set_meshes(meshes, frame, self.extent.floor_m)
+        self._framed = None
+        self._lay_ground()
+
+    def movable_under(self, x_px: float, y_px: float) -> tuple[int, NDArray[np.float64]] | None:
+        """Number of the thing or other body at a pixel, and where; bodies count on after things."""
+        eye_m, ray = self.pose.position, self.pose.ray(x_px, y_px)
+        thing, person = self.things.under(eye_m, ray), self.people.under(eye_m, ray)
+        if person is not None:
+            person = person[0] + len(self.things.surfaces), person[1]
+        found = [one for one in (thing, person) if one is not None]
+        return min(found, key=lambda one: float(np.linalg.norm(one[1] - eye_m)), default=None)
+
+    def shift_movable(self, number: int, offset_m: NDArray[np.float64]) -> None:
+        """Draw a thing or another body elsewhere than it is."""
+        things = len(self.things.surfaces)
+        if number < things:
+            self.things.shift(number, offset_m)
+        else:
+            self.people.shift(number - things, offset_m)
+
+    def set_hot_movable(self, number: int | None) -> None:
+        """Light up a thing or another body."""
+        things = len(self.things.surfaces)
+        on_thing = number is not None and number < things
+        self.things.set_hot(number if on_thing else None)
+        self.people.set_hot(None if number is None or on_thing else number - things)
+
     def set_inertial(self, vertices: Iterable[int]) -> None:
         """Show inertial sensors on vertices of the mesh."""
         self._inertial_rows = np.array(list(vertices), np.intp)
@@ -167,6 +199,7 @@ class Scene:
         self.markers.set_colours(colours)
         self.inertial.set_colours(colours)
         self.things.set_colours(colours)
+        self.people.set_colours(colours)
         self.body.shadow.GetProperty().SetColor(*fractions(colours.shadow))
         self._stale_colours = True
 
@@ -201,6 +234,7 @@ class Scene:
             points.append(_box(sensor, 0.25))
             points.append(np.array([[sensor[0], body.floor_m, sensor[2]]]))
         points += [self._near(self.markers.positions_m), self._near(self.things.points_m)]
+        points.append(self._near(self.people.points_m))
         return np.concatenate(points)
 
     @property
@@ -367,7 +401,7 @@ class Scene:
         for place in (np.zeros(3), np.asarray(self.sensor.position_m)):
             if np.linalg.norm(self.extent.centre_m - place) < _FAR_OFF_M:
                 low, high = np.minimum(low, place), np.maximum(high, place)
-        for places in (self.markers.positions_m, self.things.points_m):
+        for places in (self.markers.positions_m, self.things.points_m, self.people.points_m):
             if len(near := self._near(places)):
                 low, high = np.minimum(low, near.min(axis=0)), np.maximum(high, near.max(axis=0))
         covered = shapes.grid_rectangle(low[[0, 2]], high[[0, 2]])

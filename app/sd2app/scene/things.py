@@ -77,7 +77,7 @@ class Things:
         self, eye_m: NDArray[np.float64], ray: NDArray[np.float64]
     ) -> tuple[int, NDArray[np.float64]] | None:
         """Number of the nearest thing that a ray meets, and where; None if it meets none."""
-        met = [_first_meeting(eye_m, ray, *surface) for surface in self.surfaces]
+        met = [first_meeting(eye_m, ray, *surface) for surface in self.surfaces]
         if not met or not np.isfinite(nearest := min(met)):
             return None
         return met.index(nearest), eye_m + nearest * ray
@@ -98,7 +98,7 @@ def sharp_edges(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> N
     return unique[bent | (counts != 2)].astype(np.int32)
 
 
-def _first_meeting(
+def first_meeting(
     eye_m: NDArray[np.float64],
     ray: NDArray[np.float64],
     vertices: NDArray[np.float64],

@@ -84,6 +84,7 @@ class SceneView(QWidget):
         self._planned: object = None
         self._dragged = False
         self._around: Surroundings | None = None
+        self._others: tuple[MeshSequence, ...] = ()
         self._backend.widget.installEventFilter(self)
         self._followed = (
             (session.display.theme_changed, self._follow_theme),
@@ -282,13 +283,17 @@ class SceneView(QWidget):
 
     def _follow_things(self) -> None:
         mesh = self._session.document.mesh
-        around = None if mesh is None else mesh.surroundings
-        if around is not self._around:
-            self._around = around
-            self.scene.set_things(() if around is None else around.surfaces)
-            self.overlay.thing_names = [] if around is None else [one.name for one in around.things]
-            self.navigator.look_again()
-            self.request_render()
+        around, others = (None, ()) if mesh is None else (mesh.surroundings, mesh.others)
+        if around is self._around and others == self._others:
+            return
+        self._around, self._others = around, others
+        self.scene.set_things(() if around is None else around.surfaces)
+        with self._explaining():
+            self.scene.set_people(others, self._frame or 0)
+        named = [] if around is None else [one.name for one in around.things]
+        self.overlay.thing_names = named + ([] if mesh is None else list(mesh.persons[1:]))
+        self.navigator.look_again()
+        self.request_render()
 
     def _follow_inertial(self) -> None:
         self.scene.set_inertial(self._inertial.vertices.values())
@@ -316,11 +321,13 @@ class SceneView(QWidget):
         frame = mesh.timebase.frame_at(time_s)
         covered, someone = mesh.timebase.covers(time_s), bool(mesh.presence.there[frame])
         self.scene.show_mesh(covered and someone)
+        anybody = any(bool(body.presence.there[frame]) for body in mesh.bodies)
         why = "No person at this time" if covered else "No mesh at this time"
-        self.overlay.message = "" if covered and someone else why
+        self.overlay.message = "" if covered and anybody else why
         if frame != self._frame:
             self._frame = frame
             self.scene.set_vertices(mesh.frame(frame))
+        self.scene.people.show_frame(frame, covered)
         if self._stale_scattering:
             self._fetch_scattering()
 

@@ -12,6 +12,7 @@ from sd2app.feature import Action, Feature, Shell
 from sd2app.maps.model import SynthesisModel
 from sd2app.sensor.alignment import AlignmentModel
 from sd2app.sensor.alignment_dialog import AlignmentDialog
+from sd2app.sensor.bodies_page import BodiesPage
 from sd2app.sensor.panel import SensorPanel
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.sensor.placements_page import PlacementsPage
@@ -68,6 +69,11 @@ class SensorFeature(Feature):
                 lambda: self._shell.bring_up("Sensor", "Things"),
             ),
             Action(
+                "bodies", "Edit", "Bodies…", (),
+                "Put somebody else into the scene, whose mesh is in another file",
+                lambda: self._shell.bring_up("Sensor", "Bodies"),
+            ),
+            Action(
                 "align", "Edit", "Align automatically…", (),
                 "Find the time offset of the radar by the motion that mesh and radar both show",
                 self._align, lambda: not alignment.why_not, why_not=lambda: alignment.why_not,
@@ -110,10 +116,12 @@ class SensorFeature(Feature):
         )
         placements = PlacementsPage(self.placements, self._accuracy, shell, self._make_batch)
         things = ThingsPage(self._session, self._synthesis, shell.warn)
+        bodies = BodiesPage(self._session, shell.warn)
         return {
             "Sensor": paged_panel(
                 InnerPage("Sensor", "Where the sensor is and what it sees", sensor),
                 InnerPage("Placements", "Many places around the body, for a map each", placements),
                 InnerPage("Things", "What stands around the body, and hides it", things),
+                InnerPage("Bodies", "Who else moves in the scene", bodies),
             )
         }

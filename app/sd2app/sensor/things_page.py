@@ -93,7 +93,7 @@ class ThingsPage(QWidget):
         body = self._synthesis.torso_m or (0.0, 0.0, 2.0)
         x, _, z = np.mean([body, self._session.sensor.sensor.position_m], axis=0).round(2).tolist()
         floor_m = round(float(mesh.frame(0)[:, 1].max()), 2)
-        self._take(lambda: Thing(shape, (x, floor_m, z)), self._session.edits.add_thing)
+        self._take(lambda: Thing(shape, (x, floor_m, z)), self._session.edits.add_to_scene)
 
     def _type(self) -> None:
         number, things = self._current, self._things
@@ -114,7 +114,7 @@ class ThingsPage(QWidget):
             edits = self._session.edits
             self._take(
                 lambda: replace(thing, **changes),  # type: ignore[arg-type]
-                lambda changed: edits.change_thing(number, changed),
+                lambda changed: edits.change_in_scene(number, changed),
             )
 
     def _take(self, make: Callable[[], Thing], use: Callable[[Thing], None]) -> None:
@@ -131,7 +131,7 @@ class ThingsPage(QWidget):
 
     def _remove_thing(self) -> None:
         if 0 <= self._current < len(self._things):
-            self._session.edits.remove_thing(self._current)
+            self._session.edits.remove_from_scene(self._current, self._things[self._current])
 
     # --- showing --------------------------------------------------------------------------
 

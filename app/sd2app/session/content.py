@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -162,7 +162,8 @@ def load_content(recording: Recording, progress: Progress) -> Content:
         )
 
     video = attempt(recording.video, lambda: recording.open_video(step(0)))
-    mesh = attempt(recording.mesh, lambda: recording.load_mesh(step(1)))
+    whole = replace(recording, bodies=recording.bodies_there)
+    mesh = attempt(recording.mesh, lambda: whole.load_mesh(step(1)))
     capture = recorded = None
     if recording.holds_radar_map:
         recorded = attempt(recording.radar, recording.load_radar_map)

@@ -27,6 +27,7 @@ from sd2app.session.mesh_reading import MeshReader, ReadMesh, mesh_fields
 from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
 from sd2core.errors import Cure, Sd2Error
+from sd2core.io.bodies import with_bodies
 from sd2core.io.things import with_things
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
@@ -349,17 +350,21 @@ class DocumentModel(QObject):
         self._offer(read.offers)
 
     def _surround(self) -> None:
-        """Put the recording's things around its mesh."""
+        """Put the recording's things and other bodies around its mesh."""
         content = self.content
         if content is None or content.mesh is None:
             return
-        around, things = content.mesh.surroundings, content.recording.things
-        if things == (() if around is None else around.things):
-            return
+        mesh, recording = content.mesh, content.recording
+        around = mesh.surroundings
         try:
-            self.content = replace(content, mesh=with_things(content.mesh, things))
+            there = recording.bodies_there if recording.bodies or mesh.others else ()
+            if there != tuple(body.placed for body in mesh.others):
+                mesh = with_bodies(mesh, there, person=recording.subject)
+            if recording.things != (() if around is None else around.things):
+                mesh = with_things(mesh, recording.things)
         except Sd2Error as error:
             self.failed.emit(str(error))
+        self.content = replace(content, mesh=mesh)
 
     def set_clutter(self, clutter: Clutter) -> None:
         """Remove static echoes another way."""

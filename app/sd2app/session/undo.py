@@ -16,6 +16,7 @@ from sd2app.session.maps import MapModel
 from sd2app.session.mesh_reading import ReadMesh
 from sd2app.session.sensor import SensorModel
 from sd2core.errors import Cure
+from sd2core.mesh.bodies import Body
 from sd2core.mesh.things import Thing
 from sd2core.options.synthesis import HowCounted
 from sd2core.placements.placements import Placements
@@ -130,35 +131,53 @@ class Edits:
             self.place_sensor(rest.pop("sensor"), "Restore sensor")
         self._change("Restore settings", rest)
 
-    # --- things -----------------------------------------------------------------------------
+    # --- things and bodies ------------------------------------------------------------------
 
-    def add_thing(self, thing: Thing) -> None:
-        """Put one more thing into the scene."""
-        self._set_things("Add", thing, (*self._things, thing))
+    def add_to_scene(self, one: Thing | Body) -> None:
+        """Put one more thing or body into the scene."""
+        self._set_in_scene("Add", one, lambda kept: (*kept, one))
 
-    def change_thing(self, number: int, thing: Thing, text: str = "Change") -> None:
-        """Replace a thing by another, or by itself at another place."""
-        things = self._things
-        self._set_things(text, thing, (*things[:number], thing, *things[number + 1 :]))
+    def change_in_scene(self, number: int, one: Thing | Body, text: str = "Change") -> None:
+        """Replace a thing or body by another, or by itself at another place."""
+        self._set_in_scene(text, one, lambda kept: (*kept[:number], one, *kept[number + 1 :]))
 
-    def move_thing(self, number: int, by_m: Vector) -> None:
-        """Move a thing."""
-        thing = self._things[number]
-        x, y, z = (round(a + b, 3) for a, b in zip(thing.position_m, by_m, strict=True))
-        self.change_thing(number, replace(thing, position_m=(x, y, z)), "Move")
+    def move_in_scene(self, number: int, one: Thing | Body, by_m: Vector) -> None:
+        """Move a thing or body."""
+        before_m = one.position_m if isinstance(one, Thing) else one.moved_m
+        x, y, z = (round(a + b, 3) for a, b in zip(before_m, by_m, strict=True))
+        moved = (
+            replace(one, position_m=(x, y, z))
+            if isinstance(one, Thing)
+            else replace(one, moved_m=(x, y, z))
+        )
+        self.change_in_scene(number, moved, "Move")
 
-    def remove_thing(self, number: int) -> None:
-        """Take a thing out of the scene."""
-        things = self._things
-        self._set_things("Remove", things[number], things[:number] + things[number + 1 :])
+    def move_numbered(self, number: int, by_m: Vector) -> None:
+        """Move a thing, or (counted on after the things) a body beside the first one."""
+        recording, mesh = self._document.recording, self._document.mesh
+        if recording is None or mesh is None:
+            return
+        if number < len(recording.things):
+            self.move_in_scene(number, recording.things[number], by_m)
+            return
+        body = mesh.others[number - len(recording.things)].placed
+        if body is not None:
+            self.move_in_scene(recording.bodies.index(body), body, by_m)
 
-    def _set_things(self, text: str, thing: Thing, things: tuple[Thing, ...]) -> None:
-        self._change(f"{text} {thing.name}", {"things": things})
+    def remove_from_scene(self, number: int, one: Thing | Body) -> None:
+        """Take a thing or body out of the scene."""
+        self._set_in_scene("Remove", one, lambda kept: kept[:number] + kept[number + 1 :])
 
-    @property
-    def _things(self) -> tuple[Thing, ...]:
+    def _set_in_scene(
+        self,
+        text: str,
+        one: Thing | Body,
+        change: Callable[[tuple[Any, ...]], tuple[Any, ...]],
+    ) -> None:
         recording = self._document.recording
-        return () if recording is None else recording.things
+        if recording is not None:
+            name = "things" if isinstance(one, Thing) else "bodies"
+            self._change(f"{text} {one.name}", {name: change(getattr(recording, name))})
 
     # --- inertial sensors -----------------------------------------------------------------
 

@@ -25,7 +25,7 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
         "any_command", "-", "recover_labels", "-", "quit",
     ),
     "Edit": (
-        "undo", "redo", "-", "placements", "things", "place_inertial", "align",
+        "undo", "redo", "-", "placements", "things", "bodies", "place_inertial", "align",
         "align_by_hand", "-",
         "preferences",
     ),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sd2core.errors import Sd2Error
+from sd2core.io import bodies
 from sd2core.io.bodies import load_scene, with_bodies
 from sd2core.io.mesh import save_mesh
 from sd2core.mesh.bodies import Body
@@ -40,6 +41,26 @@ def test_the_same_clock_and_place_are_taken_as_they_are(path: str) -> None:
     np.testing.assert_array_equal(other.read(0, 20), scene.read(0, 20))
     assert other.present is None
     assert with_bodies(scene, []).others == ()
+
+
+def test_who_stays_is_the_same_and_who_moves_is_not_read_again(
+    path: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    anna, bert = Body(path, (1, 0, 0)), Body(path, (2, 0, 0), person="bert")
+    scene = with_bodies(walker(), [anna, bert])
+    assert [other.placed for other in scene.others] == [anna, bert]
+
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError
+
+    with monkeypatch.context() as patched:
+        patched.setattr(bodies, "load_mesh", refuse)
+        again = with_bodies(scene, [Body(path, (3, 0, 0)), bert])
+    assert again.others[1] is scene.others[1]
+    np.testing.assert_allclose(again.others[0].frame(3) - scene.others[0].frame(3), [[2, 0, 0]] * 4)
+    # A file that was written over is read again.
+    save_mesh(walker(21), path)
+    np.testing.assert_array_equal(with_bodies(walker(21), [anna]).others[0].presence.there, True)
 
 
 def test_placed_and_turned_about_its_own_middle(path: str) -> None:

@@ -100,7 +100,7 @@ def test_a_wall_is_added_typed_and_undone_and_the_map_follows(window, qtbot):
 
 def test_it_is_dragged_on_its_level_and_with_shift_upwards(window, qtbot):
     models = models_of(window)
-    models.edits.add_thing(Thing("box", (0.6, 0.3, 1.2), 20.0, (0.3, 0.3, 0.3)))
+    models.edits.add_to_scene(Thing("box", (0.6, 0.3, 1.2), 20.0, (0.3, 0.3, 0.3)))
     view = window.findChild(SceneView)
     scene, stack = view.scene, models.document.undo_stack
     qtbot.waitUntil(lambda: scene.pose.size_px == (view.width(), view.height()), timeout=5_000)

@@ -1,0 +1,144 @@
+"""Other people in the real window: added, typed, named, dragged by the mouse, undone, kept."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QFileDialog, QLineEdit, QToolButton
+from window_models import models_of
+
+from sd2app.maps.limbs import LimbMenu
+from sd2app.scene.view import SceneView
+from sd2app.sensor.bodies_page import BodiesPage
+from sd2app.widgets.inputs import NumberBox
+from sd2core.doppler import Synthesizer
+from sd2core.mesh.bodies import Body
+from sd2core.recording.recording import open_recording
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+def page_of(window) -> BodiesPage:
+    window.bring_up("Sensor", "Bodies")
+    return window.findChild(BodiesPage)
+
+
+def press(window, text: str) -> None:
+    buttons = page_of(window).findChildren(QToolButton)
+    QTest.mouseClick(next(one for one in buttons if one.text() == text), LEFT)
+
+
+def type_into(window, tip: str, text: str) -> None:
+    page = page_of(window)
+    boxes = [*page.findChildren(NumberBox), *page.findChildren(QLineEdit)]
+    box = next(box for box in boxes if tip in box.accessibleName())
+    box.setFocus()
+    box.selectAll()
+    QTest.keyClicks(box, text)
+    QTest.keyClick(box, Qt.Key.Key_Return)
+
+
+def bodies(window) -> tuple[Body, ...]:
+    return models_of(window).document.recording.bodies
+
+
+def shown(window, qtbot) -> np.ndarray:
+    """Values of the map once it is final."""
+    models = models_of(window)
+    qtbot.waitUntil(lambda: models.synthesis.complete, timeout=20_000)
+    return models.session.maps.synthetic.values.copy()
+
+
+def test_a_second_body_is_added_moved_named_and_undone(window, qtbot):
+    models = models_of(window)
+    document = models.document
+    alone = shown(window, qtbot)
+    press(window, "Add a copy")
+    (copy,) = bodies(window)
+    assert copy.moved_m == (0.8, 0, 0)
+    assert document.undo_stack.undoText().startswith("Add ")
+    type_into(window, "x: to the right", "1.5")
+    type_into(window, "z: forward", "0.4")
+    type_into(window, "Turn", "90")
+    type_into(window, "Name", "anna")
+    (moved,) = bodies(window)
+    assert (moved.moved_m, moved.turn_deg, moved.person) == ((1.5, 0, 0.4), 90, "anna")
+    assert document.mesh.persons == ("person 1", "anna")
+    both = shown(window, qtbot)
+    assert not np.array_equal(both, alone)
+    maker = models.synthesis.made_by()[0]()
+    made = Synthesizer(document.mesh, maker.options).map(models.sensor.sensor)
+    np.testing.assert_array_equal(made.values, both)
+    view = window.findChild(SceneView)
+    assert len(view.scene.people.meshes) == 1
+    for _ in range(5):
+        window.action("undo").trigger()
+    assert bodies(window) == ()
+    assert document.mesh.others == ()
+    np.testing.assert_array_equal(shown(window, qtbot), alone)
+    assert view.scene.people.meshes == ()
+    window.action("redo").trigger()
+    press(window, "Remove")
+    assert bodies(window) == ()
+
+
+def test_one_person_of_two_is_shown_alone(window, qtbot):
+    models = models_of(window)
+    alone = shown(window, qtbot)
+    press(window, "Add a copy")
+    type_into(window, "x: to the right", "3")
+    both = shown(window, qtbot)
+    menu = window.findChild(LimbMenu) or LimbMenu(models.limbs, window)
+    menu.aboutToShow.emit()
+    offered = {action.text().replace("&", ""): action for action in menu.actions()}
+    assert list(offered)[:3] == ["Everybody", "person 1", "person 2"]
+    offered["person 1"].trigger()
+    qtbot.waitUntil(lambda: models.synthesis.complete and models.synthesis.split, timeout=20_000)
+    first = models.session.maps.synthetic.values
+    np.testing.assert_allclose(first, alone, atol=1e-6 * alone.max())
+    models.limbs.show("person 2")
+    second = models.session.maps.synthetic.values
+    np.testing.assert_allclose(first + second, both, atol=1e-6 * both.max())
+
+
+def test_it_is_dragged_on_the_floor_and_kept(window, qtbot, tmp_path):
+    models = models_of(window)
+    press(window, "Add a copy")
+    view = window.findChild(SceneView)
+    scene, stack = view.scene, models.document.undo_stack
+    qtbot.waitUntil(lambda: scene.pose.size_px == (view.width(), view.height()), timeout=5_000)
+    qtbot.wait(300)  # until the view shows both
+    middle = scene.people.points_m.mean(axis=0)
+    x, y, _ = scene.pose.project(middle)[0]
+    start = QPoint(round(x), round(y))
+    widget = view.childAt(start)
+    QTest.mouseMove(widget, start)
+    assert view.navigator.thing == 0
+    (before,) = bodies(window)
+    count = stack.count()
+    QTest.mousePress(widget, LEFT, Qt.KeyboardModifier.NoModifier, start)
+    for part in (0.5, 1.0):
+        QTest.mouseMove(widget, start + QPoint(40, 15) * part)
+    QTest.mouseRelease(widget, LEFT, Qt.KeyboardModifier.NoModifier, start + QPoint(40, 15))
+    (after,) = bodies(window)
+    assert after.moved_m[1] == before.moved_m[1]
+    by = np.subtract(after.moved_m, before.moved_m)
+    assert np.linalg.norm(by) > 0.05
+    assert stack.count() == count + 1
+    np.testing.assert_allclose(
+        models.document.mesh.others[0].frame(0).mean(axis=0) - middle, by, atol=2e-3
+    )
+    models.document.save_as(tmp_path / "duo.sd2")
+    assert open_recording(tmp_path / "duo.sd2").bodies == (after,)
+
+
+def test_a_file_that_is_no_body_is_not_taken(window, tmp_path, monkeypatch: pytest.MonkeyPatch):
+    path = tmp_path / "points.npz"
+    np.savez(path, vertices=np.zeros((5, 4, 3)), times_s=np.arange(5) / 30)
+    monkeypatch.setattr(
+        QFileDialog, "getOpenFileName", lambda *_, **__: (str(path), ""), raising=True
+    )
+    press(window, "Add file…")
+    assert bodies(window) == ()
