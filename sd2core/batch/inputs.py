@@ -22,6 +22,7 @@ from sd2core.files.paths import files_at, is_there
 from sd2core.files.texts import read_json
 from sd2core.mesh.bodies import Body
 from sd2core.mesh.things import Thing
+from sd2core.mesh.walls import Wall
 from sd2core.sensor import Vector, VirtualSensor
 
 if TYPE_CHECKING:
@@ -274,7 +275,8 @@ def open_mesh(path: Path, faces: str | None, reading: Mapping[str, Any]) -> Mesh
     }
     things = (one if isinstance(one, Thing) else Thing(**one) for one in told.pop("things", ()))
     bodies = (one if isinstance(one, Body) else Body(**one) for one in told.pop("bodies", ()))
-    return load_scene(path, bodies=bodies, faces=faces, things=things, **told)
+    walls = (one if isinstance(one, Wall) else Wall(**one) for one in told.pop("walls", ()))
+    return load_scene(path, bodies=bodies, faces=faces, things=things, walls=walls, **told)
 
 
 def _bytes_in_memory(path: Path) -> int:

@@ -29,17 +29,18 @@ from sd2core.options.shared import Channel, Json, Looking, MeshReading
 if TYPE_CHECKING:
     from sd2core.mesh.bodies import Body
     from sd2core.mesh.things import Thing
+    from sd2core.mesh.walls import Wall
     from sd2core.recording.recording import Recording
     from sd2core.sensor import VirtualSensor
 
 _VERTICES = "mesh.zarr"
 _CHANNEL = ("receiver", "transmitter")
 _ABOUT_THE_BODY = ("range_m", "azimuth_deg", "elevation_deg")
+_SEVERAL = ("things", "bodies", "walls")
 _LEFT_OUT = {
     **{name: name for name in ("video", "mesh", "radar", "imu", "denoiser")},
     **{name: f"radar_{name}" for name in _CHANNEL},
-    "things": "things",
-    "bodies": "bodies",
+    **{name: name for name in _SEVERAL},
 }
 """What `sd2 set --without` names, and the fields that it empties."""
 
@@ -131,9 +132,13 @@ class Set(Content, SensorPlace, Json):
         who else moves in the scene, in place of who did: a mesh or another recording's, how far
         it is moved from where it is, degrees about the vertical, and seconds later; again for
         another
+    wall : DIRECTION@M[,DB]
+        what mirrors waves, in place of what did: a floor, a ceiling, a wall ahead, behind, left or
+        right of the camera, or in a direction in degrees to the right, how far away it is, and the
+        loss of a reflection; again for another
     without : LIST
         take out what is named, some of video, mesh, radar, imu, denoiser, receiver, transmitter,
-        things, bodies
+        things, bodies, walls
     anonymise : HOW
         after a fit, in the recording's own video: cover the head (blur), or delete it (drop); what
         is covered or deleted is gone
@@ -142,6 +147,7 @@ class Set(Content, SensorPlace, Json):
     recording: Annotated[Path, ARGUMENT]
     thing: Annotated[tuple[str, ...], Place(many="again")] = ()
     body: Annotated[tuple[str, ...], Place(many="again")] = ()
+    wall: Annotated[tuple[str, ...], Place(many="again")] = ()
     without: Names = ()
     anonymise: Literal["blur", "drop"] | None = None
 
@@ -294,6 +300,7 @@ def _set(options: Set) -> None:
       sd2 set walk.sd2 --anonymise blur
       sd2 set walk.sd2 --thing table@0,1.1,1.5,20 --thing chair.obj@0.8,1.1,2
       sd2 set walk.sd2 --body anna=anna.npz@0.8,0,0.5,90 --body bert.sd2
+      sd2 set walk.sd2 --wall floor@1.1 --wall right@2,6
     """
     from sd2core.cli.info.description import describe_parts, describe_recording, show
     from sd2core.cli.reading import mesh_reading, refuse_unused_mesh_options
@@ -305,11 +312,13 @@ def _set(options: Set) -> None:
     if is_bundled(recording.folder):
         raise Sd2Error(f"{recording.folder} comes with the program", "a recording of your own")
     for name in options.without:
-        setattr(recording, _LEFT_OUT[name], () if name in ("things", "bodies") else None)
+        setattr(recording, _LEFT_OUT[name], () if name in _SEVERAL else None)
     if options.body:
         recording.bodies = tuple(map(_body, options.body))
     if options.thing:
         recording.things = tuple(map(_thing, options.thing))
+    if options.wall:
+        recording.walls = tuple(map(_wall, options.wall))
     for name, value in _content(options).items():
         if isinstance(value, Path) and not value.exists():
             raise Sd2Error(f"The {name} {value} does not exist", "a file or folder")
@@ -385,6 +394,25 @@ def _body(text: str) -> Body:
             )
         path, person, reading = of.mesh, person or of.subject, of.mesh_reading.options()
     return Body(str(path), (x, y, z), turn_deg, start_s, person, reading)
+
+
+def _wall(text: str) -> Wall:
+    """Wall as it is typed."""
+    from sd2core.mesh.walls import DIRECTIONS, Wall
+
+    direction, _, rest = text.rpartition("@")
+    try:
+        numbers = tuple(map(float, rest.split(",")))
+        azimuth_deg, elevation_deg = DIRECTIONS.get(direction) or (float(direction), 0.0)
+    except ValueError:
+        numbers = ()
+    if len(numbers) not in (1, 2):
+        known = ", ".join(DIRECTIONS)
+        raise Sd2Error(
+            f"--wall is {text!r}", f"DIRECTION@M[,DB] with one of {known}, or degrees, e.g. right@2"
+        )
+    loss_db = numbers[1] if len(numbers) == 2 else Wall.loss_db
+    return Wall(numbers[0], azimuth_deg, elevation_deg, loss_db)
 
 
 def _anonymise(folder: Path, how: Literal["blur", "drop"]) -> None:

@@ -96,6 +96,17 @@ class ThingEntry(BaseModel):
     size_m: tuple[FiniteFloat, FiniteFloat, FiniteFloat] | None = None
 
 
+class WallEntry(BaseModel):
+    """Fields of :class:`sd2core.mesh.walls.Wall`."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    distance_m: FiniteFloat
+    azimuth_deg: FiniteFloat = 0.0
+    elevation_deg: FiniteFloat = 0.0
+    loss_db: FiniteFloat
+
+
 class MeshReading(BaseModel):
     """Options for reading a mesh file; see :func:`sd2core.io.mesh.load_mesh`."""
 
@@ -181,6 +192,7 @@ class Document(BaseModel):
     placements: dict[str, Any] | None = None
     things: tuple[ThingEntry, ...] = ()
     bodies: tuple[BodyEntry, ...] = ()
+    walls: tuple[WallEntry, ...] = ()
     spans: tuple[Span, ...] = ()
 
 

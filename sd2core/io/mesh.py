@@ -33,9 +33,10 @@ from sd2core.io.mesh_files import (
 from sd2core.io.mesh_models import is_estimate, read_model_output
 from sd2core.io.readers import MESH_FILES, FileReader, MeshHints, plug_in_for
 from sd2core.io.stored_vertices import StoredVertices, real_type
-from sd2core.io.things import with_things
+from sd2core.io.things import with_things, with_walls
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.things import Thing
+from sd2core.mesh.walls import Wall
 from sd2core.progress import Progress, silent
 from sd2core.timebase import Timebase
 
@@ -58,6 +59,7 @@ def load_mesh(
     turn: Turn | None = None,
     body_model: Path | str | None = None,
     things: Iterable[Thing] = (),
+    walls: Iterable[Wall] = (),
     progress: Progress = silent,
 ) -> MeshSequence:
     """Read a mesh sequence or point cloud.
@@ -95,6 +97,8 @@ def load_mesh(
         program in TorchScript, which is run (docs/formats.md).
     things : iterable of Thing
         What stands still around it, as for :func:`~sd2core.io.things.with_things`.
+    walls : iterable of Wall
+        What mirrors waves, as for :func:`~sd2core.io.things.with_walls`.
     progress : callable
         Called while files are read; may raise ``Cancelled``.
 
@@ -150,7 +154,7 @@ def load_mesh(
         known,
         tuple(raw.findings),
     )
-    return with_things(mesh, things)
+    return with_walls(with_things(mesh, things), walls)
 
 
 def save_mesh(mesh: MeshSequence, path: Path | str, progress: Progress = silent) -> None:

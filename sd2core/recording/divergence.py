@@ -19,6 +19,7 @@ WORDS = {
     "placements": "plan of placements",
     "things": "set of things",
     "bodies": "set of bodies",
+    "walls": "set of walls",
     "radar_offset_s": "offset of the radar",
     "radar_receiver": "receiver of the radar",
     "radar_transmitter": "transmitter of the radar",

@@ -21,7 +21,7 @@ _INERTIAL = ("imu", "imu_offset_s", "imu_places")
 _CHANNEL = ("radar_receiver", "radar_transmitter")
 MESH = ("mesh", "faces", "mesh_reading", "camera")
 """Names of the fields on which the mesh depends."""
-EDITED = (*_ALWAYS, *_INERTIAL, *_CHANNEL, *MESH, "things", "bodies")
+EDITED = (*_ALWAYS, *_INERTIAL, *_CHANNEL, *MESH, "things", "bodies", "walls")
 """Names of the fields. Journals of earlier versions lack some of the later ones."""
 
 
@@ -33,6 +33,7 @@ def edited_fields(recording: Recording) -> dict[str, Any]:
         "placements": None if planned is None else planned.as_dict(),
         "things": [asdict(thing) for thing in recording.things],
         "bodies": [asdict(body) for body in recording.bodies],
+        "walls": [asdict(wall) for wall in recording.walls],
     }
     return dict(json.loads(json.dumps(entry, default=_encoded)))
 

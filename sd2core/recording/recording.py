@@ -36,6 +36,7 @@ from sd2core.files.recording_json import (
     SensorEntry,
     Span,
     ThingEntry,
+    WallEntry,
     read_document,
 )
 from sd2core.files.resources import resource_path
@@ -44,6 +45,7 @@ from sd2core.labels.files import FILE_NAME as LABELS_NAME
 from sd2core.labels.files import labels_of, read_labels, write_labels
 from sd2core.mesh.bodies import Body
 from sd2core.mesh.things import Thing
+from sd2core.mesh.walls import Wall
 from sd2core.placements.placements import Placements, placements_from_dict
 from sd2core.progress import Progress, silent
 from sd2core.recording.divergence import WORDS, Divergence, State, digests_of
@@ -135,6 +137,8 @@ class Recording:
         What stands still around the body; paths of their files are absolute.
     bodies : tuple of Body
         Other people in the same scene, on the same clock; paths of their meshes are absolute.
+    walls : tuple of Wall
+        What mirrors waves.
     spans : tuple of Span
         Labels in ``recording.json`` itself, of a recording that was not labelled here.
     labels : Labels or None
@@ -181,6 +185,7 @@ class Recording:
     placements: Placements | None = None
     things: tuple[Thing, ...] = ()
     bodies: tuple[Body, ...] = ()
+    walls: tuple[Wall, ...] = ()
     spans: tuple[Span, ...] = ()
     labels: Labels | None = None
     labels_elsewhere: bool = False
@@ -383,6 +388,7 @@ class Recording:
             )
             for one in self.bodies
         )
+        document.walls = tuple(WallEntry.model_validate(asdict(one)) for one in self.walls)
         document.spans = () if self._writes_labels else tuple(self.spans)
         stated = {"beam": None} | self.sensor.as_dict()
         document.sensor = SensorEntry.model_validate(document.sensor.model_dump() | stated)
@@ -496,6 +502,8 @@ class Recording:
             options["things"] = self.things
         if self.bodies:
             options |= {"bodies": self.bodies, "called": self.subject}
+        if self.walls:
+            options["walls"] = self.walls
         has_video = self.video is not None and self.video.exists()
         if has_video and "image_size" not in options and is_estimate(path):
             with self.open_video() as video:
@@ -604,7 +612,7 @@ def open_recording(path: Path) -> Recording:
 def settings_of(document: Document, folder: Path) -> dict[str, Any]:
     """Fields of a recording by their names, but for labels, as its file holds them.
 
-    Raises Sd2Error where the sensor, the placements, a thing or a body cannot be.
+    Raises Sd2Error where the sensor, the placements, a thing, a body or a wall cannot be.
     """
     planned = document.placements
     return {
@@ -625,6 +633,7 @@ def settings_of(document: Document, folder: Path) -> dict[str, Any]:
             )
             for entry in document.bodies
         ),
+        "walls": tuple(Wall(**entry.model_dump()) for entry in document.walls),
     }
 
 

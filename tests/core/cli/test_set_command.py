@@ -123,11 +123,32 @@ def test_people_are_put_beside_the_first_and_taken_out(
     assert content(one) == before
 
 
+def test_walls_are_put_into_the_scene_and_taken_out(sd2: Sd2, one: Recording) -> None:
+    before = content(one)
+    outcome = sd2("set", one.folder, "--wall", "floor@1.1", "--wall", "30@2,6")
+    assert outcome.code == 0, outcome.err
+    assert "floor at 1.1 m, 8.2 dB; wall 30° to the right at 2 m, 6 dB" in outcome.out
+    assert [list(wall.values()) for wall in content(one)["walls"]] == [
+        [1.1, 0, -90, 8.2],
+        [2, 30, 0, 6],
+    ]
+    around = open_recording(one.folder).load_mesh().surroundings
+    assert around is not None
+    assert [wall.loss_db for wall in around.walls] == [8.2, 6]
+    assert json.loads(sd2("info", one.folder, "--json").out)["walls"][1]["azimuth_deg"] == 30
+    assert sd2("set", one.folder, "--without", "walls").code == 0
+    assert content(one) == before
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (("--body", "gone.npz"), "gone.npz does not exist"),
         (("--body", "anna.npz@1,2"), "[NAME=]FILE[@X,Y,Z"),
+        (("--wall", "floor"), "DIRECTION@M"),
+        (("--wall", "north@2"), "degrees, e.g. right@2"),
+        (("--wall", "floor@0"), "The distance of a wall is 0"),
+        (("--wall", "floor@1,200"), "The loss of a wall is 200"),
         (("--thing", "table@0,1"), "SHAPE@X,Y,Z"),
         (("--thing", "0,1,2"), "The thing is ''"),
         (("--thing", "sofa@0,1,2"), "one of box, table"),

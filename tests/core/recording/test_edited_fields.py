@@ -13,6 +13,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.recording_json import CameraEntry, MeshReading
 from sd2core.mesh.bodies import Body
 from sd2core.mesh.things import Thing
+from sd2core.mesh.walls import Wall
 from sd2core.placements.placements import PlacementGrid
 from sd2core.recording.edited import decoded_fields, differing, edited_fields
 from sd2core.recording.recording import Recording
@@ -63,6 +64,10 @@ recordings = st.builds(
             st.sampled_from([{}, {"scale": 0.001, "image_size": (640, 480)}]),
         ),
         max_size=2,
+    ).map(tuple),
+    walls=st.lists(
+        st.builds(Wall, st.floats(0.1, 9), angles, st.floats(-90, 90), st.floats(0, 40)),
+        max_size=3,
     ).map(tuple),
     radar_receiver=st.none() | st.integers(1, 8),
     radar_transmitter=st.none() | st.integers(1, 8),

@@ -20,6 +20,7 @@ from sd2core.labels.spans import Labels
 from sd2core.labels.spans import Span as LabelSpan
 from sd2core.mesh.bodies import Body
 from sd2core.mesh.things import Thing
+from sd2core.mesh.walls import Wall
 from sd2core.placements.placements import PlacementCloud, PlacementGrid
 from sd2core.recording.recording import (
     FILE_NAME,
@@ -684,3 +685,15 @@ def test_bodies_go_with_a_copy_and_are_found_again(tmp_path: Path) -> None:
     assert not again.missing()
     assert again.bodies[0].moved_m == (1, 0, 0)
     assert again.mesh == tmp_path / "walk.npz"
+
+
+def test_a_wall_that_cannot_be_is_named_with_its_file(tmp_path: Path) -> None:
+    (tmp_path / "walk.npz").touch()
+    wall = Wall(2.0, 30.0, loss_db=5.0)
+    made = Recording.create(tmp_path / "walk", mesh=tmp_path / "walk.npz", walls=(wall,))
+    assert open_recording(made.folder).walls == (wall,)
+    content = json.loads((made.folder / FILE_NAME).read_text())
+    for walls in ([{"distance_m": 0, "loss_db": 3}], [{"distance_m": 2, "loss_db": -1}], [{}]):
+        (made.folder / FILE_NAME).write_text(json.dumps(content | {"walls": walls}))
+        with pytest.raises(Sd2Error, match=FILE_NAME):
+            open_recording(made.folder)
