@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
+from sd2core.body.camera import camera_of
 from sd2core.body.fit_video import (
+    LANDMARKS,
     PARTIAL,
     FitChoices,
     FitReport,
     FittedVideo,
+    Stage,
     check_fit_output,
+    claim_folder,
     fit_video,
 )
+from sd2core.body.floor import standing_feet, statures_on_one_floor
 from sd2core.body.landmark_models import landmark_models
+from sd2core.body.landmarks import find_landmarks
 from sd2core.body.people import SeenPerson, chosen_people, find_people
+from sd2core.body.solve import one_thread
+from sd2core.files.atomic import atomic_write_text
 from sd2core.io.video import open_video
+from sd2core.progress import Progress, silent
+
+_STATURE = "stature.txt"
+"""File in the folder of a fit: what the floor told of the person's height, in metres."""
 
 
 def meshes_of(out: Path, people: Sequence[SeenPerson]) -> list[Path]:
@@ -59,10 +73,11 @@ def fit_people(
     *,
     models: Path | None = None,
     restart: bool = False,
-) -> Iterator[tuple[SeenPerson, Path, FittedVideo]]:
+) -> Iterator[tuple[SeenPerson, Path, FitChoices, FittedVideo]]:
     """Fit a body to each of several people; yields them as soon as their mesh is written.
 
-    A stopped run goes on with the same call; who was done then is not yielded again.
+    Several people stand on one floor, which tells how tall they are beside one another. A
+    stopped run goes on with the same call; who was done then is not yielded again.
 
     Parameters
     ----------
@@ -73,7 +88,7 @@ def fit_people(
     people : sequence of SeenPerson
         Of :func:`people_to_fit`.
     choices : FitChoices
-        Of each fit.
+        Of each fit; a stature is that of the first person.
     report_of : callable
         Gives the report of the fit of a person, by their number.
     models : Path, optional
@@ -89,15 +104,83 @@ def fit_people(
     for mesh, partial in zip(outs, partials, strict=True):
         if not (stopped and mesh.exists()):
             partial.mkdir(exist_ok=True)  # what is left to do
-    for person, mesh, partial in zip(people, outs, partials, strict=True):
-        if partial.exists():
-            made = fit_video(
-                path,
-                mesh,
-                choices,
-                report_of(person.number),
-                models=models,
-                restart=restart,
-                sightings=person.sightings,
-            )
-            yield person, mesh, made
+    left = [row for row, partial in enumerate(partials) if partial.exists()]
+    reports = {row: report_of(people[row].number) for row in left}
+    alone = len(people) == 1
+    chosen = (
+        {left[0]: choices}
+        if alone
+        else _with_statures(
+            path,
+            {row: (people[row], partials[row], reports[row]) for row in left},
+            choices,
+            models,
+            restart,
+        )
+    )
+    for row in left:
+        report = reports[row]
+        made = fit_video(
+            path,
+            outs[row],
+            chosen[row],
+            report if alone else _for_the_rest(report),
+            models=models,
+            restart=restart and alone,
+            sightings=people[row].sightings,
+        )
+        yield people[row], outs[row], chosen[row], made
+
+
+def _for_the_rest(report: FitReport) -> FitReport:
+    """Report of a fit that has begun, whose landmarks are there already."""
+
+    def progress_of(stage: Stage) -> Progress:
+        return silent if stage in ("models", "refine") else report.progress_of(stage)
+
+    return replace(report, progress_of=progress_of, started=lambda *_: None)
+
+
+def _with_statures(
+    path: Path,
+    people: Mapping[int, tuple[SeenPerson, Path, FitReport]],
+    choices: FitChoices,
+    models: Path | None,
+    restart: bool,
+) -> dict[int, FitChoices]:
+    """Choices of each of several people, with the stature that the common floor tells.
+
+    Landmarks and statures are kept in the folders of the fits.
+    """
+    feet, known = {}, {}
+    with open_video(path) as video:
+        camera, _ = camera_of(video, choices.focal_px, choices.field_of_view_deg)
+        found = landmark_models(models, model=choices.landmark_model)
+        _, partial, report = next(iter(people.values()))
+        report.started(video, (partial / LANDMARKS).is_dir())
+        for row, (person, partial, report) in people.items():
+            with claim_folder(partial, restart), one_thread():
+                track = find_landmarks(
+                    video,
+                    found,
+                    person=person.sightings,
+                    max_gap_s=choices.max_gap_s,
+                    progress_of=report.progress_of,
+                    on_frame=report.on_frame,
+                    workspace=partial / LANDMARKS,
+                )
+                feet[row] = standing_feet(track, camera)
+            with suppress(OSError, ValueError):
+                known[row] = float((partial / _STATURE).read_text())
+    first_m = choices.stature_m if 0 in people else None
+    told = dict(zip(feet, statures_on_one_floor(list(feet.values()), first_m), strict=True))
+    chosen = {}
+    for row, (_, partial, _) in people.items():
+        stature_m = known.get(row, told[row])
+        if row == 0 and first_m is not None:
+            chosen[row] = choices
+        else:
+            chosen[row] = replace(choices, stature_m=stature_m, stature_by_floor=True)
+        if stature_m is not None:
+            atomic_write_text(partial / _STATURE, str(stature_m))
+    return chosen

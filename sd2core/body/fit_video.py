@@ -70,6 +70,8 @@ class FitChoices:
     """Of the camera, like the field of view; see :func:`~sd2core.body.camera.camera_of`."""
     field_of_view_deg: float | None = None
     stature_m: float | None = None  # height of the person
+    stature_by_floor: bool = False
+    """The height follows from the floor that all people of the video stand on."""
     max_gap_s: float = DEFAULT_MAX_GAP_S  # longest gap without the person that is bridged
     resolution: Resolution = "medium"  # mesh of 1,229, 5,000 or 13,348 vertices
     landmark_model: LandmarkModel = DEFAULT_MODEL
@@ -227,7 +229,11 @@ def provenance(made: FittedVideo, path: Path, choices: FitChoices) -> dict[str, 
             "source": made.camera_source,
         },
         "stature_m": DEFAULT_STATURE_M if stature_m is None else stature_m,
-        "stature_source": "default" if stature_m is None else "user",
+        "stature_source": "default"
+        if stature_m is None
+        else "floor"
+        if choices.stature_by_floor
+        else "user",
         "max_gap_s": choices.max_gap_s,
         "landmark_model": choices.landmark_model,
         "notes": list(made.notes),

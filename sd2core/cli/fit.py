@@ -44,6 +44,12 @@ _PROGRESS_EVERY_S = 0.05
 _LANDMARKS_EVERY_S = 0.1
 _UNITS = {"models": "byte", "fit": "step"}
 
+_STATURES = {
+    "default": ", by default: every velocity is proportional to it",
+    "floor": ", by the floor that all stand on",
+    "user": ", as given",
+}
+
 _BARS = {
     "models": ("Fetching the landmark models", "B"),
     "people": ("Following everybody", "frame"),
@@ -126,8 +132,9 @@ def _fit(options: Fit) -> None:
 
     Finds the person, 33 landmarks in every frame, and the body and motion that fit
     them. The size of everything follows from the person's height: say it with
-    --stature-m where you know it, every velocity is proportional to it. At first use
-    the landmark models are fetched (77 MB; `sd2 doctor --fetch-models`).
+    --stature-m where you know it, every velocity is proportional to it. With several
+    --people it is that of the first, and the floor that all stand on tells the others'.
+    At first use the landmark models are fetched (77 MB; `sd2 doctor --fetch-models`).
 
     It can be stopped at any moment: what is done stays in FILE.partial, and the same
     command goes on from there.
@@ -209,7 +216,7 @@ def _fit_people(options: Fit) -> None:
                 else _bars(stack, f", person {number}")
             )
 
-        for person, mesh, made in fit_people(
+        for person, mesh, chosen, made in fit_people(
             options.video,
             options.out,
             people,
@@ -221,9 +228,9 @@ def _fit_people(options: Fit) -> None:
             seconds = time.perf_counter() - begun_s
             meshes.append((mesh, made))
             about = {"person": person.number, "certainty": person.certainty}
-            summaries.append(about | _summary(options, mesh, made, seconds))
+            summaries.append(about | _summary(options, mesh, made, seconds, chosen))
             if not (options.progress_json or options.json):
-                _print(options, mesh, made, seconds)
+                _print(options, mesh, made, seconds, chosen)
     if options.progress_json:
         _tell_end(options, meshes, time.perf_counter() - begun_s)
     elif options.json:
@@ -314,11 +321,12 @@ def _lines(options: Fit, number: int | None = None, numbers: Sequence[int] = ())
     from sd2core.body.fit_video import STAGES, FitReport
 
     last_landmarks_s = -1.0
-    stages = [f"{stage} {each}" for each in numbers for stage in STAGES[1:]] or STAGES
+    stages: Sequence[str] = STAGES
+    if numbers:
+        refining = [f"refine {each}" for each in numbers]
+        stages = refining + [f"{stage} {each}" for each in numbers for stage in STAGES[2:]]
 
     def started(video: VideoReader, resumed: bool) -> None:
-        if number is not None and number != numbers[0]:
-            return
         print_event(
             "start",
             format=_FORMAT,
@@ -357,10 +365,12 @@ def _lines(options: Fit, number: int | None = None, numbers: Sequence[int] = ())
     return FitReport(progress_of, started, landmarks)
 
 
-def _summary(options: Fit, out: Path, made: FittedVideo, seconds: float) -> dict[str, Any]:
+def _summary(
+    options: Fit, out: Path, made: FittedVideo, seconds: float, choices: FitChoices | None = None
+) -> dict[str, Any]:
     from sd2core.body.fit_video import provenance
 
-    about = provenance(made, options.video, _choices(options))
+    about = provenance(made, options.video, choices or _choices(options))
     return about | {
         "out": str(out),
         **picked(made, "frames", "frames_per_s", "present", "bridged", "residual_m", "quality"),
@@ -368,8 +378,10 @@ def _summary(options: Fit, out: Path, made: FittedVideo, seconds: float) -> dict
     }
 
 
-def _print(options: Fit, out: Path, made: FittedVideo, seconds: float) -> None:
-    about = _summary(options, out, made, seconds)
+def _print(
+    options: Fit, out: Path, made: FittedVideo, seconds: float, choices: FitChoices | None = None
+) -> None:
+    about = _summary(options, out, made, seconds, choices)
     camera, sources = about["camera"], {"user": "as given", "metadata": "as the file says"}
     frames, present, bridged = about["frames"], about["present"], about["bridged"]
     print_facts(
@@ -381,8 +393,7 @@ def _print(options: Fit, out: Path, made: FittedVideo, seconds: float) -> None:
             "focal length": f"{camera['focal_px']:.0f} px,"
             f" {sources.get(camera['source'], 'by default (56° across the longer side)')}",
             "stature": f"{about['stature_m']:g} m"
-            + (", by default: every velocity is proportional to it"
-               if about["stature_source"] == "default" else ", as given"),
+            + _STATURES[about["stature_source"]],
             "took": f"{seconds:.0f} s, {seconds / frames:.2f} s per frame",
         },
     )  # fmt: skip

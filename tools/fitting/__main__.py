@@ -18,6 +18,7 @@ from sd2core.options.shared import Json
 from tools.command_line import Commands, run_tool
 from tools.fitting.clips import CLIPS, REAL_MOTION, TUNING, clip_named, make_fit_truth
 from tools.fitting.error_measurement import measure_errors
+from tools.fitting.people import OTHERS, as_table, measure_people, meetings
 from tools.fitting.report import as_dict
 from tools.fitting.report_text import as_markdown, as_text
 from tools.fitting.scoring import MeshSource
@@ -94,6 +95,34 @@ class Errors(OptionRecord):
     out: Annotated[Path, Place(endings=(".json",))]
 
 
+class People(OptionRecord):
+    """Options of ``people``.
+
+    Parameters
+    ----------
+    only : TEXT
+        only meetings with this in their name
+    """
+
+    only: str = ""
+
+
+def _people(options: People) -> None:
+    """Measure how well two people who meet are told apart, and what that costs their fits.
+
+    Prints the table of docs/fitting.md.
+    """
+    chosen = [
+        (meeting, clothes)
+        for meeting in meetings()
+        for clothes in OTHERS
+        if options.only in f"{meeting.name} {meeting.apart_m:g} {clothes}"
+    ]
+    with progress_bar("Meeting", unit="meeting") as progress:
+        outcomes = measure_people(chosen, progress)
+    print(as_table(outcomes))
+
+
 def _clips(options: Clips) -> None:
     """Make videos of simulated people whose motion is known, to measure a fit against.
 
@@ -155,6 +184,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "clips": (Clips, _clips),
         "score": (Score, _score),
         "errors": (Errors, _errors),
+        "people": (People, _people),
     }
     return run_tool("fitting", commands, arguments)
 

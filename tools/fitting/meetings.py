@@ -9,13 +9,15 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.body.model import Body
+from sd2core.body.model import Body, Skeleton
 from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.simulate.gait import Path as Way
 from sd2core.simulate.gait import gait
 from sd2core.simulate.limbs import arm_length_m
+from sd2core.simulate.people.arms import STYLES
+from sd2core.simulate.people.motion import Deed, random_motion
 from tools.build_sample.clothing import Clothes, srgb
 from tools.build_sample.render import Camera, Renderer, _tone
 from tools.fitting.cast import ROOMS, Person
@@ -37,6 +39,7 @@ class Part:
     x_m: tuple[float, ...]  # at those times, positive to the right
     away_m: float  # from the camera
     yaw_deg: tuple[float, ...] | None = None  # at those times; 0 faces the camera
+    sits: bool = False  # facing the camera, moving their arms
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,25 @@ def actor(part: Part, frames: int, room: str) -> Actor:
     space, shape = _space(), part.person.shape(_space())
     skeleton, body = space.skeleton(shape), space.load("low", shape)
     times = np.arange(frames) / FRAMES_PER_S
+    rotations, move = (_sitting if part.sits else _walking)(part, skeleton, times)
+    place = np.array([0.0, CAMERA.above_floor_m, part.away_m])
+    transforms = skeleton.transforms(rotations, move + place)
+    studio = replace(ROOMS[room], wall_m=4.8, shadow_m=6.0, shadow_depth_m=3.0, noise=0.012)
+    drawer = Renderer(body, CAMERA, studio, Clothes.of(Body.load("low"), part.person.outfit))
+    points = CAMERA.project(KeypointSpace(space).of(shape).positions(transforms))
+    return Actor(drawer, pose_vertices(body, transforms), points, part.away_m)
+
+
+def _sitting(part: Part, skeleton: Skeleton, times_s: Floats) -> tuple[Floats, Floats]:
+    """Rotations and places of one who sits and talks with their hands."""
+    deed = Deed("sit", (STYLES["talk"], STYLES["wave"]), still=False)
+    rng = np.random.default_rng(round(100.0 * part.away_m))
+    motion = random_motion(rng, skeleton, part.person.stature_m, times_s, deed)
+    return motion.rotations, motion.translation_m + np.array([part.x_m[0], 0.0, 0.0])
+
+
+def _walking(part: Part, skeleton: Skeleton, times: Floats) -> tuple[Floats, Floats]:
+    """Rotations and places of one who walks across the picture."""
     x = np.array(part.x_m)
     along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(x)))])
     yaw = part.yaw_deg
@@ -71,18 +93,13 @@ def actor(part: Part, frames: int, room: str) -> Actor:
             lambda t: np.interp(t, part.times_s, along),
             lambda t: np.interp(t, part.times_s, yaw),
         ),
-        arm_length_m(skeleton) / arm_length_m(space.base_skeleton),
+        arm_length_m(skeleton) / arm_length_m(_space().base_skeleton),
     )
     # The way of the gait leads to the camera; here it leads across.
     forward = -motion.translation_m[:, 2]
     across = np.interp(times, part.times_s, x) - np.interp(times, part.times_s, along) + forward
     move = np.stack([across, motion.translation_m[:, 1], motion.translation_m[:, 0]], axis=1)
-    place = np.array([0.0, CAMERA.above_floor_m, part.away_m])
-    transforms = skeleton.transforms(motion.rotations, move + place)
-    studio = replace(ROOMS[room], wall_m=4.8, shadow_m=6.0, shadow_depth_m=3.0, noise=0.012)
-    drawer = Renderer(body, CAMERA, studio, Clothes.of(Body.load("low"), part.person.outfit))
-    points = CAMERA.project(KeypointSpace(space).of(shape).positions(transforms))
-    return Actor(drawer, pose_vertices(body, transforms), points, part.away_m)
+    return motion.rotations, move
 
 
 def pictures(actors: Sequence[Actor]) -> Iterator[NDArray[np.uint8]]:

@@ -1,0 +1,209 @@
+"""How well people who meet are told apart, and how good their fits are beside those of one alone.
+
+Simulated people of known places pass, cross, stand before and sit beside one another, in like and
+in unlike clothes. Nothing of the program was tuned on these people and places.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sd2core.body.fit_people import fit_people
+from sd2core.body.fit_video import FitChoices, FitReport, fit_video
+from sd2core.body.landmark_models import landmark_models
+from sd2core.body.people import SeenPerson, find_people
+from sd2core.io.mesh import load_mesh
+from sd2core.io.video import open_video
+from sd2core.io.video_writing import write_video
+from sd2core.progress import Progress, silent
+from tools.fitting.cast import PEOPLE
+from tools.fitting.meetings import CAMERA, FRAMES_PER_S, Actor, Part, actor, pictures
+
+OWN = PEOPLE["ada"]
+OTHERS = {
+    "unlike": PEOPLE["femi"],
+    "like": replace(PEOPLE["chen"], outfit=replace(OWN.outfit, hair=(0.12, 0.10, 0.10))),
+}
+_OFF = 0.1
+"""Distance of the hips in squares from where they are, beyond which somebody else is shown."""
+_HIPS = (23, 24)
+_SILENT = FitReport(lambda stage: silent, lambda *_: None, lambda *_: None)
+
+
+Way = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...] | None]
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """What two people do, how far one is from the other, and for how long."""
+
+    name: str
+    apart_m: float
+    ways: tuple[Way, ...]
+    """Of both: times, places across the picture, and turns."""
+    length_s: float
+    fitted: bool = False  # the errors of fits are measured, too
+    sits: bool = False
+
+    def parts(self, clothes: str, near_m: float = 3.0) -> list[Part]:
+        """Parts of both people, the other one nearer."""
+        away = (near_m if self.sits else near_m + self.apart_m, near_m)
+        return [
+            Part(who, times, x, far, turns, self.sits)
+            for who, (times, x, turns), far in zip(
+                (OWN, OTHERS[clothes]), self.ways, away, strict=True
+            )
+        ]
+
+
+_STANDS: Way = ((0.0, 1.0, 2.0, 5.0), (0.0,) * 4, (0.0, 20.0, -20.0, 0.0))
+
+
+def _walks(start_m: float, to_m: float) -> Way:
+    return (0.0, 4.0), (start_m, to_m), (-90.0 if to_m > start_m else 90.0,) * 2
+
+
+def meetings() -> Iterator[Meeting]:
+    """All of them."""
+    for apart_m in (0.5, 1.5, 3.0):
+        ways = (_walks(-2.0, 2.0), _walks(2.0, -2.0))
+        yield Meeting("pass each other", apart_m, ways, 4.2, fitted=apart_m == 1.5)
+    for apart_m in (0.5, 1.5):
+        crosses: Way = ((0.1, 4.1), (2.0, -2.0), (90.0, 90.0))
+        yield Meeting("crosses in front", apart_m, (_STANDS, crosses), 4.4)
+        waits: Way = ((0.1, 2.0, 3.0, 4.9), (-2.0, 0.0, 0.0, 2.0), (-90.0,) * 4)
+        yield Meeting("stops in front", apart_m, (_STANDS, waits), 5.2, fitted=apart_m == 1.5)
+        turns: Way = ((0.1, 2.0, 2.5, 4.4), (-2.0, 0.0, 0.0, -2.0), (-90.0, -90.0, 90.0, 90.0))
+        yield Meeting("turns back in front", apart_m, (_STANDS, turns), 4.8)
+    sides: list[Way] = [((0.0,), (x,), None) for x in (-0.4, 0.4)]
+    yield Meeting("sit side by side", 0.8, tuple(sides), 4.0, fitted=True, sits=True)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How well two people of one meeting are told apart."""
+
+    meeting: Meeting
+    clothes: str
+    looks: int  # ten times a second, at one of them in the picture
+    seen: int  # of them, in which somebody was found
+    wrong: int  # of those, in which it was the other one
+    people: int  # who were told apart
+    place_m: tuple[float, float] | None = None  # mean error, in company and alone
+    velocity_mps: tuple[float, float] | None = None  # RMS along the line of sight, the same
+
+    @property
+    def right(self) -> float:
+        """Share of the looks with somebody that show the right one."""
+        return 1.0 - self.wrong / max(self.seen, 1)
+
+
+def measure_people(
+    chosen: Sequence[tuple[Meeting, str]], progress: Progress = silent
+) -> list[Outcome]:
+    """Outcomes of meetings, each with the clothes of the other one."""
+    outcomes = []
+    with TemporaryDirectory() as folder:
+        for number, (meeting, clothes) in enumerate(chosen):
+            progress(number, len(chosen))
+            outcomes.append(_measured(meeting, clothes, Path(folder)))
+        progress(len(chosen), len(chosen))
+    return outcomes
+
+
+def told_apart(
+    meeting: Meeting, clothes: str, path: Path
+) -> tuple[list[Actor], list[SeenPerson], Outcome]:
+    """Film a meeting, find the people in it, and say how often they are taken for one another."""
+    frames = int(FRAMES_PER_S * meeting.length_s)
+    actors = [actor(part, frames, "office") for part in meeting.parts(clothes)]
+    _film(path, actors)
+    with open_video(path) as video:
+        people = find_people(video, landmark_models())
+    inside = [_hips_px(each)[:, 0] for each in actors]
+    looks = sum(int(((x > 0) & (x < CAMERA.width)).sum()) for x in inside)
+    seen = wrong = 0
+    for person in people:
+        off = _off(person, actors)
+        mistaken = (off > _OFF) & (off > off[::-1])
+        own = int(mistaken.sum(axis=1).argmin())
+        seen += off.shape[1]
+        wrong += int(mistaken[own].sum())
+    outcome = Outcome(meeting, clothes, looks, seen, wrong, len(people))
+    return actors, people, outcome
+
+
+def _hips_px(person: Actor) -> NDArray[np.float64]:
+    return np.asarray(person.points_px[:, _HIPS].mean(axis=1))
+
+
+def _off(person: SeenPerson, actors: Sequence[Actor]) -> NDArray[np.float64]:
+    """Distance of where a person was found from each actor, in squares, (2, N)."""
+    rois = person.sightings.rois[person.seen]
+    frames = person.sightings.frames[person.seen]
+    truth = np.stack([_hips_px(each)[frames] for each in actors])
+    return np.asarray(np.linalg.norm(rois[:, :2] - truth, axis=2) / rois[:, 2])
+
+
+def _measured(meeting: Meeting, clothes: str, folder: Path) -> Outcome:
+    path = folder / "pair.mp4"
+    actors, people, outcome = told_apart(meeting, clothes, path)
+    if not meeting.fitted or len(people) != len(actors):
+        return outcome
+    choices = FitChoices(focal_px=CAMERA.focal_px, resolution="low", landmark_model="full")
+    squares: list[list[float]] = [[], []]
+    places: list[list[float]] = [[], []]
+    for person in people:
+        who = int(np.median(_off(person, actors), axis=1).argmin())
+        mine = actors[who]
+        known = replace(choices, stature_m=(OWN, OTHERS[clothes])[who].stature_m)
+        ((_, mesh, _, _),) = fit_people(
+            path, folder / "pair.npz", [person], known, lambda number: _SILENT
+        )
+        alone = _film(folder / "alone.mp4", [mine])
+        fit_video(alone, folder / "alone.npz", known, _SILENT)
+        fits = [load_mesh(each) for each in (mesh, folder / "alone.npz")]
+        there = np.logical_and.reduce([fit.presence.there for fit in fits])
+        for number, fit in enumerate(fits):
+            off_m = np.asarray(fit.read(0, fit.frame_count)) - mine.vertices_m
+            places[number].append(float(np.linalg.norm(off_m[there], axis=2).mean()))
+            both = there[1:] & there[:-1]
+            rate = np.diff(off_m[..., 2], axis=0)[both] * FRAMES_PER_S
+            squares[number].append(float(np.square(rate).mean()))
+    return replace(
+        outcome,
+        place_m=(float(np.mean(places[0])), float(np.mean(places[1]))),
+        velocity_mps=(float(np.sqrt(np.mean(squares[0]))), float(np.sqrt(np.mean(squares[1])))),
+    )
+
+
+def _film(path: Path, actors: Sequence[Actor]) -> Path:
+    path.unlink(missing_ok=True)
+    write_video(path, pictures(actors), FRAMES_PER_S, (CAMERA.width, CAMERA.height))
+    return path
+
+
+def as_table(outcomes: Sequence[Outcome]) -> str:
+    """Markdown table of outcomes."""
+    lines = [
+        "| two people | apart | clothes | right | found | place off by, alone | velocity, alone |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for each in outcomes:
+        place, rate = (
+            "" if pair is None else f"{pair[0]:.3f}, {pair[1]:.3f} {unit}"
+            for pair, unit in ((each.place_m, "m"), (each.velocity_mps, "m/s"))
+        )
+        lines.append(
+            f"| {each.meeting.name} | {each.meeting.apart_m:g} m | {each.clothes} |"
+            f" {100.0 * each.right:.1f} % | {each.seen} of {each.looks} | {place} | {rate} |"
+        )
+    seen, wrong = (sum(getattr(each, name) for each in outcomes) for name in ("seen", "wrong"))
+    lines.append(f"| all | | | {100.0 * (1.0 - wrong / max(seen, 1)):.2f} % | {seen} | | |")
+    return "\n".join(lines)
