@@ -14,6 +14,7 @@ class Cure(NamedTuple):
     setting: str  # field of sd2core.files.recording_json.MeshReading
     value: float | str
     words: str
+    option: str = ""  # the same on a command line
 
 
 class Sd2Error(Exception):
@@ -55,13 +56,18 @@ class Sd2Error(Exception):
         error.cure = self.cure
         return error
 
+    @property
+    def words(self) -> str:
+        """The error without the option of a command line, for who has a button in its place."""
+        return self._with(self.remedy)
+
     def __str__(self) -> str:
-        parts = [self.found]
-        if self.expected:
-            parts.append(f"Expected: {self.expected}")
-        if self.remedy:
-            parts.append(self.remedy)
-        return " ".join(part.rstrip(".") + "." for part in parts)
+        option = "" if self.cure is None else self.cure.option
+        return self._with(f"{self.remedy}: pass {option}" if option else self.remedy)
+
+    def _with(self, remedy: str) -> str:
+        parts = [self.found, f"Expected: {self.expected}" if self.expected else "", remedy]
+        return " ".join(part.rstrip(".") + "." for part in parts if part)
 
 
 def wanted(value: object, kind: type[Value], example: str) -> Value:

@@ -71,8 +71,10 @@ def judge_rate(step_s: float, *, of_a_mesh: bool = False) -> list[Finding]:
     if of_a_mesh:
         if usual_rate is not None:
             shown = float(f"{usual_rate:.5g}")
-            cure = Cure("frames_per_s", shown, f"Read it at {shown:g} frames/s")
-        cause += f": pass --fps {'with the right rate' if cure is None else f'{cure.value:g}'}"
+            words = f"Read it at {shown:g} frames/s"
+            cure = Cure("frames_per_s", shown, words, f"--fps {shown:g}")
+        else:
+            cause += ": pass --fps with the right rate"
     expected = f"{slowest:g} to {fastest:,g} frames/s"
     return [Finding(f"The frames are {step_s:.4g} s apart, {rate:.3g} frames/s", expected, cause,
                     cure)]  # fmt: skip

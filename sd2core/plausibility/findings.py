@@ -18,14 +18,14 @@ class Finding:
     expected : str
         What is usual instead.
     remedy : str
-        The probable cause, and the option that puts it right.
+        The probable cause.
     cure : Cure, optional
-        That option, for a button.
+        What puts it right: an option of a command line, or a button.
 
     Examples
     --------
-    >>> print(Finding("The body measures 1,700 m", "a body below 10 m", "Pass --scale 0.001"))
-    The body measures 1,700 m. Expected: a body below 10 m. Pass --scale 0.001.
+    >>> print(Finding("The body measures 1,700 m", "a body below 10 m", "These are mm"))
+    The body measures 1,700 m. Expected: a body below 10 m. These are mm.
     """
 
     found: str
@@ -35,6 +35,11 @@ class Finding:
 
     def __str__(self) -> str:
         return str(self.error())
+
+    @property
+    def words(self) -> str:
+        """The finding without the option of a command line."""
+        return self.error().words
 
     def error(self) -> Sd2Error:
         """The same as an error, where nothing can be done with such content."""

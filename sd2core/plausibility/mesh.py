@@ -73,16 +73,17 @@ def judge_size(extent_m: float) -> Finding | None:
         )
     if extent_m <= LARGEST_BODY_M:
         return None
-    guess, cure = "Pass --scale with the factor to metres", None
+    keeping = "(or --scale 1 when the size is right)"
+    guess, cure = f"Pass --scale with the factor to metres {keeping}", None
     for factor, unit in ((0.01, "centimetres"), (0.001, "millimetres")):
         if _LIKELY_BODY_M[0] <= extent_m * factor <= _LIKELY_BODY_M[1]:
-            guess = f"These are probably {unit}: pass --scale {factor:g}"
-            cure = Cure("scale", factor, f"Read it as {unit}")
+            guess, option = f"These are probably {unit}", f"--scale {factor:g} {keeping}"
+            cure = Cure("scale", factor, f"Read it as {unit}", option)
             break
     return Finding(
         f"The body measures {extent_m:,.0f} m",
         f"metres, a body below {LARGEST_BODY_M:g} m",
-        f"{guess} (or --scale 1 when the size is right)",
+        guess,
         cure,
     )
 
@@ -103,8 +104,8 @@ def judge_place(body: BodyPoints) -> list[Finding]:
                 f"The body is {extent_m[2]:.2f} m long along the line of sight and"
                 f" {extent_m[1]:.2f} m high",
                 "y down and z forward",
-                "It lies towards the camera, or z points up: pass --turn x90",
-                Cure("turn", "x90", "Turn it: z is up"),
+                "It lies towards the camera, or z points up",
+                Cure("turn", "x90", "Turn it: z is up", "--turn x90"),
             )
         ]
     if depth_m > _FARTHEST_M:
@@ -129,8 +130,8 @@ def _behind(depth_m: float, wholly: bool, at_root: bool) -> Finding:
     if at_root:
         remedy = "It is centred on its root: pass its distance (--distance-m)"
     elif wholly:
-        remedy = "y probably points up and z backward: pass --turn x180"
-        cure = Cure("turn", "x180", "Turn it to the front")
+        remedy = "y probably points up and z backward"
+        cure = Cure("turn", "x180", "Turn it to the front", "--turn x180")
     return Finding(
         f"The mesh is at a mean depth of {depth_m:.2f} m, at or behind the camera",
         "the camera's frame: x right, y down, z forward",

@@ -6,10 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from PySide6.QtCore import QObject
 
 from sd2app.background.latest import Emit, LatestRunner
-from sd2app.session.content import OfferedCure, camera_of, offers_of
+from sd2app.session.content import OfferedCure, camera_of, notes_of, offers_of, words_of
 from sd2app.session.mesh_reading import ReadMesh, mesh_fields
 from sd2app.session.video_frames import VideoFrames
 from sd2core.body.camera import PinholeCamera
@@ -68,9 +69,7 @@ class MeshPreview(VideoFrames):
     @property
     def notes(self) -> str:
         """What was assumed or repaired, and found unlikely without a remedy."""
-        offered = {one.text for one in self.offers}
-        notes = () if self.mesh is None else self.mesh.notes
-        return "\n\n".join(note for note in notes if note not in offered)
+        return "" if self.mesh is None else "\n\n".join(notes_of(self.mesh))
 
     @property
     def someone(self) -> bool:
@@ -83,6 +82,16 @@ class MeshPreview(VideoFrames):
         if self.mesh is None or self.loading:
             return None
         return ReadMesh(mesh_fields(self.recording), self.mesh, self.offers)
+
+    def first_frame(self) -> int:
+        """The middle frame, or the one in the middle of those in which the mesh has somebody."""
+        middle, mesh, reader = super().first_frame(), self.mesh, self.reader
+        if mesh is None or reader is None:
+            return middle
+        there = np.flatnonzero(mesh.presence.there)
+        if not there.size or mesh.person_at(reader.timebase.time_of(middle)) is not None:
+            return middle
+        return reader.timebase.nearest_frame(float(mesh.times_s[there[len(there) // 2]]))
 
     # --- what is said of it ---------------------------------------------------------------
 
@@ -125,11 +134,13 @@ class MeshPreview(VideoFrames):
 
     def _take_mesh(self, read: tuple[Recording, MeshSequence]) -> None:
         self.recording, self.mesh = read
+        if not self.someone and self.frame == super().first_frame():
+            self.show_frame(self.first_frame())  # the user has not looked elsewhere
         self._tell("", offers_of(self.mesh.findings))
 
     def _refuse_mesh(self, error: Exception) -> None:
         self.mesh = None
-        self._tell(str(error), offers_of([error]))
+        self._tell(words_of(error), offers_of([error]))
 
     def _tell(self, problem: str, offers: tuple[OfferedCure, ...]) -> None:
         self.mesh_problem, self.offers = problem, offers

@@ -102,7 +102,8 @@ class ListenDialog(QDialog):
             ("Into", row_of((self._folder, 1), self._button(self._ask_folder), spacing_px=8)),
             gaps_px=(16, 12),
         )
-        foot = with_help("Record", buttons, copy_button(lambda: setup.line, self))
+        self._copy = copy_button(lambda: setup.line, self)
+        foot = with_help("Record", buttons, self._copy)
         self.setLayout(column_of(form, STRETCH, self._message, foot, spacing_px=16, margins_px=16))
         setup.changed.connect(self._refresh)
         self._refresh()
@@ -135,7 +136,8 @@ class ListenDialog(QDialog):
         elif not words and setup.continues:
             words = f"{setup.folder.name} exists: frames are added to it, if it is of this radar."
         say(self._message, words, role)
-        self._begin.setEnabled(not setup.problem)
+        for button in (self._begin, self._copy):
+            button.setEnabled(not setup.problem)
         self._begin.setText("Continue" if setup.continues else "Record")
 
     def _choose_camera(self, camera: str) -> None:

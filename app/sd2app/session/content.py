@@ -182,7 +182,7 @@ def load_content(recording: Recording, progress: Progress) -> Content:
         )
     notes = [*recording.notes] if recording.folder != UNTITLED else []
     for part in parts:
-        notes.extend(part.notes)
+        notes.extend(part.notes if part is not mesh else notes_of(mesh))
     radar = capture or (None if recorded is None else recorded.doppler)
     timebase = clock_of(recording, video, mesh, radar)
     spans_s = [(span.start_s, span.end_s) for span in recording.labelled.spans]
@@ -196,15 +196,26 @@ def load_content(recording: Recording, progress: Progress) -> Content:
         radar_map=radar_map,
         radar_labels=None if recorded is None else recorded.labels,
         notes=tuple(notes),
-        problems=tuple(str(problem) for problem in problems),
+        problems=tuple(problem.words for problem in problems),
         offers=offers_of([*problems, *(() if mesh is None else mesh.findings)]),
     )
 
 
 def offers_of(unlikely: Iterable[Exception | Finding]) -> tuple[OfferedCure, ...]:
     """What can be read another way, of errors and findings."""
-    cured = ((str(one), getattr(one, "cure", None)) for one in unlikely)
-    return tuple(OfferedCure(text, cure) for text, cure in cured if cure is not None)
+    told = [one for one in unlikely if isinstance(one, (Sd2Error, Finding))]
+    return tuple(OfferedCure(one.words, one.cure) for one in told if one.cure is not None)
+
+
+def words_of(error: Exception) -> str:
+    """An error in words; what puts it right is offered by a button, not as an option."""
+    return error.words if isinstance(error, Sd2Error) else str(error)
+
+
+def notes_of(mesh: MeshSequence) -> list[str]:
+    """What was assumed about a mesh, or is unlikely and cannot be offered to be read otherwise."""
+    offered = {str(one) for one in mesh.findings if one.cure is not None}
+    return [note for note in mesh.notes if note not in offered]
 
 
 def camera_of(recording: Recording, video: VideoReader | None) -> PinholeCamera:

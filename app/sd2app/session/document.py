@@ -22,6 +22,7 @@ from sd2app.session.content import (
     load_content,
     offers_of,
     recording_of,
+    words_of,
 )
 from sd2app.session.mesh_reading import MeshReader, ReadMesh, mesh_fields
 from sd2app.session.tasks import Job, ListedRunner, TaskList
@@ -71,7 +72,7 @@ class DocumentModel(QObject):
         self._runner.failed.connect(self._offer_instead)
         self._maps = ListedRunner("radar", jobs, self, self._receive_map)
         for runner in (self._runner, self._maps):
-            runner.failed.connect(lambda error: self.failed.emit(str(error)))
+            runner.failed.connect(lambda error: self.failed.emit(words_of(error)))
         self._meshes = MeshReader(jobs, self)
         self._meshes.ready.connect(self._exchange_mesh)
         self._meshes.failed.connect(self.failed)

@@ -9,7 +9,7 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import Emit
-from sd2app.session.content import OfferedCure, offers_of
+from sd2app.session.content import OfferedCure, offers_of, words_of
 from sd2app.session.tasks import ListedRunner, TaskList
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.edited import MESH
@@ -108,7 +108,7 @@ class MeshReader(QObject):
         self._runner.submit(read, f"Reading {name}")
 
     def _say(self, error: Exception) -> None:
-        self.failed.emit(str(error))
+        self.failed.emit(words_of(error))
 
     def _tell(self, read: ReadMesh) -> None:
         self.keep(read)

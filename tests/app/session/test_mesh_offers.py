@@ -36,7 +36,7 @@ def test_a_mesh_behind_the_camera_is_turned_and_back_by_the_history(document, qt
     opened(document, folder, qtbot)
     (offer,) = document.offers
     assert document.offers_of_open
-    assert "--turn x180" in offer.text
+    assert offer.text.endswith("y probably points up and z backward.")
     edits, stack = Edits(document, SensorModel()), document.undo_stack
     edits.set_radar_offset(0.5)
     with qtbot.waitSignal(document.opened, timeout=10_000):

@@ -88,7 +88,7 @@ def test_vertices_in_another_order_are_parts_that_are_too_fast():
 def test_a_place_that_no_camera_sees_has_its_cure(place, pose, value):
     (finding,) = judge_place(seen(np.tile(place, (5, 1)).astype(float), pose=pose))
     assert (finding.cure and finding.cure.value) == value
-    assert ("--distance-m" if value is None else f"--turn {value}") in finding.remedy
+    assert ("--distance-m" if value is None else f"--turn {value}") in str(finding)
 
 
 def test_a_distance_by_a_guessed_focal_length_is_named():

@@ -14,7 +14,14 @@ from grey_video import FRAMES, RATE, write_video
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QCheckBox, QComboBox, QFileDialog, QToolButton, QWidget
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QFileDialog,
+    QLabel,
+    QToolButton,
+    QWidget,
+)
 from window_models import models_of
 
 from sd2app.foreign_mesh.dialog import MeshDialog
@@ -108,15 +115,23 @@ def test_people_are_listed_and_chosen_and_frames_stepped_through(qtbot, dialog) 
     ]  # fmt: skip
     choose(qtbot, dialog, "Person", 2)
     assert preview.read_as.person == "8"
-    assert preview.frame == FRAMES // 2
-    assert not preview.someone
-    assert "The mesh has nobody in this frame." in words_in(dialog, "warning") or preview.offers
+    # It has nobody in the middle of the video: it is seen in the middle of where it has somebody.
+    assert (preview.frame, preview.someone) == (SHORT // 2, True)
     dialog._slider.slider.setFocus()
-    for _ in range(FRAMES // 2 - SHORT + 1):
-        QTest.keyClick(dialog._slider.slider, Qt.Key.Key_Left)
+    for _ in range(SHORT // 2):
+        QTest.keyClick(dialog._slider.slider, Qt.Key.Key_Right)
     settle(qtbot, preview)
-    assert preview.frame == SHORT - 1
-    assert preview.someone
+    assert (preview.frame, preview.someone) == (SHORT, False)
+    assert "The mesh has nobody in this frame." in words_in(dialog, "warning") or preview.offers
+    # Where the user looks it stays.
+    choose(qtbot, dialog, "How the mesh is turned", 1)
+    assert preview.frame == SHORT
+
+
+def test_what_a_button_puts_right_is_told_once_and_by_no_option_of_a_command_line(qtbot, dialog) -> None:
+    said = "\n".join(label.text() for label in dialog.findChildren(QLabel) if label.isVisible())
+    assert said.count("at or behind the camera") == 1
+    assert "--turn" not in said
 
 
 def test_what_is_turned_and_its_focal_length_are_seen_at_once(qtbot, dialog) -> None:

@@ -52,6 +52,16 @@ def test_the_command_records_the_same(parent, qtbot) -> None:
         assert (command.out, command.radar, command.json) == (setup.folder, "test", False)
 
 
+def test_what_cannot_be_recorded_cannot_be_copied_as_a_command(parent, tmp_path) -> None:
+    setup = ListenSetup(Settings.forgetful(), parent)
+    dialog = ListenDialog(setup, parent)
+    copy = button_of(dialog, "Copy command")
+    for way in ("test", "replay"):  # of which no capture is chosen
+        setup.choose("way", way)
+        assert copy.isEnabled() == (not setup.problem) == dialog._begin.isEnabled()
+    assert not copy.isEnabled()
+
+
 def test_the_place_that_is_found_goes_with_what_is_recorded(parent, qtbot) -> None:
     setup = ListenSetup(Settings.forgetful(), parent)
     setup.choose("way", "test")
