@@ -128,7 +128,7 @@ def test_people_are_listed_and_chosen_and_frames_stepped_through(qtbot, dialog) 
     assert preview.frame == SHORT
 
 
-def test_what_a_button_puts_right_is_told_once_and_by_no_option_of_a_command_line(qtbot, dialog) -> None:
+def test_what_a_button_puts_right_is_told_once_and_by_no_option(qtbot, dialog) -> None:
     said = "\n".join(label.text() for label in dialog.findChildren(QLabel) if label.isVisible())
     assert said.count("at or behind the camera") == 1
     assert "--turn" not in said
