@@ -14,7 +14,8 @@ from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.expected import SIGMA_FACTOR, count_expected, sigma_bins
 from sd2core.doppler.histogram import Counts, Scatterers, counting_of
 from sd2core.doppler.masks import Quality, Visibility, VisibilityMasks, position_of
-from sd2core.doppler.moving import MovingVertices, visible_counts
+from sd2core.doppler.moving import MovingVertices
+from sd2core.doppler.moving_kernels import marked_counts_kernel
 from sd2core.doppler.prepared import Block, PreparedMesh
 from sd2core.mesh.walls import Wall
 from sd2core.numerics.compiled import kernels_ready
@@ -125,11 +126,12 @@ class FrameCounts:
             duration_s = block.frames.duration_s[rows]
             histogram.count(moving, rows.start, duration_s, ends, self.counting, scatterers, into)
             if shares:
-                points, mask = prepared.points(block)[rows], scatterers.mask
-                normals = None if scatterers.normals is None else prepared.normals(block)[rows]
-                into.visible[:] = visible_counts(
-                    points, ends[0], mask, normals, prepared.multiplicity
-                )
+                if scatterers.mask is not None:
+                    marked_counts_kernel(scatterers.mask, prepared.stands_for, into.visible)
+                elif scatterers.normals is not None:
+                    prepared.add_still(block, rows, moving, ends[0], into.visible)
+                else:
+                    into.visible[:] = self.mesh.represented_count
         if self.options.range_law == "frame":
             into.histogram[:] *= self.frame_law(block, rows, path)[:, None, None]
         return quality

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from sd2core.doppler.histogram import Counting, Frames, Paths
 from sd2core.doppler.moving_kernels import (
     GROUP,
-    facing_counts_kernel,
     gather_kernel,
     moving_kernel,
     moving_normals_kernel,
@@ -144,36 +143,3 @@ def find_moving(
         GROUP,
         vertices,
     )
-
-
-def visible_counts(
-    points: NDArray[Any],
-    sensor: NDArray[np.float64],
-    mask: NDArray[np.uint8] | None,
-    normals: NDArray[np.int8] | None,
-    multiplicity: NDArray[np.float32] | None,
-) -> NDArray[np.float64]:
-    """Number of all visible vertices in each frame, (n,): marked, facing the sensor, or all.
-
-    Parameters
-    ----------
-    points : ndarray, (n, 3, V)
-        Positions of all vertices.
-    sensor : float64 ndarray, (3,)
-        In the frame of the positions.
-    mask : uint8 ndarray, (n, V), or None
-        Where it is given, only marked vertices are visible.
-    normals : int8 ndarray, (n, 3, V), or None
-        Without a mask only vertices whose normal faces the sensor are visible; None: all are.
-    multiplicity : float32 ndarray, (V,), or None
-        Number of vertices that each stands for; None: itself only.
-    """
-    vertices = points.shape[2]
-    stands_for = np.ones(vertices) if multiplicity is None else multiplicity.astype(np.float64)
-    if mask is not None:
-        return (mask > 0) @ stands_for
-    visible = np.full(len(points), stands_for.sum())
-    if normals is not None:
-        own = np.empty(0, np.float32) if multiplicity is None else multiplicity
-        facing_counts_kernel(points, normals, own, sensor.astype(points.dtype), visible)
-    return visible

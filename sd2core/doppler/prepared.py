@@ -16,6 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 from sd2core.doppler import vid2doppler
 from sd2core.doppler.histogram import Counting, Frames
 from sd2core.doppler.moving import MovingVertices, find_moving, still_bins
+from sd2core.doppler.moving_kernels import (
+    STEADY,
+    add_still_kernel,
+    steadiness_kernel,
+)
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.sequence import MeshSequence, refuse_missing
 from sd2core.mesh.walls import Wall
@@ -74,6 +79,8 @@ class PreparedMesh:
         self.faces = None if self.mesh.faces is None else np.array(self.mesh.faces, np.int32)
         counts = self.mesh.vertex_counts
         self.multiplicity = None if counts is None else counts.astype(np.float32)
+        alone = np.ones(self.mesh.vertex_count, np.float32)
+        self.stands_for = alone if self.multiplicity is None else self.multiplicity
         # Points are kept around the clip's own origin, in single precision where that
         # is enough (see _positions), so that large coordinates cost nothing. The origin
         # is a number that the mesh's own precision has. The compatible rule works on the
@@ -225,6 +232,33 @@ class PreparedMesh:
 
         return self._kept("normals", block, self._normals, moving, few)
 
+    def add_still(
+        self,
+        block: Block,
+        rows: slice,
+        moving: MovingVertices,
+        place_m: NDArray[np.float64],
+        visible: NDArray[np.float64],
+    ) -> None:
+        """Add to the visible vertices that move those of the others that face the sensor.
+
+        Parameters
+        ----------
+        block, rows, moving
+            The n frames, and what moves in the block.
+        place_m : float64 ndarray, (3,)
+            Of the sensor, in the frame of the prepared positions.
+        visible : float64 ndarray, (n,)
+            Written.
+        """
+        points, normals = self.points(block), self.normals(block)
+        turn, shift = self._kept("steadiness", block, self._steadiness)
+        place, stands_for = place_m.astype(points.dtype), self.stands_for
+        paths = moving.vertex, moving.first
+        add_still_kernel(
+            points, normals, turn, shift, *paths, stands_for, rows.start, place, visible
+        )
+
     def areas(self, block: Block, moving: MovingVertices | None = None) -> NDArray[np.float32]:
         """Vertex areas of a block's frames in m², float32 (n, V), or of what moves."""
         return self._kept("areas", block, self._areas, moving)
@@ -344,6 +378,13 @@ class PreparedMesh:
         normals = np.empty(points.shape, np.int8)
         visibility.vertex_normals_kernel(points, faces, 0, len(points), normals)
         return normals
+
+    def _steadiness(self, block: Block) -> NDArray[np.float32]:
+        """How little facing tests change within groups of frames, (2, groups, V)."""
+        points = self.points(block)
+        steady = np.empty((2, -(-len(points) // STEADY), points.shape[2]), np.float32)
+        steadiness_kernel(points, self.normals(block), *steady)
+        return steady
 
     def _area_vectors(self, block: Block) -> NDArray[np.float32]:
         points, faces = self._at_frames(block), self._faces()

@@ -25,7 +25,7 @@ from sd2core.mesh.presence import gaps_in_words, runs
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import VertexParts
 from sd2core.numerics.byte_budget import ByteBudget
-from sd2core.numerics.compiled import compile_in_background, kernels_ready
+from sd2core.numerics.compiled import compile_in_background, kernels_ready, worker_count
 from sd2core.numerics.parallel import Ticket, run_jobs, run_light_jobs
 from sd2core.numerics.precision import SHARE_OF_A_BIN, stored_velocity_error_mps
 from sd2core.progress import Progress, part_of, silent
@@ -646,12 +646,15 @@ class Synthesizer:
         blocks = self._frames.blocks_between(start, stop)
         pairs = [self.prepared.pairs_moving(index) for index, *_ in blocks]
         light = quick and None not in pairs and sum(pair or 0 for pair in pairs) <= _LIGHT_PAIRS
+        # Light work is cut into equal parts, one for every thread.
+        shared = np.linspace(start, stop, worker_count() + 1).astype(int).tolist() if light else []
         for index, low, high in blocks:
             # A block that must be read first is one job: its readers would wait.
             size = _FAST_FRAMES if quick else 2 * at_once
-            size = max(size, (stop - start) // 2) if light else size
             pieces = -(-(high - low) // size) if self.prepared.has(index) else 1
             cuts = np.linspace(low, high, pieces + 1).astype(int).tolist()
+            if light:
+                cuts = [low, *(cut for cut in shared if low < cut < high), high]
             jobs += [job(index, a, b) for a, b in pairwise(cuts)]
         if light and self._threads is None:
             processor_s = run_light_jobs(jobs, stop - start, progress)

@@ -6,13 +6,14 @@ more moves.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from timing import best_s
+from timing import best_s, spent_s
 
 import sd2core as sd2
 from sd2core.body.parts import known_parts
@@ -40,9 +41,9 @@ class Dense(PreparedMesh):
         return
 
 
-def in_turns(*works: Any, rounds: int = 30) -> NDArray[np.float64]:
+def in_turns(*works: Any, rounds: int = 30, timed: Any = best_s) -> NDArray[np.float64]:
     """Shortest times, in turns, so that a busy machine slows all."""
-    return np.min([[best_s(work, 1) for work in works] for _ in range(rounds)], axis=0)
+    return np.min([[timed(work, 1) for work in works] for _ in range(rounds)], axis=0)
 
 
 def pair_of(mesh: MeshSequence) -> tuple[Synthesizer, Synthesizer]:
@@ -56,42 +57,45 @@ def pair_of(mesh: MeshSequence) -> tuple[Synthesizer, Synthesizer]:
 
 
 def test_gestures(benchmark: Any, mesh: MeshSequence, capsys: pytest.CaptureFixture[str]) -> None:
-    """Target: a whole-clip facing map takes 0.7 times as long as a plain copy of the mesh."""
+    """Target: ``map()`` after a move takes 0.7 times as long as a copy of the mesh, facing.
+
+    With all that it says of the map, from another place each time; the copy goes into an array
+    that is there, whose pages nobody has to fetch first.
+    """
     whole, sparse = pair_of(mesh)
-    vertices, parts, place = np.array(mesh.read(0, 450)), known_parts(mesh), VirtualSensor()
-
-    def stretched(maker: Synthesizer, **how: Any) -> Any:
-        return lambda: maker.stretch(place, 0, 450, **how)
-
+    vertices, parts = np.array(mesh.read(0, 450)), known_parts(mesh)
+    kept = vertices.copy()
     exact = Synthesizer(mesh, PRESETS["paper"], blocks_of=sparse)
-    exact.stretch(place, 0, 450)
+    exact.stretch(VirtualSensor(), 0, 450)
     moves = iter(range(1, 10**6))
 
-    def moved() -> None:
-        exact.stretch(
-            VirtualSensor(position_m=(1e-9 * next(moves), 0.0, 0.0)), 0, 450, shares=False
-        )
+    def place() -> VirtualSensor:
+        at = float(next(moves))
+        return VirtualSensor(position_m=(0.5 * math.sin(at), 0.3 * math.cos(0.7 * at), 0.0))
 
-    copy_s, dense_s, map_s, mask_s, exact_s, shares_s, dense_limbs_s, limbs_s = in_turns(
-        vertices.copy,
-        stretched(whole, shares=False),
-        stretched(sparse, shares=False),
-        stretched(exact, visibility="frozen", shares=False),
-        moved,
-        stretched(sparse),
-        stretched(whole, shares=False, parts=parts),
-        stretched(sparse, shares=False, parts=parts),
-    )
+    def stretched(maker: Synthesizer, **how: Any) -> Any:
+        return lambda: maker.stretch(place(), 0, 450, **how)
+
+    works = {
+        "copied": lambda: np.copyto(kept, vertices),
+        "map()": lambda: sparse.map(place()),
+        "without shares": stretched(sparse, shares=False),
+        "mask kept, without shares": stretched(exact, visibility="frozen", shares=False),
+        "by limb": stretched(sparse, shares=False, parts=parts),
+        "counting everything": stretched(whole, shares=False),
+        "by limb, counting everything": stretched(whole, shares=False, parts=parts),
+    }
+    clock = dict(zip(works, in_turns(*works.values()), strict=True))
+    processor = dict(zip(works, in_turns(*works.values(), timed=spent_s), strict=True))
+    exact_s = spent_s(lambda: exact.map(place()), 5)
     with capsys.disabled():
-        print(
-            f"\ngestures, facing: {map_s / copy_s:.2f} times a copy of the mesh ({1e3 * map_s:.1f}"
-            f" ms), mask kept {mask_s / copy_s:.2f}, exact {1e3 * exact_s / 450:.3f} ms/frame,"
-            f" counting everything {dense_s / copy_s:.2f}, with the share that is seen"
-            f" {shares_s / copy_s:.2f}; by limb {limbs_s / copy_s:.2f}, counting everything"
-            f" {dense_limbs_s / copy_s:.2f}"
-        )
-    assert map_s < 0.6 * dense_s
-    benchmark.pedantic(stretched(sparse, shares=False), rounds=20)
+        print("\ngestures, facing, in copies of the mesh by the clock (by processor time):")
+        for name in works:
+            ratio, spent = (spans[name] / spans["copied"] for spans in (clock, processor))
+            print(f"  {name}: {ratio:.2f} ({spent:.2f}), {1e3 * clock[name]:.2f} ms")
+        print(f"  exact: {1e3 * exact_s / 450:.3f} ms of processor time a frame")
+    assert processor["without shares"] < 0.6 * processor["counting everything"]
+    benchmark.pedantic(works["map()"], rounds=20)
 
 
 @pytest.mark.parametrize("visibility", ["facing", "exact"])

@@ -128,6 +128,17 @@ def test_most_vertices_are_left_out_where_few_move(share: float) -> None:
     assert restless.prepared.moving(restless.prepared.block(0), made._frames.counting) is None
 
 
+def test_a_plate_that_sinks_slowly_past_the_sensor_is_seen_from_then_on() -> None:
+    """Slower than any bin that is kept; it keeps its normal, which points up."""
+    corners = np.array([(x, y, 0.0) for x in (1.0, 2.0) for y in (-1.0, 0.0, 1.0)])
+    faces = np.array([(0, 3, 1), (1, 3, 4), (1, 4, 2), (2, 4, 5)], np.int32)
+    height_m = 0.00525 - 0.001 * np.arange(FRAMES)
+    places = (corners + height_m[:, None, None] * (0, 0, 1)).astype(np.float32)
+    plate = MeshSequence(places, faces, Timebase(np.arange(FRAMES) / RATE))
+    seen = Synthesizer(plate).map(VirtualSensor(), visibility="facing").meta["visible_share"]
+    assert seen == (height_m < 0).tolist()
+
+
 def test_maps_of_what_moves_keep_a_quarter_of_the_mesh() -> None:
     """Of a ball of which a twentieth moves at a time, as a body's gestures do."""
     mesh, options = body(3, 0.02, 2.0, counts=False), replace(PRESETS["paper"], visibility="facing")
