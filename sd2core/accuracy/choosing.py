@@ -207,8 +207,18 @@ def _reach_m(survey: Survey, progress: Progress) -> float | None:
 def _candidates(survey: Survey, tolerance: float) -> list[AccuracyPlan]:
     options = survey.trial.options
     dropped = survey.change[replace(survey.base, beyond="drop")]
+    # What changes least is left out first.
+    parts = sorted(
+        survey.trial.scene_parts,
+        key=lambda part: survey.change[replace(survey.base, left_out=(part,))],
+    )
     return [
-        replace(plan, beyond="wrap" if dropped > _FREE_SHARE * tolerance else "drop")
+        replace(
+            plan,
+            beyond="wrap" if dropped > _FREE_SHARE * tolerance else "drop",
+            left_out=tuple(parts[:count]),
+        )
+        for count in range(len(parts) + 1)
         for plan in counting_plans(
             options.weight,
             surface=survey.base.visibility != "none",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from sd2core.accuracy.plans import AccuracyPlan
+from collections.abc import Collection
+
+from sd2core.accuracy.plans import AccuracyPlan, ScenePart
 
 _COUNT_NS, _MOMENT_NS = 1.0, 1.5
 _ONE_RANGE = 0.9
@@ -17,15 +19,39 @@ pixel of a depth buffer. Rounded from surveys of the sample's body and of sphere
 vertices; they decide between plans and are shown nowhere."""
 
 
-def modelled_ns(plan: AccuracyPlan, vertices: int, moving_share: float) -> float:
+_BEAM, _THINGS = 3.0, 1.15
+"""Factors of a beam on the time of counting, and of things on that of masks (docs/decisions/0080,
+0081)."""
+
+
+def modelled_ns(
+    plan: AccuracyPlan,
+    vertices: int,
+    moving_share: float,
+    scene: Collection[ScenePart] = (),
+    walls: int = 0,
+) -> float:
     """Processor time per frame of a counting plan on a nominal machine, in nanoseconds.
 
-    ``vertices`` are those of the full mesh; ``moving_share`` of them leave the nulled bins.
+    Parameters
+    ----------
+    plan : AccuracyPlan
+    vertices : int
+        Of the full mesh.
+    moving_share : float
+        Share of them that leaves the nulled bins.
+    scene : collection of {"beam", "things", "walls"}
+        What the scene has, and a plan may leave out.
+    walls : int
+        In the scene; by way of each is counted once more.
     """
+    modelled = set(scene) - set(plan.left_out)
     kept = plan.vertices_kept * vertices
     count_ns = kept * (_COUNT_NS + _MOMENT_NS * plan.frame_rate_factor)
     if plan.range_law == "frame":
         count_ns *= _ONE_RANGE
+    if "beam" in modelled:
+        count_ns *= _BEAM
     mask_ns = 0.0
     if plan.visibility == "facing":
         mask_ns = _FACING_NS * kept
@@ -34,4 +60,7 @@ def modelled_ns(plan: AccuracyPlan, vertices: int, moving_share: float) -> float
         mask_ns = once_ns + kept * (vertex_ns + moving_ns * moving_share)
         if plan.visibility == "depth":
             mask_ns += _PIXEL_NS * plan.depth_resolution**2
-    return _FRAME_NS + count_ns + mask_ns / plan.mask_stride
+    if "things" in modelled:
+        mask_ns *= _THINGS
+    times = 1 + walls if "walls" in modelled else 1
+    return _FRAME_NS + times * (count_ns + mask_ns / plan.mask_stride)

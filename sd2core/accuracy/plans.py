@@ -10,10 +10,13 @@ from typing import Any, Literal, get_args
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.options import Motion, WaveOptions
+from sd2core.io.things import with_things, with_walls
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.options.synthesis import Beyond, DepthResolution, RangeLaw, Visibility, Weight
 
 Signal = Literal["histogram", "fmcw", "direct"]
 Family = Literal["histogram", "fmcw"]
+ScenePart = Literal["beam", "things", "walls"]
 
 FRAME_RATE_FACTORS = (1, 2, 4, 8)
 MASK_STRIDES = (1, 2, 5, 10)
@@ -52,6 +55,8 @@ class AccuracyPlan:
         FMCW: parts of a frame's chirps with a beat frequency of their own.
     motion : {"constant", "interpolated"}
         FMCW: within a frame, constant velocity or interpolated at every chirp.
+    left_out : tuple of {"beam", "things", "walls"}
+        Parts of the scene that counting leaves out of account.
     """
 
     signal: Signal = "histogram"
@@ -66,8 +71,15 @@ class AccuracyPlan:
     frame_rate_factor: int = 1
     blocks: int = 1
     motion: Motion = "constant"
+    left_out: tuple[ScenePart, ...] = ()
 
     def __post_init__(self) -> None:
+        # JSON knows no tuples.
+        object.__setattr__(self, "left_out", tuple(sorted(self.left_out)))
+        if not set(self.left_out) <= set(get_args(ScenePart)):
+            raise Sd2Error(
+                f"A plan leaves out {self.left_out}", f"some of {', '.join(get_args(ScenePart))}"
+            )
         if self.signal not in get_args(Signal):
             raise Sd2Error(f"signal is {self.signal!r}", f"one of {', '.join(get_args(Signal))}")
         if self.family == "fmcw" and self.visibility not in ("facing", "exact"):
@@ -114,6 +126,8 @@ class AccuracyPlan:
         if self.frame_rate_factor > 1:
             yield f"frame rate × {self.frame_rate_factor}"
         yield {"drop": "beyond dropped", "wrap": "wrapped", "clip": "clipped"}[self.beyond]
+        if self.left_out:
+            yield f"without {', '.join(self.left_out)}"
 
     def options(self, base: SynthesisOptions) -> SynthesisOptions:
         """Synthesis options of a counting plan; what it does not choose is taken from ``base``."""
@@ -127,6 +141,12 @@ class AccuracyPlan:
             beyond=self.beyond,
             oversampling=self.frame_rate_factor,
         )
+
+    def scene(self, mesh: MeshSequence) -> MeshSequence:
+        """Mesh without the things and walls that a counting plan leaves out of account."""
+        if "things" in self.left_out:
+            mesh = with_things(mesh, ())
+        return with_walls(mesh, ()) if "walls" in self.left_out else mesh
 
     def wave(self, base: WaveOptions) -> WaveOptions:
         """Options of an FMCW plan; what it does not choose is taken from ``base``."""

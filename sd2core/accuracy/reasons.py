@@ -108,6 +108,17 @@ def reasons_for(
             f" {'modelled' if modelled else 'one range per frame'}"
         )
         add("range_law", modelled, off, law, range_law="frame")
+    for part in survey.trial.scene_parts:
+        modelled, off = part not in plan.left_out, alone(left_out=(part,))
+        what, verb = (f"the {part}", "changes") if part == "beam" else (part, "change")
+        use = "modelled" if modelled else "not modelled"
+        if tolerance is not None and not modelled:
+            use += f" at a tolerance of {percent(tolerance)}"
+        use = f"{what} {verb} this map by {percent(off)}: {use}"
+        add(part, modelled, off, use, left_out=(*plan.left_out, part))
+    if (off_alone := survey.others_change) is not None:
+        people = f"other people change this map by {percent(off_alone)}: modelled"
+        found.append(Reason("people", True, off_alone, people))
     edge_mps = survey.trial.options.axis.v_max_mps
     if facts.beyond_share <= 0:
         add(

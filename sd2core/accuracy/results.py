@@ -134,8 +134,8 @@ class Reason:
     """Reason for one setting of a plan, in words with numbers."""
 
     setting: str
-    """One of occlusion, static, range_law, aliasing, motion, mask_age, mask_reuse, geometry and
-    weight."""
+    """One of occlusion, static, range_law, aliasing, motion, mask_age, mask_reuse, geometry,
+    weight, beam, things, walls and people."""
     modelled: bool  # True if the scene requires it, so that the plan contains it
     value: float  # the number that decided: a relative change of the map, or a share
     text: str  # one sentence without a full stop

@@ -60,13 +60,16 @@ class Survey:
     mask_ms: dict[AccuracyPlan, float] = field(default_factory=dict)
     """Milliseconds of processor time per frame for visibility."""
     count_ms: dict[AccuracyPlan, float] = field(default_factory=dict)  # the same for counting
+    others_change: float | None = None
+    """Relative L1 of the map of the first body alone; None where there is no other."""
     cost_share: dict[float, float] = field(default_factory=lambda: {1.0: 1.0})
     """Cost of a share of the vertices, as a share of the cost of all."""
 
     def forecast_error(self, plan: AccuracyPlan) -> float:
         """Sum of the errors of a plan's settings: more than their error together."""
         lowered = (names for names in _ALONE if self._differs(plan, names))
-        down = (self.change[self._taking(plan, *names)] for names in lowered)
+        down = [self.change[self._taking(plan, *names)] for names in lowered]
+        down += [self.change[replace(self.base, left_out=(part,))] for part in plan.left_out]
         return self.change[self._taking(plan, "frame_rate_factor")] + sum(down)
 
     def forecast_ms(self, plan: AccuracyPlan) -> float:
@@ -77,20 +80,26 @@ class Survey:
             per_vertex = self.count_ms[self.base]
             saved = per_vertex - self.count_ms[self._taking(plan, "range_law")]
             count_ms -= min(max(saved, 0.0), 0.9 * per_vertex)
-        return self.cost_share[plan.vertices_kept] * (mask_ms + count_ms) / worker_count()
+        spent = self._modelled_ns(plan) / self._modelled_ns(replace(plan, left_out=()))
+        return self.cost_share[plan.vertices_kept] * spent * (mask_ms + count_ms) / worker_count()
 
     def cost_key(self, plan: AccuracyPlan) -> tuple[int, int]:
         """Sort key: cost in steps of 5 %, then the number of settings that differ from the base.
 
         The cost is a model's, since measured times differ each time.
         """
-        moving = 1.0 - self.facts.still_share
-        cost_ns = modelled_ns(plan, self.trial.mesh.vertex_count, moving) + _NEGLIGIBLE_NS
+        cost_ns = self._modelled_ns(plan) + _NEGLIGIBLE_NS
         return round(math.log(cost_ns) / math.log(_WORTH_TAKING)), self.settings_changed(plan)
+
+    def _modelled_ns(self, plan: AccuracyPlan) -> float:
+        mesh, moving = self.trial.mesh, 1.0 - self.facts.still_share
+        walls = 0 if mesh.surroundings is None else len(mesh.surroundings.walls)
+        return modelled_ns(plan, mesh.vertex_count, moving, self.trial.scene_parts, walls)
 
     def settings_changed(self, plan: AccuracyPlan) -> int:
         """Number of settings in which a plan differs from the base."""
-        return sum(self._differs(plan, names) for names in (*_ALONE, ("frame_rate_factor",)))
+        lowered = sum(self._differs(plan, names) for names in (*_ALONE, ("frame_rate_factor",)))
+        return lowered + len(plan.left_out)
 
     def _differs(self, plan: AccuracyPlan, names: tuple[str, ...]) -> bool:
         return any(getattr(plan, name) != getattr(self.base, name) for name in names)
@@ -132,9 +141,10 @@ def survey_scene(
     if options.range_exponent:
         single.append(replace(base, range_law="frame"))
     single.append(replace(base, beyond="drop"))
+    single += [replace(base, left_out=(part,)) for part in trial.scene_parts]
     single = [plan for plan in single if plan != base]
     rates = [replace(base, frame_rate_factor=factor) for factor in FRAME_RATE_FACTORS]
-    total = len(single) + len(rates) + 3
+    total = len(single) + len(rates) + 3 + bool(mesh.others)
     done = 0
 
     def step() -> None:
@@ -180,6 +190,11 @@ def survey_scene(
             spent_ms = min(found.milliseconds, again.milliseconds)
             share = spent_ms / against.milliseconds if against.milliseconds > 0 else 1.0
             survey.cost_share[plan.vertices_kept] = min(max(share, plan.vertices_kept), 1.0)
+        step()
+    if mesh.others:
+        alone = Trial(replace(mesh, others=()), sensor, options, trial.sample)
+        found = alone.columns(base, runs, progress=within)
+        survey.others_change = relative_l1(found.smooth, against.smooth)
         step()
     return survey
 

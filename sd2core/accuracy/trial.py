@@ -10,7 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.accuracy.plans import VERTICES_KEPT, AccuracyPlan, reference_plan, visibility_plans
+from sd2core.accuracy.plans import (
+    VERTICES_KEPT,
+    AccuracyPlan,
+    ScenePart,
+    reference_plan,
+    visibility_plans,
+)
 from sd2core.accuracy.results import Errors, compute_errors
 from sd2core.accuracy.sample import Run, Sample
 from sd2core.doppler.masks import Visibility
@@ -54,8 +60,12 @@ def synthesizer_for(
     """
     if plan.family != "histogram":
         raise Sd2Error(f"The plan is {plan}", "a plan that counts vertices")
-    counted = like.mesh if like is not None else decimate(mesh, plan.vertices_kept)
-    return Synthesizer(counted, plan.options(options), blocks_of=like)
+    if like is None:
+        counted = decimate(mesh, plan.vertices_kept)
+    else:  # whose plan may leave out other things
+        counted = replace(like.mesh, surroundings=mesh.surroundings)
+    beam = "beam" not in plan.left_out
+    return Synthesizer(plan.scene(counted), plan.options(options), blocks_of=like, beam=beam)
 
 
 _BLOCK_FRAMES = 5
@@ -116,6 +126,17 @@ class Trial:
         return tuple(
             kept for kept in VERTICES_KEPT if kept == 1 or self._sampled(kept).vertex_count < every
         )
+
+    @property
+    def scene_parts(self) -> tuple[ScenePart, ...]:
+        """Parts of the scene that a plan may leave out."""
+        around = self.mesh.surroundings
+        there: dict[ScenePart, bool] = {
+            "beam": self.sensor.beam is not None,
+            "things": around is not None and bool(around.things) and self.mesh.faces is not None,
+            "walls": around is not None and bool(around.walls),
+        }
+        return tuple(part for part, is_there in there.items() if is_there)
 
     def at(self, sensor: VirtualSensor) -> Trial:
         """Trial from another place, sharing what does not depend on it."""
@@ -252,8 +273,9 @@ class Trial:
         key = plan.vertices_kept, plan.frame_rate_factor, block_frames
         like = self._prepared.get(key)
         made = Synthesizer(
-            self._sampled(plan.vertices_kept),
+            plan.scene(self._sampled(plan.vertices_kept)),
             plan.options(self._unsmoothed),
+            beam="beam" not in plan.left_out,
             blocks_of=like,
             threads=threads,
             block_frames=block_frames,

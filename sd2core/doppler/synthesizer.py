@@ -133,6 +133,8 @@ class Synthesizer:
     blocks_of : Synthesizer, optional
         Another synthesizer of the same mesh, maybe among other things, whose prepared blocks and
         budget are shared where the options allow it.
+    beam : bool
+        False: sensors' beams are left out of account.
 
     Raises
     ------
@@ -158,6 +160,7 @@ class Synthesizer:
         threads: int | None = None,
         block_frames: int | None = None,
         blocks_of: Synthesizer | None = None,
+        beam: bool = True,
     ) -> None:
         if isinstance(preset, str) and preset not in PRESETS:
             raise Sd2Error(f"The preset is {preset!r}", f"one of {', '.join(PRESETS)}")
@@ -172,6 +175,7 @@ class Synthesizer:
         self.mesh = mesh
         self.options = options
         self._threads = threads
+        self._beam = beam
         share_bytes = memory_budget_bytes // len(mesh.bodies)
         like = () if blocks_of is None else blocks_of._bodies
         found = (one.prepared.shared(mesh, options) for one in like)
@@ -190,6 +194,7 @@ class Synthesizer:
                     threads=threads,
                     block_frames=block_frames,
                     blocks_of=blocks_of,
+                    beam=beam,
                 )
                 for body in mesh.others
             ),
@@ -604,6 +609,7 @@ class Synthesizer:
         shares: bool = True,
     ) -> tuple[Counts, NDArray[np.float64], Quality, float]:
         """Counts per frame, their totals, the visibility used, and processor seconds."""
+        sensor = sensor if self._beam else replace(sensor, beam=None)
         if not kernels_ready():
             compile_in_background()
         counts = Counts.empty(

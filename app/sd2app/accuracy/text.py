@@ -75,6 +75,8 @@ def short(plan: AccuracyPlan) -> str:
         words.append(f"{percent(plan.vertices_kept)} of the vertices")
     if plan.frame_rate_factor > 1:
         words.append(f"frame rate × {plan.frame_rate_factor}")
+    if plan.left_out:
+        words.append(f"without {', '.join(plan.left_out)}")
     return " · ".join(words)
 
 
