@@ -17,8 +17,10 @@ from sd2app.scene.colours import Colouring, SceneColours, fractions, mesh_colour
 from sd2app.scene.parts import Body, GroundGrid, InertialMarkers, Markers, SensorGlyph, Shape
 from sd2app.scene.people import People
 from sd2app.scene.things import Things
+from sd2app.scene.walls import Walls
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.things import Surface
+from sd2core.mesh.walls import Wall
 from sd2core.sensor import VirtualSensor
 
 SENSOR_RADIUS_M = 0.045
@@ -66,6 +68,7 @@ class Scene:
         self.inertial = InertialMarkers(renderer)
         self.things = Things(renderer)
         self.people = People(renderer)
+        self.walls = Walls(renderer)
         self._inertial_rows = np.zeros(0, np.intp)
         self._set_extent(_NOTHING)
         self.set_colours(self.colours)
@@ -143,9 +146,10 @@ class Scene:
         self._framed = None
         self._lay_ground()
 
-    def set_things(self, surfaces: Sequence[Surface]) -> None:
+    def set_things(self, surfaces: Sequence[Surface], walls: Sequence[Wall]) -> None:
         """Show what stands around the body."""
         self.things.set_surfaces(surfaces)
+        self.walls.set_walls(walls, self.extent.centre_m)
         self._framed = None
         self._lay_ground()
 
@@ -200,6 +204,7 @@ class Scene:
         self.inertial.set_colours(colours)
         self.things.set_colours(colours)
         self.people.set_colours(colours)
+        self.walls.set_colours(colours)
         self.body.shadow.GetProperty().SetColor(*fractions(colours.shadow))
         self._stale_colours = True
 
@@ -312,7 +317,7 @@ class Scene:
             self._colour_mesh()
         for shape in (
             self.camera_glyph, self.markers, *self.sensor_glyph.shapes, *self.ground.shapes,
-            *self.things.shapes,
+            *self.things.shapes, *self.walls.shapes,
         ):  # fmt: skip
             shape.set_pixel_scale(pixel_scale)
         if self.has_mesh and self.body.drawn_as_dots:

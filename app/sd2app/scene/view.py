@@ -287,7 +287,10 @@ class SceneView(QWidget):
         if around is self._around and others == self._others:
             return
         self._around, self._others = around, others
-        self.scene.set_things(() if around is None else around.surfaces)
+        if around is None:
+            self.scene.set_things((), ())
+        else:
+            self.scene.set_things(around.surfaces, around.walls)
         with self._explaining():
             self.scene.set_people(others, self._frame or 0)
         named = [] if around is None else [one.name for one in around.things]

@@ -90,7 +90,7 @@ class BodiesPage(QWidget):
         if reading.pop("faces", None) is not None:
             self._warn("The mesh of this recording has its faces in another file: save it as one.")
             return
-        for name in ("things", "bodies", "called"):
+        for name in ("things", "walls", "bodies", "called"):
             reading.pop(name, None)
         path = str(Path(recording.mesh).absolute())
         self._take(lambda: Body(path, (_BESIDE_M, 0.0, 0.0), reading=reading))

@@ -65,7 +65,7 @@ class SensorFeature(Feature):
             ),
             Action(
                 "things", "Edit", "Things…", (),
-                "Put a box, a table, a screen or a mesh file between sensor and body",
+                "Put a box, a table, a screen, a mesh file, walls or a floor around the body",
                 lambda: self._shell.bring_up("Sensor", "Things"),
             ),
             Action(
@@ -121,7 +121,7 @@ class SensorFeature(Feature):
             "Sensor": paged_panel(
                 InnerPage("Sensor", "Where the sensor is and what it sees", sensor),
                 InnerPage("Placements", "Many places around the body, for a map each", placements),
-                InnerPage("Things", "What stands around the body, and hides it", things),
+                InnerPage("Things", "What stands around the body, and walls", things),
                 InnerPage("Bodies", "Who else moves in the scene", bodies),
             )
         }

@@ -10,6 +10,7 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from sd2app.maps.model import SynthesisModel
+from sd2app.sensor.walls_section import WallsSection
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import ask_file
 from sd2app.widgets.inputs import Choice, NumberBox
@@ -67,7 +68,8 @@ class ThingsPage(QWidget):
         which = row_of((self._which, 1), self._remove, spacing_px=6)
         self._about = pane(which, form_of(*rows, gaps_px=(8, 3)), spacing_px=6)
         head = row_of(title("Things"), STRETCH, self._shelf, self._add)
-        parts = head, sentence(_NOTHING), self._about, STRETCH
+        walls = WallsSection(session)
+        parts = head, sentence(_NOTHING), self._about, walls, STRETCH
         self.setLayout(column_of(*parts, spacing_px=6, margins_px=(8, 4, 8, 4)))
         session.document.changed.connect(self._refresh)
         self._refresh()

@@ -29,7 +29,7 @@ from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
 from sd2core.errors import Cure, Sd2Error
 from sd2core.io.bodies import with_bodies
-from sd2core.io.things import with_things
+from sd2core.io.things import with_things, with_walls
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
@@ -351,7 +351,7 @@ class DocumentModel(QObject):
         self._offer(read.offers)
 
     def _surround(self) -> None:
-        """Put the recording's things and other bodies around its mesh."""
+        """Put the recording's things, walls and other bodies around its mesh."""
         content = self.content
         if content is None or content.mesh is None:
             return
@@ -361,6 +361,8 @@ class DocumentModel(QObject):
             there = recording.bodies_there if recording.bodies or mesh.others else ()
             if there != tuple(body.placed for body in mesh.others):
                 mesh = with_bodies(mesh, there, person=recording.subject)
+            if recording.walls != (() if around is None else around.walls):
+                mesh = with_walls(mesh, recording.walls)
             if recording.things != (() if around is None else around.things):
                 mesh = with_things(mesh, recording.things)
         except Sd2Error as error:

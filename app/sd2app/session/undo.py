@@ -18,6 +18,7 @@ from sd2app.session.sensor import SensorModel
 from sd2core.errors import Cure
 from sd2core.mesh.bodies import Body
 from sd2core.mesh.things import Thing
+from sd2core.mesh.walls import Wall
 from sd2core.options.synthesis import HowCounted
 from sd2core.placements.placements import Placements
 from sd2core.radar_config import Clutter
@@ -131,14 +132,14 @@ class Edits:
             self.place_sensor(rest.pop("sensor"), "Restore sensor")
         self._change("Restore settings", rest)
 
-    # --- things and bodies ------------------------------------------------------------------
+    # --- things, bodies and walls -----------------------------------------------------------
 
-    def add_to_scene(self, one: Thing | Body) -> None:
-        """Put one more thing or body into the scene."""
+    def add_to_scene(self, one: Thing | Body | Wall) -> None:
+        """Put one more thing, body or wall into the scene."""
         self._set_in_scene("Add", one, lambda kept: (*kept, one))
 
-    def change_in_scene(self, number: int, one: Thing | Body, text: str = "Change") -> None:
-        """Replace a thing or body by another, or by itself at another place."""
+    def change_in_scene(self, number: int, one: Thing | Body | Wall, text: str = "Change") -> None:
+        """Replace one by another, or by itself at another place."""
         self._set_in_scene(text, one, lambda kept: (*kept[:number], one, *kept[number + 1 :]))
 
     def move_in_scene(self, number: int, one: Thing | Body, by_m: Vector) -> None:
@@ -164,19 +165,19 @@ class Edits:
         if body is not None:
             self.move_in_scene(recording.bodies.index(body), body, by_m)
 
-    def remove_from_scene(self, number: int, one: Thing | Body) -> None:
-        """Take a thing or body out of the scene."""
+    def remove_from_scene(self, number: int, one: Thing | Body | Wall) -> None:
+        """Take a thing, body or wall out of the scene."""
         self._set_in_scene("Remove", one, lambda kept: kept[:number] + kept[number + 1 :])
 
     def _set_in_scene(
         self,
         text: str,
-        one: Thing | Body,
+        one: Thing | Body | Wall,
         change: Callable[[tuple[Any, ...]], tuple[Any, ...]],
     ) -> None:
         recording = self._document.recording
         if recording is not None:
-            name = "things" if isinstance(one, Thing) else "bodies"
+            name = {Thing: "things", Body: "bodies", Wall: "walls"}[type(one)]
             self._change(f"{text} {one.name}", {name: change(getattr(recording, name))})
 
     # --- inertial sensors -----------------------------------------------------------------
