@@ -38,6 +38,7 @@ class RadarPlaceBadge(QToolButton):
             f"Seen from {away_m:.1f} m beside the radar · {go}",
             f"{go}, {away_m:.1f} m away",
             go,
+            "To the radar",
         )
         if not apart:
             words = ()

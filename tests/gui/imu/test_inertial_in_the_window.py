@@ -175,7 +175,7 @@ def test_the_track_shares_the_maps_time_axis(window, placed, qtbot) -> None:
     # Between the spans, which a double click plays.
     place = QPoint(round(placed.scale.x_of(0.9)), round(placed.lane_rect(1).center().y()))
     qtbot.mouseClick(placed, LEFT, pos=place)
-    assert models.playback.time_s == pytest.approx(placed.scale.time_of(place.x()), abs=0.02)
+    assert models.playback.time_s == pytest.approx(placed.scale.time_of(place.x()), abs=1 / 30)
     before = models.span.duration_s
     wheel = QWheelEvent(
         QPointF(place), QPointF(placed.mapToGlobal(place)), QPoint(), QPoint(0, 120),
