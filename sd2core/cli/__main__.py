@@ -9,7 +9,6 @@ from typing import NoReturn
 
 from sd2core.cli import build_parser, run
 from sd2core.cli.command_parser import add_command, add_options
-from sd2core.cli.importing import copy_sample
 from sd2core.cli.preparing import JOBS, Doctor, do_job
 from sd2core.errors import Sd2Error
 from sd2core.options.records import OptionRecord
@@ -53,6 +52,8 @@ def _demo(options: Demo) -> None:
     """
     if options.out is None:
         _absent(argparse.Namespace(name="demo"))
+    from sd2core.cli.importing import copy_sample
+
     copy_sample(options.out)
 
 

@@ -204,6 +204,7 @@ class MainWindow(QMainWindow):
         everybody = s.document.changed, features.labels.autosave.changed, self.keys.changed
         for signal in (*everybody, self.side.folded_changed):
             signal.connect(lambda *_: self._refresh())
+        s.sensor.dragging_changed.connect(lambda _: self._refresh([]))
         s.document.opened.connect(self._show_document)
         for signal in (s.document.changed, s.video.frame_changed):
             signal.connect(self._show_or_hide_video)
@@ -250,9 +251,11 @@ class MainWindow(QMainWindow):
         self.setWindowTitle(f"{name}SD² Studio")
 
     def _refresh(self, features: Iterable[Feature] | None = None) -> None:
-        # An edit changes several models; actions follow them once, before they are used.
+        # An edit changes several models; actions follow them once, before they are used: not
+        # while the sensor is dragged, unless a key is pressed.
         self._behind.update(self.features if features is None else features)
-        self._soon.start()
+        if not self.session.sensor.dragging:
+            self._soon.start()
 
     def _restyle(self) -> None:
         application = QApplication.instance()
