@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -27,7 +29,8 @@ def models_of(window: MainWindow) -> SimpleNamespace:
 def build_models(parent: QObject, settings: Settings, parts: Parts | None = None) -> Any:
     """Models without a window."""
     session, shell = build_session(parent, settings), NoShell()
-    features = Features(session, shell, parts or Parts(), parent)
+    parts = replace(parts or Parts(), pictures=Path(os.devnull))  # keeps none
+    features = Features(session, shell, parts, parent)
     return _named(session, features, shell=shell)
 
 

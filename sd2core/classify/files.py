@@ -10,10 +10,14 @@ from sd2core.classify.defaults import CLASSIFIERS
 from sd2core.denoise.files import readable, save_network, user_models_folder
 from sd2core.denoise.weights import SUFFIX, Shapes, read_header, read_network
 from sd2core.errors import Sd2Error
+from sd2core.files.resources import bundled_files, resource_path
 
 if TYPE_CHECKING:
     from sd2core.classify.live import TrainedClassifier
     from sd2core.classify.models import Classifier
+
+GESTURES = "gestures"
+"""Name of the bundled classifier."""
 
 _EXPECTED = "a classifier (.safetensors) written by `sd2 classify train`"
 
@@ -53,8 +57,14 @@ def load_classifier(path: Path) -> TrainedClassifier:
 
 
 def available_classifiers() -> list[ClassifierCard]:
-    """Cards of the user's classifiers; damaged files are left out."""
-    return readable(sorted(user_classifiers_folder().glob(f"*{SUFFIX}")), describe_classifier)
+    """Cards of the user's classifiers and the bundled one; damaged files are left out."""
+    own = sorted(user_classifiers_folder().glob(f"*{SUFFIX}"))
+    return readable([*own, *bundled_files(f"{GESTURES}{SUFFIX}")], describe_classifier)
+
+
+def bundled_classifier() -> Path:
+    """File of the classifier that comes with the program."""
+    return resource_path(f"{GESTURES}{SUFFIX}")
 
 
 def user_classifiers_folder() -> Path:

@@ -148,7 +148,7 @@ def user_models_folder() -> Path:
 def _known_files() -> dict[str, Path]:
     own = sorted(user_models_folder().glob(f"*{SUFFIX}"))
     # Of one name, the user's own is meant.
-    return {path.stem: path for path in [*bundled_files(f"*{SUFFIX}"), *own]}
+    return {path.stem: path for path in [*bundled_files(f"{MAP_MODEL}*{SUFFIX}"), *own]}
 
 
 def _read_header(path: Path) -> tuple[ModelCard, Shapes]:

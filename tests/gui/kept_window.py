@@ -28,6 +28,7 @@ from sd2app.settings import DEFAULT_TOLERANCE, Settings
 from sd2app.shell.parts import Parts
 from sd2app.shell.status_bar import StatusLine
 from sd2app.shell.window import MainWindow
+from sd2core.files.paths import user_data
 from sd2core.labels.recovery import recovery_folder
 
 _PLAIN = (str, int, float, complex, bytes, type(None), enum.Enum, Path)
@@ -60,6 +61,7 @@ def new_window(qtbot: Any, fake: Any, fake_models: Any, fake_classes: Any) -> Ma
             denoisers=fake_models.library,
             classifiers=fake_classes.library,
             learn_command=(sys.executable, "-u", fake_class_command.__file__),
+            pictures=user_data("pictures"),
         ),
     )
     window.resize(1280, 800)

@@ -19,12 +19,13 @@ from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.suggestions.finders import Found, Threshold
 from sd2core.classify.card import ClassifierCard
+from sd2core.classify.files import GESTURES
 from sd2core.classify.spans import SpanOptions, predicted_spans
 
 _PATIENCE_MS = 1500
 """Delay after the first map before the last session's classifier is loaded."""
 
-_MODEL, _SHOWN = "classify/model", "classify/shown"
+_MODEL, _SHOWN, _NONE = "classify/model", "classify/shown", "classify/none"
 
 
 class _Loaded(NamedTuple):
@@ -66,8 +67,15 @@ class ClassifyModel(ReportingModel):
         # The classifier that is in use or being loaded, and the card of the one in use.
         self.path: Path | None = next(iter(self._settings.paths(_MODEL)), None)
         self.card: ClassifierCard | None = None
+        chosen = self.path is not None or self._settings.flag(_NONE, False)
+        usual = None if chosen else library.named(GESTURES)
+        if usual is not None:
+            self.path, self.card = usual.path, usual
         self._problem = ""
-        self.shown = self._settings.flag(_SHOWN, True)  # under the maps, as the user wants it
+        # Under the maps, as the user wants it.
+        self.shown = self._settings.flag(_SHOWN, usual is None)
+        # The bundled one is loaded once it is asked for.
+        self._asleep = usual is not None and not self.shown
         self._chosen: MapModel | None = None
         self._runner = LatestRunner("classifier", self, self._set_loaded, self._fail)
         self._patience = delayed(self._load, _PATIENCE_MS, self)
@@ -192,6 +200,8 @@ class ClassifyModel(ReportingModel):
         card = self.describe(path) if path is not None else None
         self.path = None if path is None else Path(path).absolute()
         self._settings.set_paths(_MODEL, [self.path] if self.path is not None else [])
+        self._settings.set_value(_NONE, self.path is None)
+        self._asleep = False
         self._set_card(card)
         self.track.use(None, None)
         if path is not None:
@@ -199,6 +209,12 @@ class ClassifyModel(ReportingModel):
         self._load()
         self._follow()
         self.changed.emit()
+
+    def wake(self) -> None:
+        """Have the classifier loaded, where it waits to be asked for."""
+        if self._asleep:
+            self._asleep = False
+            self._load()
 
     def set_source(self, source: MapModel | None) -> None:
         """Look at another map; None leaves it to the classifier."""
@@ -210,6 +226,7 @@ class ClassifyModel(ReportingModel):
         """Show the probabilities under the maps, or not."""
         if shown != self.shown:
             self.shown = shown
+            self.wake()
             self._settings.set_value(_SHOWN, shown)
             self.changed.emit()
 
@@ -231,7 +248,8 @@ class ClassifyModel(ReportingModel):
         if source is not self.track.source:
             self.track.look_at(source)
             self.changed.emit()
-        waiting = self.path is not None and self.track.card is None and not self._problem
+        asked = self.path is not None and not self._asleep
+        waiting = asked and self.track.card is None and not self._problem
         about_to = self._runner.busy or self._patience.isActive()
         if waiting and source is not None and not about_to:
             self._patience.start()

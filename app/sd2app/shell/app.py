@@ -51,8 +51,8 @@ def run(
     apply_theme(application, is_dark(settings.dark))
     # A picture takes no lock on labels.
     aside = None if screenshot is None else TemporaryDirectory()
-    recovery = None if aside is None else Path(aside.name)
-    window = MainWindow(settings, Parts(recovery=recovery, parser=parser))
+    place = None if aside is None else Path(aside.name)
+    window = MainWindow(settings, Parts(recovery=place, pictures=place, parser=parser))
 
     def fill() -> None:
         # Loading Qt's reader of SVG does not delay the skeleton.

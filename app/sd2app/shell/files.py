@@ -75,6 +75,11 @@ class FilesFeature(Feature):
                 self._ask_open,
             ),
             Action(
+                "open_radar", "File", "Open a radar capture…", (),
+                "Raw samples, point clouds or maps that a radar has recorded",
+                lambda: self._ask_open(radar=True),
+            ),
+            Action(
                 "add", "File", "Add to this recording…", (),
                 "Add a video, a mesh, a radar capture or an inertial sensor's samples to what is"
                 " open",
@@ -117,7 +122,7 @@ class FilesFeature(Feature):
         for paths in self._session.settings.recent:
             others = "".join(f" + {path.name}" for path in paths[1:])
             action = menu.addAction(f"{paths[0]}{others}".replace("&", "&&"))
-            action.triggered.connect(lambda _=False, paths=paths: self._replace(paths))
+            action.triggered.connect(lambda _=False, paths=paths: self.replace(paths))
         menu.setEnabled(True)
         if menu.isEmpty():
             menu.addAction("Nothing yet").setEnabled(False)
@@ -134,7 +139,7 @@ class FilesFeature(Feature):
             paths = [self._fit.request.to_open]
         self._document.open(paths)
 
-    def _replace(self, paths: Sequence[Path]) -> None:
+    def replace(self, paths: Sequence[Path]) -> None:
         """Open files in place of what is open, a foreign mesh once it was seen over the video."""
         if not self.may_discard():
             return
@@ -146,14 +151,14 @@ class FilesFeature(Feature):
 
     def open_sample(self) -> None:
         """Open the recording that comes with the program."""
-        self._replace([resource_path("swipes.sd2")])
+        self.replace([resource_path("swipes.sd2")])
 
-    def _ask_open(self) -> None:
-        if paths := self._ask("Open"):
+    def _ask_open(self, *, radar: bool = False) -> None:
+        if paths := self._ask("Open a radar capture" if radar else "Open", radar=radar):
             if self._document.recording is not None and _is_inertial(paths):
                 self._add(paths)  # nothing to look at by itself
             else:
-                self._replace(paths)
+                self.replace(paths)
 
     def _ask_add(self) -> None:
         if paths := self._ask("Add to this recording"):
@@ -186,17 +191,17 @@ class FilesFeature(Feature):
         camera = None if is_estimate(made.mesh) else made.camera
         return replace(made, faces=None, mesh_reading=MeshReading(), camera=camera)
 
-    def _ask(self, title: str) -> list[Path]:
+    def _ask(self, title: str, *, radar: bool = False) -> list[Path]:
         recent = self._session.settings.recent
         folder = recent[0][0].parent if recent and recent[0][0].parent.is_dir() else None
-        return ask_to_open(self._shell.dialog_parent, title, folder)
+        return ask_to_open(self._shell.dialog_parent, title, folder, radar=radar)
 
     def drops_of(self, paths: Sequence[Path]) -> Sequence[Drop]:
         """Ways to use dropped files: in place of what is open, and with it."""
         document, title = self._document, self._document.title
-        open_them = Drop(f"Open instead of “{title}”", lambda: self._replace(paths))
+        open_them = Drop(f"Open instead of “{title}”", lambda: self.replace(paths))
         if document.recording is None:
-            return (Drop("Open", lambda: self._replace(paths)),)
+            return (Drop("Open", lambda: self.replace(paths)),)
         if len(paths) == 1 and read_request(paths[0]) is not None:
             return (open_them,)
         try:

@@ -43,11 +43,14 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
         "@denoisers", "difference", "live", "-", "@classifiers", "show_classes",
         "train_classifier", "study",
     ),
-    "Help": ("first_five_minutes", "manual", "find_action", "keys", "-", "sample", "-", "about"),
+    "Help": (
+        "first_five_minutes", "manual", "find_action", "keys", "-", "sample", "tour", "-", "about",
+    ),
 }  # fmt: skip
 """Menus of the menu bar: ids of actions, ``-`` lines, ``@`` places that a feature fills."""
 
 ELSEWHERE: Mapping[str, tuple[str, ...]] = {
+    "Start": ("open_radar",),
     "Scene": (
         "colour_velocity", "colour_range", "colour_visibility", "colour_plain", "dots",
         "draw_placements", "view_three_quarter", "view_camera", "view_sensor", "view_side",

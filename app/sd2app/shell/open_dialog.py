@@ -22,15 +22,20 @@ _KINDS = ("recording", "mesh", "radar")
 class OpenDialog(QFileDialog):
     """Files, and folders that are a recording, a capture or a mesh.
 
-    A double click on such a folder chooses it, one on any other looks into it.
+    A double click on such a folder chooses it, one on any other looks into it. ``radar`` shows
+    no files but those of radars.
     """
 
-    def __init__(self, parent: QWidget, title: str, folder: Path | None) -> None:
-        suffixes = sorted(_SUFFIXES | suffixes_of(MESH_FILES) | suffixes_of(RADAR_FILES))
-        files = (
-            "Recordings, videos, meshes, radar, inertial sensors"
-            f" ({' '.join(f'*{one}' for one in suffixes)} recording.json);;All files (*)"
-        )
+    def __init__(
+        self, parent: QWidget, title: str, folder: Path | None, *, radar: bool = False
+    ) -> None:
+        if radar:
+            words, suffixes = "Radar captures", RADAR_SUFFIXES | suffixes_of(RADAR_FILES)
+        else:
+            words = "Recordings, videos, meshes, radar, inertial sensors"
+            suffixes = _SUFFIXES | suffixes_of(MESH_FILES) | suffixes_of(RADAR_FILES)
+        endings = " ".join(f"*{one}" for one in sorted(suffixes))
+        files = f"{words} ({endings} recording.json);;All files (*)"
         super().__init__(parent, title, str(folder or ""), files)
         # Those of the systems know either files or folders.
         self.setOption(QFileDialog.Option.DontUseNativeDialog)
@@ -71,8 +76,10 @@ def can_be_opened(path: Path) -> bool:
         return False
 
 
-def ask_to_open(parent: QWidget, title: str, folder: Path | None) -> list[Path]:
-    """Let the user choose files and folders; none where the dialog is cancelled."""
-    dialog = OpenDialog(parent, title, folder)
+def ask_to_open(
+    parent: QWidget, title: str, folder: Path | None, *, radar: bool = False
+) -> list[Path]:
+    """Let the user choose files and folders, or radars' alone; none where it is cancelled."""
+    dialog = OpenDialog(parent, title, folder, radar=radar)
     accepted(dialog)
     return dialog.paths

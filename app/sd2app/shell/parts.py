@@ -18,8 +18,9 @@ class Parts:
     """Parts that may be replaced, e.g. by faster ones in a test.
 
     Accuracy functions, denoisers and classifiers are the library's, the commands that fit, train,
-    work in batches and listen ``sd2`` itself, and the recovery folder of labels is the user's by
-    default. The manual has the commands of ``parser``, those of the library by default.
+    work in batches and listen ``sd2`` itself, and the folders for recovering labels and of pictures
+    of recordings are the user's by default. The manual has the commands of ``parser``, those of the
+    library by default.
     """
 
     accuracy: Library | None = None
@@ -28,6 +29,7 @@ class Parts:
     train_command: Sequence[str] | None = None
     learn_command: Sequence[str] | None = None  # of classifiers and studies, in a folder
     recovery: Path | None = None
+    pictures: Path | None = None
     batch_command: Sequence[str] | None = None
     classifiers: ClassifierLibrary | None = None
     listen_command: Sequence[str] | None = None

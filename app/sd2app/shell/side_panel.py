@@ -223,8 +223,9 @@ class PageWidths(QObject):
         self._settings.set_value(_FOLDED, self._side.folded)
 
     def _remember(self) -> None:
-        if not self._side.folded:
-            self._settings.set_value(self._name(self._shown), self._splitter.sizes()[-1])
+        wide_px = self._splitter.sizes()[-1]
+        if wide_px and not self._side.folded:  # none while nothing is open
+            self._settings.set_value(self._name(self._shown), wide_px)
 
     def _turn(self) -> None:
         if self._shown not in self._usual:

@@ -31,6 +31,7 @@ from sd2app.shell.messages.views import MessageNotice, MessagesDialog
 from sd2app.shell.parts import Parts
 from sd2app.shell.side_panel import PageWidths, SidePanel
 from sd2app.shell.tab_order import controls_of
+from sd2app.shell.window_size import place_on_screen
 from sd2app.widgets.dialogs import accepted
 from sd2app.widgets.inputs import claims
 from sd2app.widgets.layouts import column_of
@@ -77,12 +78,9 @@ class MainWindow(QMainWindow):
         self._tabbed: QWidget | None = None  # control that Tab has reached last
         self.setWindowTitle("SD² Studio")
         self.setAcceptDrops(True)
-        self.setMinimumSize(960, 640)
-        self.resize(1280, 800)
         self._panels = {name: panel(name) for name in _PANELS}
         self._build_skeleton()
-        if (geometry := settings.layout("window")) is not None:
-            self.restoreGeometry(geometry)
+        place_on_screen(self, settings.layout("window"))
 
     @property
     def settled(self) -> bool:
@@ -141,6 +139,7 @@ class MainWindow(QMainWindow):
             {name: fill for feature in self.features for name, fill in feature.menus().items()}
         )
         self._fill_panels()
+        self.start = self.features.welcome.start_page()
         bars = [bar for feature in self.features for bar in feature.bars()]
         for bar in bars:
             self._column.insertWidget(0, bar)
@@ -157,8 +156,19 @@ class MainWindow(QMainWindow):
         status = StatusLine(s, accuracy, synthesis, partial(self.bring_up, "Accuracy"), self)
         self._column.addWidget(transport)
         self._lines.addWidget(status)
-        self._regions = (*notices, *bars, *self._panels.values(), transport, status)
+        self._column.insertWidget(self._column.indexOf(self._rows), self.start, 1)
+        self.start.hide()
+        self._views = (self._rows, self._panels["side"], transport)  # of a recording
+        label_set = self.features.labels.model
+        self.tour = self.features.welcome.callout(
+            self, lambda: label_set.labels.label_set.labels[0].key
+        )
+        shown = self.start, *self._panels.values(), transport, status, self.tour
+        self._regions = (*notices, *bars, *shown)
         self._soon = delayed(self._follow_actions, 0, self)
+        # Once it is known if something is being opened, and before anything is painted.
+        self._start_or_views = delayed(self._choose_start, 0, self)
+        self._start_or_views.start()
         self._connect()
         self._restyle()
         self._refresh()
@@ -206,6 +216,8 @@ class MainWindow(QMainWindow):
             signal.connect(lambda *_: self._refresh())
         s.sensor.dragging_changed.connect(lambda _: self._refresh([]))
         s.document.opened.connect(self._show_document)
+        for signal in (s.document.opened, s.jobs.changed):
+            signal.connect(self._start_or_views.start)
         for signal in (s.document.changed, s.video.frame_changed):
             signal.connect(self._show_or_hide_video)
         for runs in (features.training.model, features.classify.training):
@@ -227,6 +239,16 @@ class MainWindow(QMainWindow):
         self.messages.dismiss()
         self.maps.refresh()
         self._refresh()
+
+    def _choose_start(self) -> None:
+        """Show the start page while nothing is open, and none of what belongs to a recording."""
+        document = self.session.document
+        starts = document.content is None and document.reading is None
+        if self.ready and starts == self.start.isHidden():
+            for view in self._views:
+                view.setVisible(not starts)
+            self.start.refresh()
+            self.start.setVisible(starts)
 
     def _show_or_hide_video(self) -> None:
         """Leave the video's room to the other views where a radar was recorded alone."""
@@ -303,6 +325,7 @@ class MainWindow(QMainWindow):
 
     def bring_up(self, panel: str, page: str = "") -> None:
         """Show a panel at the side, and a page of it."""
+        self._panels["side"].show()  # also beside the start page
         self.side.bring_up(panel, page)
 
     @property

@@ -42,9 +42,12 @@ from sd2app.study.feature import StudyFeature
 from sd2app.suggestions.feature import SuggestionsFeature
 from sd2app.training.feature import TrainingFeature
 from sd2app.video.feature import VideoFeature
+from sd2app.welcome.feature import WelcomeFeature
+from sd2app.welcome.steps import tour_steps
 from sd2app.widgets.layouts import pane
 from sd2app.widgets.pages import InnerPage, paged_panel
 from sd2core.cli import build_parser
+from sd2core.files.paths import user_cache
 from sd2core.labels.recovery import recovery_folder
 
 
@@ -141,6 +144,23 @@ class Features:
             self.imu.model.add_file,
             self.foreign_mesh.ask,
         )
+        self.welcome = WelcomeFeature(
+            session,
+            shell,
+            tour_steps(
+                session,
+                labels.model,
+                denoise.model,
+                maps.difference,
+                self.suggestions.model,
+                self.training.model,
+                self.training.adoption,
+            ),
+            self.files.open_sample,
+            self.files.replace,
+            parts.pictures or user_cache("pictures"),
+            parent,
+        )
         self.scene = SceneFeature(
             session,
             shell,
@@ -154,6 +174,7 @@ class Features:
             self.dataset_export, self.fit, self.batch, self.commands, self.training, self.study,
             self.classify, self.denoise, self.maps, self.accuracy, self.video, self.labels,
             self.figures, self.live, self.playback, self.program, self.imu, self.files, self.scene,
+            self.welcome,
         )  # fmt: skip
         session.document.opened.connect(lambda: _attach(session, self))
 
@@ -177,6 +198,7 @@ def _attach(session: Session, features: Features) -> None:
             features.agreement,
             features.maps,
             features.fit,
+            features.welcome,
         ):
             feature.attach()
 

@@ -62,6 +62,9 @@ class SpanFinder(Protocol):
     def ready(self) -> bool:
         """True if everything needed for a search is there."""
 
+    def wake(self) -> None:
+        """Begin to get ready."""
+
     def look(self, threshold: float) -> Callable[[], Found]:
         """Make the search, to be run in the background."""
 
@@ -110,6 +113,9 @@ class MotionFinder:
     def ready(self) -> bool:
         """True if the map is complete."""
         return self.source is not None and self.source.covered is None
+
+    def wake(self) -> None:
+        """Wait for the map, which is made anyway."""
 
     def look(self, threshold: float) -> Callable[[], Found]:
         """Make the search, to be run in the background."""

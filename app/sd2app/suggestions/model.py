@@ -192,6 +192,7 @@ class SuggestionsModel(BackgroundModel):
             self._wanted = False
             self.changed.emit()
             return
+        self.finder.wake()
         self._wanted = not self.finder.ready
         if not self._wanted:
             look = self.finder.look(self.threshold)

@@ -16,6 +16,7 @@ from sd2app.widgets.progress_bar import ProgressBar
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
 from sd2core.denoise.registry import DENOISERS
+from sd2core.files.resources import is_bundled
 from sd2core.options.training import DataConfig, TrainingConfig
 
 _FIELDS = (
@@ -153,7 +154,9 @@ class TrainingSetupView(TrainingForm):
             return "Pairs are being made"
         if recording is None or recording.mesh is None or recording.radar is None:
             return "It takes a recording with a mesh and a radar capture"
-        return "Save the recording first" if self._document.modified else ""
+        # What comes with the program is learnt from as it came.
+        unsaved = self._document.modified and not is_bundled(recording.folder)
+        return "Save the recording first" if unsaved else ""
 
     def _make_of_this(self) -> None:
         recording = self._document.recording

@@ -36,6 +36,11 @@ _DRAWN = {
     "Train": f'<path d="M3 2.5V17H17.5M6 4C7 11 10 13 17 13.5" {_LINE}/>',
     # spans on their tracks
     "Labels": '<path d="M2 3h9v3.4h-9zM8 8.3h10v3.4h-10zM4 13.6h7v3.4h-7z"/>',
+    # a map with an arch in it, a film, what is being recorded
+    "Sample": f'<g {_LINE}><rect x="2" y="3" width="16" height="14"/>'
+    '<path d="M5 12.5C6.5 12.5 7 7 10 7C13 7 13.5 12.5 15 12.5"/></g>',
+    "Video": f'<g {_LINE}><rect x="2" y="4" width="16" height="12"/></g><path d="M8 7v6l5-3z"/>',
+    "Record": f'<circle cx="10" cy="10" r="8" {_LINE}/><circle cx="10" cy="10" r="4.2"/>',
     # what two people have in common
     "Agreement": f'<g {_LINE}><circle cx="7.2" cy="10" r="5.6"/>'
     '<circle cx="12.8" cy="10" r="5.6"/></g>',

@@ -17,7 +17,7 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     It is trained on labelled maps and evaluated on people it was not trained on.
 
       sd2 classify train campaign.zarr --out gestures.safetensors
-      sd2 classify apply walk.sd2 --model gestures.safetensors
+      sd2 classify apply walk.sd2
     """
     parser = add_command(commands, "classify", about=add_commands)
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)

@@ -39,10 +39,17 @@ class TrainedModel(OptionRecord):
     Parameters
     ----------
     model : FILE
-        classifier from `sd2 classify train`
+        classifier from `sd2 classify train` (default: the one that comes with SD² Studio)
     """
 
-    model: Path
+    model: Path | None = None
+
+    @property
+    def classifier(self) -> Path:
+        """Its file."""
+        from sd2core.classify.files import bundled_classifier
+
+        return bundled_classifier() if self.model is None else self.model
 
 
 class Evaluate(SourcesAndMaps, TrainedModel, Judging):
@@ -95,7 +102,7 @@ def _eval(options: Evaluate) -> None:
     from sd2core.classify.live import judge
     from sd2core.files.figure_files import save_figure
 
-    classifier = load_classifier(options.model)
+    classifier = load_classifier(options.classifier)
     maps = parsed_maps(options.maps)
     known = clips_of(options.data, maps, options.denoiser)
     clips = _judged(known, classifier.card, options)
@@ -103,7 +110,7 @@ def _eval(options: Evaluate) -> None:
     subjects = list(dict.fromkeys(clip.subject for clip in clips))
     learnt = set(classifier.card.about.get("split", {}).get("training", ())) & set(subjects)
     told = {
-        "model": str(options.model),
+        "model": str(options.classifier),
         "maps": list(known.kinds),
         "subjects": subjects,
         "learnt_from": sorted(learnt),
@@ -122,7 +129,7 @@ def _eval(options: Evaluate) -> None:
             [shares(found.frames), shares(found.gestures)],
             found.classes,
             ["frames", "gestures"],
-            f"{options.model.stem} on {' and '.join(known.kinds)} maps",
+            f"{options.classifier.stem} on {' and '.join(known.kinds)} maps",
         )
         save_figure(figure, options.figure)
 
@@ -176,7 +183,7 @@ def _apply(options: Apply) -> None:
     probability of its class. The map must be on the velocity axis that the classifier
     was trained on; another frame rate is resampled to the classifier's and back.
 
-      sd2 classify apply walk.sd2 --model gestures.safetensors
+      sd2 classify apply walk.sd2
       sd2 classify apply walk.sd2 --of radar --model g.safetensors --out found.json
       sd2 classify apply map.npz --model g.safetensors --probabilities p.npz
     """
@@ -187,12 +194,12 @@ def _apply(options: Apply) -> None:
     if options.out is not None:
         check_label_output(options.out)
     chosen = SpanOptions(options.min_duration_s, options.merge_gap_s)
-    card = describe_classifier(options.model)
+    card = describe_classifier(options.classifier)
     doppler, clock = map_and_clock(options, card.axis)
     # Before torch is loaded, which takes seconds.
     check_bins(doppler, card)
     with progress_bar("Classifying") as progress:
-        probabilities = load_classifier(options.model).probabilities(doppler, progress)
+        probabilities = load_classifier(options.classifier).probabilities(doppler, progress)
     spans = predicted_spans(
         probabilities, doppler.timebase, card.classes, chosen, present=doppler.present
     )
@@ -203,7 +210,7 @@ def _apply(options: Apply) -> None:
         print_json(
             {
                 "map_kind": doppler.kind,
-                "model": str(options.model),
+                "model": str(options.classifier),
                 "classes": list(card.classes),
                 "mean_probabilities": dict(
                     zip(card.classes, probabilities.mean(axis=0).tolist(), strict=True)
@@ -214,7 +221,7 @@ def _apply(options: Apply) -> None:
             }
         )
         return
-    print(f"{counted(len(spans), 'gesture')} in the {doppler.kind} map, by {options.model}")
+    print(f"{counted(len(spans), 'gesture')} in the {doppler.kind} map, by {options.classifier}")
     if spans:
         rows = [("id", "start s", "end s", "gesture", "confidence")]
         rows += [(*span_cells(span), span.label, f"{span.confidence:.2f}") for span in spans]

@@ -176,3 +176,31 @@ def test_words_of_a_reading(set_up):
     model.use(set_up.path)
     set_up.settle()
     assert reading_text(model.reading) == "background 100 %"
+
+
+def test_the_bundled_one_is_there_from_the_start_and_loaded_when_it_is_asked_for(set_up, qtbot):
+    usual = set_up.fake.add("/bundled/gestures.safetensors", kinds=("synthetic",))
+    model = set_up.model()
+    set_up.tracks[0].set_map(a_map("synthetic"))
+    assert model.path == usual
+    assert model.why_not == ""
+    assert not model.visible
+    qtbot.wait(1700)  # longer than a chosen one waits
+    assert set_up.fake.loaded == []
+
+    model.wake()
+
+    qtbot.waitUntil(lambda: model.ready, timeout=10_000)
+    assert set_up.fake.loaded == [usual]
+
+
+def test_whoever_wants_none_or_another_has_it_the_next_time(set_up):
+    usual = set_up.fake.add("/bundled/gestures.safetensors")
+    first = set_up.model()
+    first.use(None)
+    assert set_up.model().path is None
+    first.use(set_up.path)
+    assert set_up.model().path == set_up.path
+    first.use(usual)
+    first.set_shown(True)
+    assert set_up.model().path == usual

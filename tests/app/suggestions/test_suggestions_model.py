@@ -41,6 +41,9 @@ class KnownSpans:
     def set_source(self, source) -> None:
         pass
 
+    def wake(self) -> None:
+        pass
+
     def look(self, threshold):
         spans = (
             Span(1, "Suggestions", 5.0, 6.0, "horizontal", confidence=0.9, origin="suggestion"),

@@ -130,7 +130,7 @@ def test_a_radar_alone_has_no_empty_pane_and_its_message_leaves_with_it(
     models, live = models_of(window), window.features.live.model
     video = window.findChild(VideoView)
     top = splitter_around(video, Qt.Orientation.Horizontal)
-    assert video.isVisible()
+    assert not window.start.isHidden()  # nothing is open
     before = top.sizes()
     listen(window, monkeypatch, capture, folder)
     qtbot.waitUntil(lambda: live.state == "stopped", timeout=LIMIT_MS)

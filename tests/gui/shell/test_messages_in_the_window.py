@@ -166,15 +166,15 @@ def test_everything_that_was_said_is_listed(window, qtbot, pointer_elsewhere) ->
 
 def test_the_offer_of_a_fit_lies_over_the_content(empty_window, qtbot, tmp_path: Path) -> None:
     window = empty_window
-    before = {name: part.geometry() for name, part in panels_of(window).items()}
     video = tmp_path / "walk.mp4"
     write_video(video)
     with qtbot.waitSignal(models_of(window).document.opened, timeout=20_000):
         window.open_paths([video])
     offer = shown(window, FitOffer)
     assert offer.text.startswith("walk.mp4 has no mesh")
-    assert {name: part.geometry() for name, part in panels_of(window).items()} == before
     assert "walk.mp4 has no mesh" in window.messages.history[-1].text
+    with_it = {name: part.geometry() for name, part in panels_of(window).items()}
     QTest.mouseClick(cross_of(offer), LEFT)
     assert not offer.isVisible()
+    assert {name: part.geometry() for name, part in panels_of(window).items()} == with_it
     assert models_of(window).fit_on_screen.offered is None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from finding import named, panel_of, splitter_around
-from kept_window import close_window
+from kept_window import close_window, opened
 from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QSplitterHandle, QWidget
@@ -34,7 +34,7 @@ def drag(handle: QSplitterHandle, right_px: int, down_px: int = 0) -> None:
 
 
 @pytest.fixture
-def windows(qtbot, compiled_kernels, fake, fake_models, fake_classes):
+def windows(qtbot, compiled_kernels, fake, fake_models, fake_classes, small_recording):
     """Makes windows one after the other on the same settings."""
     settings = Settings.forgetful()
     made: list[MainWindow] = []
@@ -51,6 +51,7 @@ def windows(qtbot, compiled_kernels, fake, fake_models, fake_classes):
         window.populate()
         qtbot.waitUntil(lambda: window.settled, timeout=120_000)
         window.resize(width_px, height_px)
+        opened(window, qtbot, small_recording)
         made.append(window)
         return window
 

@@ -1,0 +1,1 @@
+"""The start page, pictures of recordings, and the tour of the sample."""

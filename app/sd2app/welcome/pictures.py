@@ -1,0 +1,116 @@
+"""Small pictures of recordings, kept in the user's cache from when they were open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from hashlib import sha256
+from pathlib import Path
+
+from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QObject, QRect, QSize, Qt, Signal
+from PySide6.QtGui import QImage, QImageWriter
+
+from sd2app.background.latest import LatestRunner, delayed
+from sd2app.maps.heatmap_image import heatmap_image
+from sd2app.session.session import Session
+from sd2core.files.atomic import atomic_write
+from sd2core.files.paths import plain_path
+
+SIZE_PX = QSize(448, 252)
+_COLUMNS = 448
+_PATIENCE_MS = 700
+"""Delay after which what has just been opened is worth a picture."""
+_MOST = 60
+"""Number of pictures that are kept."""
+
+
+class RecordingPictures(QObject):
+    """Makes a picture of what is open, of its video or else of a map, and finds it again.
+
+    ``folder`` holds the pictures. One that cannot be written is not there; nothing else is lost.
+    """
+
+    changed = Signal()
+
+    def __init__(self, session: Session, folder: Path, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._session, self._folder = session, folder
+        self._wanted = False  # what is open, or where it lies, has no picture yet
+        self._writer = LatestRunner("picture", self, lambda _: self.changed.emit())
+        self._patience = delayed(self._keep, _PATIENCE_MS, self)
+        document, maps = session.document, session.maps
+        for signal in (document.opened, document.saved):
+            signal.connect(self._want)
+        for signal in (session.video.frame_changed, maps.real.changed, maps.synthetic.changed):
+            signal.connect(self._wait)
+
+    @property
+    def busy(self) -> bool:
+        """True while a picture is being written."""
+        return self._writer.busy
+
+    def close(self) -> None:
+        """Finish."""
+        self._patience.stop()
+        self._writer.close()
+
+    def path_of(self, paths: Sequence[Path]) -> Path:
+        """File of the picture of what is opened together, which may not be there."""
+        names = "\n".join(str(plain_path(path)) for path in paths)
+        return self._folder / f"{sha256(names.encode()).hexdigest()[:24]}.png"
+
+    def _want(self) -> None:
+        self._wanted = True
+        self._wait()
+
+    def _wait(self) -> None:
+        # Frames and maps change many times a second.
+        if self._wanted and not self._patience.isActive():
+            self._patience.start()
+
+    def _keep(self) -> None:
+        paths, picture = self._session.document.paths, self._picture()
+        if not paths or picture is None or self._session.document.growing:
+            return
+        self._wanted = False
+        path = self.path_of(paths)
+        self._writer.submit(lambda emit: _write(picture, path))
+
+    def _picture(self) -> QImage | None:
+        session = self._session
+        frame = session.video.picture
+        if frame is not None:
+            height, width, _ = frame.shape
+            stride = frame.strides[0]
+            return QImage(frame.data, width, height, stride, QImage.Format.Format_RGB888).copy()
+        if session.document.video is not None:
+            return None  # its first frame is on its way
+        for track in (session.maps.real, session.maps.synthetic):
+            if track.map is not None and track.covered is None:
+                start_s, end_s = (
+                    getattr(track.map.timebase, edge) + track.offset_s
+                    for edge in ("start_s", "end_s")
+                )
+                levels = session.display.levels
+                return heatmap_image(track, levels, start_s, end_s, _COLUMNS, 0xFF000000)
+        return None
+
+
+def _write(picture: QImage, path: Path) -> None:
+    """Write the middle of a picture, as large as pictures are; delete the oldest of too many."""
+    whole = SIZE_PX if picture.height() < 64 else picture.size()  # a map has a row per bin
+    fitted = picture.scaled(
+        whole.scaled(SIZE_PX, Qt.AspectRatioMode.KeepAspectRatioByExpanding),
+        Qt.AspectRatioMode.IgnoreAspectRatio,
+        Qt.TransformationMode.SmoothTransformation,
+    )
+    middle = QRect(0, 0, SIZE_PX.width(), SIZE_PX.height())
+    middle.moveCenter(fitted.rect().center())
+    buffer = QBuffer()
+    buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+    QImageWriter(buffer, QByteArray(b"png")).write(fitted.copy(middle))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_write(path) as stream:
+        stream.write(bytes(buffer.data().data()))
+    kept = sorted(path.parent.glob("*.png"), key=lambda one: one.stat().st_mtime)
+    for old in kept[:-_MOST]:
+        old.unlink(missing_ok=True)
