@@ -250,7 +250,7 @@ class FrameCounts:
         """
         place_m, image_m = map(position_of, ends_m)
         masks, before = self._by_way_of[wall], self.prepared.before_wall(block, wall)
-        also, quality = masks.for_rows(block, rows, image_m, quality)
+        also, quality = masks.for_rows(block, rows, image_m, quality, mask)
         if mask is None or also is None:
             if before is None or quality == "none":
                 return None if before is None else before[rows], quality

@@ -16,7 +16,7 @@ from sd2core.doppler.prepared import Block, PreparedMesh
 from sd2core.mesh.walls import Wall
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering import depth_plain, exact_plain
-from sd2core.scattering.behind_things import hide_behind, may_hide
+from sd2core.scattering.behind_things import CORNERS, hide_behind, may_hide
 from sd2core.scattering.depth import depth_visibility_kernel
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.scattering.visibility import facing_kernel, facing_mask
@@ -79,7 +79,12 @@ class VisibilityMasks:
         self._kept_at: dict[int, tuple[tuple[Occlusion, Position], ...]] = {}
 
     def for_rows(
-        self, block: Block, rows: slice, position_m: Position, visibility: Visibility
+        self,
+        block: Block,
+        rows: slice,
+        position_m: Position,
+        visibility: Visibility,
+        among: NDArray[np.uint8] | None = None,
     ) -> tuple[NDArray[np.uint8] | None, Quality]:
         """Mask for counting some of a block's frames, and the visibility that was used.
 
@@ -93,6 +98,9 @@ class VisibilityMasks:
             Place of the sensor in the camera frame.
         visibility : {"none", "facing", "depth", "exact", "frozen"}
             What is wished for; ``frozen`` becomes ``facing`` if no mask is kept.
+        among : uint8 ndarray, (n, V), optional
+            Vertices that count at all, always the same from the same place; others need not be
+            tested.
 
         Returns
         -------
@@ -102,7 +110,7 @@ class VisibilityMasks:
             Visibility that was used.
         """
         if visibility == "exact" or visibility == "depth":
-            return self._compute(block, rows, position_m, visibility), visibility
+            return self._compute(block, rows, position_m, visibility, among), visibility
         if visibility == "frozen":
             mask = self._frozen(block, rows, position_m)
             return mask, "facing" if mask is None else "frozen"
@@ -225,7 +233,12 @@ class VisibilityMasks:
         return None
 
     def _compute(
-        self, block: Block, rows: slice, position_m: Position, occlusion: Occlusion
+        self,
+        block: Block,
+        rows: slice,
+        position_m: Position,
+        occlusion: Occlusion,
+        among: NDArray[np.uint8] | None,
     ) -> NDArray[np.uint8]:
         """Mask of these rows, kept or computed now."""
         here = (occlusion, position_m)
@@ -241,7 +254,8 @@ class VisibilityMasks:
             place = self._prepared.sensor(position_m)
             view = self._view(block, rows, place)
             visible = _facing(view, self._prepared.normals(block)[rows])
-            self._test(view, self._needed(block, rows, place), visible, occlusion)
+            needed = self._needed(block, rows, place)
+            self._test(view, needed if among is None else needed & among, visible, occlusion)
             mask.visible[rows] = visible
             mask.done[rows] = True
         return mask.visible[rows]
@@ -369,6 +383,10 @@ class VisibilityMasks:
         around, faces = self._prepared.mesh.surroundings, self._prepared.faces
         assert around is not None
         assert faces is not None
+        own_m = self._prepared.boxes(view.first, view.first + len(view.points))
+        corners_m = wall.mirrored(own_m[:, CORNERS, [0, 1, 2]])
+        image_m = np.stack([corners_m.min(axis=1), corners_m.max(axis=1)], axis=1)
+        near = may_hide(image_m, own_m, view.places_m + view.origins_m)
         for t, seen in enumerate(visible):
             frame = view.first + t
             others = [
@@ -376,7 +394,7 @@ class VisibilityMasks:
                 for other in self.others
                 if other.faces is not None and other.mesh.presence.there[frame]
             ]
-            own = view.points[t].T + view.origins_m[t], faces
+            own = (view.points[t].T + view.origins_m[t], faces) if near[t] else None
             seen &= needed[t]
             view.hide(t, *around.by_way_of(wall, own, others), seen)
 

@@ -11,7 +11,7 @@ from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.scattering.exact_plain import exact_visibility
 
-_CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 """Which end of a box in x, y, z each corner is at, (8, 3)."""
 
 _ROOM = 1e-5
@@ -86,7 +86,7 @@ def may_hide(
 
     def seen(ends_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
         """Depths (n, 8) of a box's corners, and their places in the picture, (n, 2, 8)."""
-        corners = ends_m[:, _CORNERS, [0, 1, 2]] - places_m[:, None]  # (n, 8, 3)
+        corners = ends_m[:, CORNERS, [0, 1, 2]] - places_m[:, None]  # (n, 8, 3)
         turned = axes @ corners.transpose(0, 2, 1)
         return turned[:, 2], turned[:, :2] / np.maximum(turned[:, 2:], 1e-9)
 

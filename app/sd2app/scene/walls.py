@@ -35,7 +35,7 @@ class Walls:
             face.look.SetOpacity(_OPACITY)
             face.look.LightingOff()
             lines = Shape(self._renderer, points, segments=segments)
-            lines.look.SetOpacity(0.5)
+            lines.look.SetOpacity(0.3)
             self.shapes += [face, lines]
         if self._colours is not None:
             self.set_colours(self._colours)
