@@ -18,6 +18,7 @@ from sd2app.session.content import UNTITLED, recording_of
 from sd2app.session.mesh_reading import ReadMesh
 from sd2app.session.session import Session
 from sd2app.shell.mesh_offer import MeshOffer
+from sd2app.shell.mesh_readings import MeshReadings
 from sd2app.shell.open_dialog import ask_to_open
 from sd2app.widgets.dialogs import Answer, ask_folder, ask_new, confirmed
 from sd2app.widgets.notices import Notice
@@ -59,7 +60,9 @@ class FilesFeature(Feature):
         self._session, self._shell, self._fit, self._labels = session, shell, fit, labels
         self._add_inertial, self._see_mesh = add_inertial, see_mesh
         self._document = session.document
+        self._readings = MeshReadings(session.settings)
         self._document.opened.connect(self._remember)
+        self._document.changed.connect(self._remember_reading)
         self._document.saved.connect(self._remember)
         report(shell, self._document)
         self.closing = (self._document,)
@@ -122,7 +125,7 @@ class FilesFeature(Feature):
         for paths in self._session.settings.recent:
             others = "".join(f" + {path.name}" for path in paths[1:])
             action = menu.addAction(f"{paths[0]}{others}".replace("&", "&&"))
-            action.triggered.connect(lambda _=False, paths=paths: self.replace(paths))
+            action.triggered.connect(lambda _=False, paths=paths: self.reopen(paths))
         menu.setEnabled(True)
         if menu.isEmpty():
             menu.addAction("Nothing yet").setEnabled(False)
@@ -130,6 +133,20 @@ class FilesFeature(Feature):
     def _remember(self) -> None:
         if paths := self._document.paths:
             self._session.settings.add_recent(*map(plain_path, paths))
+
+    def _remember_reading(self) -> None:
+        """Remember how the mesh of loose files is read; a recording says it itself."""
+        recording = self._document.recording
+        if recording is not None and recording.folder == UNTITLED and recording.mesh is not None:
+            self._readings.keep([*map(plain_path, self._document.paths)], recording)
+
+    def reopen(self, paths: Sequence[Path]) -> None:
+        """Open what was open lately; its mesh is read as it was then."""
+        fields = self._readings.fields(paths)
+        if fields is None:
+            self.replace(paths)
+        elif self.may_discard():
+            self._document.open(paths, fields)
 
     def open(self, paths: Sequence[Path]) -> None:
         """Open files in place of what is open, or continue the fit of a folder."""

@@ -157,7 +157,7 @@ class Features:
                 self.training.adoption,
             ),
             self.files.open_sample,
-            self.files.replace,
+            self.files.reopen,
             parts.pictures or user_cache("pictures"),
             parent,
         )

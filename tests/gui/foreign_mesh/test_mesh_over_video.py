@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from answering import once_asked, press_when_ready
+from dropping import drop
 from finding import words_in
 from grey_video import FRAMES, RATE, write_video
 from PySide6.QtCore import QPoint, Qt
@@ -19,6 +20,7 @@ from PySide6.QtWidgets import (
     QComboBox,
     QFileDialog,
     QLabel,
+    QMenu,
     QToolButton,
     QWidget,
 )
@@ -28,7 +30,7 @@ from sd2app.foreign_mesh.dialog import MeshDialog
 from sd2app.foreign_mesh.model import MeshPreview, is_foreign
 from sd2app.palette import palette_for
 from sd2app.widgets.inputs import NumberBox
-from sd2core.files.recording_json import CameraEntry
+from sd2core.files.recording_json import CameraEntry, MeshReading
 from sd2core.recording.recording import Recording
 from tests.core.io.body_models import model_arrays, write_model
 
@@ -240,6 +242,34 @@ def test_taken_in_the_window_it_is_made_smooth_and_undone(labelled, qtbot, files
     qtbot.waitUntil(lambda: c.document.recording.mesh != mesh, timeout=20_000)
     qtbot.waitUntil(lambda: c.document.mesh.vertex_count == before.vertex_count, timeout=20_000)
     assert not c.document.modified
+
+
+def test_files_that_were_open_lately_are_read_as_then_and_nobody_is_asked(
+    empty_window, qtbot, files
+):
+    window, c = empty_window, models_of(empty_window)
+
+    def take(dialog: MeshDialog) -> None:
+        settle(qtbot, dialog.preview)
+        choose(qtbot, dialog, "How the mesh is turned", 1)
+        qtbot.mouseClick(dialog._take, LEFT)
+
+    once_asked(MeshDialog, take)
+    with qtbot.waitSignal(c.document.opened, timeout=30_000):
+        drop(window, *files)
+    assert c.document.recording.mesh_reading.turn == "x180"
+    # Another cure, chosen in the window, is remembered as well.
+    c.edits.read_mesh("Read smaller", {"mesh_reading": MeshReading(turn="x180", scale=0.9)})
+    qtbot.waitUntil(lambda: c.document.recording.mesh_reading.scale == 0.9, timeout=20_000)
+    c.document.undo_stack.setClean()
+    menus = {one.title().replace("&", ""): one for one in window.findChildren(QMenu)}
+    recent = menus["Open recent"]
+    recent.aboutToShow.emit()
+    with qtbot.waitSignal(c.document.opened, timeout=30_000):
+        recent.actions()[0].trigger()  # a dialog would wait for ever
+    reading = c.document.recording.mesh_reading
+    assert (reading.turn, reading.scale) == ("x180", 0.9)
+    qtbot.waitUntil(lambda: window.settled, timeout=30_000)
 
 
 def test_the_camera_of_the_video_is_still_known_with_another_mesh(
