@@ -58,7 +58,7 @@ def test_the_ball_is_where_it_should_be_in_the_map(window):
 
 def test_home_and_end_go_to_the_ends_wherever_the_keyboard_is(window, qtbot):
     playback, tried = models_of(window).playback, set()
-    for page in ("Sensor", "Accuracy", "Train", "Labels", "Agree"):
+    for page in ("Sensor", "Accuracy", "Train", "Labels", "Agreement"):
         window.bring_up(page)
         for control in controls_of([window]):
             if isinstance(control, (QAbstractSpinBox, QLineEdit)):
@@ -456,7 +456,7 @@ def test_a_point_cloud_counts_every_point(empty_window, fake, tmp_path, qtbot):
     with qtbot.waitSignal(c.document.opened, timeout=10_000):
         empty_window.open_paths([tmp_path / "cloud.npz"])
     qtbot.waitUntil(lambda: c.synthesis.complete, timeout=10_000)
-    assert c.synthetic.status == "±0 % · all vertices"
+    assert c.synthetic.status == "±0 %"
     assert c.synthesis.readout().visible_share == 1.0
     assert np.nanmean(c.synthetic.map.mean_velocity_mps()) == pytest.approx(0.9, abs=0.15)
 
