@@ -108,10 +108,8 @@ class Corrected(Denoiser):
         self.network = network
         self._first = parts * self.bins if self.more else 0
         self.skip = nn.Linear(self.bins, self.bins)
+        nn.init.eye_(self.skip.weight)
         nn.init.zeros_(self.skip.bias)
-        with torch.no_grad():
-            # Unlike eye_, without loading torch's compiler where only shapes are planned.
-            self.skip.weight.zero_().fill_diagonal_(1.0)
 
     def _of_frame(self, values: Tensor) -> Tensor:
         """Answer (…, bins) of each frame's histogram; of parts those of their sum, nearly."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import struct
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -22,6 +23,9 @@ Shapes = Mapping[str, list[int]]
 
 _KEY = "sd2"
 _LONGEST_HEADER = 4 << 20
+_ROOM, _TIMES = 10_000_000, 16
+"""Numbers that may be made on the way to a network, and how often each of its own."""
+
 Network = TypeVar("Network", bound="nn.Module")
 
 
@@ -122,7 +126,8 @@ def read_network(
     path : Path
         The model file.
     build : callable
-        Makes the network; called twice, at first on torch's device without memory (``meta``).
+        Makes the network; where it is larger than its file says, on torch's device without memory
+        (``meta``), too.
     name : str
         Name of the model in the file, for messages.
     shapes : mapping
@@ -140,11 +145,16 @@ def read_network(
     from safetensors.torch import load
 
     try:
-        with torch.device("meta"):  # Shapes, without memory for what they would hold.
-            planned = build()
+        planned = network = _built_within(
+            build, _ROOM + _TIMES * sum(map(math.prod, shapes.values()))
+        )
+        if planned is None:
+            # Shapes, without memory for what they would hold; torch loads its compiler for that.
+            with torch.device("meta"):
+                planned = build()
         wanted = {key: list(tensor.shape) for key, tensor in planned.state_dict().items()}
         _compare_shapes(path, name, shapes, wanted, expected)
-        network = build()
+        network = build() if network is None else network
     except Sd2Error as error:
         if str(path) in error.found:
             raise
@@ -161,6 +171,36 @@ def read_network(
         )
     network.load_state_dict(weights)
     return network
+
+
+def _built_within(build: Callable[[], Network], most: int) -> Network | None:
+    """Network, unless more than so many numbers are made on the way."""
+    import torch
+    from torch.overrides import TorchFunctionMode
+
+    class TooLargeError(Exception):
+        """The numbers so far are too many."""
+
+    class Counted(TorchFunctionMode):
+        """Counts the numbers of every result, before anything is written to new ones."""
+
+        made = 0
+
+        def __torch_function__(
+            self, function: Any, types: Any, args: Any = (), kwargs: Any = None
+        ) -> Any:
+            result = function(*args, **(kwargs or {}))
+            if isinstance(result, torch.Tensor):
+                self.made += result.numel()
+                if self.made > most:
+                    raise TooLargeError
+            return result
+
+    try:
+        with Counted():
+            return build()
+    except (TooLargeError, MemoryError, RuntimeError):  # the last: torch found no room
+        return None
 
 
 def _cut_short(path: Path, size: int, expected: int) -> Sd2Error:

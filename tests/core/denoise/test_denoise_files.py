@@ -91,6 +91,20 @@ def test_describing_needs_no_torch(model: Path) -> None:
     assert done.stdout.split() == ["gru", "False"]
 
 
+def test_loading_needs_no_compiler() -> None:
+    """Torch's own, with some hundred modules and a computer algebra."""
+    code = """
+import sys
+import sd2core as sd2
+sd2.load_model("denoiser-limbs")
+print(*{"torch", "torch._dynamo", "sympy"}.intersection(sys.modules))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120
+    )
+    assert done.stdout.split() == ["torch"]
+
+
 def test_a_failed_save_leaves_the_old_file(model: Path) -> None:
     before = model.read_bytes()
     with pytest.raises(Sd2Error, match="cannot be written"):
