@@ -54,8 +54,11 @@ _HASHED_BYTES = 1 << 20
 
 def new_window(qtbot: Any, fake: Any, fake_models: Any, fake_classes: Any) -> MainWindow:
     """Window without a recording, all views in place."""
+    settings = Settings.forgetful()
+    for name in ("folded", "over"):  # the panel at the side is open and beside the maps
+        settings.set_value(f"layouts/Look/{name}", False)
     window = MainWindow(
-        Settings.forgetful(),
+        settings,
         Parts(
             accuracy=fake.library,
             denoisers=fake_models.library,

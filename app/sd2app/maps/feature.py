@@ -13,7 +13,7 @@ from sd2app.accuracy.model import AccuracyModel
 from sd2app.feature import Action, Feature, Shell
 from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.heatmap import HeatmapView
-from sd2app.maps.level_bar import LevelBar
+from sd2app.maps.level_bar import LevelBar, MapEdge
 from sd2app.maps.limbs import LimbMenu, LimbsModel
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.radar_place import RadarPlaceBadge
@@ -137,7 +137,8 @@ class MapsFeature(Feature):
         """The spectra of this frame over the levels of all maps."""
         levels = LevelBar(self._session, self._shell.action("uncertain"))
         self._spectrum = SpectrumView(self._session)
-        return {"spectrum": pane((self._spectrum, 1), levels)}
+        frame, layouts = pane((self._spectrum, 1), levels), self._session.layouts
+        return {"spectrum": MapEdge(self._session, frame, partial(layouts.show, "spectrum"))}
 
     def attach(self) -> None:
         """Compute the map of the recording that was opened."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
-from PySide6.QtCore import QRectF
-from PySide6.QtGui import QAction, QColor, QPainter
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QAction, QColor, QMouseEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from sd2app.session.display import COLOUR_MAPS
@@ -13,8 +15,11 @@ from sd2app.widgets.canvas import Canvas, image_of
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.panel import outlined
 
 _STRIP_PX = 14
+_SCALE_PX = 32
+_ANY_WIDTH_PX = (1 << 24) - 1  # Qt's largest
 
 
 class _ColourStrip(Canvas):
@@ -36,6 +41,75 @@ class _ColourStrip(Canvas):
         painter.drawImage(QRectF(self.rect()), image_of(np.stack(strips)))
         painter.setPen(QColor(self._display.palette.border))
         painter.drawRect(self.rect().adjusted(0, 0, -1, -1))
+
+
+class ColourScale(Canvas):
+    """The colours of the levels from below, with the level at either end; a click unfolds it."""
+
+    clicked = Signal()
+
+    def __init__(self, session: Session) -> None:
+        super().__init__()
+        self._display = session.display
+        self.setFixedWidth(_SCALE_PX)
+        self.setAccessibleName("Levels")
+        self.setToolTip("Level of the colours in dB; click for this frame and for the levels")
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.follow(self._display.levels_changed, self._display.theme_changed)
+
+    def paint(self, painter: QPainter) -> None:
+        """A strip of colours between its two ends."""
+        levels, palette = self._display.levels, self._display.palette
+        painter.fillRect(self.rect(), QColor(palette.panel))
+        line_px = painter.fontMetrics().height()
+        strip = self.rect().adjusted(10, line_px + 4, -10, -line_px - 4)
+        table = lookup_table(levels.colour_map)
+        painter.drawImage(QRectF(strip), image_of(np.ascontiguousarray(table[::-1, None])))
+        painter.setPen(QColor(palette.border))
+        painter.drawRect(strip)
+        painter.setPen(QColor(palette.muted))
+        for y, level in ((0, levels.high_db), (self.height() - line_px - 2, levels.low_db)):
+            text = f"{level:g}".replace("-", "−")
+            painter.drawText(
+                QRectF(0, y, self.width(), line_px + 2), Qt.AlignmentFlag.AlignCenter, text
+            )
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Unfold it."""
+        if event.button() == Qt.MouseButton.LeftButton:
+            self.clicked.emit()
+
+
+class MapEdge(QWidget):
+    """Right edge of the maps: a colour scale, or unfolded *This frame* over the levels.
+
+    ``show_frame`` is called with whether it is to be unfolded.
+    """
+
+    def __init__(
+        self, session: Session, frame: QWidget, show_frame: Callable[[bool], object]
+    ) -> None:
+        super().__init__()
+        self._scale, self._frame = ColourScale(session), frame
+        self._scale.clicked.connect(lambda: show_frame(True))
+        tip = "Fold this frame to the scale of colours"
+        fold = outlined("»", tip, lambda: show_frame(False), self._frame, name=tip, look="")
+        self.setLayout(row_of(self._scale, (frame, 1), spacing_px=0, margins_px=0))
+        self._fold = fold
+
+    def set_folded(self, folded: bool) -> None:
+        """Show the scale of colours alone, or this frame and the levels."""
+        self._scale.setVisible(folded)
+        self._frame.setVisible(not folded)
+        edge = self.parentWidget()
+        assert edge is not None
+        edge.setMaximumWidth(_SCALE_PX + 2 if folded else _ANY_WIDTH_PX)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Keep the button in the corner."""
+        super().resizeEvent(event)
+        size = self._fold.sizeHint()
+        self._fold.setGeometry(self.width() - size.width() - 4, 0, size.width(), 24)
 
 
 class LevelBar(QWidget):

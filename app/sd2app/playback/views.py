@@ -1,12 +1,12 @@
-"""Bar that plays, steps and scrubs, and the time axis under the tracks."""
+"""Bar that plays and steps, and the time axis under the tracks."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, Qt
+from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QAction, QColor, QPainter, QPen
-from PySide6.QtWidgets import QLabel, QSlider, QToolButton, QWidget
+from PySide6.QtWidgets import QLabel, QToolButton, QWidget
 
 from sd2app.labels.loop import SpanLoop
 from sd2app.maps.track_mouse import SeekingPlot
@@ -37,18 +37,14 @@ class TransportBar(QWidget):
         self._time = self._label("00:00.000 ")
         self._frame = self._label("frame 162000 / 162000")
         self._frame.setObjectName("muted")
-        self._slider = QSlider(Qt.Orientation.Horizontal, self)
-        self._slider.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self._slider.setAccessibleName("Frame")
-        self._slider.valueChanged.connect(playback.seek_frame)
         self._speed = self._label("0.25× ")
         self._speed.setAlignment(Qt.AlignmentFlag.AlignCenter)
         steps = [self._button(action(name)) for name in _BUTTONS]
         speed = (self._button(action("slower")), self._speed, self._button(action("faster")))
         parts: tuple[Part, ...] = (
-            *steps, self._stretch, 8, self._time, self._frame, (self._slider, 1), *speed,
+            *steps, self._stretch, 8, self._time, self._frame, *speed,
         )  # fmt: skip
-        self.setLayout(row_of(*parts, spacing_px=4, margins_px=(8, 4, 8, 4)))
+        self.setLayout(row_of(*parts, spacing_px=4, margins_px=(0, 4, 0, 4)))
         playback.frame_changed.connect(self._refresh)
         playback.speed_changed.connect(self._refresh)
         looped.changed.connect(self._show_stretch)
@@ -71,9 +67,6 @@ class TransportBar(QWidget):
     def _refresh(self) -> None:
         playback = self._playback
         last = len(playback.timebase) - 1
-        with QSignalBlocker(self._slider):
-            self._slider.setRange(0, last)
-            self._slider.setValue(playback.frame)
         self._time.setText(clock_text(playback.time_s))
         self._frame.setText(f"frame {playback.frame} / {last}")
         self._speed.setText(f"{playback.speed:g}×")

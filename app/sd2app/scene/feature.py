@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QLabel, QMenu, QWidget
+from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.imu.model import ImuModel
@@ -60,7 +60,7 @@ class SceneBar(QWidget):
         views.addActions([action(name) for name, *_ in _VIEWS])
         look = outlined("Look from", "Where to look at the scene from", views, self, look="")
         dots = action_button(action("dots"), "As dots")
-        parts = (title("Scene"), 8, QLabel("colour", self), colour, dots, STRETCH, look)
+        parts = (title("Scene"), 8, colour, dots, STRETCH, look)
         self.setLayout(row_of(*parts, spacing_px=4, margins_px=(8, 2, 4, 2)))
         display.mesh_changed.connect(lambda: colour.show_value(display.mesh_colour))
         colour.show_value(display.mesh_colour)

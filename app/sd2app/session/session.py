@@ -10,6 +10,7 @@ from PySide6.QtCore import QObject
 from sd2app.session.content import reference_of
 from sd2app.session.display import DisplayModel
 from sd2app.session.document import DocumentModel
+from sd2app.session.layouts import Layouts
 from sd2app.session.maps import MapModel, PointerModel
 from sd2app.session.mode import Mode
 from sd2app.session.playback import PlaybackModel
@@ -65,6 +66,7 @@ class Session:
     placing: Mode  # a click on the body places an inertial sensor
     aligning: Mode  # grips on what was measured move it in time
     edits: Edits
+    layouts: Layouts
     results: ByteBudget  # of places and models that were left, by :attr:`MapModel.key`
 
     def has_content(self) -> bool:
@@ -148,6 +150,7 @@ def build_session(parent: QObject, settings: Settings) -> Session:
         placing=Mode(parent),
         aligning=Mode(parent),
         edits=Edits(document, sensor),
+        layouts=Layouts(settings, parent),
         results=ByteBudget(_RESULTS_BYTES),
     )
     document.grown.connect(session.extend)

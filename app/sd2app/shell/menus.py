@@ -31,7 +31,8 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
     ),
     "View": (
         "zoom_in", "zoom_out", "zoom_fit", "-", "reset_reference", "uncertain", "-",
-        "side_panel", "messages",
+        "pane_video", "pane_scene", "pane_spectrum", "side_panel",
+        "pane_over", "-", "messages",
     ),
     "Play": ("play", "back_second", "on_second", "loop"),
     "Labels": (
@@ -80,6 +81,7 @@ ELSEWHERE: Mapping[str, tuple[str, ...]] = {
         "accept_suggestion", "reject_suggestion", "accept_suggestions", "reject_suggestions",
     ),
     "Agreement": ("next_disagreement", "previous_disagreement", "end_comparison"),
+    "Layouts": ("layout_look", "layout_label", "layout_learn", "layout_capture"),
     "Preferences": ("dark",),
 }  # fmt: skip
 """Likewise what is in no menu of the bar, because a button or a context menu has it: by its place.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 from PySide6.QtWidgets import QMainWindow, QMessageBox
@@ -11,6 +11,7 @@ from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.feature import LabelsFeature
 from sd2app.manual.pages import FIRST_FIVE_MINUTES, INDEX
 from sd2app.manual.window import ManualOpener
+from sd2app.session.layouts import LAYOUTS
 from sd2app.session.session import Session
 from sd2app.shell.action_search import ActionSearch
 from sd2app.shell.keys.bindings import KeyBindings
@@ -49,6 +50,17 @@ MOUSE = (
 """Use of the mouse, for the list of keys."""
 
 
+_PANES = {
+    "video": ("Video", "Show the video, where there is one"),
+    "scene": ("Scene", "Show body and sensor in space, where there is a mesh"),
+    "over": (
+        "Side panel over the maps",
+        "Let the panel at the side lie over the maps instead of beside them",
+    ),
+    "spectrum": ("This frame", "Show the spectrum of this frame and the levels beside the maps"),
+}
+
+
 class ProgramFeature(Feature):
     """Actions of the program; the history waits while labels are dragged."""
 
@@ -60,7 +72,8 @@ class ProgramFeature(Feature):
         self.closing = (manual,)
         stack = session.document.undo_stack
         history = stack.indexChanged, stack.cleanChanged, labels.dragging.changed
-        self.changing = *history, session.display.theme_changed
+        layouts = session.layouts.changed, session.layouts.panes_changed
+        self.changing = *history, *layouts, session.display.theme_changed
 
     def actions(self) -> Sequence[Action]:
         """Undo, theme, messages, side panel, manual, keys, about, quit."""
@@ -85,6 +98,7 @@ class ProgramFeature(Feature):
                 "dark", "View", "Dark theme", ("Ctrl+D",), "Dark or light",
                 lambda: self.set_dark(not display.dark), checked=lambda: display.dark,
             ),
+            *self._layout_actions(),
             Action(
                 "messages", "View", "Messages…", (), "What you were told since the window opened",
                 lambda: shell.show_messages(),
@@ -117,6 +131,26 @@ class ProgramFeature(Feature):
                 "about", "Help", "About SD² Studio", (), "Version and licence", self._show_about
             ),
         )  # fmt: skip
+
+    def _layout_actions(self) -> Iterator[Action]:
+        layouts = self._session.layouts
+        for key, (name, layout) in zip(("F5", "F6", "F7", "F8"), LAYOUTS.items(), strict=True):
+            yield Action(
+                f"layout_{name.lower()}", "View", f"Layout: {name}", (key,), layout.tip,
+                partial(layouts.choose, name), checked=partial(self._is_layout, name),
+            )  # fmt: skip
+        for pane, (text, tip) in _PANES.items():
+            yield Action(
+                f"pane_{pane}", "View", text, (), tip, partial(self._turn_pane, pane),
+                checked=partial(layouts.shows, pane),
+            )  # fmt: skip
+
+    def _is_layout(self, name: str) -> bool:
+        return self._session.layouts.name == name
+
+    def _turn_pane(self, pane: str) -> None:
+        layouts = self._session.layouts
+        layouts.show(pane, not layouts.shows(pane))
 
     def set_dark(self, dark: bool | None) -> None:
         """Choose the theme and remember it; None follows the system."""

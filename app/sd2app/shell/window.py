@@ -29,12 +29,13 @@ from sd2app.shell.loading import LoadingCover
 from sd2app.shell.messages.model import MessagesModel
 from sd2app.shell.messages.views import MessageNotice, MessagesDialog
 from sd2app.shell.parts import Parts
-from sd2app.shell.side_panel import PageWidths, SidePanel
+from sd2app.shell.side_dock import SideDock
+from sd2app.shell.side_panel import SidePanel
 from sd2app.shell.tab_order import controls_of
 from sd2app.shell.window_size import place_on_screen
 from sd2app.widgets.dialogs import accepted
 from sd2app.widgets.inputs import claims
-from sd2app.widgets.layouts import column_of
+from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.notices import Notice, NoticeStack
 from sd2app.widgets.panel import fill, panel, replace_content, sentence, splitter
 from sd2app.widgets.theme import apply_theme, is_dark
@@ -52,11 +53,12 @@ T = TypeVar("T")
 _LABELS_PX = 560
 """Room for the usual columns of the table of spans."""
 _PANELS = ("video", "scene", "tracks", "spectrum", "side")
+_SPLITTERS = ("views", "main")  # whose sizes each layout remembers
 _SIDE_PX = 328
 
 
 class MainWindow(QMainWindow):
-    """One recording: frame-wise views on top, time-wise tracks below.
+    """One recording: frame-wise views at the left, time-wise tracks beside them.
 
     It is also the :class:`sd2app.feature.Shell` of its features.
     """
@@ -92,24 +94,25 @@ class MainWindow(QMainWindow):
 
     def _build_skeleton(self) -> None:
         across, panels = Qt.Orientation.Horizontal, self._panels
-        self._top = splitter(across, [panels["video"], panels["scene"]], (340, 588))
-        self._bottom = splitter(across, [panels["tracks"], panels["spectrum"]], (728, 200))
-        # A wide window gives the video a part of its width, which its height lets it fill.
-        self._top.setStretchFactor(0, 1)
-        self._top.setStretchFactor(1, 3)
-        self._rows = splitter(Qt.Orientation.Vertical, [self._top, self._bottom], (250, 470))
+        self._views = splitter(
+            Qt.Orientation.Vertical, [panels["video"], panels["scene"]], (300, 320)
+        )
         # Of the room of a larger window, maps take most.
-        self._rows.setStretchFactor(0, 1)
-        self._rows.setStretchFactor(1, 2)
-        self._column = column_of((self._rows, 1), spacing_px=4, margins_px=0)
+        parts = [self._views, panels["tracks"], panels["spectrum"]]
+        self._main = splitter(across, parts, (384, 640, 200))
+        for place, share in enumerate((0, 1, 0)):
+            self._main.setStretchFactor(place, share)
+        self._column = column_of((self._main, 1), spacing_px=4, margins_px=0)
         beside = QWidget(self)
         beside.setLayout(self._column)
-        # The side panel has the window's full height, from the menus to the last line.
-        self._across = splitter(across, [beside, panels["side"]], (936, _SIDE_PX))
-        self._lines = column_of((self._across, 1), spacing_px=4, margins_px=(8, 0, 8, 0))
+        # The side panel has the window's full height, from the menus to the last line; it lies
+        # over its room, which it may exceed.
+        self._across = splitter(across, [beside, QWidget()], (936, _SIDE_PX))
+        self._lines = column_of((self._across, 1), spacing_px=0, margins_px=(8, 0, 8, 0))
         self._centre = QWidget(self)
         self._centre.setLayout(self._lines)
         self.setCentralWidget(self._centre)
+        panels["side"].setParent(self._centre)
         self._loading = LoadingCover(self._centre)
         self._loading.painted.connect(self.first_painted, Qt.ConnectionType.SingleShotConnection)
 
@@ -122,6 +125,7 @@ class MainWindow(QMainWindow):
         from sd2app.playback.views import TransportBar
         from sd2app.session.session import build_session
         from sd2app.shell.keys.bindings import KeyBindings
+        from sd2app.shell.layout_tabs import LayoutTabs
         from sd2app.shell.menus import Menus, in_order
         from sd2app.shell.status_bar import StatusLine
         from sd2app.shell.wiring import Features
@@ -150,21 +154,27 @@ class MainWindow(QMainWindow):
         beside = self._column.parentWidget()
         assert beside is not None
         notices.insert(0, MessageNotice(self.messages))
-        self._notices = NoticeStack(beside, self._top, notices)
+        self._notices = NoticeStack(beside, self._views, notices)
         accuracy, synthesis = self.features.accuracy.model, self.features.maps.synthesis
         transport = TransportBar(s.playback, self.features.labels.loop, self.action, self)
         status = StatusLine(s, accuracy, synthesis, partial(self.bring_up, "Accuracy"), self)
-        self._column.addWidget(transport)
-        self._lines.addWidget(status)
-        self._column.insertWidget(self._column.indexOf(self._rows), self.start, 1)
+        self._lines.addLayout(row_of(transport, (status, 1), spacing_px=8, margins_px=0))
+        tabs = LayoutTabs(self.session.layouts, self)
+        # A menu bar that is not the window's has no corner.
+        if self.menuBar().isNativeMenuBar():
+            self._lines.insertWidget(0, tabs)
+        else:
+            self.menuBar().setCornerWidget(tabs)
+        self._column.insertWidget(self._column.indexOf(self._main), self.start, 1)
         self.start.hide()
-        self._views = (self._rows, self._panels["side"], transport)  # of a recording
+        room = self._across.widget(1)
+        self._of_recording = (tabs, self._main, room, self._panels["side"], transport)
         label_set = self.features.labels.model
         self.tour = self.features.welcome.callout(
             self, lambda: label_set.labels.label_set.labels[0].key
         )
         shown = self.start, *self._panels.values(), transport, status, self.tour
-        self._regions = (*notices, *bars, *shown)
+        self._regions = (tabs, *notices, *bars, *shown)
         self._soon = delayed(self._follow_actions, 0, self)
         # Once it is known if something is being opened, and before anything is painted.
         self._start_or_views = delayed(self._choose_start, 0, self)
@@ -172,9 +182,7 @@ class MainWindow(QMainWindow):
         self._connect()
         self._restyle()
         self._refresh()
-        for name in ("top", "bottom", "rows"):
-            if (state := self._settings.layout(name)) is not None:
-                getattr(self, f"_{name}").restoreState(state)
+        self._show_layout()
         self._loading.follow(s)
         self.ready = True
         for feature in self.features:
@@ -186,14 +194,21 @@ class MainWindow(QMainWindow):
         gc.enable()
 
     def _fill_panels(self) -> None:
+        from sd2app.maps.level_bar import MapEdge
         from sd2app.shell.wiring import side_pages, track_stack
 
         views = {name: view for feature in self.features for name, view in feature.panels().items()}
         for name in ("video", "spectrum"):
             fill(self._panels[name], views[name])
-        self.side = SidePanel(side_pages(self.features, views))
+        edge = views["spectrum"]
+        assert isinstance(edge, MapEdge)
+        self._edge = edge
+        self.side = SidePanel(side_pages(self.features, views), self._menus["pane_over"])
         fill(self._panels["side"], self.side)
-        self._widths = PageWidths(self._across, self.side, {"Labels": _LABELS_PX}, self._settings)
+        self._dock = SideDock(
+            self._panels["side"], self._across, self.side, {"Labels": _LABELS_PX}, self._settings,
+            self.session.layouts,
+        )  # fmt: skip
         stack, self.maps = track_stack(self.session, self.features, views)
         fill(self._panels["tracks"], stack)
         self._scene_comes = sentence("Loading the 3D view…")
@@ -219,7 +234,10 @@ class MainWindow(QMainWindow):
         for signal in (s.document.opened, s.jobs.changed):
             signal.connect(self._start_or_views.start)
         for signal in (s.document.changed, s.video.frame_changed):
-            signal.connect(self._show_or_hide_video)
+            signal.connect(self._show_panes)
+        self.session.layouts.leaving.connect(self._keep_layout)
+        self.session.layouts.changed.connect(self._show_layout)
+        self.session.layouts.panes_changed.connect(self._show_panes)
         for runs in (features.training.model, features.classify.training):
             runs.changed.connect(self._mark_training)
         # Without a person in the frame there is nothing to aim at.
@@ -245,16 +263,42 @@ class MainWindow(QMainWindow):
         document = self.session.document
         starts = document.content is None and document.reading is None
         if self.ready and starts == self.start.isHidden():
-            for view in self._views:
+            for view in self._of_recording:
                 view.setVisible(not starts)
             self.start.refresh()
             self.start.setVisible(starts)
 
-    def _show_or_hide_video(self) -> None:
-        """Leave the video's room to the other views where a radar was recorded alone."""
-        recording, filmed = self.session.document.recording, self.session.video.picture is not None
-        alone = recording is not None and recording.video is None and recording.mesh is None
-        self._panels["video"].setVisible(filmed or not alone)
+    def _show_panes(self) -> None:
+        """Show the panes of the layout that have content."""
+        document, filmed = self.session.document, self.session.video.picture is not None
+        there = {
+            "video": filmed or document.video is not None,
+            "scene": document.mesh is not None,
+        }
+        shown = {name: there[name] and self.session.layouts.shows(name) for name in there}
+        for name, is_shown in shown.items():
+            self._panels[name].setVisible(is_shown)
+        self._views.setVisible(any(shown.values()))
+        self._edge.set_folded(not self.session.layouts.shows("spectrum"))
+
+    def _show_layout(self) -> None:
+        """Show the layout in use as it was left."""
+        self._dock.restore()
+        for name in _SPLITTERS:
+            if (state := self.session.layouts.sizes(name)) is not None:
+                getattr(self, f"_{name}").restoreState(state)
+        self._show_panes()
+        if self.session.layouts.sizes("main") is None:
+            wide_px = self._main.width()
+            left_px = max(self.session.layouts.usual.views_px, wide_px // 5)
+            edge_px = self._panels["spectrum"].sizeHint().width()
+            self._main.setSizes([left_px, wide_px - left_px - edge_px, edge_px])
+        self._refresh()
+
+    def _keep_layout(self) -> None:
+        self._dock.remember()
+        for name in _SPLITTERS:
+            self.session.layouts.keep_sizes(name, getattr(self, f"_{name}").saveState())
 
     def _follow_actions(self) -> None:
         """Enable and check the actions, and name the window, as the models stand now."""
@@ -415,9 +459,7 @@ class MainWindow(QMainWindow):
             event.ignore()
             return
         self._settings.set_layout("window", self.saveGeometry())
-        self._widths.remember()
-        for name in ("top", "bottom", "rows"):
-            self._settings.set_layout(name, getattr(self, f"_{name}").saveState())
+        self._keep_layout()
         self.ready = False
         self._importer.close()
         self.session.playback.pause()

@@ -100,6 +100,12 @@ def _style_sheet(c: Palette) -> str:
     QFrame#rail {{ border: none; border-left: 1px solid {c.border}; border-radius: 0; }}
     QToolButton#rail {{ border-radius: 6px; }}
     QToolButton:focus {{ border-color: {c.accent}; }}
+    QTabBar#layouts::tab {{
+        padding: 4px 12px; border: none; border-bottom: 2px solid transparent; color: {c.muted};
+    }}
+    QTabBar#layouts::tab:selected {{ color: {c.text}; border-bottom-color: {c.accent}; }}
+    QTabBar#layouts::tab:hover {{ background: {c.well}; }}
+    QTabBar#layouts:focus {{ border: 1px solid {c.accent}; border-radius: 4px; }}
     QTableView {{ border: 1px solid {c.border}; border-radius: 4px; }}
     QTableView:focus {{ border-color: {c.accent}; }}
     QHeaderView::section {{

@@ -244,7 +244,8 @@ def test_the_panel_is_as_wide_as_its_table_needs_and_others_are_as_before(labell
     assert labelled.side.width() == narrow
     labelled.side.bring_up("Labels")
     assert labelled.side.width() >= wide  # as far as the scene gives way
-    across = splitter_around(labelled.side, Qt.Orientation.Horizontal)
+    across = Qt.Orientation.Horizontal
+    across = splitter_around(splitter_around(labelled.maps, across), across)
     across.splitterMoved.emit(0, 0)  # a hand has chosen what is there
     chosen = labelled.side.width()
     labelled.side.bring_up("Sensor")

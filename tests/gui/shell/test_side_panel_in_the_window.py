@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from finding import named, panel_of, splitter_around
+from finding import button_of, named, panel_of, splitter_around
 from kept_window import close_window, opened
 from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel, QSplitterHandle, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QSplitter, QSplitterHandle, QWidget
 
 from sd2app.maps.arrangement import HEADER_PX
 from sd2app.settings import Settings
@@ -33,10 +33,18 @@ def drag(handle: QSplitterHandle, right_px: int, down_px: int = 0) -> None:
     QTest.mouseRelease(handle, LEFT, pos=start)
 
 
+def around_all(window: MainWindow) -> QSplitter:
+    """The splitter between all views and the room of the panel at the side."""
+    across = Qt.Orientation.Horizontal
+    return splitter_around(splitter_around(window.maps, across), across)
+
+
 @pytest.fixture
 def windows(qtbot, compiled_kernels, fake, fake_models, fake_classes, small_recording):
     """Makes windows one after the other on the same settings."""
     settings = Settings.forgetful()
+    for name in ("folded", "over"):  # the panel is open and beside the maps
+        settings.set_value(f"layouts/Look/{name}", False)
     made: list[MainWindow] = []
 
     def make(width_px: int = 1280, height_px: int = 720) -> MainWindow:
@@ -79,6 +87,28 @@ def test_it_stands_beside_scene_and_maps_and_shows_every_icon(windows, size) -> 
         assert place_of(panel_of(window, other)).right() < side.left()
 
 
+def test_it_lies_over_the_maps_by_choice_and_takes_no_room_of_theirs(windows) -> None:
+    window = windows()
+    side, tracks, beside_px = window.side, panel_of(window, "tracks"), window.side.width()
+    narrow_px = tracks.width()
+    QTest.mouseClick(button_of(side, "Over maps"), LEFT)
+    QApplication.processEvents()
+    assert tracks.width() > narrow_px + 200
+    assert side.width() == pytest.approx(beside_px, abs=4)
+    assert place_of(side).left() < place_of(panel_of(window, "spectrum")).right()
+    assert window.childAt(side.mapTo(window, QPoint(20, 200))) is not None
+    assert side.isAncestorOf(window.childAt(side.mapTo(window, QPoint(20, 200))))
+    wide_px = tracks.width()
+    QTest.keyClick(window, Qt.Key.Key_F9)
+    QApplication.processEvents()
+    assert side.folded
+    assert tracks.width() == wide_px
+    again = windows()
+    QTest.keyClick(again, Qt.Key.Key_S)
+    QApplication.processEvents()
+    assert panel_of(again, "tracks").width() == pytest.approx(wide_px, abs=2)
+
+
 def test_icons_have_names_tips_and_a_ring_for_what_is_under_way(windows) -> None:
     side = windows().side
     for name in NAMES:
@@ -93,6 +123,19 @@ def test_icons_have_names_tips_and_a_ring_for_what_is_under_way(windows) -> None
     assert before != quarter != icon.grab().toImage()
     side.set_mark("Train", "")
     assert icon.grab().toImage() == before
+
+
+def test_icons_have_their_words_where_the_window_is_wide(windows) -> None:
+    window = windows(1280, 720)
+    icon = window.side.button("Agreement")
+    worded = icon.size()
+    assert worded.width() >= icon.fontMetrics().horizontalAdvance("Agree")
+    window.resize(1000, 700)
+    QApplication.processEvents()
+    assert icon.width() < worded.width()
+    window.resize(1280, 720)
+    QApplication.processEvents()
+    assert icon.size() == worded
 
 
 def test_arrows_go_from_panel_to_panel(windows) -> None:
@@ -110,13 +153,13 @@ def test_arrows_go_from_panel_to_panel(windows) -> None:
 
 def test_its_own_icon_or_a_key_folds_it_and_another_opens_it(windows) -> None:
     window = windows()
-    side, scene = window.side, panel_of(window, "scene")
-    wide_px, scene_px = side.width(), scene.width()
+    side, tracks = window.side, panel_of(window, "tracks")
+    wide_px, tracks_px = side.width(), tracks.width()
     QTest.mouseClick(side.button("Sensor"), LEFT)
     assert side.folded
     assert not window.action("side_panel").isChecked()
-    assert side.width() < 60
-    assert scene.width() > scene_px + 100
+    assert side.width() < 80
+    assert tracks.width() > tracks_px + 100
     assert all(side.rect().contains(side.button(name).geometry()) for name in NAMES)
     QTest.mouseClick(side.button("Accuracy"), LEFT)
     assert (side.folded, side.shown, side.width()) == (False, "Accuracy", wide_px)
@@ -129,7 +172,7 @@ def test_its_own_icon_or_a_key_folds_it_and_another_opens_it(windows) -> None:
 def test_the_next_window_has_the_width_that_was_chosen(windows) -> None:
     window = windows()
     before_px = window.side.width()
-    drag(splitter_around(window.side, Qt.Orientation.Horizontal).handle(1), -90)
+    drag(around_all(window).handle(1), -90)
     chosen_px = window.side.width()
     assert chosen_px == pytest.approx(before_px + 90, abs=2)
     again = windows()
@@ -137,7 +180,7 @@ def test_the_next_window_has_the_width_that_was_chosen(windows) -> None:
     QTest.keyClick(again, Qt.Key.Key_F9)
     folded = windows()
     assert folded.side.folded
-    assert folded.side.width() < 60
+    assert folded.side.width() < 80
     QTest.keyClick(folded, Qt.Key.Key_F9)
     assert folded.side.width() == chosen_px
 
@@ -157,9 +200,10 @@ def test_the_next_window_has_the_heights_that_were_chosen(windows, qtbot, small_
         return window.maps.synthetic.height(), window.maps.real.height()
 
     window = opened()
-    before_px = window.maps.height()
-    drag(splitter_around(window.maps, Qt.Orientation.Vertical).handle(1), 0, -60)
-    chosen_px = window.maps.height()
+    video = panel_of(window, "video")
+    before_px = video.height()
+    drag(splitter_around(video, Qt.Orientation.Vertical).handle(1), 0, 60)
+    chosen_px = video.height()
     assert chosen_px == pytest.approx(before_px + 60, abs=2)
     view = window.maps.synthetic
     border = QPoint(200, view.height() - 2)
@@ -171,7 +215,7 @@ def test_the_next_window_has_the_heights_that_were_chosen(windows, qtbot, small_
     chosen = heights(window)
     assert chosen[0] > border.y() + 40
     window = opened()
-    assert window.maps.height() == chosen_px
+    assert panel_of(window, "video").height() == chosen_px
     assert heights(window) == chosen
     QTest.mouseClick(window.maps.real, LEFT, pos=QPoint(10, HEADER_PX // 2))
     assert heights(window)[1] == HEADER_PX
