@@ -208,10 +208,10 @@ class HeatmapView(TrackMouse, MapWidget):
         left = HANDLE_PX + paint_title(painter, box, self.title(), colours.text) + 12
         painter.setPen(QColor(colours.muted))
         left += 0 if self.still else self._place_button(left)
-        room = self.width() - 16 - left - self._paint_corner(painter, box, left)
-        status = painter.fontMetrics().elidedText(
-            self.status(), Qt.TextElideMode.ElideRight, int(max(room - 16, 40))
-        )
+        metrics, words = painter.fontMetrics(), self.status()
+        taken_px = left + metrics.horizontalAdvance(words)
+        room = self.width() - 16 - left - self._paint_corner(painter, box, taken_px)
+        status = metrics.elidedText(words, Qt.TextElideMode.ElideRight, int(max(room - 16, 40)))
         painter.drawText(QRectF(left, 0, self.width(), HEADER_PX), AT_LEFT, status)
 
     @property
@@ -236,7 +236,7 @@ class HeatmapView(TrackMouse, MapWidget):
         """Paint the right end of the header; returns its width."""
         text = "approaching +  /  receding −   m/s"
         width = painter.fontMetrics().horizontalAdvance(text)
-        if self.width() - 16 - left - width <= 60:
+        if self.width() - 32 - left - width <= 0:
             return 0.0
         painter.drawText(box, AT_RIGHT, text)
         return width

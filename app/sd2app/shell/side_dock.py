@@ -14,7 +14,8 @@ _MAX_SHARE = 0.42
 """Share of the window that a panel with a width of its own takes before the user says so."""
 _ANY_WIDTH_PX = (1 << 24) - 1  # Qt's largest
 _EDGES_PX = 2
-_WORDED_FROM_PX = 1200  # of the window
+_BESIDE_FROM_PX, _WORDED_FROM_PX = 1100, 1200
+"""Widths of the window that have room for a panel beside the maps, and for words at its icons."""
 _PLACED_AGAIN = {
     QEvent.Type.Resize,
     QEvent.Type.Move,
@@ -58,6 +59,7 @@ class SideDock(QObject):
         self._usual, self._settings, self._layouts = usual, settings, layouts
         self._otherwise_px = splitter.sizes()[-1]
         self._shown = side.shown
+        self._fits: tuple[bool, bool] | None = None
         side.turned.connect(self._turn)
         side.folded_changed.connect(self._widen)
         layouts.panes_changed.connect(self._widen)
@@ -82,8 +84,9 @@ class SideDock(QObject):
 
     @property
     def _beside(self) -> bool:
-        """True while the room of the splitter is the panel's."""
-        return not self._side.folded and not self._layouts.shows("over")
+        """True while the room of the splitter is the panel's; a narrow window has none beside."""
+        over = self._layouts.shows("over") or self._splitter.width() < _BESIDE_FROM_PX
+        return not self._side.folded and not over
 
     def _remember(self) -> None:
         wide_px = self._splitter.sizes()[-1]
@@ -106,11 +109,13 @@ class SideDock(QObject):
         chosen_px = self._settings.stored(self._name(self._shown), usual_px)
         return max(chosen_px, self._frame.minimumSizeHint().width())
 
-    def _fit_words(self) -> None:
-        """Let icons have their words where the window is wide."""
-        before_px = self._side.rail_px
-        self._side.set_worded(self._splitter.width() >= _WORDED_FROM_PX)
-        if self._side.rail_px != before_px:
+    def _fit(self) -> None:
+        """Let icons have their words, and the panel its room, where the window is wide."""
+        wide_px = self._splitter.width()
+        fits = wide_px >= _BESIDE_FROM_PX, wide_px >= _WORDED_FROM_PX
+        if fits != self._fits:
+            self._fits = fits
+            self._side.set_worded(fits[1])
             self._widen()
 
     @property
@@ -142,7 +147,7 @@ class SideDock(QObject):
         """Follow the splitter, and the needs of the open panel."""
         if event.type() in _PLACED_AGAIN:
             if watched is self._splitter and event.type() == QEvent.Type.Resize:
-                self._fit_words()
+                self._fit()
             if watched is self._room and event.type() == QEvent.Type.Show:
                 self._widen()
             elif watched is not self._frame:

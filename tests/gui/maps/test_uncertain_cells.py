@@ -74,7 +74,7 @@ def test_what_is_not_known_has_no_colour_until_a_key_gives_it(fitted, qtbot, tmp
     )
     qtbot.keyClick(fitted, Qt.Key.Key_U)
     assert c.synthetic.uncertainty is None
-    assert colour_of(view) > 60
+    assert colour_of(view) > 40
     qtbot.mouseMove(view, place + QPoint(1, 0))
     assert c.pointer.reading.deviation is None
 

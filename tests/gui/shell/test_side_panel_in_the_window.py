@@ -83,8 +83,9 @@ def test_it_stands_beside_scene_and_maps_and_shows_every_icon(windows, size) -> 
         icon = place_of(window.side.button(name))
         assert side.contains(icon), name
         assert icon.width() >= 32
-    for other in ("tracks", "scene"):
-        assert place_of(panel_of(window, other)).right() < side.left()
+    if size[0] > 1100:  # a narrow window has no room beside its maps
+        for other in ("tracks", "scene"):
+            assert place_of(panel_of(window, other)).right() < side.left()
 
 
 def test_it_lies_over_the_maps_by_choice_and_takes_no_room_of_theirs(windows) -> None:
