@@ -107,7 +107,8 @@ class MainWindow(QMainWindow):
         beside.setLayout(self._column)
         # The side panel has the window's full height, from the menus to the last line; it lies
         # over its room, which it may exceed.
-        self._across = splitter(across, [beside, QWidget()], (936, _SIDE_PX))
+        self._room = QWidget()
+        self._across = splitter(across, [beside, self._room], (936, _SIDE_PX))
         self._lines = column_of((self._across, 1), spacing_px=0, margins_px=(8, 0, 8, 0))
         self._centre = QWidget(self)
         self._centre.setLayout(self._lines)
@@ -167,8 +168,7 @@ class MainWindow(QMainWindow):
             self.menuBar().setCornerWidget(tabs)
         self._column.insertWidget(self._column.indexOf(self._main), self.start, 1)
         self.start.hide()
-        room = self._across.widget(1)
-        self._of_recording = (tabs, self._main, room, self._panels["side"], transport)
+        self._of_recording = (tabs, self._main, self._room, self._panels["side"], transport)
         label_set = self.features.labels.model
         self.tour = self.features.welcome.callout(
             self, lambda: label_set.labels.label_set.labels[0].key
