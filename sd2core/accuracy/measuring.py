@@ -132,6 +132,7 @@ class _Counts:
                 surface=self._surface,
                 range_law=options.range_exponent > 0,
                 vertices_kept=self._trial.vertices_kept,
+                scene=self._trial.scene_parts,
             )
         )
 

@@ -236,10 +236,16 @@ def compared_plans(
     surface: bool = True,
     range_law: bool = True,
     vertices_kept: Sequence[float] = VERTICES_KEPT,
+    scene: Sequence[ScenePart] = (),
 ) -> Iterator[AccuracyPlan]:
     """Counting plans of a table: every setting alone, and the main combinations.
 
-    Parameters as for :func:`counting_plans`.
+    Parameters
+    ----------
+    weight, surface, range_law, vertices_kept
+        As for :func:`counting_plans`.
+    scene : sequence of {"beam", "things", "walls"}
+        What the scene has: each is left out once.
     """
     base = AccuracyPlan(visibility="exact" if surface else "none", weight=weight)
     for plan in counting_plans(
@@ -258,6 +264,7 @@ def compared_plans(
         if lowered <= 1 or usual:
             yield plan
     yield replace(base, beyond="drop")
+    yield from (replace(base, left_out=(part,)) for part in scene)
     if surface:
         for reach_m in MASK_REUSE_M:
             yield replace(base, mask_reuse_m=reach_m)

@@ -10,6 +10,7 @@ import pytest
 from accuracy_scenes import ball, swinging
 
 from sd2core.accuracy.choosing import choose
+from sd2core.accuracy.measuring import measure
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.accuracy.results import Choice, Reason
 from sd2core.accuracy.trial import synthesizer_for
@@ -84,6 +85,14 @@ def test_a_plan_leaves_out_what_it_says() -> None:
         for made in (None, like):
             found = synthesizer_for(plan, scene, PAPER, like=made).map(BEAMED).values
             np.testing.assert_array_equal(found, expected)
+
+
+def test_the_table_of_plans_has_each_part_left_out() -> None:
+    scene = with_walls(with_things(body(), [BOX]), [Wall.named("right", 1.0)])
+    measured = measure(scene, BEAMED, repeats=1, memory=False)
+    without = {one.plan.left_out: one.errors.l1 for one in measured.results}
+    assert {("beam",), ("things",), ("walls",)} < set(without)
+    assert without["walls",] > 0.02
 
 
 def test_a_plan_says_what_it_leaves_out_and_comes_back_from_json() -> None:
