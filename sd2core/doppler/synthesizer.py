@@ -28,7 +28,7 @@ from sd2core.numerics.byte_budget import ByteBudget
 from sd2core.numerics.compiled import compile_in_background, kernels_ready, worker_count
 from sd2core.numerics.parallel import Ticket, run_jobs, run_light_jobs
 from sd2core.numerics.precision import SHARE_OF_A_BIN, stored_velocity_error_mps
-from sd2core.progress import Progress, part_of, silent
+from sd2core.progress import Progress, silent
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
 from sd2core.scattering.velocity import radial_velocity
 from sd2core.sensor import VirtualSensor
@@ -95,6 +95,13 @@ def _body_notes(prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop:
             " numbers of a map can be: it is empty or nearly so. Choose a farther reference range."
         )
     return notes
+
+
+def _of_bodies(progress: Progress, number: int, of: int) -> Progress:
+    """Progress of one of several bodies, in frames of the clip."""
+    if of == 1:
+        return progress
+    return lambda done, total: progress((number * total + done) // of, total)
 
 
 _MEMORY_BUDGET_BYTES = 512 << 20
@@ -439,7 +446,7 @@ class Synthesizer:
         by_body = (None,) * len(self._bodies) if parts is None else (parts, *parts.others)
         of, each = len(self._bodies), []
         for number, (one, its) in enumerate(zip(self._bodies, by_body, strict=True)):
-            counting = progress if of == 1 else part_of(progress, number, number + 1, of)
+            counting = _of_bodies(progress, number, of)
             each.append(one._own_stretch(sensor, start, stop, visibility, counting, its, shares))
         return each[0] if of == 1 else self._joined(each)
 
@@ -577,7 +584,7 @@ class Synthesizer:
         known = any(body.uncertainty is not None for body in self.mesh.bodies)
         each = []
         for number, one in enumerate(self._bodies):
-            counting = progress if of == 1 else part_of(progress, number, number + 1, of)
+            counting = _of_bodies(progress, number, of)
             if known and one.mesh.uncertainty is None:  # what is not said is taken to be right
                 values = one._own_stretch(sensor, start, stop, chosen, counting, None, False).values
                 each.append(CellUncertainty(values, np.zeros_like(values)))

@@ -168,6 +168,15 @@ def test_what_a_map_says_of_a_scene() -> None:
     assert len(prints) == 3
 
 
+def test_progress_is_counted_in_frames_of_the_clip() -> None:
+    told: list[tuple[int, int]] = []
+    scene = together(approaching(2.0), approaching(3.0), approaching(4.0))
+    Synthesizer(scene, RAW).map(SENSOR, progress=lambda *one: told.append(one))
+    assert {total for _, total in told} == {6}
+    assert sorted(told) == told
+    assert told[-1] == (6, 6)
+
+
 def test_parts_of_each_person_add_up() -> None:
     scene = together(wobbling(8), beside(wobbling(8, seed=2), 0.2, 0, 0.8))
     count = scene.vertex_count
