@@ -103,15 +103,24 @@ def _demo(options: Demo) -> int:
 
       sd2 demo
       sd2 demo --out sample.sd2            (a copy; opens no window)
+      sd2 demo --scene two                 (two people and a table)
       sd2 demo --screenshot window.png    (needs no display)
     """
     from sd2core.cli.importing import copy_sample
+    from sd2core.files.paths import user_cache
     from sd2core.files.resources import resource_path
+    from sd2core.version import __version__
 
-    if options.out is None:
-        return _show([resource_path("swipes.sd2")], options.screenshot)
-    copy_sample(options.out)
-    return 0
+    if options.out is not None:
+        copy_sample(options.out, options.scene)
+        return 0
+    shown = resource_path("swipes.sd2")
+    if options.scene == "two":
+        shown = user_cache("samples") / f"two-{__version__}.sd2"
+        if not (shown / "recording.json").exists():
+            shown.parent.mkdir(parents=True, exist_ok=True)
+            copy_sample(shown, "two")
+    return _show([shown], options.screenshot)
 
 
 def _show(paths: Sequence[Path], screenshot: Path | None) -> int:

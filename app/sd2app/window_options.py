@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+from sd2core.options.kinds import DemoScene
 from sd2core.options.records import ARGUMENTS, Place
 from sd2core.options.shared import Overwrite
 
@@ -42,6 +43,9 @@ class Demo(Screenshot):
     ----------
     out : NAME.sd2
         write a copy of the sample with its files, and open no window
+    scene : NUMBER
+        of people: one who swipes, or two who walk past each other
     """
 
     out: Annotated[Path | None, Place(one_of="instead")] = None
+    scene: DemoScene = "one"

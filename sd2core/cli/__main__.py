@@ -11,6 +11,7 @@ from sd2core.cli import build_parser, run
 from sd2core.cli.command_parser import add_command, add_options
 from sd2core.cli.preparing import JOBS, Doctor, do_job
 from sd2core.errors import Sd2Error
+from sd2core.options.kinds import DemoScene
 from sd2core.options.records import OptionRecord
 from sd2core.options.shared import Json
 
@@ -24,9 +25,12 @@ class Demo(OptionRecord):
     ----------
     out : NAME.sd2
         the copy to write; new
+    scene : NUMBER
+        of people: one who swipes, or two who walk past each other
     """
 
     out: Path | None = None
+    scene: DemoScene = "one"
 
 
 def main() -> int:
@@ -48,13 +52,14 @@ def main() -> int:
 def _demo(options: Demo) -> None:
     """Write a copy of the bundled sample recording.
 
-    A simulated body makes eight swipes in front of a simulated radar.
+    A simulated body makes eight swipes in front of a simulated radar; or two people walk past
+    each other behind a table.
     """
     if options.out is None:
         _absent(argparse.Namespace(name="demo"))
     from sd2core.cli.importing import copy_sample
 
-    copy_sample(options.out)
+    copy_sample(options.out, options.scene)
 
 
 def _doctor(options: Doctor) -> None:

@@ -14,7 +14,7 @@ from sd2core.cli.command_parser import add_command
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.bounds import AZIMUTH_DEG, ELEVATION_DEG, RANGE_M
-from sd2core.options.kinds import Names, Vector
+from sd2core.options.kinds import DemoScene, Names, Vector
 from sd2core.options.records import (
     ARGUMENT,
     Group,
@@ -192,11 +192,16 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     add_command(commands, "relink", options=Relink, handler=_relink)
 
 
-def copy_sample(out: Path) -> None:
-    """Write a copy of the bundled sample recording, with the true body of its person."""
+def copy_sample(out: Path, scene: DemoScene = "one") -> None:
+    """Write a copy of the bundled sample recording, with the true body of its person, or two."""
     from sd2core.files.resources import resource_path
     from sd2core.recording.recording import open_recording
 
+    if scene == "two":
+        from sd2core.simulate.two_people import two_people
+
+        print(f"Wrote {two_people(out).folder}")
+        return
     sample = resource_path("swipes.sd2")
     copy = open_recording(sample).save_as(out, copy=True)
     shutil.copytree(sample / "mesh.zarr", copy.folder / "mesh.zarr")

@@ -184,3 +184,6 @@ Words = Annotated[tuple[str, ...], Typed(word_list, joined)]
 Bins = Annotated[tuple[int, ...], Typed(bin_list, joined)]
 Paths = Annotated[tuple[Path, ...], Typed(Path)]
 Assignment = Annotated[tuple[str, Any], Typed(assignment, assigned)]
+
+DemoScene = Literal["one", "two"]
+"""Sample recordings by their people: one who swipes, bundled; two, made when asked for."""
