@@ -4,18 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Protocol, runtime_checkable
 
-from PySide6.QtCore import QBuffer, QIODevice, QPoint, QPointF, QRect, Qt
+from PySide6.QtCore import QBuffer, QIODevice, QPoint, QPointF, QRect, QSize, Qt
 from PySide6.QtGui import QGuiApplication, QPainter, QPixmap
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QMenu, QMessageBox, QWidget
 
-from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import ask_new
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 
 _KINDS = "Picture (*.png);;Drawing (*.svg)"
+
+
+@runtime_checkable
+class Pictured(Protocol):
+    """A widget whose picture differs from what is on screen."""
+
+    def picture_size(self) -> QSize:
+        """Size of the picture of it, in pixels."""
+
+    def paint_picture(self, painter: QPainter) -> None:
+        """Paint what a picture of it shows."""
 
 
 def copy_drawing(widget: QWidget) -> None:
@@ -28,7 +39,7 @@ def copy_drawing(widget: QWidget) -> None:
 
 def _drawing(widget: QWidget) -> bytes:
     """The widget as SVG."""
-    size = widget.picture_size() if isinstance(widget, Canvas) else widget.size()
+    size = widget.picture_size() if isinstance(widget, Pictured) else widget.size()
     buffer = QBuffer()
     buffer.open(QIODevice.OpenModeFlag.WriteOnly)
     drawing = QSvgGenerator()
@@ -36,7 +47,7 @@ def _drawing(widget: QWidget) -> bytes:
     drawing.setSize(size)
     drawing.setViewBox(QRect(QPoint(), size))
     drawing.setTitle(widget.accessibleName())
-    if isinstance(widget, Canvas):
+    if isinstance(widget, Pictured):
         with QPainter(drawing) as painter:
             painter.setFont(widget.font())
             widget.paint_picture(painter)
@@ -47,7 +58,7 @@ def _drawing(widget: QWidget) -> bytes:
 
 def pixmap_of(widget: QWidget) -> QPixmap:
     """The widget in pixels: what it shows, without what the mouse is for."""
-    if not isinstance(widget, Canvas):
+    if not isinstance(widget, Pictured):
         return widget.grab()
     ratio = widget.devicePixelRatioF()
     pixmap = QPixmap(widget.picture_size() * ratio)
