@@ -11,14 +11,20 @@ import contextlib
 import os
 import pickle
 import sys
+import time
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from sd2core.errors import Sd2Error
+from sd2core.processes import keep_little_free_memory, return_free_memory
 
 _KEPT = 5
 """Models: the denoiser in use, the one before, the one that is about to be; the classifier
 in use, and the next. Of clips that are gone through frame after frame as many."""
+
+_LONG_S = 0.03
+"""After an answer that took so long freed memory is given back, which takes milliseconds: not
+between those about single frames."""
 
 
 class Worker:
@@ -78,6 +84,7 @@ def serve(source: BinaryIO, sink: BinaryIO) -> None:
             do, arguments = pickle.load(source)
         except EOFError:
             return
+        begun_s = time.monotonic()
         try:
             answer = getattr(worker, do)(*arguments)
         except Sd2Error as error:
@@ -86,10 +93,13 @@ def serve(source: BinaryIO, sink: BinaryIO) -> None:
             answer = Sd2Error(f"The model failed ({error!r})")
         pickle.dump(answer, sink, pickle.HIGHEST_PROTOCOL)
         sink.flush()
+        if time.monotonic() - begun_s > _LONG_S:
+            return_free_memory()
 
 
 def main() -> int:
     """Serve, with the output of libraries redirected away from the answers."""
+    keep_little_free_memory()
     sink = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     with contextlib.suppress(BrokenPipeError, KeyboardInterrupt):
