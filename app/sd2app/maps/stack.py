@@ -150,9 +150,6 @@ class MapStack(QScrollArea):
             self._under_way()
             or "Add a mesh to see its synthetic Doppler: File → Add to this recording…\n\n"
             "From a video alone: File → New from video… fits a body to the person in it."
-            if self._session.has_content()
-            else "Drop a recording, video, mesh or radar capture here, or choose File → Open…\n\n"
-            "Help → Open the sample recording shows what it looks like."
         )
 
     def toggle_enlarged(self, name: str) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from hashlib import sha256
 from pathlib import Path
 
-from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QObject, QRect, QSize, Qt, Signal
+from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QObject, QPoint, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QImage, QImageWriter
 
 from sd2app.background.latest import LatestRunner, delayed
@@ -19,6 +19,8 @@ SIZE_PX = QSize(448, 252)
 _COLUMNS = 448
 _PATIENCE_MS = 700
 """Delay after which what has just been opened is worth a picture."""
+_ABOVE = 0.2
+"""Share of what is cut off a high picture that is cut above: people have their heads there."""
 _MOST = 60
 """Number of pictures that are kept."""
 
@@ -96,18 +98,18 @@ class RecordingPictures(QObject):
 
 
 def _write(picture: QImage, path: Path) -> None:
-    """Write the middle of a picture, as large as pictures are; delete the oldest of too many."""
+    """Write a picture cut to size, heads left on; delete the oldest of too many."""
     whole = SIZE_PX if picture.height() < 64 else picture.size()  # a map has a row per bin
     fitted = picture.scaled(
         whole.scaled(SIZE_PX, Qt.AspectRatioMode.KeepAspectRatioByExpanding),
         Qt.AspectRatioMode.IgnoreAspectRatio,
         Qt.TransformationMode.SmoothTransformation,
     )
-    middle = QRect(0, 0, SIZE_PX.width(), SIZE_PX.height())
-    middle.moveCenter(fitted.rect().center())
+    over_px = fitted.size() - SIZE_PX
+    part = QRect(QPoint(over_px.width() // 2, round(_ABOVE * over_px.height())), SIZE_PX)
     buffer = QBuffer()
     buffer.open(QIODevice.OpenModeFlag.WriteOnly)
-    QImageWriter(buffer, QByteArray(b"png")).write(fitted.copy(middle))
+    QImageWriter(buffer, QByteArray(b"png")).write(fitted.copy(part))
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_write(path) as stream:
         stream.write(bytes(buffer.data().data()))
