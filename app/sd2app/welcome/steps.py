@@ -124,7 +124,7 @@ def tour_steps(
             "Use it",
             "When the training has ended, press Use this model: its map takes the place of the"
             " one before. One recording is little to learn from, and it shows.",
-            ("Use this model", "Train"), lambda: adoption.run, moved,
+            ("Use this model", "Stop", "Train"), lambda: adoption.run, moved,
             lambda: training.run is not None,
         ),
     )  # fmt: skip
