@@ -233,7 +233,7 @@ def test_sensors_are_saved_with_the_recording(desk: Desk, walk: Path, tmp_path: 
     desk.session.edits.drag_offset(0.1)
     desk.session.edits.drag_offset(-0.125)
     desk.session.edits.end_offset_drag()
-    assert desk.history.undoText() == "Align inertial sensor"
+    assert desk.history.undoText() == "Inertial sensor offset"
     desk.session.document.save()
     again = open_recording(walk)
     assert (again.imu, again.imu_offset_s) == (tmp_path / "hand.csv", 0.125)

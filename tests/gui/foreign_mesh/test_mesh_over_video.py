@@ -196,7 +196,7 @@ def test_taken_in_the_window_it_is_made_smooth_and_undone(labelled, qtbot, files
     window, c = labelled, models_of(labelled)
     _, mesh = files
     before = c.document.mesh
-    monkeypatch.setattr("sd2app.shell.files.ask_to_open", lambda *_: [mesh])
+    monkeypatch.setattr("sd2app.shell.files.ask_to_open", lambda *_, **__: [mesh])
 
     press_when_ready(MeshDialog, "Cancel")
     window.action("add").trigger()
@@ -278,8 +278,9 @@ def test_the_camera_of_the_video_is_still_known_with_another_mesh(
     window, c = labelled, models_of(labelled)
     known = CameraEntry(focal_px=900.0, source="user")
     c.document.recording.camera = known
-    np.savez(tmp_path / "theirs.npz", vertices=ball(0.0, FRAMES) * [1, -1, -1])
-    monkeypatch.setattr("sd2app.shell.files.ask_to_open", lambda *_: [tmp_path / "theirs.npz"])
+    theirs = tmp_path / "theirs.npz"
+    np.savez(theirs, vertices=ball(0.0, FRAMES) * [1, -1, -1])
+    monkeypatch.setattr("sd2app.shell.files.ask_to_open", lambda *_, **__: [theirs])
 
     def take(dialog: MeshDialog) -> None:
         settle(qtbot, dialog.preview)

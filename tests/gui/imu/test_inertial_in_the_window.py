@@ -268,7 +268,7 @@ def test_a_real_sensors_file_is_opened_beside_what_is_open(
 ) -> None:
     models, path = models_of(window), wrist(tmp_path / "wrist.csv")
     before = models.document.recording
-    monkeypatch.setattr(files, "ask_to_open", lambda *_: [path])
+    monkeypatch.setattr(files, "ask_to_open", lambda *_, **__: [path])
     window.action(name).trigger()
     qtbot.waitUntil(lambda: models.imu.measured is not None, timeout=20_000)
     assert models.document.recording is before
