@@ -190,7 +190,7 @@ def test_the_context_menu_reads_sets_and_plays(window, stack, qtbot):
     c, view = models_of(window), stack.synthetic
     values = c.synthetic.map.values
     bin_, frame = divmod(int(values.argmax()), values.shape[1])
-    time_s = c.synthetic.map.timebase.time_of(frame) + 1e-3
+    time_s = c.synthetic.map.timebase.time_of(frame) + 0.5 / 30  # the middle of the frame
     velocity_mps = c.synthetic.map.axis.centres_mps[bin_]
     place = QPoint(round(view.scale.x_of(time_s)), round(view.y_of(velocity_mps)))
     pick(menu_at(view, place), "Copy value")
