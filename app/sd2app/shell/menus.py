@@ -32,11 +32,11 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
     "View": (
         "zoom_in", "zoom_out", "zoom_fit", "-", "reset_reference", "uncertain", "-",
         "pane_video", "pane_scene", "pane_spectrum", "side_panel",
-        "pane_over", "-", "messages",
+        "-", "messages",
     ),
     "Play": ("play", "back_second", "on_second", "loop"),
     "Labels": (
-        "suggest", "find_gestures", "-", "end_marks", "fill_gaps", "add_track", "-", "next_span",
+        "suggest", "find_gestures", "-", "end_marks", "add_track", "-", "next_span",
         "previous_span", "find_spans", "-", "label_set", "import_labels", "export_labels",
         "cut_out", "compare_labels", "-", "restore_labels", "edit_labels_here",
     ),
@@ -65,12 +65,12 @@ ELSEWHERE: Mapping[str, tuple[str, ...]] = {
     ),
     "Panels": (
         "show_sensor", "show_trade", "show_train", "show_labels", "show_agree",
-        "sensor_to_camera", "aim_sensor", "measure", "export_inertial",
+        "pane_over", "sensor_to_camera", "aim_sensor", "measure", "export_inertial",
     ),
     "Mark": ("@label keys", "-", "carve_marks", "leave"),
     "Spans": (
         "span_starts_here", "span_ends_here", "nudge_back", "nudge_on", "-", "split_span",
-        "merge_spans", "meet_spans", "duplicate_spans", "delete_spans", "-", "loop_span",
+        "merge_spans", "meet_spans", "duplicate_spans", "delete_spans", "fill_gaps", "-", "loop_span",
         "select_all", "spans_up", "spans_down",
     ),
     "Tracks": (

@@ -107,7 +107,7 @@ class MainWindow(QMainWindow):
         beside.setLayout(self._column)
         # The side panel has the window's full height, from the menus to the last line; it lies
         # over its room, which it may exceed.
-        self._room = QWidget()
+        self._room = QWidget(self)
         self._across = splitter(across, [beside, self._room], (936, _SIDE_PX))
         self._lines = column_of((self._across, 1), spacing_px=0, margins_px=(8, 0, 8, 0))
         self._centre = QWidget(self)
