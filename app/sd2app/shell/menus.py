@@ -70,7 +70,8 @@ ELSEWHERE: Mapping[str, tuple[str, ...]] = {
     "Mark": ("@label keys", "-", "carve_marks", "leave"),
     "Spans": (
         "span_starts_here", "span_ends_here", "nudge_back", "nudge_on", "-", "split_span",
-        "merge_spans", "meet_spans", "duplicate_spans", "delete_spans", "fill_gaps", "-", "loop_span",
+        "merge_spans", "meet_spans", "duplicate_spans", "delete_spans", "fill_gaps", "-",
+        "loop_span",
         "select_all", "spans_up", "spans_down",
     ),
     "Tracks": (
