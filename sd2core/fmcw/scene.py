@@ -15,7 +15,7 @@ from sd2core.mesh.things import Surface
 from sd2core.mesh.walls import Wall
 from sd2core.radar_config import RadarConfig
 from sd2core.scattering.behind_things import may_hide
-from sd2core.scattering.facets import facets_before, visible_facets
+from sd2core.scattering.facets import facets_before, points_behind, visible_facets
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
@@ -156,6 +156,14 @@ class MeshScene:
     def surface(self, time_s: float) -> Surface:
         """Vertices (V, 3) and faces in the mesh frame nearest to an instant."""
         return self._nearest(time_s), self._faces
+
+    def hidden_by_bodies(self, time_s: float, points_m: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Points (n, 3) that this body or another hides at an instant, (n,)."""
+        hidden = np.zeros(len(points_m), np.bool_)
+        for body in (self, *self.others):
+            if body.there(time_s):
+                hidden |= points_behind(*body.surface(time_s), self.sensor.position_m, points_m)
+        return hidden
 
     def between(self, times_s: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.float64], ...]]:
         """Interpolate vertices and velocity at some times, on a smooth path through the frames.

@@ -129,6 +129,8 @@ def _fill(
         found = scene.frame(float(times_s[frame]), lambda: ticket.advance(0))
         power[frame] = np.mean(np.square(np.abs(found)))
         found += static
+        if (shadow := scene.shadow(float(times_s[frame]))) is not None:
+            found -= shadow
         peak[frame] = np.abs(found).max()
         signal[frame] = found
         ticket.advance(1)

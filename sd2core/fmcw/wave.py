@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,18 @@ _LONGEST_PIECE_M = 0.1
 """Of a thing: over it neither its direction nor its range changes much."""
 
 _NO_PLANE = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """P small triangles of things, each with corners of its own."""
+
+    corners_m: NDArray[np.float64]  # (3 P, 3)
+    faces: NDArray[np.int32]  # (P, 3)
+    centres_m: NDArray[np.float64]  # (P, 3)
+    # (P,), facing the sensor and hidden by no thing: directly, and by way of each wall
+    seen: Mapping[Wall | None, NDArray[np.bool_]]
+    phases: NDArray[np.complex128]  # (P,)
 
 
 class WaveScene:
@@ -174,8 +187,8 @@ class WaveScene:
     def static(self, reflectors: tuple[Reflector, ...]) -> BeatSignal:
         """Beat signal of static points and of things, (receivers, chirps, samples).
 
-        Things are rough, whatever the body's surface is: a large smooth plane would echo in one
-        direction only. What the body hides of them is left out of account.
+        As if there were no body; see :meth:`shadow`. Things are rough, whatever the body's surface
+        is: a large smooth plane would echo in one direction only.
         """
         found = self.silence()
         if reflectors:
@@ -184,11 +197,30 @@ class WaveScene:
                     self._points(reflectors, *pair) for pairs in ways.values() for pair in pairs
                 ]
                 found[receiver] = self.sampled(direct(_joined(parts), self.config))
+        if self._pieces is not None:
+            found += self._of_pieces(self._pieces.seen[None])
+        return found
+
+    def shadow(self, time_s: float) -> BeatSignal | None:
+        """Beat signal of what bodies hide of things in the frame around a time; None if nothing.
+
+        It is missing from the frame's signal, and part of :meth:`static`. What is hidden from the
+        sensor echoes by way of no wall, either.
+        """
+        pieces = self._pieces
+        if pieces is None:
+            return None
+        hidden = pieces.seen[None] & self.scene.hidden_by_bodies(time_s, pieces.centres_m)
+        return self._of_pieces(hidden) if hidden.any() else None
+
+    @cached_property
+    def _pieces(self) -> _Pieces | None:
+        """Surfaces of things in small pieces."""
         around = self.scene.mesh.surroundings
         if around is None or not around.things:
-            return found
-        longest_m = min(self.config.range_resolution_m, _LONGEST_PIECE_M)
-        corners = pieces_of(around, longest_m).reshape(-1, 3)
+            return None
+        triangles = pieces_of(around, min(self.config.range_resolution_m, _LONGEST_PIECE_M))
+        corners = triangles.reshape(-1, 3)
         faces = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
         place_m = np.asarray(self.scene.sensor.position_m)
         seen: dict[Wall | None, NDArray[np.bool_]] = {}
@@ -199,14 +231,21 @@ class WaveScene:
             also &= facets_before(corners, faces, image_m, surface)
             seen[wall] = seen[None] & also
         turns = np.random.default_rng([self._seed, 0, 2]).random(len(faces))
-        phases, still = np.exp(2j * np.pi * turns), np.zeros_like(corners)
+        return _Pieces(corners, faces, triangles.mean(axis=1), seen, np.exp(2j * np.pi * turns))
+
+    def _of_pieces(self, chosen: NDArray[np.bool_]) -> BeatSignal:
+        """Beat signal of some pieces of things that are seen, (receivers, chirps, samples)."""
+        pieces, found = self._pieces, self.silence()
+        assert pieces is not None
+        corners, faces, phases = pieces.corners_m, pieces.faces, pieces.phases
+        still = np.zeros_like(corners)
         for receiver, ways in enumerate(self.paths):
             parts = [
-                self._facets(corners, still, faces, seen[wall], out, back, phases)
+                self._facets(corners, still, faces, chosen & pieces.seen[wall], out, back, phases)
                 for wall, pairs in ways.items()
                 for out, back in pairs
             ]
-            found[receiver] += self.sampled(nufft(_joined(parts), self.config))
+            found[receiver] = self.sampled(nufft(_joined(parts), self.config))
         return found
 
     def _signal(

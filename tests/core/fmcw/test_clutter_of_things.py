@@ -127,6 +127,72 @@ def test_a_thing_behind_another_one_and_beside_the_beam_is_silent() -> None:
     assert quiet < 1e-6 * loud
 
 
+def hidden_pieces(*things: Thing, time_s: float = 0.1) -> tuple[Any, Any, Any]:
+    """Middles of the pieces of things that echo, which the body hides, and vertices of the ball."""
+    made = scene(*things)
+    pieces = made._pieces
+    assert pieces is not None
+    mesh = made.scene.mesh
+    vertices = mesh.frame(mesh.timebase.nearest_frame(time_s)).astype(float)
+    points = pieces.centres_m[pieces.seen[None]]
+    return points, made.scene.hidden_by_bodies(time_s, points), vertices
+
+
+def test_the_shadow_of_a_ball_is_that_of_a_sphere() -> None:
+    """Hidden is what lies beyond it within the cone of lines that touch it, as seen from here."""
+    screen = Thing("screen", (0.1, 1.0, 4.0), 20.0, (2.0, 2.0, 0.02))
+    before = Thing("box", (0.05, 0.1, 1.0), size_m=(0.05, 0.05, 0.05))
+    points, hidden, ball_m = hidden_pieces(screen, before)
+    middle = 0.5 * (ball_m.min(axis=0) + ball_m.max(axis=0))
+    radius_m = np.linalg.norm(ball_m - middle, axis=1).max()
+    away, along = np.linalg.norm(points, axis=1), points @ middle / np.linalg.norm(points, axis=1)
+    past_m = np.sqrt(np.maximum(middle @ middle - along**2, 0.0))  # of the line to the middle
+    beyond = away > along
+    inside, outside = (
+        beyond & (past_m < 0.93 * radius_m),
+        ~beyond | (past_m > radius_m),
+    )
+    assert inside.sum() > 20
+    assert hidden[inside].all()
+    assert not hidden[outside].any()
+
+
+def test_a_box_behind_the_ball_is_silent_while_it_is_hidden() -> None:
+    behind = Thing("box", (0.0, 0.05, 3.5), size_m=(0.1, 0.1, 0.1))
+    before = Thing("box", (0.0, 0.02, 0.6), size_m=(0.04, 0.04, 0.04))
+    beside = Thing("box", (1.0, 0.05, 3.5), size_m=(0.1, 0.1, 0.1))
+    made = scene(behind)
+    np.testing.assert_allclose(made.shadow(0.1), made.static(()))
+    for seen in (before, beside):
+        assert scene(seen).shadow(0.1) is None
+    np.testing.assert_allclose(
+        scene(behind, beside).static(()) - scene(behind, beside).shadow(0.1),
+        scene(behind, beside)._of_pieces(beside_of(behind, beside)),
+    )
+
+
+def beside_of(behind: Thing, beside: Thing) -> Any:
+    """Pieces of the second of two boxes that are seen."""
+    pieces = scene(behind, beside)._pieces
+    assert pieces is not None
+    return pieces.seen[None] & (pieces.centres_m[:, 0] > 0.5)
+
+
+def test_a_capture_has_clutter_only_while_nobody_hides_it() -> None:
+    mesh = ball()
+    aside = np.where(np.arange(mesh.frame_count) < mesh.frame_count // 2, 0.0, 1.5)
+    stepping = replace(mesh, vertices=mesh.vertices + aside[:, None, None] * [1.0, 0.0, 0.0])
+    behind = Thing("box", (0.0, 0.15, 3.65), size_m=(0.3, 0.3, 0.3))
+    with_box, without = (
+        simulate_radar(one, FINE, options=QUIET).samples[...].astype(float)
+        for one in (with_things(stepping, [behind]), stepping)
+    )
+    # Each has its own gain and middle; both show the ball alone in the first frame.
+    gain, middle = np.polyfit(without[0].ravel(), with_box[0].ravel(), 1)
+    left = with_box - gain * without - middle
+    assert np.abs(left[0]).max() < 0.05 * np.abs(left[-1]).max()
+
+
 def test_it_is_seen_in_a_floor_as_well() -> None:
     box = Thing("box", (0.0, 0.1, 2.0), size_m=(0.2, 0.2, 0.2))
     floor = Mirror.ground(1.0)
