@@ -463,6 +463,7 @@ def _relink(options: Relink) -> int:
     from sd2core.recording.recording import open_recording
 
     recording = open_recording(options.recording)
+    sought = recording.missing()
     with progress_bar("Searching", unit="folder") as progress:
         result = recording.relink(options.folder, progress)
     if options.json:
@@ -482,7 +483,7 @@ def _relink(options: Relink) -> int:
             print(f"{role}: several files fit equally well, so none was taken:")
             print(*(f"  {path}" for path in paths), sep="\n")
         for role in result.missing:
-            print(f"{role}: {getattr(recording, role).name} is not under {options.folder}")
+            print(f"{role}: {sought[role].name} is not under {options.folder}")
         if not (result.found or result.ambiguous or result.missing):
             print("No file of this recording is missing.")
     return 1 if result.ambiguous or result.missing else 0

@@ -58,6 +58,7 @@ from sd2core.recording.relinking import (
     find_again,
     is_many,
     role_words,
+    thing_role,
 )
 from sd2core.sensor import VirtualSensor
 
@@ -318,19 +319,33 @@ class Recording:
             return self.load_radar_map().labels.shifted(self.radar_offset_s)
         return self.labelled
 
-    def missing(self) -> dict[Role, Path]:
-        """Files that are not where the recording says."""
-        return {role: path for role, path in self._files().items() if not exists(role, path)}
+    def missing(self) -> dict[str, Path]:
+        """Files that are not where the recording says, by their roles; those of things last."""
+        things = [
+            (thing_role(number), Path(thing.shape))
+            for number, thing in enumerate(self.things, start=1)
+            if thing.is_file
+        ]
+        files = [*self._files().items(), *things]
+        return {role: path for role, path in files if not exists(role, path)}
+
+    @property
+    def things_there(self) -> tuple[Thing, ...]:
+        """Things without those whose mesh file is missing."""
+        return tuple(one for one in self.things if not one.is_file or Path(one.shape).exists())
 
     def relink(self, folder: Path, progress: Progress = silent) -> Relinked:
         """Find all missing files by name under one folder, and save where it was saved before.
 
         See :func:`~sd2core.recording.relinking.find_again`.
         """
-        relinked = find_again(self.missing(), Path(folder), progress)
+        missing = self.missing()
+        relinked = find_again(missing, Path(folder), progress)
+        moved = {str(missing[role]): path for role, path in relinked.found.items()}
         for role in relinked.found.keys() & set(ROLES):
             setattr(self, role, relinked.found[role])
         self.bodies = _at_paths(self.bodies, relinked.found)
+        self.things = _with_files(self.things, lambda path: moved.get(path, path))
         if relinked.found and (self.folder / FILE_NAME).exists():
             self.save()
         return relinked
@@ -729,6 +744,8 @@ def _copied_things(things: tuple[Thing, ...], folder: Path, made: list[Path]) ->
     for thing in things:
         path = Path(thing.shape)
         if not thing.is_file or path.is_relative_to(folder) or thing.shape in inside:
+            continue
+        if not path.exists():  # it can be found again later
             continue
         target = free_path(folder, path.name, "thing", reserved=FILE_NAME)
         made.append(target)

@@ -11,7 +11,10 @@ from sd2core.files.paths import common_suffix_length, is_pattern, is_there, path
 from sd2core.progress import Progress
 
 Role = str
-"""Role of a file in a recording: one of :data:`ROLES`, or ``body 2`` of a body beside the first."""
+"""Role of a file in a recording: one of :data:`ROLES`, or of a mesh of the scene.
+
+Such as ``body 2``, beside the first, or ``thing 1``.
+"""
 
 ROLES: tuple[Role, ...] = ("video", "mesh", "faces", "radar", "denoiser", "imu")
 
@@ -23,9 +26,17 @@ def body_role(index: int) -> Role:
     return f"{_BODY}{index + 2}"
 
 
+_THING = "thing "
+
+
+def thing_role(number: int) -> Role:
+    """Role of the mesh file of a thing, counted from 1."""
+    return f"{_THING}{number}"
+
+
 def role_words(role: Role) -> str:
-    """Role of a file in a sentence, such as ``video`` or ``inertial sensor's file``."""
-    if role.startswith(_BODY):
+    """Role of a file in a sentence, such as ``video`` or ``mesh of thing 2``."""
+    if role.startswith((_BODY, _THING)):
         return f"mesh of {role}"
     return "inertial sensor's file" if role == "imu" else role
 

@@ -162,8 +162,8 @@ def load_content(recording: Recording, progress: Progress) -> Content:
         )
 
     video = attempt(recording.video, lambda: recording.open_video(step(0)))
-    whole = replace(recording, bodies=recording.bodies_there)
-    mesh = attempt(recording.mesh, lambda: whole.load_mesh(step(1)))
+    there = replace(recording, bodies=recording.bodies_there, things=recording.things_there)
+    mesh = attempt(recording.mesh, lambda: there.load_mesh(step(1)))
     capture = recorded = None
     if recording.holds_radar_map:
         recorded = attempt(recording.radar, recording.load_radar_map)

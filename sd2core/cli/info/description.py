@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
@@ -110,7 +110,7 @@ def describe_parts(recording: Recording) -> list[Description]:
     bodies = {role for role in missing if role not in ROLES}
     if recording.mesh is not None and not missing.keys() & {"mesh", "faces", *bodies}:
         with progress_bar("Reading the mesh") as progress:
-            mesh = recording.load_mesh(progress)
+            mesh = replace(recording, things=recording.things_there).load_mesh(progress)
         parts.append(describe_mesh(recording.mesh, mesh))
     if recording.radar is not None and "radar" not in missing:
         parts.append(

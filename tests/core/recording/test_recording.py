@@ -334,6 +334,26 @@ class TestRelink:
         assert not again.missing()
         assert content(again)["video"] == "../../disk/walk.mkv"
 
+    def test_the_mesh_files_of_things_are_found_as_well(self, files: Path, tmp_path: Path) -> None:
+        chair = files / "chair.obj"
+        chair.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        made = make(files)
+        box, seat = Thing("box", (0, 1, 2)), Thing(str(chair), (1, 1, 2), 30.0)
+        made.things = (box, seat, replace(seat, position_m=(2, 1, 2)))
+        made.save()
+        assert not made.missing()
+        (tmp_path / "store").mkdir()
+        chair.rename(tmp_path / "store" / "chair.obj")
+        read = open_recording(made.folder)
+        assert read.missing() == {"thing 2": chair, "thing 3": chair}
+        assert read.things_there == (box,)
+        found = tmp_path / "store" / "chair.obj"
+        assert read.relink(tmp_path / "store").found == {"thing 2": found, "thing 3": found}
+        again = open_recording(made.folder)
+        assert not again.missing()
+        assert [one.shape for one in again.things] == ["box", str(found), str(found)]
+        assert again.things[1].turn_deg == 30.0
+
     def test_what_was_never_saved_is_not_saved(
         self, files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
