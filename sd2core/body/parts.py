@@ -66,7 +66,13 @@ def body_parts(mesh: MeshSequence) -> VertexParts | None:
     'trunk'
     """
     if mesh not in _FOUND:
-        found = _find_parts(mesh)
+        # The same surface among other things is the same body.
+        alike = [
+            parts
+            for other, parts in list(_FOUND.items())
+            if other.vertices is mesh.vertices and not (other.others or mesh.others)
+        ]
+        found = alike[0] if alike else _find_parts(mesh)
         if mesh.others:
             each = [found, *map(body_parts, mesh.others)]
             first, *others = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -75,8 +75,6 @@ class VisibilityMasks:
         self._live = live
         self._stride = prepared.options.mask_stride
         self.others: tuple[PreparedMesh, ...] = ()  # bodies of the scene that may hide this one
-        # Newest first, per block.
-        self._kept_at: dict[int, tuple[tuple[Occlusion, Position], ...]] = {}
 
     def for_rows(
         self,
@@ -144,7 +142,10 @@ class VisibilityMasks:
                 view = self._view(block, slice(serving, serving + 1), place)
             else:
                 view = self._view_of(block.start + serving, place)
-            self._test(view, np.ones_like(visible), visible, visibility)
+            every = np.ones_like(visible)
+            self._test_alone(view, every, visible, visibility)
+            if self._wall is None:
+                self._hide(view, lambda: every, visible)
             return visible[0] > 0, visibility
         mask, quality = self.for_rows(block, rows, position_m, visibility)
         if quality == "none":
@@ -159,7 +160,13 @@ class VisibilityMasks:
         return _facing(view, self._prepared.normals(block)[rows])
 
     def kept(
-        self, index: int, rows: slice, position_m: Position, occlusion: Occlusion
+        self,
+        index: int,
+        rows: slice,
+        position_m: Position,
+        occlusion: Occlusion,
+        *,
+        alone: bool = False,
     ) -> NDArray[np.uint8] | None:
         """Mask of a block's frames from this place, uint8 (n, V), if all are in memory.
 
@@ -173,33 +180,47 @@ class VisibilityMasks:
             Place of the sensor in the camera frame; no other one will do.
         occlusion : {"depth", "exact"}
             Kind of mask.
+        alone : bool
+            True for what the body itself hides, whatever stands around it.
         """
         if self._stride == 1:
             mask: _BlockMask | None = self._prepared.budget.get(
-                self._key(occlusion, index, position_m)
+                self._key(occlusion, index, position_m, alone)
             )
             return mask.visible[rows] if mask is not None and mask.done[rows].all() else None
         served = []
-        for frame in self._serving(self._frames(index, rows)).tolist():
+        serving, which = np.unique(self._serving(self._frames(index, rows)), return_inverse=True)
+        for frame in serving.tolist():
             home, local = divmod(frame, self._prepared.block_frames)
-            mask = self._prepared.budget.get(self._key(occlusion, home, position_m))
+            mask = self._prepared.budget.get(self._key(occlusion, home, position_m, alone))
             if mask is None or not mask.done[local]:
                 return None
             served.append(mask.visible[local])
-        return np.stack(served)
+        return np.stack(served)[which]
 
-    def _key(self, occlusion: Occlusion, index: int, position_m: Position) -> Hashable:
+    def _key(
+        self, occlusion: Occlusion, index: int, position_m: Position, alone: bool = False
+    ) -> Hashable:
         # Prepared blocks, and with them the budget, may serve several options: those with the
         # same masks share them. Which vertices are tested depends on the bins they fall into.
         options = self._prepared.options
         pixels = options.depth_resolution if occlusion == "depth" else None
         needed = options.axis, options.null_bins, options.beyond, self._prepared.spreads
         around = self._prepared.mesh.surroundings
-        hiding = None if around is None else around.digest, *(one.number for one in self.others)
+        hiding: tuple[Hashable, ...] = ()
+        if not alone:
+            digest = None if around is None else around.digest
+            hiding = digest, *(one.number for one in self.others)
         return (
-            *("mask", occlusion, pixels, self._stride, needed, hiding, self._wall),
+            *("mask", occlusion, pixels, self._stride, needed, hiding, self._walls, self._wall),
             *(index, position_m),
         )
+
+    def _places(self, index: int) -> list[tuple[Occlusion, Position]]:
+        """Where masks of a block were made, the newest first."""
+        options = self._prepared.options
+        kind = options.depth_resolution, self._stride, self._prepared.spreads, options.axis
+        return self._prepared.places.setdefault((*kind, self._wall, index), [])
 
     def _frames(self, index: int, rows: slice) -> NDArray[np.intp]:
         """Numbers of some of a block's frames in the clip."""
@@ -225,11 +246,14 @@ class VisibilityMasks:
         Its error grows with the distance (docs/decisions/0010); of equally near ones
         the newest. Not all are complete: a drag that goes on cancels what its pause began.
         """
-        kept = self._kept_at.get(block.index, ())
+        kept = self._places(block.index)
         for occlusion, place in sorted(kept, key=lambda here: math.dist(here[1], position_m)):
             mask = self.kept(block.index, rows, place, occlusion)
             if mask is not None:
                 return mask
+            # Things that moved hide something else; what the body hides is known.
+            if self.kept(block.index, rows, place, occlusion, alone=True) is not None:
+                return self._compute(block, rows, place, occlusion, None)
         return None
 
     def _compute(
@@ -241,24 +265,53 @@ class VisibilityMasks:
         among: NDArray[np.uint8] | None,
     ) -> NDArray[np.uint8]:
         """Mask of these rows, kept or computed now."""
-        here = (occlusion, position_m)
-        others = [place for place in self._kept_at.get(block.index, ()) if place != here]
-        self._kept_at[block.index] = (here, *others[: _PLACES_KEPT - 1])
+        here, places = (occlusion, position_m), self._places(block.index)
+        places[:] = (here, *[place for place in places if place != here][: _PLACES_KEPT - 1])
         if self._stride > 1:
             frames = self._serving(self._frames(block.index, rows))
             serving, which = np.unique(frames, return_inverse=True)
             masks = [self._serving_mask(frame, position_m, occlusion) for frame in serving.tolist()]
             return np.stack(masks)[which]
+
+        def needed() -> NDArray[np.uint8]:
+            marked = self._needed(block, rows, self._prepared.sensor(position_m))
+            return marked if among is None else marked & among
+
+        return self._mask(block, rows, position_m, occlusion, needed)
+
+    def _mask(
+        self,
+        block: Block,
+        rows: slice,
+        position_m: Position,
+        occlusion: Occlusion,
+        needed: Callable[[], NDArray[np.uint8]],
+    ) -> NDArray[np.uint8]:
+        """Mask of these rows, uint8 (n, V): what the body hides, which is kept, and then others.
+
+        ``needed`` marks the vertices that are tested.
+        """
         mask = self._block_mask(block.index, position_m, occlusion)
-        if not mask.done[rows].all():
-            place = self._prepared.sensor(position_m)
-            view = self._view(block, rows, place)
-            visible = _facing(view, self._prepared.normals(block)[rows])
-            needed = self._needed(block, rows, place)
-            self._test(view, needed if among is None else needed & among, visible, occlusion)
-            mask.visible[rows] = visible
-            mask.done[rows] = True
+        if mask.done[rows].all():
+            return mask.visible[rows]
+        view = self._view(block, rows, self._prepared.sensor(position_m))
+        alone, apart = mask, self._wall is None and self._has_others
+        if apart:
+            alone = self._block_mask(block.index, position_m, occlusion, alone=True)
+        if not alone.done[rows].all():
+            visible, marked = _facing(view, self._prepared.normals(block)[rows]), needed()
+            self._test_alone(view, marked, visible, occlusion)
+            alone.visible[rows], alone.done[rows] = visible, True
+        if apart:
+            visible = alone.visible[rows].copy()
+            self._hide(view, needed, visible)
+            mask.visible[rows], mask.done[rows] = visible, True
         return mask.visible[rows]
+
+    @property
+    def _has_others(self) -> bool:
+        """True if there is something around the body that may hide it."""
+        return self._prepared.mesh.surroundings is not None or bool(self.others)
 
     def _serving_mask(
         self, frame: int, position_m: Position, occlusion: Occlusion
@@ -270,24 +323,24 @@ class VisibilityMasks:
         """
         home, local = divmod(frame, self._prepared.block_frames)
         mask = self._block_mask(home, position_m, occlusion)
-        if not mask.done[local]:
+        if mask.done[local]:  # its block need not be in memory
+            return mask.visible[local]
+        first = max(frame - self._stride, 0)
+
+        def needed() -> NDArray[np.uint8]:
             place = self._prepared.sensor(position_m)
-            first = max(frame - self._stride, 0)
             around = np.arange(first, min(frame + self._stride, self._prepared.mesh.frame_count))
             served = around[self._serving(around) == frame]
-            needed = np.zeros((1, self._prepared.mesh.vertex_count), np.uint8)
+            marked = np.zeros((1, self._prepared.mesh.vertex_count), np.uint8)
             for index in np.unique(served // self._prepared.block_frames).tolist():
                 start, stop = self._prepared.span(index)
                 low, high = max(int(served[0]), start), min(int(served[-1]) + 1, stop)
                 rows = slice(low - start, high - start)
-                needed |= self._needed(self._counted(index), rows, place).max(axis=0)
-            view = self._view_of(frame, place)
-            normals = self._prepared.normals(self._counted(home))[local : local + 1]
-            visible = _facing(view, normals)
-            self._test(view, needed, visible, occlusion)
-            mask.visible[local] = visible[0]
-            mask.done[local] = True
-        return mask.visible[local]
+                marked |= self._needed(self._counted(index), rows, place).max(axis=0)
+            return marked
+
+        rows = slice(local, local + 1)
+        return self._mask(self._counted(home), rows, position_m, occlusion, needed)[0]
 
     def _view_of(self, frame: int, place: NDArray[np.float64]) -> _View:
         """View of one frame of the clip."""
@@ -302,7 +355,9 @@ class VisibilityMasks:
     def _counted(self, index: int) -> Block:
         return self._prepared.counted(index, self._counting, points=True)
 
-    def _block_mask(self, index: int, position_m: Position, occlusion: Occlusion) -> _BlockMask:
+    def _block_mask(
+        self, index: int, position_m: Position, occlusion: Occlusion, *, alone: bool = False
+    ) -> _BlockMask:
         """Mask of a block from a place, as far as it has been computed."""
 
         def make() -> tuple[_BlockMask, int]:
@@ -311,7 +366,7 @@ class VisibilityMasks:
             return _BlockMask(visible, np.zeros(stop - start, bool)), visible.nbytes
 
         mask: _BlockMask = self._prepared.budget.get_or_make(
-            self._key(occlusion, index, position_m), make
+            self._key(occlusion, index, position_m, alone), make
         )
         return mask
 
@@ -350,24 +405,30 @@ class VisibilityMasks:
             paths, start, duration_s = frames.paths(), 0, frames.duration_s
         return histogram.mark_needed(paths, start, duration_s, ends, self._counting, self._live)
 
-    def _test(
+    def _test_alone(
         self,
         view: _View,
         needed: NDArray[np.uint8],
         visible: NDArray[np.uint8],
         occlusion: Occlusion,
     ) -> None:
-        """Set ``visible`` of the needed vertices, and to 0 of those that others hide."""
+        """Set ``visible`` of the needed vertices, as if nothing stood around; by a wall, all."""
         self._test_body(view, needed, visible, occlusion)
         if self._wall is not None:
             self._hide_by_way_of(self._wall, view, needed, visible)
-            return
+
+    def _hide(
+        self, view: _View, needed: Callable[[], NDArray[np.uint8]], visible: NDArray[np.uint8]
+    ) -> None:
+        """Set ``visible`` to 0 of what things hide, and of the needed vertices that others hide."""
         # Of all vertices: what hides them is soon looked at, and the share that is seen is right.
         if (around := self._prepared.mesh.surroundings) is not None:
             for t, seen in enumerate(visible):
                 view.hide(t, *around.surface, seen)
-        for other in self.others:
-            self._hide_behind_body(other, view, needed, visible)
+        if self.others:
+            marked = needed()
+            for other in self.others:
+                self._hide_behind_body(other, view, marked, visible)
 
     def _hide_by_way_of(
         self,

@@ -61,6 +61,8 @@ class PreparedMesh:
     block_frames: int = field(init=False)
     reach_m: float = field(init=False)  # largest coordinate in the first frame
     origin_m: NDArray[np.float64] = field(init=False)  # of the prepared positions
+    # Places from which visibility was found, by block and options.
+    places: dict[Hashable, list[Any]] = field(init=False, default_factory=dict)
     number: int = field(init=False)  # the same for all that share its blocks, and for no other
 
     def __post_init__(self) -> None:
@@ -197,7 +199,10 @@ class PreparedMesh:
         Returns the vertices (n, 3, V) and that point for each frame, float64 (n, 3), which is
         zero if the block is in single precision.
         """
-        points = self.points(block)[rows]
+        if len(block.frames.positions) or self.options.oversampling == 1:
+            points = self._points(self.whole(block), rows)  # of a few frames no more are copied
+        else:
+            points = self.points(block)[rows]
         place_m = np.zeros((len(points), 3))
         if points.dtype == np.float64:
             place_m = 0.5 * (points.min(axis=2) + points.max(axis=2))
@@ -427,9 +432,9 @@ class PreparedMesh:
         """Vertices of the block's own frames relative to each body, float32 (n, 3, V)."""
         return self.near_points(block, slice(None))[0]
 
-    def _points(self, block: Block) -> NDArray[Any]:
+    def _points(self, block: Block, rows: slice = slice(None)) -> NDArray[Any]:
         """Those of a block with positions; a copy where they are a part of them."""
-        first, last = block.frames.centre[[0, -1]].tolist()
+        first, last = block.frames.centre[rows][[0, -1]].tolist()
         return np.ascontiguousarray(
             block.frames.positions[first : last + 1 : self.options.oversampling]
         )

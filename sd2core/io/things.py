@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -67,13 +68,19 @@ def with_walls(mesh: MeshSequence, walls: Iterable[Wall]) -> MeshSequence:
 
 
 def _read(path: Path) -> Surface:
-    """Surface of a file in its own frame."""
+    """Surface of a file in its own frame; one that is dragged is not read again."""
     if not path.is_file():
         raise Sd2Error(
             f"The mesh {path} of a thing is not there",
             "the file where the recording or the command says",
-            "Move it back, or say anew what stands there: `sd2 set RECORDING --thing`",
+            "Move it back, find it again with `sd2 relink RECORDING FOLDER`, or say anew what"
+            " stands there with `sd2 set RECORDING --thing`",
         )
+    return _read_once(path, path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=8)
+def _read_once(path: Path, _modified_ns: int) -> Surface:
     vertices, faces = read_surface(path)
     if faces is None or len(faces) > _MAX_FACES:
         raise Sd2Error(

@@ -184,7 +184,7 @@ def test_exact_visibility_is_kept_per_sensor_position(monkeypatch: pytest.Monkey
     def never(*arguments: Any) -> None:
         raise AssertionError("worked out again")
 
-    monkeypatch.setattr(VisibilityMasks, "_test", never)
+    monkeypatch.setattr(VisibilityMasks, "_test_body", never)
     np.testing.assert_array_equal(maker.map(NEAR).values, first)
 
 

@@ -182,3 +182,28 @@ def test_far_from_the_origin_it_hides_the_same() -> None:
     found = there.frame(sensor_at(x + 900, y, z + 900), 1, "exact").visible
     assert (found != here).mean() < 2e-3
     assert here.mean() < Synthesizer(near, RAW).frame(SENSOR, 1, "exact").visible.mean()
+
+
+@OCCLUSION
+@pytest.mark.parametrize("stride", [1, 3])
+def test_of_things_that_move_only_what_they_hide_is_found_again(
+    visibility: Any, stride: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The kept mask of the body serves: the preview from the same place is the map itself."""
+    wanted = options(visibility=visibility, mask_stride=stride)
+    mesh = approaching()
+    screens = [Thing("screen", (x, 1.0, 0.5), size_m=(0.2, 2.0, 0.03)) for x in (-0.1, 0.1)]
+    before, after = (with_things(mesh, [screen]) for screen in screens)
+    first = Synthesizer(before, wanted)
+    first.map(SENSOR)
+    expected = Synthesizer(after, wanted).map(SENSOR).values
+    moved = Synthesizer(after, wanted, blocks_of=first)
+
+    def refuse(*_: Any) -> None:
+        raise AssertionError("the body was looked at again")
+
+    monkeypatch.setattr(masks.VisibilityMasks, "_test_body", refuse)
+    made = moved.map(SENSOR, visibility="frozen")
+    assert made.meta["visibility"] == "frozen"
+    np.testing.assert_array_equal(made.values, expected)
+    assert not np.array_equal(expected, first.map(SENSOR).values)
