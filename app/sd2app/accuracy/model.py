@@ -162,6 +162,8 @@ class AccuracyModel(ReportingModel):
     def surround(self, mesh: MeshSequence) -> None:
         """Go on with the same clip among other things; plans hold until others are chosen."""
         assert self._scene is not None
+        if mesh is self._scene[0]:
+            return
         self.hold()
         self._scene = mesh, self._scene[1]
         self._decided_for = self._asking = None

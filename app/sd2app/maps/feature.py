@@ -14,7 +14,8 @@ from sd2app.feature import Action, Feature, Shell
 from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.level_bar import LevelBar, MapEdge
-from sd2app.maps.limbs import LimbMenu, LimbsModel
+from sd2app.maps.limb_menu import LimbMenu
+from sd2app.maps.limbs import LimbsModel
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.radar_place import RadarPlaceBadge
 from sd2app.maps.readout import reading_lines
@@ -44,7 +45,8 @@ class MapsFeature(Feature):
         self.limbs.failed.connect(shell.warn)
         shown = self.uncertainty.changed, self.difference.state_changed
         self.changing = *self.synthesis.completeness, *shown
-        self.closing, self.working = (self.uncertainty, self.synthesis), (self.synthesis,)
+        self.closing = (self.uncertainty, self.limbs, self.synthesis)
+        self.working = (self.synthesis,)
 
     def actions(self) -> Sequence[Action]:
         """Export, levels, uncertainty, difference."""

@@ -15,9 +15,9 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from sd2app.maps.arrangement import BELOW_PX, HEADER_PX
 from sd2app.maps.heatmap_image import MapWidget
-from sd2app.maps.limbs import title_of
 from sd2app.maps.readout import body_range_m, reading_lines
 from sd2app.maps.track_mouse import TrackMouse, offset_text
+from sd2app.session.limbs import colours_of, part_words, title_of
 from sd2app.session.maps import UNCERTAIN_SHARE, MapModel, Reading
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, clipped, image_of
@@ -135,8 +135,8 @@ class HeatmapView(TrackMouse, MapWidget):
         self.redraw()
 
     def title(self) -> str:
-        """Title of the map, with the part of the body that is shown alone."""
-        return title_of(self.track)
+        """Title of the map, with the part of the body that is shown alone, if it is one."""
+        return self.track.title if len(self.track.parts) > 1 else title_of(self.track)
 
     def bin_marks(self) -> BinMarks:
         """Look of bins without information."""
@@ -208,11 +208,26 @@ class HeatmapView(TrackMouse, MapWidget):
         left = HANDLE_PX + paint_title(painter, box, self.title(), colours.text) + 12
         painter.setPen(QColor(colours.muted))
         left += 0 if self.still else self._place_button(left)
+        left += self._paint_parts(painter, left)
         metrics, words = painter.fontMetrics(), self.status()
         taken_px = left + metrics.horizontalAdvance(words)
         room = self.width() - 16 - left - self._paint_corner(painter, box, taken_px)
         status = metrics.elidedText(words, Qt.TextElideMode.ElideRight, int(max(room - 16, 40)))
         painter.drawText(QRectF(left, 0, self.width(), HEADER_PX), AT_LEFT, status)
+
+    def _paint_parts(self, painter: QPainter, left: int) -> int:
+        """Paint the names of several parts of the body in their colours; returns their width."""
+        parts = self.track.parts if len(self.track.parts) > 1 else ()
+        words = [part_words(part) for part in parts]
+        widths = [painter.fontMetrics().horizontalAdvance(one) + 25 for one in words]
+        if left + sum(widths) > self.width() - 8:  # the swatches alone
+            words, widths = [""] * len(parts), [13] * len(parts)
+        x = left
+        for colour, word, width in zip(colours_of(parts).values(), words, widths, strict=True):
+            painter.fillRect(x, HEADER_PX // 2 - 4, 9, 9, QColor(colour))
+            painter.drawText(QRectF(x + 13, 0, width, HEADER_PX), AT_LEFT, word)
+            x += width
+        return x - left
 
     @property
     def _button_px(self) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,11 +13,13 @@ from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QResizeEvent
 from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.track_mouse import TimePlot
 from sd2app.session.display import HeatmapLevels
+from sd2app.session.limbs import colours_of
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import Overlay, clipped, image_of
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 from sd2app.widgets.time_axis import TimeScale
+from sd2core.figures.colours import rgb
 
 _NOBODY = "no person"
 
@@ -70,6 +72,13 @@ class Columns:
         values[:, ~filled] = 0.0  # what is not computed yet is no number
         return values, filled
 
+    def by_part(self) -> dict[str, NDArray[np.float32]]:
+        """Values of every column, (bins, columns), of each part of the body that is shown."""
+        return {
+            part: self._strongest(values[:, self.begin : self.end])
+            for part, values in self.track.split.items()
+        }
+
     def uncertain(self, levels: HeatmapLevels) -> NDArray[np.bool_] | None:
         """Mask of uncertain cells, bool (bins, columns); None where that is not known.
 
@@ -104,13 +113,32 @@ def heatmap_image(
     """One pixel per column and bin, fastest approach on top; uncertain cells without colour."""
     view = Columns.of(track, start_s, stop_s, columns)
     values, filled = view.shown()
-    numbers = (track.shade(values, levels) * 255.0).astype(np.uint8)
-    colours = lookup_table(levels.colour_map)[numbers]
+    shade, table = track.shade(values, levels), lookup_table(levels.colour_map)
+    numbers = (shade * 255.0).astype(np.uint8)
+    parts = view.by_part()
+    colours = _mixed(parts, shade, int(table[0])) if len(parts) > 1 else table[numbers]
     uncertain = view.uncertain(levels)
     if uncertain is not None:
         colours = np.where(uncertain, uncertain_table(levels.colour_map)[numbers], colours)
     colours[:, ~filled] = background
     return image_of(colours[::-1], QImage.Format.Format_RGB32)
+
+
+def _mixed(
+    parts: Mapping[str, NDArray[np.float32]], shade: NDArray[np.float32], nothing: int
+) -> NDArray[np.uint32]:
+    """Colours (bins, columns) of parts of the body, mixed by their shares, as bright as the level.
+
+    ``shade``, 0 to 1, is that of all together, ``nothing`` the colour at 0.
+    """
+    values = np.stack([*parts.values()])  # (parts, bins, columns)
+    share = values / np.maximum(values.sum(axis=0), np.finfo(np.float32).tiny)
+    own = np.stack([rgb(colour) for colour in colours_of(parts).values()]).astype(np.float32)
+    ground = np.array([nothing >> 16 & 255, nothing >> 8 & 255, nothing & 255], np.float32)
+    mix = np.tensordot(share, own, (0, 0))  # (bins, columns, 3)
+    shaded = ground + shade[..., None] * (mix - ground)
+    red, green, blue = np.moveaxis(shaded, 2, 0).astype(np.uint32)
+    return np.uint32(255 << 24) | red << 16 | green << 8 | blue
 
 
 def difference_image(

@@ -204,17 +204,17 @@ class SynthesisModel(QObject):
         moved = mesh.vertices is before.vertices and around[0] != around[1]
         if synthesizers.options.count == document.count and not moved:
             return
-        self._stop()
+        dragging = self._session.sensor.dragging
+        if not dragging:  # else the pass under way shows a place a moment ago
+            self._stop()
         self._keep()
         options = replace(synthesizers.options, count=document.count)
-        self._synthesizers = SynthesizerCache(mesh, options, synthesizers.full)
-        self._synthesizers.limbs = synthesizers.limbs
-        self._prefetcher.forget()
+        self._synthesizers = synthesizers.among(mesh, options)
         self._partial.mark_stale()
-        if options == synthesizers.options:
-            self._accuracy.surround(mesh)
-        else:
+        if options != synthesizers.options:
+            self._prefetcher.forget()
             self._accuracy.attach(mesh, options)
+        self._set_moving(self.moving or dragging)
         self._follow()
 
     def made_by(self) -> tuple[Callable[[], Synthesizer], VirtualSensor] | None:
@@ -344,6 +344,7 @@ class SynthesisModel(QObject):
         self._rest.stop()
         self._next_sweep.clear()
         self._sweeping = False
+        self._accuracy.surround(self._synthesizers.mesh)
         sensor = self._sensor
         self._accuracy.measured.rest_at(sensor)
         was_complete = self.complete
@@ -475,6 +476,7 @@ class SynthesisModel(QObject):
             self._accuracy.while_dragging,
             self._prefetcher.prefetched_for,
             self._sensor,
+            stays=self.shows_sensor,
         )
 
     def _final_quality(self) -> QualityLevel | None:

@@ -64,6 +64,19 @@ class SynthesizerCache:
         self._made: OrderedDict[AccuracyPlan, Synthesizer] = OrderedDict()
         self._lock = threading.Lock()
 
+    def among(self, mesh: MeshSequence, options: SynthesisOptions) -> SynthesizerCache:
+        """Those of the same mesh among other things, or with other options.
+
+        Whatever is the same is shared: of things that move, all but what they hide.
+        """
+        other = SynthesizerCache(mesh, options, self.full)
+        other.limbs = self.limbs
+        if options == self.options and mesh.others == self.mesh.others:
+            for plan, made in list(self._made.items()):
+                counted = replace(made.mesh, surroundings=mesh.surroundings)
+                other._made[plan] = Synthesizer(counted, made.options, blocks_of=made)
+        return other
+
     def key(self, plan: AccuracyPlan | None, sensor: VirtualSensor) -> Hashable:
         """Key of all that a final map depends on."""
         return self._scene, plan and _key(plan), self.limbs, sensor
@@ -141,11 +154,14 @@ def preview_quality(
     dragging: InUse | None,
     masks_of: VirtualSensor | None,
     sensor: VirtualSensor,
+    *,
+    stays: bool = False,
 ) -> QualityLevel:
-    """Quality for a moving sensor, and where no frame is computed yet.
+    """Quality for what moves, and where no frame is computed yet.
 
     ``plan`` is in use at rest: its masks serve until one for dragging is known. Masks for
-    dragging were made for ``masks_of``.
+    dragging were made for ``masks_of``. Where the sensor ``stays``, and things move, those of rest
+    are as good.
     """
     synthesizer = synthesizers.ready(dragging.plan) if dragging is not None else None
     parts_of = synthesizers.parts_of
@@ -158,7 +174,7 @@ def preview_quality(
     newest = synthesizers.ready(plan) or synthesizers.full
     if synthesizers.options.visibility == "none":
         return QualityLevel(lambda: newest, PREVIEW, _ALL_WORDS, "none", parts_of)
-    if dragging is not None:
+    if dragging is not None and not stays:
         return QualityLevel(lambda: newest, PREVIEW, _ROUGH_WORDS, "facing", parts_of)
     words = "preview: visibility of the nearest place"
     return QualityLevel(lambda: newest, PREVIEW, words, "frozen", parts_of)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QFontMetrics, QPainter, QPen, QPolygonF
 
 from sd2app.maps.heatmap import paint_velocity_labels, velocity_labels, y_of
-from sd2app.maps.limbs import title_of
 from sd2app.maps.stack import MapStack
+from sd2app.session.limbs import colours_of, part_words, title_of
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT, Canvas, clipped
@@ -30,6 +31,17 @@ class _Curve:
     map: DopplerMap
     frame: int | None  # None outside the map
     colour: QColor
+    part: str = ""  # of the body, of several
+
+    @property
+    def values(self) -> NDArray[np.float32]:
+        """Values on screen, (bins, frames)."""
+        return self.track.split[self.part] if self.part else self.track.values
+
+    @property
+    def words(self) -> str:
+        """What it is, in the legend."""
+        return part_words(self.part) if self.part else title_of(self.track).lower()
 
     @property
     def nobody(self) -> bool:
@@ -74,12 +86,20 @@ class SpectrumView(Canvas):
 
     def _curves(self) -> list[_Curve]:
         time_s, palette = self._playback.time_s, self._display.palette
-        # The palette has a colour for each map, by the map's name.
-        return [
-            _Curve(track, track.map, track.frame_at(time_s), QColor(getattr(palette, name)))
-            for name, track in vars(self._maps).items()
-            if track.map is not None
-        ]
+        curves = []
+        for name, track in vars(self._maps).items():
+            if track.map is None:
+                continue
+            # The palette has a colour for each map, by the map's name.
+            colours = {"": getattr(palette, name)}
+            if len(parts := track.split) > 1:
+                colours = colours_of(parts)
+            frame = track.frame_at(time_s)
+            curves += [
+                _Curve(track, track.map, frame, QColor(colour), part)
+                for part, colour in colours.items()
+            ]
+        return curves
 
     def paint(self, painter: QPainter) -> None:
         """Axes, marked bins and curves."""
@@ -147,12 +167,12 @@ class SpectrumView(Canvas):
             return list(map(QPointF, xs.tolist(), ys.tolist()))
 
         known = curve.track.uncertainty
-        if known is not None and not curve.track.part:
+        if known is not None and not curve.track.parts:
             # One standard deviation up and down.
             value, sd = known.expected[:, frame], known.sd[:, frame]
             band = line(value + sd) + line(np.maximum(value - sd, 0.0), -1)
             _fill(painter, band, curve.colour, 90, Qt.BrushStyle.Dense4Pattern)
-        points = line(curve.track.values[:, frame])
+        points = line(curve.values[:, frame])
         feet = [QPointF(plot.left(), end.y()) for end in (points[-1], points[0])]
         _fill(painter, points + feet, curve.colour, 40, Qt.BrushStyle.SolidPattern)
         painter.setPen(QPen(curve.colour, 2))
@@ -186,7 +206,7 @@ class SpectrumView(Canvas):
         entries: list[tuple[QPointF, str, QColor]] = []
         x, y = room.left(), room.top()
         for curve in curves:
-            text = title_of(curve.track).lower() + (": no person" if curve.nobody else "")
+            text = curve.words + (": no person" if curve.nobody else "")
             width = 20 + metrics.horizontalAdvance(text)
             if x > room.left() and x + width > room.right():
                 x, y = room.left(), y + _LEGEND_PX

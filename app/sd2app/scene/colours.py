@@ -107,6 +107,8 @@ class Colouring:
     range_limits_m: tuple[float, float] = (0.0, 1.0)
     visible: NDArray[np.bool_] | None = None
     as_dots: bool = False
+    limbs: tuple[tuple[str, str], ...] = ()  # words and colours of parts that are shown alone
+    vertex_limb: NDArray[np.intp] | None = None  # of these, from 1; 0: none of them
 
 
 def mesh_colours(colouring: Colouring, colours: SceneColours, count: int) -> Rgb:
@@ -116,6 +118,13 @@ def mesh_colours(colouring: Colouring, colours: SceneColours, count: int) -> Rgb
     mode but ``plain``: they do not contribute to the spectrum.
     """
     mode, visible, as_dots = colouring.mode, colouring.visible, colouring.as_dots
+    if colouring.vertex_limb is not None and len(colouring.vertex_limb) == count:
+        shades = [colours.plain, *(colour for _, colour in colouring.limbs)]
+        result = np.stack([rgb(shade) for shade in shades])[colouring.vertex_limb]
+        if visible is None:
+            return result
+        muted = (0.5 * result + 0.5 * rgb(colours.hidden)).astype(np.uint8)
+        return np.where(visible[:, None], result, muted)
     if mode == "velocity" and colouring.velocity_mps is not None:
         result = velocity_colours(colouring.velocity_mps, colouring.v_max_mps)
     elif mode == "range" and colouring.range_m is not None:

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.imu.model import ImuModel
+from sd2app.maps.limbs import LimbsModel
 from sd2app.maps.model import SynthesisModel
 from sd2app.scene.camera import Preset
 from sd2app.sensor.placements import PlacementsModel
@@ -79,11 +80,13 @@ class SceneFeature(Feature):
         synthesis: SynthesisModel,
         placements: PlacementsModel,
         inertial: ImuModel,
+        limbs: LimbsModel,
         offer_frame: MenuPart,
     ) -> None:
         self._session, self._shell = session, shell
         self._offer_frame = offer_frame
         self._synthesis, self._placements, self._inertial = synthesis, placements, inertial
+        self._limbs = limbs
         self.view: SceneView | None = None
         self.changing = (session.display.mesh_changed,)
 
@@ -128,7 +131,7 @@ class SceneFeature(Feature):
         from sd2app.scene.view import SceneView
 
         self.view = view = SceneView(
-            self._session, self._synthesis, self._placements, self._inertial
+            self._session, self._synthesis, self._placements, self._inertial, self._limbs
         )
         export = self._shell.action("export_strip")
         view.menu_parts = (

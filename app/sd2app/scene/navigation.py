@@ -37,7 +37,7 @@ class _Held:
 
 @dataclass
 class _HeldThing:
-    number: int
+    number: int  # of those that are shown, bodies after things
     at_m: Vector  # where it was taken hold of
     moved_m: Vector
 
@@ -91,9 +91,12 @@ class Navigator:
         return math.hypot(x - x_px, y - y_px) <= max(MIN_GRAB_PX, radius_px)
 
     @property
-    def holds_thing(self) -> bool:
-        """True while a thing is dragged."""
-        return self._held_thing is not None
+    def held_thing(self) -> tuple[int, tuple[float, ...], tuple[float, ...]] | None:
+        """Number of the thing or body that is dragged, where it is held, and how far it moved."""
+        held = self._held_thing
+        if held is None:
+            return None
+        return held.number, triple(held.at_m + held.moved_m), triple(held.moved_m)
 
     def thing_at(self, x_px: float, y_px: float) -> tuple[int, Vector] | None:
         """Number of the thing or other body under the pointer; not if the first is before it."""
@@ -181,7 +184,7 @@ class Navigator:
             self._show_hot()
         if self._held_thing is not None:
             held, self._held_thing = self._held_thing, None
-            self._edits.move_numbered(held.number, triple(held.moved_m))
+            self._edits.end_scene_drag(triple(held.moved_m))
             self._show_hot()
 
     def look_again(self) -> None:
@@ -220,6 +223,7 @@ class Navigator:
         found = None if self.marker_at(x_px, y_px) is not None else self.thing_at(x_px, y_px)
         if found is not None:
             self._held_thing = _HeldThing(*found, np.zeros(3))
+            self._edits.begin_scene_drag(found[0])
         return found is not None
 
     def _drag_thing(
@@ -233,6 +237,7 @@ class Navigator:
         if at is not None:
             held.moved_m = at - held.at_m
             self._scene.shift_movable(held.number, held.moved_m)
+            self._edits.drag_in_scene(triple(held.moved_m))
             self._changed()
 
     def _look(self, x_px: float, y_px: float) -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter, QPen
 from PySide6.QtWidgets import QWidget
@@ -42,6 +44,8 @@ class _Bar:
     @classmethod
     def of(cls, colouring: Colouring) -> _Bar | None:
         """Bar of what the colour of the mesh means, where that is a number."""
+        if colouring.limbs:
+            return None
         if colouring.mode == "velocity":
             values = [colouring.v_max_mps * (1.0 - 2.0 * share) for share in np.linspace(0, 1, 5)]
             texts = [f"{value:+.3g}".replace("-", "−") if value else "0" for value in values]
@@ -91,11 +95,12 @@ class Overlay(Canvas):
         scene, navigator, colouring = self._scene, self._navigator, self._scene.colouring
         legend = (
             (self.font(), scene.colours, scene.has_mesh, scene.knows_hidden),
-            (colouring.mode, colouring.v_max_mps, colouring.range_limits_m),
+            (colouring.mode, colouring.v_max_mps, colouring.range_limits_m, colouring.limbs),
         )
         rest = (
             (self.message, self.hint, scene.pose, scene.sensor, scene.metre_labels),
             (navigator.hovers_sensor, navigator.holds_sensor, navigator.marker, navigator.thing),
+            navigator.held_thing,
         )
         if legend != self._states[0]:
             self._kept.clear()
@@ -131,8 +136,10 @@ class Overlay(Canvas):
             self._paint_where_sensor_is(painter)
         position_m, marker = self._scene.sensor.position_m, self._navigator.marker
         if self._navigator.holds_sensor:
-            x, y, z = position_m
-            self._paint_beside(painter, f"x {x:+.2f}   y {y:+.2f}   z {z:+.2f} m", position_m)
+            self._paint_beside(painter, _place_words(position_m), position_m)
+        elif (held := self._navigator.held_thing) is not None:
+            number, at_m, moved_m = held
+            self._paint_beside(painter, self._words_of_held(number, moved_m), at_m)
         elif self._navigator.hovers_sensor:
             self._paint_hint(painter, HINT)
         elif self.hint:
@@ -140,9 +147,18 @@ class Overlay(Canvas):
         elif (thing := self._navigator.thing) is not None and thing < len(self.thing_names):
             self._paint_hint(painter, THING_HINT.format(self.thing_names[thing]))
         elif marker is not None:
-            place_m = tuple(self._scene.markers.positions_m[marker])
+            place_m = self._scene.markers.positions_m[marker]
             self._paint_beside(painter, self.marker_words[marker], place_m)
             self._paint_hint(painter, MARKER_HINT)
+
+    def _words_of_held(self, number: int, moved_m: Sequence[float]) -> str:
+        """Where the foot of a dragged thing is, or by how much a body is moved from its file's."""
+        things, people = self._scene.things.things, self._scene.people.meshes
+        if number < len(things):
+            return _place_words(np.add(things[number].position_m, moved_m))
+        placed = people[number - len(things)].placed
+        before_m = (0.0, 0.0, 0.0) if placed is None else placed.moved_m
+        return f"moved by {_place_words(np.add(before_m, moved_m))}"
 
     def _font(self) -> QFont:
         font = QFont(self.font())
@@ -234,11 +250,11 @@ class Overlay(Canvas):
         self._legend = QRectF()
         scene, colours, metrics = self._scene, self._colours, QFontMetricsF(painter.font())
         mode, bar = scene.colouring.mode, _Bar.of(scene.colouring)
-        swatches = [(colours.visible, "visible")] if mode == "visibility" else []
-        swatches += [(colours.hidden, "hidden")]
-        if not scene.knows_hidden:
-            swatches = []
-        if not scene.has_mesh or mode == "plain" or not (bar or swatches):
+        swatches = [(colour, words) for words, colour in scene.colouring.limbs]
+        if not swatches and scene.knows_hidden and mode != "plain":
+            swatches = [(colours.visible, "visible")] if mode == "visibility" else []
+            swatches += [(colours.hidden, "hidden")]
+        if not scene.has_mesh or not (bar or swatches):
             return
         line = metrics.height()
         length = min(max(0.36 * self.height(), 72.0), 170.0)
@@ -289,9 +305,7 @@ class Overlay(Canvas):
         painter.drawRoundedRect(box, 6.0, 6.0)
         painter.setBrush(Qt.BrushStyle.NoBrush)
 
-    def _paint_beside(
-        self, painter: QPainter, text: str, point_m: tuple[float, float, float]
-    ) -> None:
+    def _paint_beside(self, painter: QPainter, text: str, point_m: ArrayLike) -> None:
         """Paint a text right above a point, on a chip."""
         x, y, _ = self._scene.pose.project(point_m)[0]
         text = text.replace("-", "−")
@@ -345,3 +359,8 @@ class Overlay(Canvas):
     def _chip_box(self, painter: QPainter, text: str) -> QRectF:
         metrics = QFontMetricsF(painter.font())
         return QRectF(0.0, 0.0, metrics.horizontalAdvance(text) + 16.0, metrics.height() + 8.0)
+
+
+def _place_words(place_m: Iterable[float]) -> str:
+    x, y, z = place_m
+    return f"x {x:+.2f}   y {y:+.2f}   z {z:+.2f} m"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -19,8 +19,7 @@ from sd2app.scene.people import People
 from sd2app.scene.things import Things
 from sd2app.scene.walls import Walls
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.mesh.things import Surface
-from sd2core.mesh.walls import Wall
+from sd2core.mesh.things import Surroundings
 from sd2core.sensor import VirtualSensor
 
 SENSOR_RADIUS_M = 0.045
@@ -146,10 +145,10 @@ class Scene:
         self._framed = None
         self._lay_ground()
 
-    def set_things(self, surfaces: Sequence[Surface], walls: Sequence[Wall]) -> None:
+    def set_things(self, around: Surroundings | None) -> None:
         """Show what stands around the body."""
-        self.things.set_surfaces(surfaces)
-        self.walls.set_walls(walls, self.extent.centre_m)
+        self.things.set_surfaces(*((around.surfaces, around.things) if around else ((), ())))
+        self.walls.set_walls(around.walls if around else (), self.extent.centre_m)
         self._framed = None
         self._lay_ground()
 

@@ -10,7 +10,7 @@ from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from sd2app.scene.colours import SceneColours, mixed
 from sd2app.scene.parts import Shape
-from sd2core.mesh.things import Surface
+from sd2core.mesh.things import Surface, Thing
 
 _OPACITY = 0.38
 _SHARP_COSINE = 0.9
@@ -22,6 +22,7 @@ class Things:
 
     def __init__(self, renderer: vtkRenderer) -> None:
         self._renderer = renderer
+        self.things: tuple[Thing, ...] = ()
         self.surfaces: tuple[Surface, ...] = ()
         self._shapes: list[tuple[Shape, Shape]] = []
         self._colours: SceneColours | None = None
@@ -37,11 +38,11 @@ class Things:
         """All vertices, (n, 3)."""
         return np.concatenate([np.zeros((0, 3)), *(vertices for vertices, _ in self.surfaces)])
 
-    def set_surfaces(self, surfaces: Sequence[Surface]) -> None:
-        """Show other things."""
+    def set_surfaces(self, surfaces: Sequence[Surface], things: tuple[Thing, ...] = ()) -> None:
+        """Show other things, which have these surfaces."""
         for shape in self.shapes:
             self._renderer.RemoveActor(shape.actor)
-        self.surfaces, self._hot = tuple(surfaces), None
+        self.surfaces, self.things, self._hot = tuple(surfaces), things, None
         self._shapes = []
         for vertices, faces in surfaces:
             face = Shape(self._renderer, vertices, triangles=faces, lit=True)

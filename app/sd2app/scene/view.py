@@ -17,6 +17,7 @@ from sd2app.scene.backend import Backend, NoOpenGL, chosen_backend
 from sd2app.scene.camera import Preset
 from sd2app.scene.colours import SceneColours
 from sd2app.scene.inertial import PLACING_HINT, InertialHand
+from sd2app.scene.limbs import LIMB_HINT, LimbHand
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.overlay import Overlay
 from sd2app.scene.scene import Scene
@@ -27,6 +28,7 @@ from sd2core.errors import Sd2Error
 if TYPE_CHECKING:
     # The view alone loads no kernels.
     from sd2app.imu.model import ImuModel
+    from sd2app.maps.limbs import LimbsModel
     from sd2app.maps.model import SynthesisModel
     from sd2app.sensor.placements import PlacementsModel
     from sd2app.session.session import Session
@@ -60,6 +62,7 @@ class SceneView(QWidget):
         synthesis: SynthesisModel,
         placements: PlacementsModel,
         inertial: ImuModel,
+        limbs: LimbsModel,
     ) -> None:
         super().__init__()
         self._session, self._synthesis, self._placements = session, synthesis, placements
@@ -77,6 +80,7 @@ class SceneView(QWidget):
         self.navigator = Navigator(self.scene, session.edits, placements.use, self.request_render)
         self.overlay = Overlay(self.scene, self.navigator, session.display, self)
         self.inertial_hand = InertialHand(self.scene, session, inertial)
+        self.limb_hand = LimbHand(self.scene, self.inertial_hand, limbs)
         self._pressed_px = (0.0, 0.0)
         self.setAccessibleName("Scene")
         self._frame: int | None = None
@@ -91,12 +95,14 @@ class SceneView(QWidget):
             (session.display.mesh_changed, self._follow_colour),
             (session.document.opened, self._attach),
             (session.document.changed, self._follow_things),
+            (session.sensor.dragging_changed, self._follow_things),
             (session.playback.time_changed, self._follow_clock),
             (session.sensor.changed, self._follow_sensor),
             (session.sensor.dragging_changed, self._follow_sensor),
             (synthesis.frame_changed, self._follow_scattering),
             (placements.changed, self._follow_placements),
             (inertial.changed, self._follow_inertial),
+            (limbs.changed, self._follow_limbs),
             (session.placing.changed, self._follow_placing),
         )
         for signal, slot in self._followed:
@@ -154,6 +160,7 @@ class SceneView(QWidget):
         elif kind == QEvent.Type.Leave:
             self.navigator.leave()
             self.overlay.show_reading((0.0, 0.0), "")
+            self.overlay.hint = PLACING_HINT if self.inertial_hand.placing else ""
         elif kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
             # QtInteractor would take them; they belong to the window.
             event.ignore()
@@ -171,16 +178,23 @@ class SceneView(QWidget):
             self.navigator.move(*place, event.modifiers())
             at_body = not event.buttons() and not self._at_something(place)
             self.overlay.show_reading(place, self._words_at(place) if at_body else "")
+            if not self.inertial_hand.placing:
+                part = self.limb_hand.part_at(*place) if at_body else None
+                self.overlay.hint = "" if part is None else LIMB_HINT
         elif kind == QEvent.Type.MouseButtonRelease:
             self.navigator.release(*place, event.button())
             if math.dist(place, self._pressed_px) >= _CLICK_PX:
                 return  # a drag
             if event.button() == Qt.MouseButton.LeftButton:
-                self.inertial_hand.click(*place)
+                if self.inertial_hand.placing:
+                    self.inertial_hand.click(*place)
+                elif not self._at_something(place):
+                    self.limb_hand.click(*place, event.modifiers())
             elif event.button() == Qt.MouseButton.RightButton:
                 menu = picture_menu(self, self.menu_parts, QPointF(*place))
                 menu.popup(event.globalPosition().toPoint())
         elif kind == QEvent.Type.MouseButtonDblClick and not self._at_something(place):
+            self._pressed_px = (math.inf, math.inf)  # its release is no click
             self.set_view("overview")
         else:
             # Also the second press of a double click: a hurried hand takes the sensor.
@@ -190,7 +204,11 @@ class SceneView(QWidget):
     def _words_at(self, place: tuple[float, float]) -> str:
         """What is under the pointer, or what a click would place there, in words."""
         words = self.inertial_hand.words_at(*place)
-        return words if words or self.inertial_hand.placing else self.reading_at(*place)
+        if words or self.inertial_hand.placing:
+            return words
+        return "  ·  ".join(
+            filter(None, [self.limb_hand.words_at(*place), self.reading_at(*place)])
+        )
 
     def reading_at(self, x_px: float, y_px: float) -> str:
         """Range, radial velocity and visibility of the vertex in front at a pixel, in words."""
@@ -284,16 +302,14 @@ class SceneView(QWidget):
     def _follow_things(self) -> None:
         mesh = self._session.document.mesh
         around, others = (None, ()) if mesh is None else (mesh.surroundings, mesh.others)
-        if around is self._around and others == self._others:
+        # One that is dragged is drawn where the hand is, without being made again.
+        if (around is self._around and others == self._others) or self.navigator.held_thing:
             return
         self._around, self._others = around, others
-        if around is None:
-            self.scene.set_things((), ())
-        else:
-            self.scene.set_things(around.surfaces, around.walls)
+        self.scene.set_things(around)
         with self._explaining():
             self.scene.set_people(others, self._frame or 0)
-        named = [] if around is None else [one.name for one in around.things]
+        named = [one.name for one in self.scene.things.things]
         self.overlay.thing_names = named + ([] if mesh is None else list(mesh.persons[1:]))
         self.navigator.look_again()
         self.request_render()
@@ -301,6 +317,10 @@ class SceneView(QWidget):
     def _follow_inertial(self) -> None:
         self.scene.set_inertial(self._inertial.vertices.values())
         self.request_render()
+
+    def _follow_limbs(self) -> None:
+        self.limb_hand.show()
+        self._follow_scattering()
 
     def _follow_placing(self) -> None:
         self.overlay.hint = PLACING_HINT if self.inertial_hand.placing else ""
@@ -361,7 +381,7 @@ class SceneView(QWidget):
         if self._backend is None:
             return
         navigator = self.navigator
-        if navigator.holds_sensor or navigator.holds_thing:
+        if navigator.holds_sensor or navigator.held_thing:
             shape = Qt.CursorShape.ClosedHandCursor
         elif navigator.hovers_sensor or navigator.thing is not None:
             shape = Qt.CursorShape.OpenHandCursor

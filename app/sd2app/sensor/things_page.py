@@ -145,9 +145,9 @@ class ThingsPage(QWidget):
         if not thing.is_file:
             return SHELF[thing.shape][0]
         around = None if mesh is None else mesh.surroundings
-        if around is None or around.things != self._things:
-            return (0.0, 0.0, 0.0)
-        x, y, z = around.surfaces[number][0].T
+        if around is None or thing not in around.things:
+            return (SIZES_M[0],) * 3
+        x, y, z = around.surfaces[around.things.index(thing)][0].T
         turned = np.exp(1j * np.radians(thing.turn_deg)) * (x + 1j * z)
         return tuple(float(np.ptp(one)) for one in (turned.real, y, turned.imag))
 
@@ -160,7 +160,12 @@ class ThingsPage(QWidget):
             # The one that was changed, or the newest.
             changed = [at for at, one in enumerate(things) if one not in before]
             current = changed[-1] if changed else current
-        names = [f"{number}: {one.name}" for number, one in enumerate(things, start=1)]
+        recording = self._session.document.recording
+        there = () if recording is None else recording.things_there
+        names = [
+            f"{number}: {one.name}" + ("" if one in there else " (file missing)")
+            for number, one in enumerate(things, start=1)
+        ]
         self._which.offer(names, min(max(current, 0), len(things) - 1))
         self._refresh_fields()
 

@@ -356,15 +356,15 @@ class DocumentModel(QObject):
         if content is None or content.mesh is None:
             return
         mesh, recording = content.mesh, content.recording
-        around = mesh.surroundings
+        around, things = mesh.surroundings, recording.things_there
         try:
             there = recording.bodies_there if recording.bodies or mesh.others else ()
             if there != tuple(body.placed for body in mesh.others):
                 mesh = with_bodies(mesh, there, person=recording.subject)
             if recording.walls != (() if around is None else around.walls):
                 mesh = with_walls(mesh, recording.walls)
-            if recording.things != (() if around is None else around.things):
-                mesh = with_things(mesh, recording.things)
+            if things != (() if around is None else around.things):
+                mesh = with_things(mesh, things)
         except Sd2Error as error:
             self.failed.emit(str(error))
         self.content = replace(content, mesh=mesh)

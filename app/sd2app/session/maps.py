@@ -74,20 +74,34 @@ class MapModel(QObject):
         self.offset_s = 0.0  # start of the map's clock on the recording's clock
         self.reference = 1.0  # value shown as 0 dB
         self.by_hand = False  # the user chose that value
-        self.part = ""  # part of the body that is shown alone, where its map is known
+        self.parts: tuple[str, ...] = ()  # shown alone where their maps are known
         self.growing = False  # frames are being added at its end
         self.awaited = False  # is going to be made: its place is kept while it is not there
         self.status = ""  # quality of the map in a few words, e.g. "exact"
         self._gaps: tuple[tuple[int, int], ...] = ()
         self._strongest: float | None = None
+        self._added: tuple[DopplerMap, NDArray[np.float32]] | None = None  # parts of which map
 
     @property
     def values(self) -> NDArray[np.float32]:
-        """Values on screen, (bins, frames): the map's, or of one part of the body or person."""
+        """Values on screen, (bins, frames): the map's, or of some parts of the body or people."""
         assert self.map is not None
-        limbs = self.map.limbs
-        shown = None if limbs is None or not self.part else limbs.shown(self.part)
-        return self.map.values if shown is None else shown
+        split = self.split
+        if not split:
+            return self.map.values
+        if self._added is None or self._added[0] is not self.map:
+            values = [*split.values()]
+            self._added = self.map, values[0] if len(values) == 1 else np.sum(values, axis=0)
+        return self._added[1]
+
+    @property
+    def split(self) -> dict[str, NDArray[np.float32]]:
+        """Values (bins, frames) of each part of the body or person that is shown alone."""
+        limbs = None if self.map is None else self.map.limbs
+        if limbs is None:
+            return {}
+        values = {one: limbs.shown(one) for one in self.parts}
+        return {one: its for one, its in values.items() if its is not None}
 
     @property
     def known(self) -> NDArray[np.bool_]:
@@ -158,11 +172,11 @@ class MapModel(QObject):
             self.uncertainty = uncertainty
             self.changed.emit()
 
-    def set_part(self, part: str) -> None:
-        """Show one part of the body alone, or (empty) all of it."""
-        if part != self.part:
-            self.part = part
-            self._strongest = None
+    def set_parts(self, parts: tuple[str, ...]) -> None:
+        """Show some parts of the body alone, or (none) all of it."""
+        if parts != self.parts:
+            self.parts = parts
+            self._strongest = self._added = None
             self.changed.emit()
 
     def set_offset(self, offset_s: float) -> None:
@@ -214,7 +228,7 @@ class MapModel(QObject):
         return np.clip(shade, 0.0, 1.0).astype(np.float32)
 
     def _deviation(self, index: int, frame: int) -> float | None:
-        if self.map is None or self.uncertainty is None or self.part:
+        if self.map is None or self.uncertainty is None or self.parts:
             return None
         column = self.map.values[:, frame : frame + 1]
         return float(self.uncertainty.between(frame, frame + 1).deviation(column)[index, 0])
@@ -227,7 +241,7 @@ class MapModel(QObject):
         Deviations are those of :meth:`CellUncertainty.deviation`. The shape is
         (bins, stop - start); None if no uncertainty is known.
         """
-        if self.map is None or self.uncertainty is None or self.part:
+        if self.map is None or self.uncertainty is None or self.parts:
             return None
         values = self.map.values[:, start:stop]
         highest = self.reference * 10.0 ** (levels.high_db / 10.0)

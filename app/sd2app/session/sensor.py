@@ -8,7 +8,7 @@ from sd2core.sensor import VirtualSensor
 
 
 class SensorModel(QObject):
-    """Virtual sensor, and a flag while it is dragged."""
+    """Virtual sensor, and a flag while it or a thing is dragged."""
 
     changed = Signal()
     dragging_changed = Signal(bool)
@@ -16,7 +16,7 @@ class SensorModel(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.sensor = VirtualSensor()
-        self.dragging = False  # true while the sensor is dragged
+        self.dragging = False  # true while the sensor or a thing is dragged
 
     def set_sensor(self, sensor: VirtualSensor) -> None:
         """Place the sensor."""
@@ -25,7 +25,7 @@ class SensorModel(QObject):
             self.changed.emit()
 
     def set_dragging(self, dragging: bool) -> None:
-        """Note that a drag of the sensor began or ended."""
+        """Note that a drag began or ended."""
         if dragging != self.dragging:
             self.dragging = dragging
             self.dragging_changed.emit(dragging)

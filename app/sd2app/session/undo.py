@@ -63,6 +63,7 @@ class Edits:
         self._document = document
         self._sensor = sensor
         self._before: Any = None
+        self._dragged: Thing | Body | None = None
         self._planned_before: tuple[Recording, Placements | None] | None = None
 
     # --- sensor ---------------------------------------------------------------------------
@@ -138,32 +139,46 @@ class Edits:
         """Put one more thing, body or wall into the scene."""
         self._set_in_scene("Add", one, lambda kept: (*kept, one))
 
-    def change_in_scene(self, number: int, one: Thing | Body | Wall, text: str = "Change") -> None:
+    def change_in_scene(self, number: int, one: Thing | Body | Wall) -> None:
         """Replace one by another, or by itself at another place."""
-        self._set_in_scene(text, one, lambda kept: (*kept[:number], one, *kept[number + 1 :]))
+        self._set_in_scene("Change", one, lambda kept: (*kept[:number], one, *kept[number + 1 :]))
 
-    def move_in_scene(self, number: int, one: Thing | Body, by_m: Vector) -> None:
-        """Move a thing or body."""
-        before_m = one.position_m if isinstance(one, Thing) else one.moved_m
-        x, y, z = (round(a + b, 3) for a, b in zip(before_m, by_m, strict=True))
-        moved = (
-            replace(one, position_m=(x, y, z))
-            if isinstance(one, Thing)
-            else replace(one, moved_m=(x, y, z))
-        )
-        self.change_in_scene(number, moved, "Move")
+    def begin_scene_drag(self, number: int) -> None:
+        """Begin to drag a thing, or (counted on after the things) a body beside the first one.
 
-    def move_numbered(self, number: int, by_m: Vector) -> None:
-        """Move a thing, or (counted on after the things) a body beside the first one."""
-        recording, mesh = self._document.recording, self._document.mesh
-        if recording is None or mesh is None:
-            return
-        if number < len(recording.things):
-            self.move_in_scene(number, recording.things[number], by_m)
-            return
-        body = mesh.others[number - len(recording.things)].placed
-        if body is not None:
-            self.move_in_scene(recording.bodies.index(body), body, by_m)
+        ``number`` counts what is shown: a thing whose file is missing is not.
+        """
+        mesh = self._document.mesh
+        assert mesh is not None
+        things = () if mesh.surroundings is None else mesh.surroundings.things
+        on_thing = number < len(things)
+        self._dragged = things[number] if on_thing else mesh.others[number - len(things)].placed
+        self._before = self._fields(["things" if on_thing else "bodies"])
+        self._sensor.set_dragging(on_thing)
+
+    def drag_in_scene(self, by_m: Vector) -> None:
+        """Move a thing from where it was when the drag began; a body, once it is let go."""
+        if isinstance(self._dragged, Thing):
+            self._document.assign(self._moved(by_m))
+
+    def end_scene_drag(self, by_m: Vector) -> None:
+        """End the drag of a thing or body; it becomes one step in the history."""
+        self._sensor.set_dragging(False)
+        if self._dragged is not None:
+            self._document.assign(self._moved(by_m))
+            self._push_change(f"Move {self._dragged.name}", self._before)
+
+    def _moved(self, by_m: Vector) -> dict[str, tuple[Any, ...]]:
+        """All that is like what is dragged, with that elsewhere."""
+        one = self._dragged
+        assert one is not None
+        place = "position_m" if isinstance(one, Thing) else "moved_m"
+        at_m = tuple(round(a + b, 3) for a, b in zip(getattr(one, place), by_m, strict=True))
+        moved = replace(one, **{place: at_m})  # type: ignore[arg-type]
+        return {
+            name: tuple(moved if this is one else this for this in before)
+            for name, before in self._before.items()
+        }
 
     def remove_from_scene(self, number: int, one: Thing | Body | Wall) -> None:
         """Take a thing, body or wall out of the scene."""

@@ -167,6 +167,7 @@ class Features:
             maps.synthesis,
             self.sensor.placements,
             self.imu.model,
+            maps.limbs,
             labels.offer_frame,
         )
         self._in_order: tuple[Feature, ...] = (

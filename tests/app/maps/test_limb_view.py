@@ -14,10 +14,13 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QWidget
 from window_models import build_models
 
-from sd2app.maps.limbs import LimbMenu, part_words, title_of
+from sd2app.maps.heatmap_image import heatmap_image
+from sd2app.maps.limb_menu import LimbMenu
 from sd2app.maps.spectrum import SpectrumView
+from sd2app.session.limbs import LIMB_COLOURS, part_words, title_of
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
+from sd2app.widgets.colour_maps import lookup_table
 from sd2core.body.parts import known_parts
 from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.files.resources import resource_path
@@ -106,11 +109,11 @@ def test_one_part_is_shown_alone(context, qtbot, body):
         rtol=1e-5,
         atol=1e-8,
     )
-    limbs.show("")
+    limbs.show()
     np.testing.assert_array_equal(track.values, whole)
     limbs.show("trunk")
     open_it(context, qtbot, body)
-    assert track.part == ""
+    assert track.parts == ()
 
 
 def test_the_spectrum_is_of_the_part_that_is_shown(context, qtbot, body):
@@ -143,7 +146,7 @@ def test_what_is_no_body_is_shown_whole(context, qtbot, ball):
     limbs.show("trunk")
     qtbot.waitUntil(lambda: bool(said), timeout=30_000)
     assert "closed surface of one whole body" in said[0]
-    assert limbs.part == ""
+    assert limbs.parts == ()
 
 
 def test_the_menu_chooses_a_part(context, qtbot, body):
@@ -157,11 +160,78 @@ def test_the_menu_chooses_a_part(context, qtbot, body):
     assert list(rows)[:4] == ["Whole body", "Head and trunk", "Left upper arm", "Right upper arm"]
     assert rows["Whole body"].isChecked()
     rows["Left lower leg"].trigger()
-    assert limbs.part == "lower_leg.L"
+    assert limbs.parts == ("lower_leg.L",)
     menu.aboutToShow.emit()
     assert rows["Left lower leg"].isChecked()
+    assert not rows["Whole body"].isChecked()
+    rows["Right forearm"].trigger()
+    assert limbs.parts == ("forearm.R", "lower_leg.L")
+    rows["Left lower leg"].trigger()
+    assert limbs.parts == ("forearm.R",)
+    rows["Whole body"].trigger()
+    assert limbs.parts == ()
     assert part_words("forearm.L") == "left forearm"
     rest(context, qtbot)
+
+
+def test_several_parts_add_up_and_each_has_its_colour(context, qtbot, body):
+    open_it(context, qtbot, body)
+    track, limbs = context.synthetic, context.limbs
+    limbs.show("forearm.R", "upper_arm.R")
+    rest(context, qtbot)
+    assert title_of(track) == "Synthetic · right upper arm + right forearm"
+    expected = split(body, VirtualSensor()).values
+    upper, forearm = (expected[PARTS.index(part)] for part in ("upper_arm.R", "forearm.R"))
+    np.testing.assert_allclose(track.values, upper + forearm, rtol=1e-5, atol=1e-8)
+    levels = context.display.levels
+    clock = track.map.timebase
+    image = heatmap_image(track, levels, clock.start_s, clock.end_s, len(clock), 0)
+    data = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1, 4)
+    shown = data[::-1, : image.width(), 2::-1].astype(float)  # (bins, frames, 3), slowest last
+    ground, *own = (
+        np.array(QColor(colour).getRgb()[:3])
+        for colour in (
+            QColor.fromRgb(int(lookup_table(levels.colour_map)[0])),
+            LIMB_COLOURS["upper_arm.R"],
+            LIMB_COLOURS["forearm.R"],
+        )
+    )
+    shade = track.shade(upper + forearm, levels)[..., None]
+    of_upper = (upper / np.maximum(upper + forearm, 1e-30))[..., None]
+    mix = of_upper * own[0] + (1 - of_upper) * own[1]
+    assert of_upper.max() > 0.9
+    assert of_upper[shade > 0.5].min() < 0.1
+    np.testing.assert_allclose(
+        shown, np.where(shade > 0, ground + shade * (mix - ground), ground), atol=1.5
+    )
+
+
+def test_what_is_picked_replaces_adds_or_ends_it(context, qtbot, body):
+    open_it(context, qtbot, body)
+    limbs = context.limbs
+    heard = []
+    limbs.changed.connect(lambda: heard.append(limbs.parts))
+    for part, adds, expected in (
+        ("trunk", False, ("trunk",)),
+        ("forearm.L", False, ("forearm.L",)),
+        ("thigh.R", True, ("forearm.L", "thigh.R")),
+        (None, True, ("forearm.L", "thigh.R")),
+        ("forearm.L", True, ("thigh.R",)),
+        ("thigh.R", False, ()),  # once more ends it
+        ("trunk", True, ("trunk",)),
+        (None, False, ()),
+    ):
+        limbs.pick(part, adds=adds)
+        assert limbs.parts == expected
+    assert len(heard) == 7
+    qtbot.waitUntil(lambda: limbs.vertex_parts is not None, timeout=30_000)
+    np.testing.assert_array_equal(limbs.vertex_parts.numbers, known_parts(load_mesh(body)).numbers)
+    rest(context, qtbot)
+
+
+def test_every_part_has_a_colour_of_its_own():
+    assert list(LIMB_COLOURS) == list(PARTS)
+    assert len({*LIMB_COLOURS.values()}) == len(PARTS)
 
 
 def test_a_denoiser_of_parts_gets_them(context, denoisers, qtbot, body):

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtGui import QGuiApplication
-from scene_stage import Document, Drag, Inertial, Placements, Stage, Synthesis, two_plates
+from scene_stage import Document, Drag, Inertial, Limbs, Placements, Stage, Synthesis, two_plates
 
 from sd2app.session.display import DisplayModel
 from sd2app.session.mode import Mode
@@ -29,7 +29,7 @@ def make_stage(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable
         monkeypatch.setenv("SD2_SCENE", backend)
         document, synthesis, placements = Document(), Synthesis(), Placements()
         playback, sensor, display = PlaybackModel(), SensorModel(), DisplayModel()
-        inertial, placing = Inertial(), Mode(document)
+        inertial, placing, limbs = Inertial(), Mode(document), Limbs()
         log: list[str] = []
 
         session = SimpleNamespace(
@@ -40,13 +40,13 @@ def make_stage(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable
             placing=placing,
             edits=Drag(sensor, log),
         )
-        view = SceneView(session, synthesis, placements, inertial)
+        view = SceneView(session, synthesis, placements, inertial, limbs)
         qtbot.addWidget(view)
         view.resize(*SIZE)
         view.show()
         QGuiApplication.processEvents()
         models = (document, playback, sensor, display, synthesis, placements, inertial, placing)
-        made.append(Stage(view, *models, log))
+        made.append(Stage(view, *models, limbs, log))
         return made[-1]
 
     yield make

@@ -16,6 +16,7 @@ from sd2app.session.mode import Mode
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.vertex_parts import VertexParts
 from sd2core.placements.body_extent import SensorCoverage
 from sd2core.placements.placements import Place
 from sd2core.radar_config import PAPER_RADAR
@@ -85,6 +86,26 @@ class Inertial(QObject):
         self.clicked.append(vertex)
 
 
+class Limbs(QObject):
+    """Two parts of the two plates, and what was picked."""
+
+    changed = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.parts: tuple[str, ...] = ()
+        self.vertex_parts: VertexParts | None = None
+        self.persons: tuple[str, ...] = ()
+        self.picked: list[tuple[str | None, bool]] = []
+
+    def part_of(self, vertex: int) -> str | None:
+        known = self.vertex_parts
+        return None if known is None else known.names[known.numbers[vertex]]
+
+    def pick(self, part: str | None, *, adds: bool) -> None:
+        self.picked.append((part, adds))
+
+
 class Drag:
     """Edits of the sensor by a drag, which are written down."""
 
@@ -117,6 +138,7 @@ class Stage:
     placements: Placements
     inertial: Inertial
     placing: Mode
+    limbs: Limbs
     log: list[str]
 
     def open(self, mesh: MeshSequence | None) -> None:

@@ -20,7 +20,9 @@ from scene_stage import LEFT, RIGHT, Stage, two_plates
 from sd2app.scene import backend as choose
 from sd2app.scene import offscreen_backend as image_backend
 from sd2app.scene.colours import SceneColours
+from sd2app.session.limbs import LIMB_COLOURS
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.vertex_parts import VertexParts
 from sd2core.placements.placements import Place, PlacementCloud
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
@@ -603,3 +605,56 @@ def test_a_thousand_places_are_one_actor(stage: Stage) -> None:
     stage.view.grab()
     assert len(stage.view.scene.markers.positions_m) == 1000
     assert renderer.GetActors().GetNumberOfItems() == count
+
+
+# Parts of the body
+
+
+@pytest.fixture
+def limbed(stage: Stage) -> Stage:
+    """The left plate is a trunk, the right one a forearm."""
+    stage.limbs.vertex_parts = VertexParts(("trunk", "forearm.R"), np.repeat([0, 1], 4))
+    return stage
+
+
+def click(stage: Stage, place: QPoint, keys: Any = Qt.KeyboardModifier.NoModifier) -> None:
+    QTest.mouseClick(stage.view.childAt(place), Qt.MouseButton.LeftButton, keys, place)
+
+
+def test_a_click_picks_a_part_and_with_keys_several(limbed: Stage) -> None:
+    left, right = limbed.pixel_of(LEFT), limbed.pixel_of(RIGHT)
+    click(limbed, left)
+    click(limbed, right, Qt.KeyboardModifier.ControlModifier)
+    click(limbed, right, Qt.KeyboardModifier.ShiftModifier)
+    click(limbed, QPoint(20, 430))
+    several = [("forearm.R", True)] * 2
+    assert limbed.limbs.picked == [("trunk", False), *several, (None, False)]
+    drag(limbed, left, left + QPoint(30, 0))  # turns the view
+    assert len(limbed.limbs.picked) == 4
+    limbed.view.set_view("overview")
+    limbed.view.grab()
+    click(limbed, limbed.pixel_of(limbed.sensor.sensor.position_m))
+    assert len(limbed.limbs.picked) == 4
+
+
+def test_chosen_parts_have_their_colours_and_the_rest_is_plain(limbed: Stage) -> None:
+    limbed.scatter([2.0] * 8, [True] * 8)
+    assert greyness(limbed.colour_at(LEFT)) > 60  # it approaches
+    limbed.limbs.parts = ("forearm.R",)
+    limbed.limbs.changed.emit()
+    assert greyness(limbed.colour_at(LEFT)) < 25
+    hue = limbed.colour_at(RIGHT).hue()
+    assert abs(hue - QColor(LIMB_COLOURS["forearm.R"]).hue()) < 8
+    limbed.limbs.parts = ()
+    limbed.limbs.changed.emit()
+    assert greyness(limbed.colour_at(LEFT)) > 60
+
+
+def test_the_pointer_names_the_part(limbed: Stage) -> None:
+    limbed.scatter([0.5] * 8, [True] * 8)
+    place = limbed.pixel_of(RIGHT)
+    QTest.mouseMove(limbed.view.childAt(place), place)
+    assert limbed.view.overlay.reading.startswith("right forearm")
+    assert "Ctrl" in limbed.view.overlay.hint
+    QTest.mouseMove(limbed.view.childAt(place), QPoint(20, 430))
+    assert limbed.view.overlay.reading == limbed.view.overlay.hint == ""

@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QToolButton
 from window_models import models_of
 
-from sd2app.maps.limbs import LimbMenu
+from sd2app.maps.limb_menu import LimbMenu
 from sd2app.scene.view import SceneView
 from sd2app.sensor.bodies_page import BodiesPage
 from sd2app.widgets.inputs import NumberBox

@@ -119,10 +119,14 @@ def test_it_is_dragged_on_its_level_and_with_shift_upwards(window, qtbot):
     QTest.mousePress(widget, LEFT, Qt.KeyboardModifier.NoModifier, start)
     for part in (0.5, 1.0):
         QTest.mouseMove(widget, start + moved * part)
-    assert things(window) == (before,)  # until it is let go
     assert scene.pose == pose
+    (after,) = things(window)  # while it is held
+    assert stack.count() == count
+    shown = scene.things.surfaces
     QTest.mouseRelease(widget, LEFT, Qt.KeyboardModifier.NoModifier, start + moved)
-    (after,) = things(window)
+    assert things(window) == (after,)
+    by_m = np.subtract(after.position_m, before.position_m)
+    np.testing.assert_allclose(scene.things.points_m, shown[0][0] + by_m, atol=1e-6)
     assert after.position_m[1] == before.position_m[1]
     by = np.subtract(after.position_m, before.position_m)
     assert np.linalg.norm(by) > 0.05
@@ -144,6 +148,46 @@ def test_it_is_dragged_on_its_level_and_with_shift_upwards(window, qtbot):
     window.action("undo").trigger()
     assert things(window) == (before,)
     np.testing.assert_allclose(scene.things.points_m.mean(axis=0), middle)
+
+
+def pixel_of(pose, point_m) -> QPoint:
+    return QPoint(*np.rint(pose.project(point_m)[0, :2]).astype(int).tolist())
+
+
+def test_the_map_follows_a_thing_while_it_is_dragged_and_settles(window, qtbot, monkeypatch):
+    models = models_of(window)
+    free, synthesis = shown(window, qtbot), models.synthesis
+    models.edits.add_to_scene(Thing("screen", (1.5, 0.5, 1.0), 0.0, (1.2, 1.2, 0.03)))
+    np.testing.assert_array_equal(shown(window, qtbot), free)  # it stands aside
+    view = window.findChild(SceneView)
+    scene = view.scene
+    qtbot.waitUntil(lambda: scene.pose.size_px == (view.width(), view.height()), timeout=5_000)
+    view.grab()
+    pose = scene.pose
+    start = pixel_of(pose, scene.things.points_m.mean(axis=0))
+    held_m = scene.things.under(pose.position, pose.ray(start.x(), start.y()))[1]
+    there = pixel_of(pose, held_m - [1.5, 0.0, 0.0])
+    written = []
+    monkeypatch.setattr(
+        type(view.overlay), "_paint_beside", lambda _, painter, text, at: written.append(text)
+    )
+    widget = view.childAt(start)
+    QTest.mousePress(widget, LEFT, Qt.KeyboardModifier.NoModifier, start)
+    for part in (0.3, 0.7, 1.0):
+        QTest.mouseMove(widget, start + (there - start) * part)
+    (moved,) = things(window)
+    assert abs(moved.position_m[0]) < 0.1
+    assert synthesis.moving
+    values = models.session.maps.synthetic
+    qtbot.waitUntil(lambda: values.map.values.sum() < 0.5 * free.sum(), timeout=10_000)
+    view.grab()
+    assert written[-1] == "x {:+.2f}   y {:+.2f}   z {:+.2f} m".format(*moved.position_m)
+    QTest.mouseRelease(widget, LEFT, Qt.KeyboardModifier.NoModifier, there)
+    final = shown(window, qtbot)
+    made = Synthesizer(models.document.mesh, synthesis.made_by()[0]().options)
+    np.testing.assert_array_equal(made.map(models.sensor.sensor).values, final)
+    window.action("undo").trigger()
+    np.testing.assert_array_equal(shown(window, qtbot), free)
 
 
 def move(widget, place: QPoint, keys: Qt.KeyboardModifier) -> None:

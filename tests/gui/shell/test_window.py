@@ -18,10 +18,14 @@ from window_models import all_actions, models_of
 
 from sd2app.maps.overview import Overview
 from sd2app.playback.views import TimeRuler
+from sd2app.sensor.things_page import ThingsPage
 from sd2app.shell.keys.dialog import KeysDialog
 from sd2app.shell.tab_order import controls_of
+from sd2app.widgets.inputs import Choice
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.maps import DopplerMap
+from sd2core.mesh.things import Thing
+from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
 
 
@@ -496,6 +500,38 @@ def test_a_recording_with_a_missing_file_shows_the_rest_and_finds_it_again(
     with qtbot.waitSignal(document.opened, timeout=10_000):
         document.relink(tmp_path / "elsewhere")
     assert document.mesh is not None
+
+
+def test_a_thing_whose_file_is_gone_is_named_left_out_and_found_again(
+    empty_window, recording_copy, qtbot, tmp_path
+):
+    chair = tmp_path / "chair.obj"
+    chair.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    recording = open_recording(recording_copy)
+    box = Thing("box", (1.0, 0.3, 1.0))
+    recording.things = (Thing(str(chair), (2.0, 0.3, 1.0)), box)
+    recording.save()
+    (tmp_path / "store").mkdir()
+    chair.rename(tmp_path / "store" / "chair.obj")
+    document = models_of(empty_window).document
+    with qtbot.waitSignal(document.failed, timeout=10_000):
+        empty_window.open_paths([recording_copy])
+    assert "The mesh of thing 1 is not at" in empty_window.messages.text
+    assert "chair.obj" in empty_window.messages.text
+    assert document.mesh.surroundings.things == (box,)
+    assert empty_window.action("relink").isEnabled()
+    empty_window.bring_up("Sensor", "Things")
+    chosen = empty_window.findChild(ThingsPage).findChildren(Choice)[1]
+    assert chosen.itemText(0) == "1: chair.obj (file missing)"
+    edits = models_of(empty_window).edits
+    edits.begin_scene_drag(0)  # of those that are there
+    edits.drag_in_scene((0.25, 0.0, 0.0))
+    edits.end_scene_drag((0.5, 0.0, 0.0))
+    assert document.recording.things[1].position_m == (1.5, 0.3, 1.0)
+    with qtbot.waitSignal(document.opened, timeout=10_000):
+        document.relink(tmp_path / "store")
+    assert [one.name for one in document.mesh.surroundings.things] == ["chair.obj", "box"]
+    assert not document.recording.missing()
 
 
 def test_saving_keeps_sensor_and_offset(empty_window, recording_copy, qtbot):
