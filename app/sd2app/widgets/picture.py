@@ -16,17 +16,6 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 
 
-@runtime_checkable
-class Pictured(Protocol):
-    """Widget that knows what a picture of it shows, such as a canvas."""
-
-    def picture_size(self) -> QSize:
-        """Size of the picture, in pixels."""
-
-    def paint_picture(self, painter: QPainter) -> None:
-        """Paint the picture."""
-
-
 _KINDS = "Picture (*.png);;Drawing (*.svg)"
 
 
