@@ -267,6 +267,8 @@ class MainWindow(QMainWindow):
                 view.setVisible(not starts)
             self.start.refresh()
             self.start.setVisible(starts)
+            if not starts:  # Space plays, whatever had the keyboard on the page
+                self._panels["tracks"].setFocus()
 
     def _show_panes(self) -> None:
         """Show the panes of the layout that have content."""
