@@ -71,8 +71,7 @@ ELSEWHERE: Mapping[str, tuple[str, ...]] = {
     "Spans": (
         "span_starts_here", "span_ends_here", "nudge_back", "nudge_on", "-", "split_span",
         "merge_spans", "meet_spans", "duplicate_spans", "delete_spans", "fill_gaps", "-",
-        "loop_span",
-        "select_all", "spans_up", "spans_down",
+        "loop_span", "select_all", "spans_up", "spans_down",
     ),
     "Tracks": (
         "@tracks", "-", "previous_track", "next_track", "-", "rename_track", "overlap",

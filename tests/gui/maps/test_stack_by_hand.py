@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from xml.etree import ElementTree
 
 import numpy as np
@@ -192,7 +193,8 @@ def test_the_context_menu_reads_sets_and_plays(window, stack, qtbot):
     bin_, frame = divmod(int(values.argmax()), values.shape[1])
     time_s = c.synthetic.map.timebase.time_of(frame) + 0.5 / 30  # the middle of the frame
     velocity_mps = c.synthetic.map.axis.centres_mps[bin_]
-    place = QPoint(round(view.scale.x_of(time_s)), round(view.y_of(velocity_mps)))
+    # A pixel that begins within the frame, however wide the map is.
+    place = QPoint(math.ceil(view.scale.x_of(time_s)), round(view.y_of(velocity_mps)))
     pick(menu_at(view, place), "Copy value")
     words = QGuiApplication.clipboard().text()
     assert f"frame {frame}" in words
