@@ -16,6 +16,7 @@ import time
 from pathlib import Path
 
 from sd2core.cli.background import run_in_folder
+from sd2core.options.fitting import meshes_of
 from sd2core.runs.command_folder import CommandFolder
 
 STAGES = ["find", "refine", "fit", "write"]
@@ -70,6 +71,7 @@ def main() -> int:
     parser.add_argument("--focal-px", type=float)
     parser.add_argument("--person-box")
     parser.add_argument("--person-frame")
+    parser.add_argument("--people", default="")
     options = parser.parse_args()
     return run_in_folder(CommandFolder(options.folder), lambda: fit(options))
 
@@ -98,10 +100,12 @@ def fit(options: argparse.Namespace) -> int:
     for stage in STAGES[1:]:
         say(event="progress", stage=stage, done=1, total=1, unit="step")
     say(event="note", text="This was no fit.")
-    if options.body:
-        write_mesh(options.out, options.frames)
-    else:
-        options.out.mkdir()
+    people = [int(number) for number in options.people.split(",") if number]
+    for out in meshes_of(options.out, people):
+        if options.body:
+            write_mesh(out, options.frames)
+        else:
+            out.mkdir()
     partial.unlink()
     say(event="done", out=str(options.out), frames=options.frames, present=options.frames,
         seconds=0.1)  # fmt: skip

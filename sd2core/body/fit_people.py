@@ -26,17 +26,11 @@ from sd2core.body.people import SeenPerson, chosen_people, find_people
 from sd2core.body.solve import one_thread
 from sd2core.files.atomic import atomic_write_text
 from sd2core.io.video import open_video
+from sd2core.options.fitting import meshes_of
 from sd2core.progress import Progress, silent
 
 _STATURE = "stature.txt"
 """File in the folder of a fit: what the floor told of the person's height, in metres."""
-
-
-def meshes_of(out: Path, people: Sequence[SeenPerson]) -> list[Path]:
-    """File of each person: as it is called for one, ``NAME-2.zarr`` for the second of several."""
-    if len(people) == 1:
-        return [out]
-    return [out.with_name(f"{out.stem}-{each.number}{out.suffix}") for each in people]
 
 
 def people_to_fit(
@@ -84,7 +78,8 @@ def fit_people(
     path : Path
         The video.
     out : Path
-        The mesh, where there is one person; of several, see :func:`meshes_of`.
+        The mesh, where there is one person; of several, see
+        :func:`~sd2core.options.fitting.meshes_of`.
     people : sequence of SeenPerson
         Of :func:`people_to_fit`.
     choices : FitChoices
@@ -96,7 +91,7 @@ def fit_people(
     restart : bool
         Discard the results of a stopped fit.
     """
-    outs = meshes_of(out, people)
+    outs = meshes_of(out, [each.number for each in people])
     partials = [each.with_name(each.name + PARTIAL) for each in outs]
     for each in outs:
         check_fit_output(each)

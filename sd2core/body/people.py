@@ -24,7 +24,7 @@ from sd2core.io.video import VideoReader
 from sd2core.numerics.compiled import worker_count
 from sd2core.progress import Progress, silent
 
-_VERSION = 2
+_VERSION = 3
 _SHORTEST_S = 1.0
 """Time for which somebody has to be seen, if the video is longer."""
 _SURELY_SEEN = 0.75

@@ -22,7 +22,7 @@ _SMALL_EVERY_S = 0.5
 _UNSEEN_S, _HIDDEN_S = 0.35, 1.5
 """Time for which somebody who is not seen is looked for where they should be, and known at once."""
 _AWAY, _AWAY_PER_S = 0.03, 0.2
-_GREW, _GREW_PER_S = 0.06, 0.2
+_GREW, _GREW_PER_S = 0.06, 0.15
 _UNLIKE = 0.04
 """Deviation of a person's place (squares) and size (logarithm) from those expected, and what is
 added each second; deviation of the similarity of their looks from 1."""
@@ -129,7 +129,9 @@ class PeopleFollower:
             if row not in doubtful:
                 alone = self._is_alone(sights[column], self._active[row])
                 self._active[row].add(number, time_s, sights[column], learn=alone)
-        for column in set(range(len(sights))) - set(order.values()):
+        # A body that may be of one of several is not somebody new.
+        held = range(len(sights)) if doubtful else order.values()
+        for column in set(range(len(sights))) - set(held):
             sight = sights[column]
             new = Stretch(Trail(sight.roi, time_s, time_s), Looks(sight.looks))
             new.add(number, time_s, sight)
@@ -189,9 +191,9 @@ def _one_body(one: NDArray[np.bool_], two: NDArray[np.bool_]) -> bool:
 
 
 def assigned(costs: Floats) -> tuple[dict[int, int], set[int]]:
-    """Body of each stretch, and stretches of which it is not sure, by what speaks against each.
+    """Body of each stretch, and stretches of which it is not sure.
 
-    ``costs`` is (stretches, bodies).
+    ``costs`` (stretches, bodies) is how much speaks against each body being of each stretch.
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -200,17 +202,17 @@ def assigned(costs: Floats) -> tuple[dict[int, int], set[int]]:
     padded = np.hstack([costs, np.full((rows, rows), _NOBODY)])
     order = linear_sum_assignment(padded)[1]
     taken = {row: int(column) for row, column in enumerate(order) if column < columns}
+    free = [column for column in range(columns) if column not in taken.values()]
     doubtful = set()
     for one in taken:
-        for other in range(rows):
-            if other == one:
-                continue
-            now = padded[one, order[one]] + padded[other, order[other]]
-            # The other one has this body instead, and this one theirs or none.
+        own = padded[one, order[one]]
+        worse = [padded[one, column] - own for column in free]  # it is a body of nobody's
+        for other in set(range(rows)) - {one}:  # the other one has this body, this one theirs
             exchanged = padded[other, order[one]] + min(padded[one, order[other]], _NOBODY)
-            if exchanged - now < _SURELY:
-                doubtful |= {one, other}
-    return taken, doubtful & set(taken)
+            worse.append(exchanged - own - padded[other, order[other]])
+        if min(worse, default=np.inf) < _SURELY:
+            doubtful.add(one)
+    return taken, doubtful
 
 
 def _same_square(one: Roi, two: Roi) -> bool:

@@ -21,7 +21,7 @@ from sd2core.cli.output import (
     progress_events,
 )
 from sd2core.cli.output_folders import refuse_existing
-from sd2core.options.fitting import FIT_CHOICES, Fitting
+from sd2core.options.fitting import FIT_CHOICES, Fitting, meshes_of
 from sd2core.options.kinds import Natural, Typed, joined
 from sd2core.options.records import ARGUMENT, OptionError, Place, given
 from sd2core.options.shared import JsonAndProgress, Overwrite
@@ -193,7 +193,7 @@ def _tell_end(options: Fit, meshes: list[tuple[Path, FittedVideo]], seconds: flo
 
 def _fit_people(options: Fit) -> None:
     """Fit everybody, or some."""
-    from sd2core.body.fit_people import fit_people, meshes_of, people_to_fit
+    from sd2core.body.fit_people import fit_people, people_to_fit
     from sd2core.body.fit_video import PARTIAL
 
     assert options.out is not None
@@ -203,11 +203,11 @@ def _fit_people(options: Fit) -> None:
     with ExitStack() as stack:
         report = _lines(options) if options.progress_json else _bars(stack)
         people = people_to_fit(options.video, numbers, choices, report, options.models)
-        outs = meshes_of(options.out, people)
+        found = [each.number for each in people]
+        outs = meshes_of(options.out, found)
         stopped = any(mesh.with_name(mesh.name + PARTIAL).exists() for mesh in outs)
         for mesh in outs:
             refuse_existing(mesh, options.overwrite or (stopped and not options.restart))
-        found = [each.number for each in people]
 
         def report_of(number: int) -> FitReport:
             return (

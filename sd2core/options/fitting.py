@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Literal
@@ -20,6 +20,13 @@ FIT_CHOICES = (
     *("resolution", "landmark_model"),
 )
 """Options that say how a body is fitted, and not to whom or where."""
+
+
+def meshes_of(out: Path, numbers: Sequence[int]) -> list[Path]:
+    """File of each person: as it is called for one, ``NAME-2.zarr`` for number 2 of several."""
+    if len(numbers) < 2:
+        return [out]
+    return [out.with_name(f"{out.stem}-{number}{out.suffix}") for number in numbers]
 
 
 class Fitting(OptionRecord):

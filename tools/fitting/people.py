@@ -25,10 +25,10 @@ from sd2core.progress import Progress, silent
 from tools.fitting.cast import PEOPLE
 from tools.fitting.meetings import CAMERA, FRAMES_PER_S, Actor, Part, actor, pictures
 
-OWN = PEOPLE["ada"]
+OWN = PEOPLE["chen"]
 OTHERS = {
-    "unlike": PEOPLE["femi"],
-    "like": replace(PEOPLE["chen"], outfit=replace(OWN.outfit, hair=(0.12, 0.10, 0.10))),
+    "unlike": PEOPLE["dora"],
+    "like": replace(PEOPLE["bo"], outfit=replace(OWN.outfit, hair=(0.09, 0.08, 0.08))),
 }
 _OFF = 0.1
 """Distance of the hips in squares from where they are, beyond which somebody else is shown."""

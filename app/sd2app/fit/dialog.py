@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPainterPath, QPen
-from PySide6.QtWidgets import QDialog, QLabel, QSizePolicy, QWidget
+from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, QSize, Qt
+from PySide6.QtGui import QColor, QIcon, QImage, QMouseEvent, QPainter, QPainterPath, QPen, QPixmap
+from PySide6.QtWidgets import QDialog, QLabel, QListWidget, QListWidgetItem, QSizePolicy, QWidget
 
+from sd2app.fit.portraits import PICTURE_PX, Portrait
 from sd2app.fit.setup import DEFAULT_STATURE_M, FitSetupModel
 from sd2app.manual.help import with_help
 from sd2app.palette import Palette
@@ -25,6 +26,14 @@ _CAMERAS = {
     "focal": "focal length",
 }
 _DIMMED = 110
+_SCALE = (
+    f"{DEFAULT_STATURE_M:g} m where it is not known. It fixes the scale: all distances and"
+    " velocities are proportional to it."
+)
+_OF_FIRST = (
+    "Of the first who is ticked, where it is known. How tall the others are beside them, the"
+    " floor tells on which all stand."
+)
 
 
 class PersonPicker(Canvas):
@@ -135,6 +144,48 @@ class PersonPicker(Canvas):
         )
 
 
+class PeopleList(QListWidget):
+    """Everybody in the video; who is ticked is fitted, and who is clicked is shown."""
+
+    def __init__(self, setup: FitSetupModel, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._setup = setup
+        self._shown: list[Portrait] = []
+        self.setAccessibleName("People to fit")
+        self.setIconSize(QSize(PICTURE_PX, PICTURE_PX))
+        self.setMinimumHeight(2 * PICTURE_PX)
+        self.itemChanged.connect(self._tick)
+        self.currentRowChanged.connect(self._show)
+        setup.changed.connect(self._refresh)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        portraits = self._setup.portraits
+        self.setVisible(bool(portraits))
+        with QSignalBlocker(self):
+            if portraits is not self._shown:
+                self._shown = portraits
+                self.clear()
+                for each in portraits:
+                    side, form = PICTURE_PX, QImage.Format.Format_RGB888
+                    image = QImage(each.picture.data, side, side, 3 * side, form)
+                    item = QListWidgetItem(QIcon(QPixmap.fromImage(image)), each.words)
+                    item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
+                    self.addItem(item)
+            for row, each in enumerate(portraits):
+                ticked = each.number in self._setup.choices.people
+                state = Qt.CheckState.Checked if ticked else Qt.CheckState.Unchecked
+                self.item(row).setCheckState(state)
+
+    def _tick(self, item: QListWidgetItem) -> None:
+        number = self._shown[self.row(item)].number
+        self._setup.tick(number, item.checkState() == Qt.CheckState.Checked)
+
+    def _show(self, row: int) -> None:
+        if 0 <= row < len(self._shown):
+            self._setup.show_frame(self._shown[row].frame)
+
+
 class NewFromVideoDialog(QDialog):
     """A view of :class:`FitSetupModel`; what is asked for is in the model."""
 
@@ -168,7 +219,11 @@ class NewFromVideoDialog(QDialog):
         self._person = QLabel(self)
         self._person.setWordWrap(True)
         tip = "Have the person chosen"
-        self._clear = outlined("Clear", tip, lambda: setup.change(person=None), self, name=tip)
+        who = {"person": None, "people": ()}
+        self._clear = outlined("Clear", tip, lambda: setup.change(**who), self, name=tip)
+        tip = "Find everybody in the video, to tick those to fit"
+        self._everybody = outlined("Who is there?", tip, self._find, self)
+        self._people = PeopleList(setup, self)
         self._stature = option_box(Fit, "stature_m", " m", decimals=2, step=0.01)
         self._stature.setValue(DEFAULT_STATURE_M)
         self._stature.valueChanged.connect(lambda value_m: setup.change(stature_m=value_m))
@@ -191,16 +246,17 @@ class NewFromVideoDialog(QDialog):
         self._message = sentence("")
 
     def _lay_out(self) -> None:
-        scale = _hint(
-            f"{DEFAULT_STATURE_M:g} m where it is not known. It fixes the scale: all distances and"
-            " velocities are proportional to it."
-        )
+        self._scale = _hint("")
         form = form_of(
             ("Video", row_of((self._video, 1), self._other_video, spacing_px=8)),
-            ("Person", row_of((self._person, 1), self._clear, spacing_px=8)),
-            ("", _hint("Drag a rectangle around the person, where there are several.")),
+            ("Person", row_of((self._person, 1), self._clear, self._everybody, spacing_px=8)),
+            (
+                "",
+                _hint("Of several: drag a rectangle around one, or see who is there."),
+            ),
+            ("", self._people),
             ("Body height", side_by_side(self._known, self._stature)),
-            ("", scale),
+            ("", self._scale),
             ("Camera", side_by_side(self._camera, self._angle, self._focal)),
             ("Save as", row_of((self._folder, 1), self._other_folder, spacing_px=8)),
             gaps_px=(16, 12),
@@ -220,11 +276,13 @@ class NewFromVideoDialog(QDialog):
         self._folder.setText(str(choices.folder) if choices.folder is not None else "")
         self._other_folder.setEnabled(choices.folder is not None)
         self._slider.show_frame(setup.frame, setup.frames, setup.time_s)
-        person = choices.person
-        self._person.setText(
-            "who is seen best" if person is None else f"in the rectangle in frame {person.frame}"
-        )
-        self._clear.setVisible(person is not None)
+        self._person.setText(self._who())
+        self._clear.setVisible(choices.person is not None or bool(choices.people))
+        searching = setup.searched is not None
+        self._everybody.setVisible(setup.ready and not setup.portraits)
+        self._everybody.setText("Stop" if searching else "Who is there?")
+        several = len(choices.people) > 1
+        self._scale.setText(_OF_FIRST if several else _SCALE)
         self._known.show_checked(choices.stature_m is not None)
         self._stature.setEnabled(choices.stature_m is not None)
         if choices.stature_m is not None:
@@ -236,6 +294,17 @@ class NewFromVideoDialog(QDialog):
         if setup.focal_px is not None:
             self._focal.show_value(setup.focal_px)
         self._show_message()
+
+    def _who(self) -> str:
+        """Who is fitted, in words."""
+        setup, choices = self.setup, self.setup.choices
+        if setup.searched is not None:
+            return f"looking for everybody, {100.0 * setup.searched:.0f} %"
+        if choices.people:
+            one = len(choices.people) == 1
+            return ("person " if one else "people ") + ", ".join(map(str, choices.people))
+        person = choices.person
+        return "who is seen best" if person is None else f"in the rectangle in frame {person.frame}"
 
     def _show_message(self) -> None:
         setup = self.setup
@@ -254,6 +323,9 @@ class NewFromVideoDialog(QDialog):
         self._begin.setText("Continue" if setup.continues else "Fit")
 
     # --- what is clicked ------------------------------------------------------------------
+
+    def _find(self) -> None:
+        (self.setup.find_people if self.setup.searched is None else self.setup.stop_finding)()
 
     def _ask_video(self) -> None:
         start = str(self.setup.video.parent) if self.setup.video is not None else ""

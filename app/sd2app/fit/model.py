@@ -87,7 +87,7 @@ class FitModel(QObject):
             # Otherwise what was found before it was stopped is still so.
             self._landmarks = {}
         self.request = request
-        if request.mesh.exists():
+        if request.made:
             # Fitted, and the program ended before the recording was made.
             self._follow(None)
             self._complete()
@@ -115,7 +115,7 @@ class FitModel(QObject):
         """Hide the ended fit; a stopped one can still be continued from disk."""
         if not self.busy:
             request = self.request
-            if self.state == "failed" and request is not None and not request.partial.exists():
+            if self.state == "failed" and request and not any(map(Path.exists, request.partials)):
                 request.discard()
             self._settings.set_unfinished_fit(None)
             self._set_state("idle")
@@ -195,7 +195,7 @@ class FitModel(QObject):
         assert run is not None
         assert request is not None
         run.close()
-        if run.phase == "finished" and request.mesh.exists():
+        if run.phase == "finished" and request.made:
             self._complete()
         elif self.state == "cancelling":
             self._set_state("stopped")

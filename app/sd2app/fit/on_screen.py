@@ -14,6 +14,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
 from sd2core.files.recording_json import CameraEntry
 from sd2core.io.fitted import fitted_camera
+from sd2core.mesh.bodies import Body
 from sd2core.recording.recording import FILE_NAME, Recording, open_recording
 
 
@@ -127,6 +128,7 @@ class FitOnScreen(QObject):
         if recording is not None and recording.folder == made.folder:
             # Saving what is open must not take the mesh away again.
             recording.mesh, recording.camera = made.mesh, made.camera
+            recording.bodies = made.bodies
         if self._document.content is None or (waiting and not self._document.modified):
             self.open_result()
 
@@ -143,23 +145,30 @@ def make_recording(
     """Record video, written mesh and camera of a request; ``size`` is (width, height) upright.
 
     ``base`` is the open recording: where it is of the same video and has no mesh, its radar,
-    labels and sensor are taken along. Raises Sd2Error or OSError if it cannot be written.
+    labels and sensor are taken along. People but the first are other bodies of its scene.
+    Raises Sd2Error or OSError if it cannot be written.
     """
     camera = fitted_camera(request.mesh)
     if camera is None and request.focal_px is not None:
         width, height = size or (None, None)
         camera = CameraEntry(focal_px=request.focal_px, width=width, height=height, source="user")
+    bodies = tuple(
+        Body(str(mesh), person=f"person {number}")
+        for mesh, number in zip(request.meshes[1:], request.people[1:], strict=True)
+    )
     if (request.folder / FILE_NAME).exists():
         recording = open_recording(request.folder)
         recording.mesh, recording.camera = request.mesh, camera
+        recording.bodies = (*recording.bodies, *bodies)
         recording.save()
     elif base is not None and _awaits_mesh(base, request.video):
         title = request.folder.stem
         recording = replace(base, mesh=request.mesh, camera=camera, title=title)
+        recording.bodies = (*recording.bodies, *bodies)
         recording = recording.save_as(request.folder)
     else:
         recording = Recording.create(
-            request.folder, video=request.video, mesh=request.mesh, camera=camera
+            request.folder, video=request.video, mesh=request.mesh, camera=camera, bodies=bodies
         )
     request.forget()
     return recording

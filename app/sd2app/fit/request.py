@@ -13,6 +13,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import free_path, plain_path, remove
 from sd2core.files.texts import read_json
+from sd2core.options.fitting import meshes_of
 from sd2core.options.records import words_of
 from sd2core.recording.recording import FILE_NAME, SUFFIX, open_recording
 
@@ -50,17 +51,28 @@ class FitRequest:
     stature_m: float | None = None  # None: estimated
     focal_px: float | None = None  # upright picture; None: from the file, or usual field of view
     person: Person | None = None  # None: the one seen best
+    people: tuple[int, ...] = ()  # or people by their numbers, see `sd2 fit --people list`
     mesh_name: str = MESH_NAME  # in the folder
 
     @property
-    def mesh(self) -> Path:
-        """The mesh to be written."""
-        return self.folder / self.mesh_name
+    def meshes(self) -> list[Path]:
+        """The meshes to be written, one of each person."""
+        return meshes_of(self.folder / self.mesh_name, self.people)
 
     @property
-    def partial(self) -> Path:
-        """Partial result of a stopped fit, from which it continues."""
-        return self.folder / f"{self.mesh_name}.partial"
+    def mesh(self) -> Path:
+        """The first of them."""
+        return self.meshes[0]
+
+    @property
+    def made(self) -> bool:
+        """True if all are written."""
+        return all(mesh.exists() for mesh in self.meshes)
+
+    @property
+    def partials(self) -> list[Path]:
+        """Partial results of a stopped fit, from which it continues."""
+        return [mesh.with_name(f"{mesh.name}.partial") for mesh in self.meshes]
 
     @property
     def run(self) -> Path:
@@ -70,7 +82,8 @@ class FitRequest:
     def arguments(self) -> list[str]:
         """The same as a command line, whose progress can be followed."""
         # A mesh of this name in the folder is of a fit before.
-        command = replace(self.command(self.mesh), overwrite=True, progress_json=True)
+        out = self.folder / self.mesh_name
+        command = replace(self.command(out), overwrite=True, progress_json=True)
         return words_of("fit", command)
 
     def command(self, out: Path) -> Fit:
@@ -83,6 +96,7 @@ class FitRequest:
             focal_px=None if self.focal_px is None else round(self.focal_px, 2),
             person_box=None if person is None else person.box,
             person_frame=None if person is None else person.frame,
+            people=tuple(map(str, self.people)),
         )
 
     def asks_the_same(self, other: FitRequest) -> bool:
@@ -93,13 +107,14 @@ class FitRequest:
             and self.stature_m == other.stature_m
             and abs(focal_px - other_px) < _SAME_FOCAL_PX
             and self.person == other.person
+            and self.people == other.people
         )
 
     def save(self) -> None:
         """Keep it in its folder, which is made; what was done for other choices goes."""
         kept = read_request(self.folder)
         if kept is not None and not self.asks_the_same(kept):
-            remove(kept.partial)
+            kept.remove_partials()
         self.folder.mkdir(exist_ok=True)
         content = _REQUEST.dump_python(self, mode="json", exclude={"folder"})
         text = json.dumps(content | {"version": _VERSION}, indent=2)
@@ -111,9 +126,17 @@ class FitRequest:
             (self.folder / name).unlink(missing_ok=True)
         remove(self.run)
 
+    def remove_partials(self) -> None:
+        """Remove partial results, and of several people the meshes that were done before."""
+        for partial in self.partials:
+            remove(partial)
+        if len(self.people) > 1 and not self.made:
+            for mesh in self.meshes:
+                remove(mesh)
+
     def discard(self) -> None:
         """Remove all that a stopped fit has left."""
-        remove(self.partial)
+        self.remove_partials()
         self.forget()
         if self.folder.is_dir() and not any(self.folder.iterdir()):
             self.folder.rmdir()

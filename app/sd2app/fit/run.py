@@ -20,6 +20,7 @@ FORMAT, VERSION = "sd2-fit-progress", 1
 
 WORDS = {
     "models": "fetching the landmark models",
+    "people": "following everybody",
     "find": "finding the person",
     "refine": "looking again",
     "fit": "fitting the body",
@@ -89,11 +90,13 @@ class FitProgress(History):
         """Share of the whole work that is done, None while it is not known."""
         if self.stage not in self._stages:
             return None
-        weights = [_WEIGHTS.get(stage, _UNKNOWN_WEIGHT) for stage in self._stages]
+        kinds = [stage.partition(" ")[0] for stage in self._stages]  # "fit 2": of person 2
+        weights = [_WEIGHTS.get(kind, _UNKNOWN_WEIGHT) for kind in kinds]
         here = self._stages.index(self.stage)
         within = min(self.done / self.total, 1.0) if self.total else 0.0
         total = math.fsum(weights)
-        return (math.fsum(weights[:here]) + within * weights[here]) / total if total else None
+        done = math.fsum([*weights[:here], within * weights[here]])
+        return min(done / total, 1.0) if total else None
 
     @property
     def left_s(self) -> float | None:
@@ -113,7 +116,8 @@ class FitProgress(History):
     @property
     def text(self) -> str:
         """Stage and count in words."""
-        words = WORDS.get(self.stage, self.stage)
+        kind, _, person = self.stage.partition(" ")
+        words = WORDS.get(kind, self.stage) + (f", person {person}" if person else "")
         if not words:
             return "starting"
         if self.unit == "byte":

@@ -10,7 +10,9 @@ from typing import Any, Literal
 
 from PySide6.QtCore import QObject
 
+from sd2app.background.latest import LatestRunner
 from sd2app.background.quoting import quoted
+from sd2app.fit.portraits import Portrait, portraits_of
 from sd2app.fit.request import FitRequest, Person, read_request
 from sd2app.session.video_frames import VideoFrames
 from sd2core.body.camera import DEFAULT_FIELD_OF_VIEW_DEG
@@ -33,6 +35,7 @@ class FitChoices:
     camera: CameraWay = "file"  # source of the focal length
     angle_deg: float = DEFAULT_FIELD_OF_VIEW_DEG  # across the longer side of the picture
     person: Person | None = None  # rectangle around the person; None: one is chosen
+    people: tuple[int, ...] = ()  # those who are ticked in the list of everybody
 
 
 class FitSetupModel(VideoFrames):
@@ -45,12 +48,55 @@ class FitSetupModel(VideoFrames):
         super().__init__(parent)
         self.choices = FitChoices()
         self.video: Path | None = None
+        self.portraits: list[Portrait] = []
+        """Everybody in the video, once they were looked for."""
+        self.searched: float | None = None  # share of the video; None: nobody is looked for
+        self._finder = LatestRunner("people", self, self._take_people, self._find_no_one)
+        self._finder.partial.connect(self._search)
 
     def choose_video(self, path: Path, open_now: Recording | None = None) -> None:
         """Choose another video; the open recording of it, if saved, gets the mesh."""
         self.video = path
-        self.choices = replace(self.choices, folder=folder_for(path, open_now), person=None)
+        self.stop_finding()
+        self.portraits = []
+        folder = folder_for(path, open_now)
+        self.choices = replace(self.choices, folder=folder, person=None, people=())
         self.open_video(path)
+
+    # --- everybody ------------------------------------------------------------------------
+
+    def find_people(self) -> None:
+        """Look for everybody in the video."""
+        video = self.video
+        if video is not None:
+            self.searched = 0.0
+            self._finder.submit(lambda emit: portraits_of(video, emit))
+            self.changed.emit()
+
+    def stop_finding(self) -> None:
+        """Look for them no longer."""
+        self._finder.cancel()
+        self.searched = None
+        self.changed.emit()
+
+    def tick(self, number: int, fitted: bool) -> None:
+        """Fit a person of the list, or not."""
+        people = set(self.choices.people) - {number}
+        if fitted:
+            people.add(number)
+        self.change(people=tuple(sorted(people)), person=None)
+
+    def _search(self, share: float) -> None:
+        self.searched = share
+        self.changed.emit()
+
+    def _take_people(self, portraits: list[Portrait]) -> None:
+        self.portraits, self.searched = portraits, None
+        self.changed.emit()
+
+    def _find_no_one(self, error: Exception) -> None:
+        self.searched = None
+        self._refuse(error)
 
     # --- the choices ----------------------------------------------------------------------
 
@@ -110,7 +156,7 @@ class FitSetupModel(VideoFrames):
         y0, y1 = (round(min(max(y, 0), height)) for y in ys)
         if min((x1 - x0) / width, (y1 - y0) / height) < _SMALLEST_PERSON:
             return
-        self.change(person=Person(self.frame, x0, y0, x1 - x0, y1 - y0))
+        self.change(person=Person(self.frame, x0, y0, x1 - x0, y1 - y0), people=())
 
     def request(self) -> FitRequest:
         """All of it; only when :attr:`ready`."""
@@ -123,6 +169,7 @@ class FitSetupModel(VideoFrames):
             stature_m=choices.stature_m,
             focal_px=None if choices.camera == "file" else self.focal_px,
             person=choices.person,
+            people=choices.people,
         )
 
     @property
@@ -137,7 +184,8 @@ class FitSetupModel(VideoFrames):
     def first_frame(self) -> int:
         """The frame of the person who was chosen before, else the one in the middle."""
         if (kept := self.kept) is not None:
-            self.change(stature_m=kept.stature_m, person=kept.person, camera="file")
+            who = {"person": kept.person, "people": kept.people}
+            self.change(stature_m=kept.stature_m, camera="file", **who)
             if kept.focal_px is not None:
                 self.change(camera="focal")
                 self.set_focal(kept.focal_px)

@@ -90,7 +90,7 @@ def test_cancelled_says_so_at_once_and_is_continued(made, qtbot, request_, setti
     model.cancel()
     assert model.state == "cancelling"
     until(qtbot, model, "stopped")
-    assert request_.partial.read_text() == "13"
+    assert request_.partials[0].read_text() == "13"
     assert not request_.mesh.exists()
     assert settings.unfinished_fit == request_.folder
     model.resume()
@@ -132,7 +132,7 @@ def test_a_fit_that_goes_on_without_its_window_is_found_again(
     qtbot.waitUntil(lambda: later.landmarks_at(12) is not None, timeout=20_000)
     later.cancel()
     until(qtbot, later, "stopped")
-    assert request_.partial.read_text() == "13"
+    assert request_.partials[0].read_text() == "13"
 
 
 def test_discarding_leaves_nothing(made, qtbot, request_, settings) -> None:
@@ -163,7 +163,7 @@ def test_a_crash_is_no_success_and_can_be_continued(made, qtbot, request_) -> No
     until(qtbot, model, "failed")
     assert model.text
     model.dismiss()
-    assert request_.partial.exists()
+    assert request_.partials[0].exists()
     assert read_request(request_.folder) == request_
 
 

@@ -39,6 +39,30 @@ def setup(qtbot, video):
     setup.close()
 
 
+def test_who_is_ticked_or_drawn_around_is_fitted_and_not_both(setup) -> None:
+    setup.tick(3, True)
+    setup.tick(1, True)
+    request = setup.request()
+    assert request.people == (1, 3)
+    assert [mesh.name for mesh in request.meshes] == ["mesh-1.zarr", "mesh-3.zarr"]
+    assert request.command(Path("x.zarr")).people == ("1", "3")
+    setup.set_person(10, 10, 90, 90)
+    assert setup.choices.people == ()
+    setup.tick(2, True)
+    assert setup.request().person is None
+    assert [mesh.name for mesh in setup.request().meshes] == ["mesh.zarr"]
+    setup.tick(2, False)
+    assert setup.request().people == ()
+
+
+def test_a_video_without_anybody_is_told(setup, models, qtbot) -> None:
+    setup.find_people()
+    assert setup.searched == 0.0
+    qtbot.waitUntil(lambda: setup.searched is None, timeout=60_000)
+    assert setup.portraits == []
+    assert "Nobody was found" in setup.problem
+
+
 def test_the_video_is_shown_from_its_middle(setup, video, qtbot) -> None:
     assert setup.ready
     assert (setup.frames, setup.size, setup.frame) == (10, (160, 120), 5)

@@ -55,6 +55,18 @@ def test_landmarks_are_pixels_and_visibility() -> None:
     assert np.isnan(nobody.landmarks[8][:, :2]).all()
 
 
+def test_of_several_people_the_share_and_the_words_say_whose_stage_it_is() -> None:
+    stages = ["refine 1", "refine 3", "fit 1", "write 1", "fit 3", "write 3"]
+    progress = said(**START | {"stages": stages})
+    shares = []
+    for stage in stages:
+        progress.take([{"event": "progress", "stage": stage, "done": 1, "total": 1}])
+        shares.append(progress.share)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert progress.text.startswith("writing the mesh, person 3")
+
+
 @pytest.mark.parametrize(
     "line",
     [

@@ -105,6 +105,10 @@ class TestAssigning:
         order, doubtful = assigned(np.array([[1.0], [2.0]]))
         assert set(order) == doubtful == {0}
 
+    def test_one_who_may_be_a_body_of_nobody_is_doubtful(self) -> None:
+        assert assigned(np.array([[3.0, 3.5]]))[1] == {0}
+        assert assigned(np.array([[1.0, 5.0]]))[1] == set()
+
     def test_nobody_is_put_into_a_body_unlike_theirs(self) -> None:
         assert assigned(np.array([[20.0]])) == ({}, set())
 
