@@ -15,7 +15,6 @@ from sd2app.widgets.dialogs import ask_new
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 
-
 _KINDS = "Picture (*.png);;Drawing (*.svg)"
 
 
