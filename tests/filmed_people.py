@@ -24,6 +24,9 @@ STEP_S = 1.0 / 15.0
 FRAMES = 12
 _FROM_S = 0.6
 
+ONE_BY_ONE = ((65, 194), (227, 449), (505, 695), (744, 870), (922, 1200), (1236, 1361))
+"""Frames of the real video in which each of six people is in the picture, give or take five."""
+
 Picture = NDArray[np.uint8]
 
 

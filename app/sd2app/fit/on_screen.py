@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
@@ -128,7 +129,7 @@ class FitOnScreen(QObject):
         if recording is not None and recording.folder == made.folder:
             # Saving what is open must not take the mesh away again.
             recording.mesh, recording.camera = made.mesh, made.camera
-            recording.bodies = made.bodies
+            recording.bodies, recording.subject = made.bodies, made.subject
         if self._document.content is None or (waiting and not self._document.modified):
             self.open_result()
 
@@ -145,33 +146,39 @@ def make_recording(
     """Record video, written mesh and camera of a request; ``size`` is (width, height) upright.
 
     ``base`` is the open recording: where it is of the same video and has no mesh, its radar,
-    labels and sensor are taken along. People but the first are other bodies of its scene.
+    labels and sensor are taken along. People but the first are other bodies of its scene; all
+    are called by their numbers, unless the recording says who the first is.
     Raises Sd2Error or OSError if it cannot be written.
     """
     camera = fitted_camera(request.mesh)
     if camera is None and request.focal_px is not None:
         width, height = size or (None, None)
         camera = CameraEntry(focal_px=request.focal_px, width=width, height=height, source="user")
-    bodies = tuple(
-        Body(str(mesh), person=f"person {number}")
-        for mesh, number in zip(request.meshes[1:], request.people[1:], strict=True)
-    )
+    # With the video's name: data sets take recordings of one name for one person.
+    names = [f"person {number} of {request.video.stem}" for number in request.people]
+    others = zip(request.meshes[1:], names[1:], strict=True)
+    bodies = tuple(Body(str(mesh), person=name) for mesh, name in others)
+    given = {"mesh": request.mesh, "camera": camera}
+    if bodies:
+        given["subject"] = names[0]
     if (request.folder / FILE_NAME).exists():
-        recording = open_recording(request.folder)
-        recording.mesh, recording.camera = request.mesh, camera
-        recording.bodies = (*recording.bodies, *bodies)
+        recording = _with_meshes(open_recording(request.folder), given, bodies)
         recording.save()
     elif base is not None and _awaits_mesh(base, request.video):
-        title = request.folder.stem
-        recording = replace(base, mesh=request.mesh, camera=camera, title=title)
-        recording.bodies = (*recording.bodies, *bodies)
+        recording = _with_meshes(replace(base, title=request.folder.stem), given, bodies)
         recording = recording.save_as(request.folder)
     else:
-        recording = Recording.create(
-            request.folder, video=request.video, mesh=request.mesh, camera=camera, bodies=bodies
-        )
+        recording = Recording.create(request.folder, video=request.video, bodies=bodies, **given)
     request.forget()
     return recording
+
+
+def _with_meshes(
+    recording: Recording, given: dict[str, Any], bodies: tuple[Body, ...]
+) -> Recording:
+    """The same recording with the meshes that it awaited; its subject stays."""
+    kept = {"subject": recording.subject} if recording.subject else {}
+    return replace(recording, bodies=(*recording.bodies, *bodies), **given | kept)
 
 
 def _awaits_mesh(recording: Recording, video: Path) -> bool:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from filmed_people import film
+from filmed_people import ONE_BY_ONE, film
 
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.landmarks import find_landmarks
@@ -131,15 +131,11 @@ def test_who_leaves_and_comes_back_is_known(
     assert "known by their looks alone" in " ".join(track.notes)
 
 
-PEOPLE_ONE_BY_ONE = ((65, 194), (230, 445), (505, 695), (752, 868), (922, 1200), (1240, 1365))
-"""Frames in which each of six people is in the picture, give or take five."""
-
-
 @pytest.mark.parametrize("who", [0, 1, 2, 3, 4, 5])
 def test_of_six_real_people_one_is_followed(
     shared_data: Path, models: LandmarkModels, who: int
 ) -> None:
-    first, last = PEOPLE_ONE_BY_ONE[who]
+    first, last = ONE_BY_ONE[who]
     around = Rectangle(360.0, 10.0, 180.0, 400.0, (first + last) // 2)
     with open_video(shared_data / "video" / "one_by_one.mp4") as video:
         track = find_landmarks(video, models, person=around, silhouettes=1)

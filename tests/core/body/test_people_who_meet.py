@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from filmed_people import ONE_BY_ONE
 
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.people import find_people
@@ -14,8 +15,6 @@ from tools.fitting.people import OTHERS, Meeting, meetings, told_apart
 pytestmark = pytest.mark.slow
 
 SOME = [each for each in meetings() if each.apart_m in (0.8, 1.5)]
-ONE_BY_ONE = ((65, 194), (230, 445), (505, 695), (752, 868), (922, 1200), (1240, 1365))
-"""Frames in which each of six people is in the picture, give or take five."""
 
 
 @pytest.mark.parametrize("clothes", OTHERS)

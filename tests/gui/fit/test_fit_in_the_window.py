@@ -11,19 +11,24 @@ import pytest
 from answering import answer, once_asked
 from copied import copied_record
 from fake_denoisers import FakeDenoisers
-from finding import button_of, words_in
+from finding import button_of, named, words_in
 from PySide6.QtCore import QCoreApplication, QEvent, QPoint, Qt
 from PySide6.QtWidgets import (
     QCheckBox,
     QFileDialog,
+    QLabel,
+    QListWidget,
     QMessageBox,
     QPushButton,
+    QStyle,
+    QStyleOptionViewItem,
     QToolButton,
 )
 from window_models import models_of
 
 from sd2app.fit.bar import FitBar, FitOffer
 from sd2app.fit.dialog import NewFromVideoDialog
+from sd2app.fit.portraits import PICTURE_PX, Portrait
 from sd2app.fit.request import FitRequest, Person
 from sd2app.fit.setup import FitSetupModel
 from sd2app.settings import Settings
@@ -154,6 +159,70 @@ def test_a_fit_is_copied_for_a_terminal(made, qtbot, video) -> None:
     mesh = video.with_name("walk.zarr")
     assert copied_record() == asked[0].command(mesh)
     assert (copied_record().stature_m, copied_record().person_box) == (1.655, (40, 20, 80, 80))
+
+
+def press_tick(qtbot, people: QListWidget, row: int) -> None:
+    """Click the box of a row."""
+    people.scrollToItem(people.item(row))
+    option = QStyleOptionViewItem()
+    people.initViewItemOption(option)
+    option.rect = people.visualItemRect(people.item(row))
+    option.features |= QStyleOptionViewItem.ViewItemFeature.HasCheckIndicator
+    part = QStyle.SubElement.SE_ItemViewItemCheckIndicator
+    box = people.style().subElementRect(part, option, people)
+    qtbot.mouseClick(people.viewport(), Qt.MouseButton.LeftButton, pos=box.center())
+
+
+@pytest.fixture
+def three_people(monkeypatch) -> list[Portrait]:
+    """Three people of a video, found as soon as somebody looks for them."""
+    pictures = [np.full((PICTURE_PX, PICTURE_PX, 3), 60 * n, np.uint8) for n in (1, 2, 3)]
+    people = [
+        Portrait(1, 0.0, 0.9, 1.0, None, 11, pictures[0]),
+        Portrait(2, 0.2, 2.0, 0.93, None, 30, pictures[1]),
+        Portrait(3, 1.4, 2.0, 1.0, 1, 52, pictures[2]),
+    ]
+    monkeypatch.setattr("sd2app.fit.setup.portraits_of", lambda path, emit: emit(0.5) or people)
+    return people
+
+
+def test_who_is_ticked_makes_a_scene(made, qtbot, video, three_people) -> None:
+    window = made("--body")
+    show(window, qtbot, video)
+
+    def choose(dialog: NewFromVideoDialog) -> None:
+        people, setup = named(dialog, "People to fit", QListWidget), dialog.setup
+        qtbot.waitUntil(lambda: setup.picture is not None, timeout=10_000)
+        assert not people.isVisible()
+        qtbot.mouseClick(button_of(dialog, "Who is there?"), Qt.MouseButton.LeftButton)
+        qtbot.waitUntil(people.isVisible, timeout=10_000)
+        rows = [people.item(row) for row in range(people.count())]
+        assert [row.text() for row in rows] == [each.words for each in three_people]
+        assert "may be person 1" in rows[2].text()
+        for row, each in zip(rows, three_people, strict=True):
+            shown = row.icon().pixmap(PICTURE_PX, PICTURE_PX).toImage().pixelColor(40, 40)
+            assert shown.red() == each.picture[0, 0, 0]
+        for row in (2, 0, 1, 0):  # the first one is ticked by mistake
+            press_tick(qtbot, people, row)
+        assert setup.choices.people == (2, 3)
+        assert "people 2, 3" in [each.text() for each in dialog.findChildren(QLabel)]
+        place = people.visualItemRect(people.item(1)).center()
+        qtbot.mouseClick(people.viewport(), Qt.MouseButton.LeftButton, pos=place)
+        assert setup.frame == 30
+        assert setup.choices.people == (2, 3)
+        qtbot.mouseClick(button_of(dialog, "Fit"), Qt.MouseButton.LeftButton)
+
+    once_asked(NewFromVideoDialog, choose)
+    document = models_of(window).document
+    click(window, qtbot, "Fit a body…")
+    with qtbot.waitSignal(document.opened, timeout=30_000):
+        pass
+    made_of = open_recording(video.with_name("walk.sd2"))
+    assert made_of.mesh == made_of.folder / "mesh-2.zarr"
+    assert [Path(each.path).name for each in made_of.bodies] == ["mesh-3.zarr"]
+    assert document.recording.folder == made_of.folder
+    # Numbers as in the list, not by their order here.
+    assert document.mesh.persons == ("person 2 of walk", "person 3 of walk")
 
 
 @pytest.mark.slow
