@@ -101,10 +101,10 @@ def fit_people(
             partial.mkdir(exist_ok=True)  # what is left to do
     left = [row for row, partial in enumerate(partials) if partial.exists()]
     reports = {row: report_of(people[row].number) for row in left}
-    alone = len(people) == 1
+    one = len(people) == 1
     chosen = (
         {left[0]: choices}
-        if alone
+        if one
         else _with_statures(
             path,
             {row: (people[row], partials[row], reports[row]) for row in left},
@@ -119,10 +119,11 @@ def fit_people(
             path,
             outs[row],
             chosen[row],
-            report if alone else _for_the_rest(report),
+            report if one else _for_the_rest(report),
             models=models,
-            restart=restart and alone,
-            sightings=people[row].sightings,
+            restart=restart and one,
+            # Alone in a video, somebody is fitted as without a list.
+            sightings=None if people[row].alone else people[row].sightings,
         )
         yield people[row], outs[row], chosen[row], made
 

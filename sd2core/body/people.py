@@ -48,6 +48,11 @@ class SeenPerson:
         return np.isfinite(self.sightings.rois[:, 0])
 
     @property
+    def alone(self) -> bool:
+        """True if nobody else is seen in the video."""
+        return not self.sightings.others.any()
+
+    @property
     def from_s(self) -> float:
         """When the person is seen first."""
         return float(self.times_s[self.seen][0])

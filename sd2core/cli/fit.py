@@ -73,7 +73,7 @@ def _rectangle(text: str) -> tuple[float, float, float, float]:
 
 
 def _people(text: str) -> tuple[str, ...]:
-    words = tuple(word.strip() for word in text.split(","))
+    words = tuple(dict.fromkeys(word.strip() for word in text.split(",")))
     if words not in (ALL, LIST) and not all(word.isdigit() and int(word) for word in words):
         raise argparse.ArgumentTypeError(f"{text!r} is none of all, list, and numbers such as 1,3")
     return words
@@ -323,8 +323,10 @@ def _lines(options: Fit, number: int | None = None, numbers: Sequence[int] = ())
     last_landmarks_s = -1.0
     stages: Sequence[str] = STAGES
     if numbers:
-        refining = [f"refine {each}" for each in numbers]
-        stages = refining + [f"{stage} {each}" for each in numbers for stage in STAGES[2:]]
+        # Several are found before.
+        first = STAGES[:2] if len(numbers) == 1 else STAGES[1:2]
+        parts = first, STAGES[2:]
+        stages = [f"{stage} {each}" for part in parts for each in numbers for stage in part]
 
     def started(video: VideoReader, resumed: bool) -> None:
         print_event(

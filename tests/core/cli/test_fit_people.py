@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from cli_outcome import Sd2
-from filmed_people import crossing, film
+from filmed_people import crossing, film, swiping
 
 from sd2core.body.landmark_models import LandmarkModels
+from sd2core.io.mesh import load_mesh
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +57,30 @@ def test_each_gets_a_mesh(video: Path, sd2: Sd2, tmp_path: Path) -> None:
     again = sd2(*words)
     assert again.code == 1
     assert "two-1.npz exists" in again.err
+
+
+def test_nobody_is_fitted_where_one_is_missing(video: Path, sd2: Sd2, tmp_path: Path) -> None:
+    outcome = sd2("fit", video, "--people", "1,9", "--out", tmp_path / "two.npz")
+    assert outcome.code == 1
+    assert "no person 9" in outcome.err
+    assert "1 to 2" in outcome.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_who_is_alone_is_fitted_as_without_a_list(sd2: Sd2, tmp_path: Path) -> None:
+    video = film(tmp_path / "one.mp4", swiping()[0])
+    fits = []
+    for name, people in (
+        ("plain", ()),
+        ("all", ("--people", "all")),
+        ("twice", ("--people", "1,1")),
+    ):
+        out = tmp_path / f"{name}.npz"
+        words = ["--resolution", "low", "--landmark-model", "full", "--out", out]
+        assert sd2("fit", video, *people, *words).code == 0
+        fits.append(load_mesh(out))
+    for fit in fits[1:]:
+        np.testing.assert_array_equal(fit.read(0, 12), fits[0].read(0, 12))
 
 
 def test_a_stopped_run_makes_what_is_left(video: Path, sd2: Sd2, tmp_path: Path) -> None:
