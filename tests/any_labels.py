@@ -102,6 +102,7 @@ def any_labels(
             draw(notes),
             draw(st.none() | st.floats(0, 1)),
             draw(st.sampled_from(ORIGINS)),
+            draw(st.just("") | names),
         )
         for number, (track, start_s, end_s) in zip(ids, extents, strict=True)
     ]

@@ -15,7 +15,9 @@ from sd2core.timebase import Timebase
 
 def label_edits(timebase: Timebase) -> LabelEdits:
     """Edits on a model and a clock of their own, which nobody refuses and nothing keeps."""
-    document: Any = SimpleNamespace(recording=SimpleNamespace(labels=None), undo_stack=QUndoStack())
+    document: Any = SimpleNamespace(
+        recording=SimpleNamespace(labels=None), mesh=None, undo_stack=QUndoStack()
+    )
     session: Any = SimpleNamespace(refusal="", keep=lambda *_: None)
     playback = PlaybackModel()
     playback.set_timebase(timebase)

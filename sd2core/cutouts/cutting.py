@@ -38,7 +38,7 @@ _LOCK = ".sd2-lock"
 _CRF, _PRESET = 16, "fast"
 _COLUMNS = (
     "folder", "label", "track", "start_s", "end_s", "first_frame", "last_frame", "frames",
-    "note", "author", "confidence", "recording", "simulated",
+    "note", "author", "confidence", "recording", "simulated", "person",
 )  # fmt: skip
 
 
@@ -133,7 +133,8 @@ def write_index(folder: Path) -> None:
     writer.writerow(_COLUMNS)
     for one in entries:
         first, last, count = (one["frames"][name] for name in ("first", "last", "count"))
-        flat = one | one["span"] | {"first_frame": first, "last_frame": last, "frames": count}
+        flat = one | {"person": ""} | one["span"]
+        flat |= {"first_frame": first, "last_frame": last, "frames": count}
         cells = ("" if flat[name] is None else flat[name] for name in _COLUMNS)
         writer.writerow([as_cell(cell) if isinstance(cell, str) else cell for cell in cells])
     atomic_write_text(folder / "index.csv", table.getvalue())

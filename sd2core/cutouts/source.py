@@ -66,11 +66,14 @@ class CutSource:
         """Return the content of ``span.json``; the same for the same source and span."""
         first, stop = self.frames_of(span)
         frames, video = span.frames(self.timebase), self.video
+        told = asdict(span)
+        if not span.person:  # as before there were scenes: those that are written stay the same
+            del told["person"]
         return {
             "format": FORMAT,
             "version": VERSION,
             "program": f"SD² Studio {__version__}",
-            "span": asdict(span),
+            "span": told,
             "frames": frames and asdict(frames),
             "zero_s": self.zero_s(span),
             "frame_times_s": (self.timebase.times_s[first:stop] - self.zero_s(span)).tolist(),

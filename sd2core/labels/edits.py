@@ -252,9 +252,9 @@ def split(labels: Labels, timebase: Timebase, span_id: int, time_s: float) -> Ed
 def merge(labels: Labels, ids: Sequence[int]) -> Edit:
     """Merge spans of one track into one, from the first start to the last end.
 
-    The earliest of them keeps its id and label. Notes and authors that differ are joined, and the
-    lowest confidence given holds. Raises Sd2Error when they are on several tracks, or another span
-    of an exclusive track is between.
+    The earliest of them keeps its id, label and person. Notes and authors that differ are joined,
+    and the lowest confidence given holds. Raises Sd2Error when they are on several tracks, or
+    another span of an exclusive track is between.
     """
     parts = labels.these(ids)
     tracks = sorted({span.track for span in parts})

@@ -42,6 +42,7 @@ class SpanEntry(Entry):
     author: str = ""
     confidence: Annotated[float, Field(ge=0, le=1)] | None = None
     origin: Origin = "person"
+    person: str = ""
 
     def made(self) -> Span:
         """Make the span."""

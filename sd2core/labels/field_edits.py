@@ -19,7 +19,7 @@ from sd2core.labels.spans import Labels, LabelTrack, Overlap, Span
 from sd2core.labels.suggest import LABEL, TRACK
 from sd2core.timebase import Timebase
 
-SpanField = Literal["label", "note", "author", "confidence", "track"]
+SpanField = Literal["label", "note", "author", "confidence", "track", "person"]
 
 
 def set_field(labels: Labels, ids: Iterable[int], field: SpanField, value: Any) -> Edit:
@@ -29,9 +29,9 @@ def set_field(labels: Labels, ids: Iterable[int], field: SpanField, value: Any) 
     ----------
     labels : Labels
     ids : iterable of int
-    field : {"label", "note", "author", "confidence", "track"}
+    field : {"label", "note", "author", "confidence", "track", "person"}
     value : str, float or None
-        An empty note removes it; a confidence is 0 to 1, or None for unknown.
+        An empty note or person removes it; a confidence is 0 to 1, or None for unknown.
 
     Raises
     ------

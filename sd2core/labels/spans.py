@@ -53,6 +53,8 @@ class Span:
         Usually one of the label set; others are shown in grey.
     confidence : float, optional
         0 to 1.
+    person : str
+        Who of a scene of several does it; empty where that is not told.
     """
 
     id: int
@@ -64,6 +66,7 @@ class Span:
     author: str = ""
     confidence: float | None = None
     origin: Origin = "person"
+    person: str = ""
 
     def __post_init__(self) -> None:
         whole = isinstance(self.id, int) and not isinstance(self.id, bool)
@@ -75,6 +78,8 @@ class Span:
         check_name(self.track, "track")
         check_text(self.note, "note of a span")
         check_text(self.author, "author of a span")
+        if self.person:
+            check_name(self.person, "person")
         if not (abs(self.start_s) <= FARTHEST_S and abs(self.end_s) <= FARTHEST_S):
             raise Sd2Error(
                 f"{self.words()} is not in time", f"finite times in seconds, up to {FARTHEST_S:g}"

@@ -85,6 +85,12 @@ class LabelEdits(QObject):
         """Reason why labels cannot be edited; empty where they can."""
         return self._session.refusal
 
+    @property
+    def persons(self) -> tuple[str, ...]:
+        """Persons of the scene where there are several; none of one alone."""
+        mesh = self._document.mesh
+        return () if mesh is None or not mesh.others else mesh.persons
+
     # --- keys -----------------------------------------------------------------------------
 
     def relabel(self, label: str) -> None:
@@ -97,6 +103,11 @@ class LabelEdits(QObject):
         """Put the selected spans on another track."""
         ids = self._ids()
         self.apply(lambda labels, base: field_edits.set_field(labels, ids, "track", track))
+
+    def give_to(self, person: str) -> None:
+        """Say whose the selected spans are; nobody's with an empty name."""
+        ids = self._ids()
+        self.apply(lambda labels, base: field_edits.set_field(labels, ids, "person", person))
 
     def edge_here(self, side: Side) -> None:
         """Put an edge of the selected span at the frame on screen."""

@@ -256,12 +256,12 @@ def _ends_px(
 
 
 def text_on(span: Span, arrays: SpanArrays) -> str:
-    """Label of a span, after the confidence of a suggestion, or the rank of an unnamed one."""
+    """Label and person of a span, after a suggestion's confidence, or an unnamed one's rank."""
     if rank := arrays.ranks.get(span.id):
         return f"#{rank} {span.label}"
     if span.origin == "suggestion" and span.confidence is not None:
         return f"{100 * span.confidence:.0f} % {span.label}"
-    return span.label
+    return f"{span.label} · {span.person}" if span.person else span.label
 
 
 def map_overlay(model: LabelsModel) -> Overlay:

@@ -115,7 +115,7 @@ class SpanPage(QWidget):
     ) -> None:
         super().__init__(parent)
         self._model, self.table = model, table
-        self.search = SearchLine("Search label, note, track", self)
+        self.search = SearchLine("Search label, note, track, person", self)
         self._chosen = {name: Choice(f"Spans of this {name} only", self) for name in _ANY}
         for choice in self._chosen.values():
             choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)

@@ -38,13 +38,15 @@ class SpanCells(FramedCells):
             line.setToolTip(column.tip)
             return line
         coloured = column.id == "label"
+        colour_of = self._labels.colour_of
         choices = [
-            Choosable(one, one, swatch_icon(self._labels.colour_of(one)) if coloured else None)
+            Choosable(one or _NOBODY, one, swatch_icon(colour_of(one)) if coloured else None)
             for one in self._table.choices(column.listed)
         ]
         return self.listed(choices, column.heading, parent)
 
 
+_NOBODY = "Not told"
 _PADDING_PX = 8
 _HIDDEN = "span_table/hidden"
 _MENU = ("span_starts_here", "span_ends_here", "split_span", "merge_spans", "delete_spans")
@@ -76,6 +78,9 @@ class SpanTable(CellTable):
         self.clicked.connect(self._go)
         edits.labels.selection_changed.connect(self.mirror)
         edits.labels.changed.connect(self.mirror)
+        for signal in (edits.labels.changed, session.document.changed):
+            signal.connect(self._follow_persons)
+        self._follow_persons()
 
     # --- columns --------------------------------------------------------------------------
 
@@ -93,7 +98,7 @@ class SpanTable(CellTable):
             widest_px = max(map(metrics.horizontalAdvance, (column.wide, column.heading)))
             self.setColumnWidth(place, widest_px + _PADDING_PX)
             self.setColumnHidden(place, column.id in hidden)
-        self.columns_menu = self._made_columns_menu()
+        self.columns_menu = self._made_columns_menu(hidden)
         """Menu of the columns that are shown."""
         header.customContextMenuRequested.connect(
             lambda at: self.columns_menu.exec(header.mapToGlobal(at))
@@ -101,22 +106,30 @@ class SpanTable(CellTable):
         self.sortByColumn(0, Qt.SortOrder.AscendingOrder)
         self.setSortingEnabled(True)
 
-    def _made_columns_menu(self) -> QMenu:
+    def _made_columns_menu(self, hidden: list[str]) -> QMenu:
         menu = QMenu("Columns", self)
         menu.setToolTipsVisible(True)
         for place, column in enumerate(COLUMNS):
             action = menu.addAction(column.heading)
             action.setToolTip(column.tip)
             action.setCheckable(True)
-            action.setChecked(not self.isColumnHidden(place))
+            action.setChecked(column.id not in hidden)
             action.setEnabled(column.id != "start")  # one is always there
             action.toggled.connect(lambda shown, place=place: self._show_column(place, shown))
         return menu
 
     def _show_column(self, place: int, shown: bool) -> None:
         self.setColumnHidden(place, not shown)
-        hidden = [one.id for k, one in enumerate(COLUMNS) if self.isColumnHidden(k)]
+        chosen = zip(COLUMNS, self.columns_menu.actions(), strict=True)
+        hidden = [column.id for column, action in chosen if not action.isChecked()]
         self._session.settings.set_value(_HIDDEN, " ".join(hidden))
+
+    def _follow_persons(self) -> None:
+        """Offer the column of persons where there are some to choose from."""
+        place = next(place for place, one in enumerate(COLUMNS) if one.id == "person")
+        action, several = self.columns_menu.actions()[place], bool(self._model.choices("person"))
+        action.setVisible(several)
+        self.setColumnHidden(place, not (several and action.isChecked()))
 
     # --- one selection --------------------------------------------------------------------
 
@@ -223,10 +236,13 @@ class SpanTable(CellTable):
         for title, listed, run in (
             ("Give label", "label", self._edits.relabel),
             ("Put on track", "track", self._edits.put_on_track),
+            ("Give to person", "person", self._edits.give_to),
         ):
+            if not (choices := self._model.choices(listed)):
+                continue
             submenu = menu.addMenu(title)
-            for choice in self._model.choices(listed):
-                submenu.addAction(choice, partial(run, choice))
+            for choice in choices:
+                submenu.addAction(choice or _NOBODY, partial(run, choice))
         menu.addSeparator()
         menu.addActions([self._shell.action(name) for name in _MENU])
         menu.exec(event.globalPos())

@@ -55,7 +55,8 @@ class Column:
     text: Callable[[Span, Timebase], str]
     order: Callable[[Span], Any]  # sort key; ties stay in the order of time
     typed: Typed | None = None  # makes the edit of a typed text; None: not editable
-    listed: Literal["label", "track"] | None = None  # chosen from a list, for all selected spans
+    # Chosen from a list, for all selected spans.
+    listed: Literal["label", "track", "person"] | None = None
     wide: str = "000.000"  # a text as wide as the column is at first
     number: bool = False
     hidden: bool = False  # at first
@@ -111,6 +112,12 @@ COLUMNS: tuple[Column, ...] = (
         wide="■ right-to-left ",
     ),
     Column(
+        "person", "Person", "Who of the scene does it, for all selected spans",
+        lambda span, _: span.person, lambda span: span.person.casefold(),
+        _given("person"), "person",
+        wide="person 2",
+    ),
+    Column(
         "duration", "Length s", "Duration. Type seconds or frames (12 f): its end moves",
         lambda span, _: f"{span.duration_s:.3f}", lambda span: span.duration_s,
         _DURATION.typed, number=True, edge=_DURATION,
@@ -152,7 +159,7 @@ COLUMNS: tuple[Column, ...] = (
 
 @dataclass(frozen=True)
 class SpanFilter:
-    """Filter of spans by a text in label, note or track, and by label and track."""
+    """Filter of spans by a text in label, note, track or person, and by label and track."""
 
     text: str = ""
     label: str = ""
@@ -168,7 +175,10 @@ class SpanFilter:
             and (not self.track or span.track == self.track)
             and (
                 not text
-                or any(text in one.casefold() for one in (span.label, span.note, span.track))
+                or any(
+                    text in one.casefold()
+                    for one in (span.label, span.note, span.track, span.person)
+                )
             )
         ]
 
@@ -215,10 +225,17 @@ class SpanTableModel(RecordTableModel[Span]):
         return self._row_of.get(span_id)
 
     def choices(self, listed: str) -> list[str]:
-        """Return the labels of the set and others in use, or the tracks."""
+        """Return the labels of the set and others in use, the tracks, or nobody and the persons.
+
+        Where there is one person, who is not named, there is no choice of persons.
+        """
         labels = self._labels.labels
         if listed == "track":
             return [track.name for track in labels.tracks]
+        if listed == "person":
+            known = [*self._edits.persons]
+            known += sorted({span.person for span in labels.spans}.difference(["", *known]))
+            return ["", *known] if known else []
         known = [label.name for label in labels.label_set.labels]
         return known + sorted({span.label for span in labels.spans}.difference(known))
 

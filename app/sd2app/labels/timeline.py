@@ -37,7 +37,8 @@ def _tip_of(target: HitTarget) -> str:
     span = target.span
     if span is None:
         return target.track if target.part == "name" else ""
-    lines = [f"{span.label}: {span.start_s:.3f} to {span.end_s:.3f} s ({span.duration_s:.3f} s)"]
+    what = f"{span.label} of {span.person}" if span.person else span.label
+    lines = [f"{what}: {span.start_s:.3f} to {span.end_s:.3f} s ({span.duration_s:.3f} s)"]
     lines += [span.note] if span.note else []
     return "\n".join(lines)
 

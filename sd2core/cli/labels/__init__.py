@@ -103,7 +103,9 @@ def _show(options: Show) -> None:
     if not labels.spans:
         print(f"{options.file} holds no spans.")
         return
-    rows = [("id", "start s", "end s", "frames", "label", "track", "note")]
+    persons = any(span.person for span in labels.spans)
+    who = ("person",) if persons else ()
+    rows = [("id", "start s", "end s", "frames", "label", *who, "track", "note")]
     for span in labels.spans:
         frames = span.frames(clock)
         rows.append(
@@ -113,6 +115,7 @@ def _show(options: Show) -> None:
                 f"{span.end_s:.3f}",
                 "" if frames is None else frames.words(),
                 span.label,
+                *((span.person,) if persons else ()),
                 span.track,
                 " ".join(span.note.split()),
             )

@@ -2,7 +2,7 @@
 
 Source: BORIS user guide, and projects saved by BORIS 7 to 9. A span is a START and a STOP of the
 same subject and behaviour, in that order; the subject is the track, the behaviour the label. Its
-note is the comment of the START; author, confidence, origin and number stand in the comment of
+note is the comment of the START; author, confidence, origin, person and number stand in that of
 the STOP. The file is ASCII, because BORIS reads it in the encoding of the system.
 
 Times of events have the observation's time offset in them, and count from the start of the first
@@ -43,7 +43,7 @@ _PLAYERS = 8
 _LAST_S = 1e15
 
 _DETAILS = "sd2 "
-"""Prefix of the comment of a STOP that holds id, author, confidence and origin."""
+"""Prefix of the comment of a STOP that holds id, author, confidence, origin and person."""
 
 _LABEL_SET = "sd2_label_set"
 
@@ -270,6 +270,7 @@ def _details(comment: str) -> dict[str, Any] | None:
         "author": str(kept.get("author", "")),
         "confidence": float(known) if isinstance(known, int | float) else None,
         "origin": str(kept.get("origin", "import")),
+        "person": str(kept.get("person", "")),
         "id": number if isinstance(number, int) and not isinstance(number, bool) else None,
     }
 
@@ -362,6 +363,8 @@ def _stop_comment(span: Span) -> str:
         kept["confidence"] = float(span.confidence)
     if span.origin != "import":
         kept["origin"] = span.origin
+    if span.person:
+        kept["person"] = span.person
     return _DETAILS + json.dumps(kept)
 
 

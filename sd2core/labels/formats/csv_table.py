@@ -2,7 +2,7 @@
 
 RFC 4180, in UTF-8 without a byte order mark, with these columns::
 
-    id,track,overlap,label,start_s,end_s,first_frame,last_frame,frames,note,author,confidence,origin
+    id,track,overlap,label,start_s,end_s,first_frame,last_frame,frames,note,author,confidence,origin,person
 
 ``first_frame`` is the frame shown at ``start_s``, counted from 0, ``last_frame`` the last one of
 the span, and ``frames`` their number; a span outside the video has none. Seconds are exact, and
@@ -46,7 +46,7 @@ FORMAT = LabelFormat(
 
 COLUMNS = (
     "id", "track", "overlap", "label", "start_s", "end_s", "first_frame", "last_frame", "frames",
-    "note", "author", "confidence", "origin",
+    "note", "author", "confidence", "origin", "person",
 )  # fmt: skip
 
 # What other programs call them, the surest name first: ELAN and Audacity, BORIS' aggregated
@@ -69,6 +69,7 @@ _NAMES = {
     "author": ("author", "annotator", "coder"),
     "confidence": ("confidence",),
     "origin": ("origin",),
+    "person": ("person",),
     "observation": ("observation_id",),
 }  # fmt: skip
 
@@ -110,7 +111,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
                 *(span.id, as_cell(span.track), track.overlap, as_cell(span.label)),
                 *(float(span.start_s), float(span.end_s), *frames),
                 *(as_cell(span.note), as_cell(span.author)),
-                *("" if known is None else float(known), span.origin),
+                *("" if known is None else float(known), span.origin, as_cell(span.person)),
             )
         )
     atomic_write_text(path, text.getvalue())

@@ -2,8 +2,8 @@
 
 Source: "ELAN Annotation Format 3.0 and ELAN", The Language Archive, MPI for Psycholinguistics.
 Each row of spans is a tier of alignable annotations with the labels as controlled vocabulary.
-Notes, authors, confidence and origin are dependent tiers (symbolic association) below it. Times
-are whole milliseconds. Colours and keys, which ELAN itself keeps elsewhere, are a property of the
+All else about spans are dependent tiers (symbolic association) below it. Times are whole
+milliseconds. Colours and keys, which ELAN itself keeps elsewhere, are a property of the
 document that ELAN leaves alone.
 """
 
@@ -279,4 +279,5 @@ _DETAIL_TEXTS: dict[str, Callable[[Span], str]] = {
     "author": lambda span: span.author,
     "confidence": lambda span: "" if span.confidence is None else repr(float(span.confidence)),
     "origin": lambda span: "" if span.origin == "import" else span.origin,
+    "person": lambda span: span.person,
 }

@@ -26,6 +26,7 @@ DETAILS = {
     "author": "sd2-author",
     "confidence": "sd2-confidence",
     "origin": "sd2-origin",
+    "person": "sd2-person",
 }
 PROPERTY = "sd2-label-set"
 VOCABULARY_LANGUAGE = "und"
@@ -159,6 +160,7 @@ def _row(
         _confidence(path, place, texts["confidence"]),
         texts["origin"] or "import",
         whole_number(name[1:]) if name.startswith("a") else None,
+        person=texts["person"],
     )
 
 

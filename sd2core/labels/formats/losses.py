@@ -12,7 +12,7 @@ from sd2core.labels.spans import Labels, LabelTrack, Span
 
 Aspect = Literal[
     "tracks", "overlap", "empty tracks", "ids", "notes", "authors", "confidence", "origin",
-    "label set", "colours and keys",
+    "persons", "label set", "colours and keys",
 ]  # fmt: skip
 
 ASPECTS: tuple[Aspect, ...] = get_args(Aspect)
@@ -84,6 +84,8 @@ def losses_by_format(labels: Labels, file_format: LabelFormat) -> list[Loss]:
          "keeps no confidence: that of {} left out", "span"),
         ("origin", lambda span: span.origin != "import",
          "does not say who made a span: {} will count as imported", "span"),
+        ("persons", lambda span: bool(span.person),
+         "keeps no persons: those of {} left out", "span"),
     )  # fmt: skip
     for what, has, sentence, thing in fields:
         count = sum(has(span) for span in labels.spans)

@@ -37,7 +37,7 @@ _EXPECTED = "MNE annotations: onset, duration and description in each line, sepa
 _ENCODED = "# texts: percent-encoded"
 _PLAIN = " !$&'()*+-./:;<=>?@[]^_{|}~"
 _BASIC = ("onset", "duration", "description")
-_EXTRAS = ("track", "overlap", "id", "note", "author", "confidence", "origin")
+_EXTRAS = ("track", "overlap", "id", "note", "author", "confidence", "origin", "person")
 
 
 def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
@@ -61,6 +61,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
             "" if span.confidence is None else positional(float(span.confidence))
         ),
         "origin": lambda span: span.origin,
+        "person": lambda span: span.person,
     }
     lines = ["# MNE-Annotations", _ENCODED, f"# {', '.join((*_BASIC, *_EXTRAS))}"]
     # Track by track, so that their order comes back; MNE sorts by onset.
@@ -133,7 +134,10 @@ def _encoded(text: str) -> str:
 def _changed(labels: Labels) -> list[Loss]:
     losses: list[Loss] = []
     count = sum(
-        any(_encoded(text) != text for text in (span.label, span.track, span.note, span.author))
+        any(
+            _encoded(text) != text
+            for text in (span.label, span.track, span.note, span.author, span.person)
+        )
         for span in labels.spans
     )
     if count:

@@ -52,6 +52,7 @@ class Row:
     origin: str = "import"
     id: int | None = None
     frames: tuple[int, int] | None = None  # First and end, exclusive, where these stand for times.
+    person: str = ""
 
 
 @dataclass
@@ -88,7 +89,7 @@ class LabelRows:
     def add_line(self, row: Row, cells: Mapping[str, str]) -> None:
         """Add a row of a table, with the texts of its other columns, as far as there are any.
 
-        These are ``track``, ``overlap``, ``note``, ``author``, ``origin`` and ``id``.
+        These are ``track``, ``overlap``, ``note``, ``author``, ``origin``, ``person`` and ``id``.
         """
         track = cells.get("track") or DEFAULT_TRACK
         stated = next((one for one in OVERLAPS if one == cells.get("overlap")), None)
@@ -100,6 +101,7 @@ class LabelRows:
                 note=cells.get("note", ""),
                 author=cells.get("author", ""),
                 origin=cells.get("origin", ""),
+                person=cells.get("person", ""),
                 id=whole_number(cells.get("id", "")),
             )
         )
@@ -330,6 +332,7 @@ def _span(row: Row) -> Span:
             row.author,
             row.confidence,
             origin,
+            clean_name(row.person) if row.person.strip() else "",
         )
     except Sd2Error as error:
         why = error.found.replace("Span 1", "the span", 1)

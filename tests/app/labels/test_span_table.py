@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from types import SimpleNamespace
 
 import pytest
 from label_edits import label_edits
@@ -58,7 +59,7 @@ def table():
 
 def test_what_the_cells_show(table) -> None:
     assert [table.cell(0, column.id) for column in COLUMNS] == [
-        "1.000", "2.000", "left-to-right", "1.000", "30–59 (30)", "Gestures", "quick",
+        "1.000", "2.000", "left-to-right", "", "1.000", "30–59 (30)", "Gestures", "quick",
         "", "", "person",
     ]  # fmt: skip
     assert table.cell(1, "confidence") == "0.5"
@@ -102,6 +103,23 @@ def test_filtered_by_text_label_and_track(table) -> None:
     assert shown(track="Free", label="up-to-down") == []
     assert shown() == [1, 3, 2]
     assert table.model.total == 3
+
+
+def test_persons_are_offered_where_there_are_several(table) -> None:
+    assert table.model.choices("person") == []
+    scene = SimpleNamespace(others=["anna"], persons=("anna", "person 2"))
+    table.edits._document.mesh = scene
+    assert table.model.choices("person") == ["", "anna", "person 2"]
+    table.labels.select([1, 2])
+    assert table.type(0, "person", "anna")
+    assert [span.person for span in table.labels.labels.spans] == ["anna", "", "anna"]
+    table.model.set_filter(SpanFilter("ANNA"))
+    assert [span.id for span in table.model.spans] == [1, 2]
+    # Whom the scene does not have any more is still somebody.
+    table.edits._document.mesh = None
+    assert table.model.choices("person") == ["", "anna"]
+    table.edits.undo_stack.undo()
+    assert table.model.choices("person") == []
 
 
 def test_what_is_not_shown_any_more_is_not_selected_any_more(table) -> None:

@@ -374,3 +374,14 @@ def test_labels_that_were_saved_while_the_command_ran_are_not_replaced(
     assert outcome.code == 1
     assert f"{anna} was saved by a window or another program" in outcome.err
     assert [one.label for one in files.read_labels(anna).labels.spans] == ["saved meanwhile"]
+
+
+def test_persons_are_shown_where_spans_name_some(sd2: Sd2, tmp_path: Path) -> None:
+    path = written(tmp_path / "labels.json", (0.0, 1.0, "wave"))
+    assert "person" not in sd2("labels", "show", path).out
+    told = Span(2, "Gestures", 2.0, 3.0, "wave", person="anna")
+    files.write_labels(path, Labels(spans=(told,)))
+    heading, first, *_ = sd2("labels", "show", path).out.splitlines()
+    assert heading.split()[6:] == ["label", "person", "track", "note"]
+    assert "anna" in first
+    assert sd2("labels", "show", path, "--json").json["spans"][0]["person"] == "anna"

@@ -40,6 +40,7 @@ LABELS = Labels(
         ("author", "B"),
         ("confidence", 0.2),
         ("track", "Suggested"),
+        ("person", "anna"),
     ],
 )
 def test_one_field_changes(field: SpanField, value: object) -> None:
@@ -53,6 +54,8 @@ def test_one_field_changes(field: SpanField, value: object) -> None:
 
 
 def test_bad_values_are_refused() -> None:
+    with pytest.raises(Sd2Error, match="name of a person"):
+        set_field(LABELS, [1], "person", "two\nlines")
     with pytest.raises(Sd2Error, match=r"confidence 1\.5.*0 to 1"):
         set_field(LABELS, [1], "confidence", 1.5)
     with pytest.raises(Sd2Error, match="No track is called 'Feet'"):

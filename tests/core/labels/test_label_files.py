@@ -52,6 +52,7 @@ def any_labels(draw: st.DrawFn) -> Labels:
                 draw(notes),
                 draw(st.none() | st.floats(0, 1)),
                 draw(st.sampled_from(ORIGINS)),
+                draw(st.just("") | names),
             )
         )
     found = draw(st.lists(names, max_size=4, unique=True))

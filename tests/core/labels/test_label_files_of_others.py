@@ -99,8 +99,8 @@ def test_a_table_as_it_is_documented(tmp_path: Path) -> None:
     write_labels(path, Labels(spans=(Span(7, "Gestures", 0.5, 1.5, "wave", 'a "b"'),)), TIMEBASE)
     assert path.read_text(encoding="utf-8") == (
         "id,track,overlap,label,start_s,end_s,first_frame,last_frame,frames,"
-        "note,author,confidence,origin\n"
-        '7,"Gestures","exclusive","wave",0.5,1.5,5,14,10,"a ""b""","","","person"\n'
+        "note,author,confidence,origin,person\n"
+        '7,"Gestures","exclusive","wave",0.5,1.5,5,14,10,"a ""b""","","","person",""\n'
     )
 
 
@@ -461,7 +461,7 @@ def test_the_documentation_says_what_each_format_keeps() -> None:
     for one in FORMATS:
         aspects = (
             *("tracks", "overlap", "empty tracks", "ids", "notes", "authors"),
-            *("confidence", "origin", "label set", "colours and keys"),
+            *("confidence", "origin", "persons", "label set", "colours and keys"),
         )
         kept = [aspect for aspect in aspects if aspect in one.keeps]
         said = "all" if len(kept) == len(aspects) else ", ".join(kept) or "–"

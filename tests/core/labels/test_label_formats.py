@@ -66,6 +66,7 @@ def surviving(labels: Labels, keeps: frozenset[Aspect]) -> Labels:
             author=span.author if "authors" in keeps else "",
             confidence=span.confidence if "confidence" in keeps else None,
             origin=span.origin if "origin" in keeps else "import",
+            person=span.person if "persons" in keeps else "",
         )
         for number, span in enumerate(labels.spans, start=1)
     ]

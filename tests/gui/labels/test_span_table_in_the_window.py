@@ -15,6 +15,7 @@ from sd2app.labels.table import SpanTable
 from sd2app.labels.table_model import COLUMNS
 from sd2app.labels.timeline import ROW_PX, LabelTimeline
 from sd2app.widgets.table import ListedEditor
+from sd2core.mesh.bodies import Body
 
 NONE, LEFT = Qt.KeyboardModifier.NoModifier, Qt.MouseButton.LeftButton
 CONTROL, SHIFT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
@@ -125,6 +126,22 @@ def test_up_and_down_go_from_span_to_span(labelled) -> None:
     assert [span.label for span in c.labels.selected] == ["there"]
     press(labelled, "A", CONTROL)
     assert len(c.labels.selected) == 2
+
+
+def test_the_column_of_persons_is_there_where_there_are_several(labelled, qtbot) -> None:
+    c = models_of(labelled)
+    assert table(labelled).isColumnHidden(AT["person"])
+    mesh = c.document.recording.mesh
+    c.session.edits.add_to_scene(Body(str(mesh), (1.0, 0, 0), person="anna"))
+    qtbot.waitUntil(lambda: not table(labelled).isColumnHidden(AT["person"]), timeout=5000)
+    editor = edit(labelled, 0, "person")
+    assert [editor.itemText(k) for k in range(editor.count())] == ["Not told", "person 1", "anna"]
+    QTest.keyClick(editor, Qt.Key.Key_A)
+    press(labelled, "Return")
+    assert [span.person for span in c.labels.labels.spans] == ["anna", ""]
+    c.document.undo_stack.undo()
+    c.document.undo_stack.undo()
+    assert table(labelled).isColumnHidden(AT["person"])
 
 
 def test_keys_of_the_window_work_beside_the_table_and_not_in_its_cells(labelled) -> None:
