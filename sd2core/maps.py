@@ -16,7 +16,7 @@ from sd2core.files.atomic import atomic_write
 from sd2core.files.numpy_files import open_npz_file
 from sd2core.files.texts import OPEN_WITH_WRITER, check_meta
 from sd2core.mesh.presence import Presence, checked, runs
-from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, QUANTITIES
+from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, QUANTITIES, WHOLE
 from sd2core.numerics.map_accuracy import MapAccuracy
 from sd2core.options.kinds import MapKind as MapKind
 from sd2core.sensor import VelocityAxis
@@ -70,8 +70,8 @@ class LimbMaps:
 
     parts: tuple[str, ...]
     values: NDArray[np.float32]  # (parts, bins, frames)
-    # (joints, quantities, frames) as sd2core.mesh.vertex_parts names them; files of before have
-    # none.
+    # (joints, quantities, frames) as sd2core.mesh.vertex_parts names them, in a scene the joints of
+    # one person after the other, NaN of whom they are not known; files of before have none.
     kinematics: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
@@ -81,29 +81,53 @@ class LimbMaps:
                 f"Limb maps of shape {values.shape} and {len(self.parts)} parts",
                 "(parts, bins, frames), at least one part",
             )
-        moves = self.kinematics
-        if moves is not None and moves.shape != (len(JOINTS), len(QUANTITIES), values.shape[2]):
-            raise Sd2Error(
-                f"Kinematics of shape {moves.shape}",
-                f"({len(JOINTS)} joints, {len(QUANTITIES)} quantities, {values.shape[2]} frames)",
-            )
         object.__setattr__(self, "parts", tuple(str(part) for part in self.parts))
         object.__setattr__(self, "values", values)
+        moves, joints = self.kinematics, len(JOINTS) * max(1, len(self.persons))
+        if moves is not None and moves.shape != (joints, len(QUANTITIES), values.shape[2]):
+            raise Sd2Error(
+                f"Kinematics of shape {moves.shape}",
+                f"({joints} joints, {len(QUANTITIES)} quantities, {values.shape[2]} frames)",
+            )
 
     @classmethod
     def of_persons(cls, each: Sequence[LimbMaps], persons: Sequence[str]) -> LimbMaps:
-        """Join those of several persons, with their names in front; kinematics are of the first."""
+        """Join those of several persons, with their names in front."""
         parts = [
             f"{person}{OF}{part}"
             for person, one in zip(persons, each, strict=True)
             for part in one.parts
         ]
-        return cls(tuple(parts), np.concatenate([m.values for m in each]), each[0].kinematics)
+        values, moves = np.concatenate([one.values for one in each]), None
+        if any(one.kinematics is not None for one in each):
+            nothing = np.full((len(JOINTS), len(QUANTITIES), values.shape[2]), np.nan, np.float32)
+            known = [nothing if one.kinematics is None else one.kinematics for one in each]
+            moves = np.concatenate(known)
+        return cls(tuple(parts), values, moves)
+
+    @property
+    def by_person(self) -> tuple[LimbMaps, ...]:
+        """Those of each person, without the name; of one alone these themselves."""
+        found = []
+        for number, person in enumerate(self.persons):
+            rows = [row for row, one in enumerate(self.parts) if one.rpartition(OF)[0] == person]
+            moves = self.kinematics
+            if moves is not None:
+                moves = moves[number * len(JOINTS) : (number + 1) * len(JOINTS)]
+                moves = None if np.isnan(moves).any() else moves
+            names = (self.parts[row].rpartition(OF)[2] for row in rows)
+            found.append(LimbMaps(tuple(names), self.values[rows], moves))
+        return tuple(found) or (self,)
 
     @property
     def persons(self) -> tuple[str, ...]:
         """Names of the persons of a scene of several; empty of one alone."""
         return tuple(dict.fromkeys(one.rpartition(OF)[0] for one in self.parts if OF in one))
+
+    @property
+    def of_everybody(self) -> bool:
+        """True if the parts of the body are known of each person."""
+        return WHOLE not in {one.rpartition(OF)[2] for one in self.parts}
 
     def shown(self, part: str) -> NDArray[np.float32] | None:
         """Map (bins, frames) of a part, or of all parts of a person; None if there is none."""
@@ -115,19 +139,21 @@ class LimbMaps:
     def inputs(self, parts: Sequence[str]) -> NDArray[np.float32]:
         """Energies by frame, part and bin, (frames, len(parts) · bins), or the map and kinematics.
 
-        A part without a side (``forearm``) is the sum of both; of several persons parts are those
-        of the first. For
+        A part without a side (``forearm``) is the sum of both. For
         :data:`~sd2core.mesh.vertex_parts.KINEMATICS` alone columns are those of the map, all
-        quantities of all joints, and the root of what is seen of each part. Raises Sd2Error if a
+        quantities of all joints, and the root of what is seen of each part. In a scene of several
+        there are as many columns of each person, one person after the other. Raises Sd2Error if a
         part is missing.
         """
+        if self.persons:
+            return np.concatenate([one.inputs(parts) for one in self.by_person], axis=1)
         if tuple(parts) == (KINEMATICS,):
             return np.ascontiguousarray(self._moving().T)
         found = []
         for part in parts:
             rows = [
                 number
-                for number, name in enumerate(self._of_first)
+                for number, name in enumerate(self.parts)
                 if part in (name, name.partition(".")[0])
             ]
             if not rows:
@@ -137,21 +163,15 @@ class LimbMaps:
             found.append(self.values[rows].sum(axis=0))
         return np.ascontiguousarray(np.concatenate(found).T)
 
-    @property
-    def _of_first(self) -> tuple[str, ...]:
-        """Parts of the first person, without the name."""
-        first = f"{self.persons[0]}{OF}" if self.persons else ""
-        return tuple(one[len(first) :] for one in self.parts if one.startswith(first))
-
     def _moving(self) -> NDArray[np.float32]:
         """The map, and kinematics below it."""
         if self.kinematics is None:
             raise Sd2Error(
-                "The limb maps are of a version that did not keep kinematics",
-                "limb maps with kinematics",
-                "Make the map or the pairs again with --limbs",
+                "The limb maps have no kinematics, or not of everybody",
+                "kinematics, which this version keeps of whose parts of the body are known",
+                "Make the map or the pairs again with --limbs, or use a model of the map alone",
             )
-        seen = np.sqrt(self.values[: len(self._of_first)].sum(axis=1))
+        seen = np.sqrt(self.values.sum(axis=1))
         joints = self.kinematics.reshape(-1, seen.shape[1])
         return np.concatenate([self.values.sum(axis=0), joints, seen])
 

@@ -110,6 +110,12 @@ def known_parts(mesh: MeshSequence) -> VertexParts:
     return parts
 
 
+def splits_everybody(mesh: MeshSequence) -> bool:
+    """True if the parts of the body are known of each person of the scene."""
+    parts = body_parts(mesh)
+    return parts is not None and all(WHOLE not in one.names for one in (parts, *parts.others))
+
+
 def synthetic_map(
     maker: Synthesizer,
     sensor: VirtualSensor,

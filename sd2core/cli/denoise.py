@@ -58,7 +58,8 @@ def _denoise(options: Denoise) -> None:
             makes_one if kind in ("mesh", "recording") else "",
         )
     doppler = DopplerMap.load(options.map)
-    path = find_model(options.model or default_name(limbs=doppler.limbs is not None))
+    limbs = doppler.limbs is not None and doppler.limbs.of_everybody
+    path = find_model(options.model or default_name(limbs=limbs))
     # Before torch is loaded, which takes seconds.
     card = describe_model(path)
     check_map(doppler, card)

@@ -77,7 +77,7 @@ def _synthetic(recording: Recording, mesh: MeshSequence, *, limbs: bool) -> Dopp
 
 
 def _model_of(recording: Recording, mesh: MeshSequence) -> ModelCard:
-    from sd2core.body.parts import body_parts
+    from sd2core.body.parts import splits_everybody
     from sd2core.denoise.files import default_name, describe_model, find_model
 
     if recording.denoiser is None and recording.bundled_denoiser == "":
@@ -88,7 +88,7 @@ def _model_of(recording: Recording, mesh: MeshSequence) -> ModelCard:
         )
     path = recording.denoiser
     if path is None:
-        name = recording.bundled_denoiser or default_name(limbs=body_parts(mesh) is not None)
+        name = recording.bundled_denoiser or default_name(limbs=splits_everybody(mesh))
         path = find_model(name)
     return describe_model(path)
 

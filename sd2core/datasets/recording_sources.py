@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sd2core.accuracy.places import choose_for_places, spread
 from sd2core.accuracy.trial import synthesizer_for
-from sd2core.body.parts import body_parts, known_parts, synthetic_map
+from sd2core.body.parts import known_parts, splits_everybody, synthetic_map
 from sd2core.datasets.simulating import Simulation, simulated_map
 from sd2core.datasets.source import (
     BACKGROUND,
@@ -302,7 +302,7 @@ class _Opened:
         if len(models) < 2:
             return models[0] if models else None
         assert self._mesh is not None
-        return find_model(default_name(limbs=body_parts(self._mesh) is not None))
+        return find_model(default_name(limbs=splits_everybody(self._mesh)))
 
     @cached_property
     def _clock(self) -> tuple[Timebase, NDArray[np.bool_] | None, MapKind | None]:

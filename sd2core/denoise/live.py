@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sized
 from dataclasses import replace
 from typing import Any
 
@@ -116,17 +116,33 @@ class TrainedDenoiser:
 
         Energies are (frames, features) as the card counts them, and not negative. They come in
         the unit of the synthetic maps of the training, and the result is in that of its radar
-        maps.
+        maps. Of several persons (:meth:`by_person`) the answers are added up.
         """
-        if energies.ndim != 2 or energies.shape[1] != self.card.features:
-            raise Sd2Error(
-                f"The values are of shape {energies.shape}", f"(frames, {self.card.features})"
-            )
+        each = self.by_person(energies, ndim=2)
+        answer = np.zeros((len(energies), self.card.axis.bins), np.float32)
         if not len(energies):
-            return np.zeros((0, self.card.axis.bins), np.float32)
+            return answer
         run = self._in_chunks if self.network.causal else self._in_windows
-        given = self.compressed(energies)
-        return self.expanded(run(given, progress), given)
+        for number, one in enumerate(each):
+
+            def counting(frames: int, total: int, before: int = number) -> None:
+                progress((before * total + frames) // len(each), total)
+
+            given = self.compressed(one)
+            answer += self.expanded(run(given, counting), given)
+        return answer
+
+    def by_person(self, energies: NDArray[np.float32], *, ndim: int) -> list[NDArray[np.float32]]:
+        """Energies (…, features) of each person; of limb maps of several they stand side by side.
+
+        Raises Sd2Error when they are of another number of axes or of features.
+        """
+        features = self.card.features
+        persons, more = divmod(energies.shape[-1], features)
+        if energies.ndim != ndim or more or not (persons == 1 or (persons and self.card.parts)):
+            wanted = f"({features},)" if ndim == 1 else f"(frames, {features})"
+            raise Sd2Error(f"The values are of shape {energies.shape}", wanted)
+        return np.split(energies, persons, axis=-1)
 
     def compressed(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
         """Input of the network from energies (…, features)."""
@@ -248,6 +264,7 @@ class LiveDenoiser:
 
     def reset(self) -> None:
         """Forget the frames so far and begin a new clip."""
+        self._of_persons: list[LiveDenoiser] = []  # of a scene of several, whose answers add up
         self._frames: deque[NDArray[np.float32]] = deque(
             maxlen=self._trained.network.window or LENGTH
         )
@@ -259,12 +276,14 @@ class LiveDenoiser:
 
         Without a person (``present`` False) the result is empty, and a new clip begins.
         """
-        card = self._trained.card
-        if energies.shape != (card.features,):
-            raise Sd2Error(f"The frame is of shape {energies.shape}", f"({card.features},)")
+        each = self._trained.by_person(energies, ndim=1)
+        if len(each) > 1:
+            return _summed(
+                live.step(one, present) for live, one in zip(self._live(each), each, strict=True)
+            )
         if not present:
             self.reset()
-            return np.zeros(card.axis.bins, np.float32)
+            return np.zeros(self._trained.card.axis.bins, np.float32)
         given = self._trained.compressed(energies)
         return self._trained.expanded(self._answer(given), given)
 
@@ -275,6 +294,11 @@ class LiveDenoiser:
 
         ``present`` is as for :meth:`step`, one per frame; None: a person is in all.
         """
+        each = self._trained.by_person(energies, ndim=2)
+        if len(each) > 1:
+            return _summed(
+                live.advance(one, present) for live, one in zip(self._live(each), each, strict=True)
+            )
         there = Presence.of(present, len(energies)).there
         answers = np.zeros((len(energies), self._trained.card.axis.bins), np.float32)
         if self._causal is None:
@@ -290,6 +314,12 @@ class LiveDenoiser:
         if begins < len(energies):
             self.reset()
         return answers
+
+    def _live(self, each: Sized) -> list[LiveDenoiser]:
+        """One for each person."""
+        if not self._of_persons:
+            self._of_persons = [LiveDenoiser(self._trained) for _ in range(len(each))]
+        return self._of_persons
 
     def _run(self, causal: Denoiser, energies: NDArray[np.float32]) -> NDArray[np.float32]:
         """Denoise frames without a gap."""
@@ -319,6 +349,10 @@ class LiveDenoiser:
             known = np.pad(known, ((missing, 0), (0, 0)), "symmetric")
             answer = network(torch.from_numpy(known)[None].to(device))[0, -1].cpu().numpy()
         return answer
+
+
+def _summed(answers: Iterable[NDArray[np.float32]]) -> NDArray[np.float32]:
+    return np.asarray(sum(answers), np.float32)
 
 
 def denoise_long(

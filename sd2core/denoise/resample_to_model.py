@@ -80,11 +80,20 @@ def check_map(doppler: DopplerMap, card: DenoiserCard) -> None:
             f"limb maps, from which {model} learnt",
             "Make it with `sd2 synth --limbs`, or choose a model that takes the map alone",
         )
+    if card.parts and doppler.limbs is not None and not doppler.limbs.of_everybody:
+        raise Sd2Error(
+            "Somebody in the scene is no body whose parts are known",
+            f"limb maps of everybody, whom {model} answers one by one",
+            "Choose a model that takes the map alone",
+        )
     check_bins(doppler, card)
 
 
 def input_of(doppler: DopplerMap, parts: Sequence[str] = ()) -> Energies:
-    """Energies that a model takes, (frames, bins), or (frames, parts · bins) of these parts."""
+    """Energies that a model takes, (frames, bins), or (frames, parts · bins) of these parts.
+
+    Parts of several persons are side by side, for the model to answer one after the other.
+    """
     if not parts:
         return np.ascontiguousarray(doppler.values.T)
     assert doppler.limbs is not None

@@ -315,8 +315,7 @@ class Synthesizer:
         Returns
         -------
         DopplerMap
-            With ``limbs``; in a scene of several bodies with the persons' names in front, and
-            kinematics of the first.
+            With ``limbs``; in a scene of several bodies with the persons' names in front.
 
         Raises
         ------

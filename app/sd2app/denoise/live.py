@@ -112,7 +112,7 @@ class LiveDenoiseModel(QObject):
         if late < -1 or late > _JUMP_S * source.timebase.frames_per_s * self._playback.speed:
             self._begin_at(frame)
         covered, start, stop = self._synthetic.covered, self._next, frame + 1
-        if denoiser.parts and source.limbs is None:
+        if denoiser.parts and not (source.limbs and source.limbs.of_everybody):
             return
         if stop <= start or (covered is not None and not covered[start:stop].all()):
             return

@@ -135,11 +135,11 @@ class DenoisedMap(BackgroundModel):
 
     @property
     def _lacks_limbs(self) -> bool:
-        """True while the model takes limb maps, and the synthetic map is not split yet."""
+        """True while the model takes limb maps, and the synthetic map has none of everybody."""
         source, denoiser = self._synthetic.map, self.denoiser
         if source is None or denoiser is None:
             return False
-        return bool(denoiser.parts) and source.limbs is None
+        return bool(denoiser.parts) and not (source.limbs and source.limbs.of_everybody)
 
     @property
     def shows_source(self) -> bool:

@@ -291,7 +291,9 @@ class DenoiseModel(ReportingModel):
 
     def _finish(self) -> None:
         if self._synthesis.complete:
-            if self.card is not None and self.card.parts and not self._synthesis.split:
+            made = self._synthetic.map
+            known = made is not None and made.limbs is not None and made.limbs.of_everybody
+            if self.card is not None and self.card.parts and not known:
                 self._miss_parts(self.card)
             for one in (self.map, self.before_map):
                 one.finish()

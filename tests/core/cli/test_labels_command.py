@@ -384,4 +384,4 @@ def test_persons_are_shown_where_spans_name_some(sd2: Sd2, tmp_path: Path) -> No
     heading, first, *_ = sd2("labels", "show", path).out.splitlines()
     assert heading.split()[6:] == ["label", "person", "track", "note"]
     assert "anna" in first
-    assert sd2("labels", "show", path, "--json").json["spans"][0]["person"] == "anna"
+    assert json.loads(sd2("labels", "show", path, "--json").out)["spans"][0]["person"] == "anna"

@@ -145,7 +145,7 @@ def test_kinematics_come_with_limb_maps(tmp_path) -> None:  # type: ignore[no-un
     assert columns.shape == (10, 32 + len(JOINTS) * len(QUANTITIES) + len(PARTS))
     np.testing.assert_allclose(columns[:, :32], made.values.T, rtol=1e-5, atol=1e-8)
     np.testing.assert_array_equal(columns[:, 32], made.limbs.kinematics[0, 0])
-    with pytest.raises(Sd2Error, match=r"did not keep kinematics.*--limbs"):
+    with pytest.raises(Sd2Error, match=r"have no kinematics.*--limbs"):
         LimbMaps(again.parts, again.values).inputs((KINEMATICS,))
     with pytest.raises(Sd2Error, match=r"Kinematics of shape \(2, 3, 4\)"):
         LimbMaps(again.parts, again.values, np.zeros((2, 3, 4), np.float32))
