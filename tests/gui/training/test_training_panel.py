@@ -103,7 +103,7 @@ class Window:
         self.document = SimpleNamespace(recording=None, modified=False)
         shell = SayingShell(self.said)
         self.panel = TrainingPanel(self.training, self.use, self.display, self.document, shell)
-        self.side = SidePanel({"Train": self.panel})
+        self.side = SidePanel({"Train": self.panel}, QAction("Over maps"))
         self.side.resize(300, 520)
         self.side.show()
 
