@@ -25,7 +25,8 @@ _MARGINS_PX = 8, 2, 8, 2
 class SuggestionBar(QWidget):
     """View of :class:`SuggestionsModel`; hidden until suggestions are asked for.
 
-    Where one row would cut its words short, what decides stands above what finds.
+    Where one row would cut its words short, what decides stands above what finds; where that is
+    not enough, the words stand above the buttons.
     """
 
     def __init__(self, model: SuggestionsModel, action: Callable[[str], QAction]) -> None:
@@ -42,8 +43,12 @@ class SuggestionBar(QWidget):
         self._threshold.valueChanged.connect(model.set_threshold)
         buttons = [action_button(action(name), text, outlined=True) for name, text in _BUTTONS]
         self._rows = (
-            row_of((self._text, 1), *buttons, spacing_px=6),
-            row_of(self._as, STRETCH, self._by, self._source, self._threshold, spacing_px=6),
+            row_of(
+                (row_of((self._text, 1), self._as, spacing_px=6), 1),
+                row_of(*buttons, STRETCH, spacing_px=6),
+                spacing_px=6,
+            ),
+            row_of(STRETCH, self._by, self._source, self._threshold, spacing_px=6),
         )
         self._layout = row_of((self._rows[0], 1), self._rows[1], spacing_px=6)
         self._layout.setContentsMargins(*_MARGINS_PX)
@@ -67,10 +72,13 @@ class SuggestionBar(QWidget):
 
     def _fold(self) -> None:
         left_px, _, right_px, _ = _MARGINS_PX
-        needed_px = sum(row.sizeHint().width() for row in self._rows) + self._layout.spacing()
-        fits = needed_px <= self.width() - left_px - right_px
-        ways = QBoxLayout.Direction
-        self._layout.setDirection(ways.LeftToRight if fits else ways.TopToBottom)
+        room_px, ways = self.width() - left_px - right_px, QBoxLayout.Direction
+        # The inner one first: the outer one asks how wide it is.
+        for layout in (self._rows[0], self._layout):
+            parts = (layout.itemAt(place) for place in range(layout.count()))
+            needed_px = layout.spacing() + sum(one.sizeHint().width() for one in parts if one)
+            fits = needed_px <= room_px
+            layout.setDirection(ways.LeftToRight if fits else ways.TopToBottom)
 
     def _refresh(self) -> None:
         model = self._model
