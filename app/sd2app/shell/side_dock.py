@@ -10,7 +10,7 @@ from sd2app.settings import Settings
 from sd2app.shell.side_panel import SidePanel
 
 _SHOWN, _FOLDED = "panel", "folded"
-_MAX_SHARE = 0.42
+_MAX_SHARE = 0.44
 """Share of the window that a panel with a width of its own takes before the user says so."""
 _ANY_WIDTH_PX = (1 << 24) - 1  # Qt's largest
 _EDGES_PX = 2

@@ -95,7 +95,7 @@ def test_a_hand_draws_moves_and_shortens(labelled, qtbot) -> None:
     c, alt = models_of(labelled), Qt.KeyboardModifier.AltModifier
     labels = c.labels
     labels.set_label("down-to-up")
-    drag(labelled, 0.84, 0.95, alt)
+    drag(labelled, 0.88, 0.94, alt)
     assert spans(labelled)[1][0] == "down-to-up"
     drawn = spans(labelled)[1]
     assert 24 <= drawn[1] < drawn[2] <= 30
