@@ -16,7 +16,7 @@ from sd2core.files.atomic import atomic_write
 from sd2core.files.numpy_files import open_npz_file
 from sd2core.files.texts import OPEN_WITH_WRITER, check_meta
 from sd2core.mesh.presence import Presence, checked, runs
-from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, QUANTITIES, WHOLE
+from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, PARTS, QUANTITIES, WHOLE
 from sd2core.numerics.map_accuracy import MapAccuracy
 from sd2core.options.kinds import MapKind as MapKind
 from sd2core.sensor import VelocityAxis
@@ -204,6 +204,13 @@ class LimbMaps:
         return LimbMaps(
             self.parts, self.values[..., frames], None if moves is None else moves[..., frames]
         )
+
+
+def joints_of(parts: Sequence[str]) -> tuple[str, ...]:
+    """Joints in the kinematics of limb maps of these parts; none unless all persons have bodies."""
+    persons = dict.fromkeys("".join(part.rpartition(OF)[:2]) for part in parts)
+    whole = all(of + part in parts for of in persons for part in PARTS)
+    return tuple(of + joint for of in persons for joint in JOINTS) if whole else ()
 
 
 @dataclass(frozen=True, eq=False)

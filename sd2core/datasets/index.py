@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import BACKGROUND, Source
 from sd2core.denoise.resample_to_model import MAX_RESAMPLED
 from sd2core.errors import Sd2Error
-from sd2core.maps import DopplerMap
+from sd2core.maps import DopplerMap, joints_of
 from sd2core.mesh.vertex_parts import KINEMATICS
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
@@ -55,7 +55,11 @@ def header_of(source: Source, options: DatasetOptions) -> Header:
     """Return the header of a new data set; its first source fills in open options."""
     first: DopplerMap = next(iter(source.maps.values()))
     nulled = sorted({number for one in source.maps.values() for number in one.null_bins})
-    return empty_header(options, first.axis, first.timebase, tuple(nulled))
+    header = empty_header(options, first.axis, first.timebase, tuple(nulled))
+    limbs = source.maps["synthetic"].limbs if options.limbs and "synthetic" in source.maps else None
+    if limbs is not None and (joints := joints_of(limbs.parts)):  # perhaps of several persons
+        header = replace(header, parts=limbs.parts, joints=joints)
+    return header
 
 
 def empty_header(
@@ -173,8 +177,8 @@ def refuse_other_settings(out: Path, there: Header, options: DatasetOptions) -> 
         ("segments of", there.length, options.length),
         ("an overlap of", there.overlap, options.overlap),
         ("kinds", list(there.kinds_wanted), list(options.kinds)),
-        ("parts", list(there.parts), list(options.parts)),
-        ("joints", list(there.joints), list(options.joints)),
+        ("limb maps", bool(there.parts), options.limbs),
+        ("kinematics", bool(there.joints), options.limbs),
         ("inertial sensors at", list(there.imu), list(options.imu)),
         ("frames/s", there.frame_rate_hz, options.frame_rate_hz),
         ("null bins", there.null_bins, options.null_bins),

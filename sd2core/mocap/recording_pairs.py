@@ -19,7 +19,6 @@ from sd2core.fmcw.processing import doppler_map
 from sd2core.io.stored_vertices import damaged_frames
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
-from sd2core.mesh.vertex_parts import PARTS
 from sd2core.pairs.store import PairWriter, Take
 from sd2core.pairs.summary import TakeKey
 from sd2core.progress import Progress, part_of, silent
@@ -111,7 +110,7 @@ def make_recording_pairs(
                     "synthesis": asdict(synthesis),
                     "clutter": CLUTTER,
                 },
-                parts=PARTS if limbs else (),
+                parts=() if synthetic.limbs is None else synthetic.limbs.parts,
             )
         if lost:
             damaged[recording.folder.name] = lost

@@ -27,8 +27,7 @@ from sd2core.files.stores import (
     open_group,
 )
 from sd2core.files.texts import append_lines, drop_torn_line
-from sd2core.maps import LimbMaps
-from sd2core.mesh.vertex_parts import JOINTS, PARTS
+from sd2core.maps import LimbMaps, joints_of
 from sd2core.pairs.rows import check_array, kept_parts, read_rows, row_kinds
 from sd2core.pairs.summary import (
     FORMAT,
@@ -221,7 +220,7 @@ class PairWriter:
             "labels": list(labels),
             "provenance": json.loads(json.dumps(provenance)),
             "parts": list(parts),
-            "joints": list(JOINTS) if tuple(parts) == PARTS else [],
+            "joints": list(joints_of(parts)),
         }
         if not (self._path / "zarr.json").exists() or _stillborn(self._path):
             _begin(self._path, header)

@@ -197,12 +197,20 @@ def split_subjects(
 def prepare(pairs: PairSet, config: DataConfig, parts: tuple[str, ...] = ()) -> TrainingData:
     """Cut pairs into segments to learn from and to choose by.
 
-    With ``parts`` of the body the input is their limb maps, otherwise the map.
+    With ``parts`` of the body the input is their limb maps, otherwise the map. Raises Sd2Error for
+    limb maps of several persons, whom the radar's map does not tell apart.
 
     Segments to choose by overlap only where a take's length makes them, so that every frame
     counts about once, and are of the takes' own sensors. Raises Sd2Error if the subjects
     cannot be split, no take is as long as a segment, or there are no limb maps.
     """
+    for take in pairs.takes if parts else ():
+        if take.limbs is not None and take.limbs.persons:
+            raise Sd2Error(
+                f"{take.title} shows {' and '.join(take.limbs.persons)}",
+                "takes of one person, whom such a model answers",
+                "Learn from the map (inputs = map), or leave out pairs of several persons",
+            )
     split = split_subjects(pairs.subjects, config.validation_subjects, config.test_subjects)
     learnt = pairs.of(split.training).takes
     chosen_by = pairs.of(split.validation).takes if split.validation else ()

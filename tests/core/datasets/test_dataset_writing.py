@@ -332,8 +332,38 @@ def test_limb_maps_add_up_to_the_synthetic_map(tmp_path: Path, ending: str) -> N
 def test_a_data_set_has_limb_maps_of_all_or_none(tmp_path: Path, begun_with: bool) -> None:
     options = [replace(WITH_LIMBS, limbs=limbs) for limbs in (begun_with, not begun_with)]
     write_dataset(tmp_path / "set.zarr", split_sources()[:1], options[0])
-    with pytest.raises(Sd2Error, match=r"begun with parts \["):
+    with pytest.raises(Sd2Error, match="begun with limb maps"):
         write_dataset(tmp_path / "set.zarr", split_sources(), options[1])
+
+
+def test_limb_maps_of_a_scene_have_everybody_by_name(tmp_path: Path) -> None:
+    def scene(recording: str, *persons: str) -> Source:
+        """A map of several, each of whom moves as those of other sources."""
+        each = [source(recording, one, limbs=True).maps["synthetic"].limbs for one in persons]
+        both = LimbMaps.of_persons([one for one in each if one is not None], persons)
+        whole = source(recording)
+        made = replace(whole.maps["synthetic"], values=both.values.sum(axis=0), limbs=both)
+        return replace(whole, maps={"synthetic": made})
+
+    out = tmp_path / "set.zarr"
+    sources = [scene("r1", "anna", "ben"), scene("r2", "anna", "ben")]
+    write_dataset(out, sources[:1], WITH_LIMBS)
+    assert write_dataset(out, sources, WITH_LIMBS).added == 1
+    others = [*sources, scene("r3", "anna", "carla"), source("r4", limbs=True)]
+    with open_dataset(out) as dataset:
+        assert dataset.header.parts == tuple(
+            f"{who}: {one}" for who in ("anna", "ben") for one in PARTS
+        )
+        assert dataset.header.joints[0] == "anna: trunk"
+        known = sources[0].maps["synthetic"].limbs
+        assert known is not None
+        assert known.kinematics is not None
+        expected = known.kinematics[..., :24].transpose(2, 0, 1)
+        np.testing.assert_array_equal(dataset["kinematics"][0], expected)
+    failed = write_dataset(out, others, WITH_LIMBS).failed
+    assert [("carla: trunk" in one.reason, "of anna: trunk" in one.reason) for one in failed] == [
+        (True, True), (False, True),
+    ]  # fmt: skip
 
 
 def test_what_is_not_split_is_left_out_of_limb_maps(tmp_path: Path) -> None:
