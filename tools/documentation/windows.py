@@ -39,9 +39,10 @@ def opened(application: QApplication, paths: list[Path], runs: Path | None = Non
     window.resize(1280, 800)
     window.show()
     window.populate()
-    window.open_paths(paths)
+    if paths:
+        window.open_paths(paths)
     if not wait_until_settled(application, window, LIMIT_S):
-        sys.exit(f"The window was still busy with {paths[0].name} after {LIMIT_S:.0f} s")
+        sys.exit(f"The window was still busy with {paths} after {LIMIT_S:.0f} s")
     return window
 
 

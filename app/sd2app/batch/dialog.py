@@ -11,6 +11,7 @@ from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.run_view import BatchRunView
 from sd2app.batch.setup_view import BatchSetupView
 from sd2app.manual.help import help_button
+from sd2app.widgets.dialogs import take_room
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.panel import sentence, show_words
 from sd2app.widgets.run_panel import RunPanel
@@ -43,7 +44,7 @@ class BatchWindow(QDialog):
         # Not while the user still changes a number.
         self._patience = delayed(self._estimate, _ESTIMATE_MS, self)
         batch.changed.connect(self._patience.start)
-        self.resize(620, 640)
+        take_room(self, 620, 640)
 
     def warn(self, text: str) -> None:
         """Say what went wrong, or nothing any more."""

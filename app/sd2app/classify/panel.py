@@ -37,7 +37,7 @@ _MAP_TIPS = {
     "denoised": "The synthetic ones, as the bundled denoiser makes them a radar's",
 }
 _FIELDS = (
-    Field(Train, "delay_s", "Waits", 0.1, decimals=2, suffix=" s to decide"),
+    Field(Train, "delay_s", "Waits", 0.1, decimals=2, suffix=" s"),
     Field(Train, "width", "Width", 8),
     Field(Train, "steps", "Steps", 50),
     Field(Train, "seed", "Seed", 1),

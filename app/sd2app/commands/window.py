@@ -13,6 +13,7 @@ from sd2app.commands.model import AnyCommandRun, CommandForms
 from sd2app.commands.refining import MeshRefining
 from sd2app.feature import Shell
 from sd2app.manual.help import help_button
+from sd2app.widgets.dialogs import take_room
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.run_panel import Button, RunPanel, RunView, RunWords
 from sd2app.widgets.run_text import PHASES
@@ -64,4 +65,4 @@ class CommandWindow(QDialog):
         tip, guide = "Commands that were started here", help_button("Any command", self)
         runs = RunPanel(forms, form, run, tip, new="New command", guide=guide)
         self.setLayout(column_of((runs, 1), margins_px=(8, 8, 8, 10)))
-        self.resize(640, 680)
+        take_room(self, 640, 680)

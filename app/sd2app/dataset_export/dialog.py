@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 from sd2app.dataset_export.model import MAPS, ExportModel
 from sd2app.dataset_export.text import inertial_words, label_words, size_words, split_words
 from sd2app.manual.help import help_button
-from sd2app.widgets.dialogs import ask_folder, with_suffix
+from sd2app.widgets.dialogs import ask_folder, take_room, with_suffix
 from sd2app.widgets.inputs import CheckBox, Choice, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import (
@@ -242,7 +242,7 @@ class ExportDialog(QDialog):
         picture.setDevicePixelRatio(ratio)
         self._picture.setPixmap(picture)
         needed = self.sizeHint().height() + round(picture.height() / ratio) + 16
-        self.resize(max(self.width(), _SHEET_PX + 48), min(max(self.height(), needed), 860))
+        take_room(self, max(self.width(), _SHEET_PX + 48), min(max(self.height(), needed), 860))
 
     # --- what is clicked ------------------------------------------------------------------
 

@@ -14,7 +14,7 @@ from sd2app.figures.model import DrawnFigure
 from sd2app.manual.help import with_help
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import Canvas
-from sd2app.widgets.dialogs import ExportButtons, ask_figure
+from sd2app.widgets.dialogs import ExportButtons, ask_figure, take_room
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox, option_box
 from sd2app.widgets.layouts import column_of, form_of, row_of
 from sd2app.widgets.mesh_painting import paint_picture
@@ -68,7 +68,7 @@ class FigureDialog(QDialog):
         model.changed.connect(self._refresh)
         model.written.connect(lambda _: self.accept())
         self._refresh()
-        self.resize(*self.USUAL_PX)
+        take_room(self, *self.USUAL_PX)
 
     def _choices(self) -> QLayout:
         raise NotImplementedError

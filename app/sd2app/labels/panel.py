@@ -119,7 +119,7 @@ class SpanPage(QWidget):
         self._chosen = {name: Choice(f"Spans of this {name} only", self) for name in _ANY}
         for choice in self._chosen.values():
             choice.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-            choice.setMinimumWidth(48)
+            choice.setMinimumWidth(84)
             choice.activated.connect(self._filter)
         tip = "Which columns are shown"
         columns = outlined("…", tip, table.columns_menu, self, name="Columns")

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QApplication, QToolButton, QTreeWidget, QTreeWidge
 from sd2app.manual.pages import SEARCH, Entry, Manual, manual_folder
 from sd2app.manual.view import SCHEME, PageView, address
 from sd2app.settings import Settings
+from sd2app.widgets.dialogs import take_room
 from sd2app.widgets.inputs import SearchLine
 from sd2app.widgets.layouts import column_of, pane, row_of
 from sd2app.widgets.panel import outlined, splitter
@@ -48,7 +49,7 @@ class ManualWindow(QWidget):
         both = splitter(Qt.Orientation.Horizontal, parts, (_LEFT_PX, _SIZE_PX[0] - _LEFT_PX))
         both.setHandleWidth(1)
         self.setLayout(column_of(both, margins_px=0))
-        self.resize(*_SIZE_PX)
+        take_room(self, *_SIZE_PX)
         if (geometry := settings.layout(_LAYOUT)) is not None:
             self.restoreGeometry(geometry)
 

@@ -14,7 +14,7 @@ from sd2app.mesh_comparison.views import ComparedPicture, JointCurves, JointTabl
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.video.overlay_settings import OverlayModel
-from sd2app.widgets.dialogs import ask_figure
+from sd2app.widgets.dialogs import ask_figure, take_room
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.panel import ElidedLabel, copy_button, fill, outlined, panel, say, splitter
@@ -58,7 +58,7 @@ class ComparisonWindow(QWidget):
         self.setLayout(column_of(head, (body, 1), self._notes, spacing_px=8, margins_px=8))
         model.changed.connect(self._refresh)
         self._refresh()
-        self.resize(1240, 820)
+        take_room(self, 1240, 820)
 
     def _head(self) -> QHBoxLayout:
         self._summary = ElidedLabel(self, "title")

@@ -57,14 +57,14 @@ class SidePanel(QFrame):
             self._stack.addWidget(_scrolled(page))
         # Elsewhere in the window its key opens the first page.
         guide = help_button(self._topic, self, key="")
-        floating = action_button(over, "Over maps")
+        self._floating = floating = action_button(over, "Over maps")
         head = row_of(
             (self._title, 1), floating, guide, fold, spacing_px=2, margins_px=(8, 4, 4, 0)
         )
-        self._open = QWidget(self)
+        self._open = QFrame(self)
+        self._open.setObjectName("opened")
         self._open.setLayout(column_of(head, (self._stack, 1), spacing_px=2, margins_px=0))
         self._rail = rail = QFrame(self)
-        rail.setObjectName("rail")
         self.set_worded(True)
         rail.setLayout(column_of(*self._icons, STRETCH, spacing_px=4, margins_px=(4, 4, 3, 4)))
         self.setLayout(row_of((self._open, 1), rail, spacing_px=0, margins_px=0))
@@ -91,6 +91,10 @@ class SidePanel(QFrame):
     def rail_px(self) -> int:
         """Width of the icons, which stand alone while the panel is folded."""
         return self._rail.width()
+
+    def set_choice(self, offered: bool) -> None:
+        """Offer to lay the panel over the maps, where it has room beside them."""
+        self._floating.setVisible(offered)
 
     def set_worded(self, worded: bool) -> None:
         """Write its word below each icon, or not where there is little room."""

@@ -40,8 +40,8 @@ class StatusLine(QWidget):
         self._cancel.clicked.connect(self._cancel_job)
         self._job = (self._title, self._bar, self._cancel)
         parts = (STRETCH, self._plan, *self._job)
-        self.setLayout(row_of(*parts, spacing_px=16, margins_px=(12, 0, 8, 4)))
-        for widget in self._job:
+        self.setLayout(row_of(*parts, spacing_px=16, margins_px=(12, 0, 8, 0)))
+        for widget in (self._plan, *self._job):
             widget.hide()
         self.setFixedHeight(28)
         # Work that is over at once should not flicker.

@@ -59,8 +59,9 @@ class TrainingSetupView(TrainingForm):
             "Go on from a model with pairs of your own: fewer are enough",
             {"": "New", **starts},
         )
-        for name, one in (("Model", self._kind), ("Input", self._inputs), ("Start", start)):
-            self.column.addLayout(row_of(title(name), (one, 1), spacing_px=8))
+        rows = ("Model", self._kind), ("Input", self._inputs), ("Start", start)
+        lines = ((title(name), one) for name, one in rows)
+        self.column.addLayout(grid_of(*lines, gaps_px=(8, 6)))
         self.column.addWidget(self._about)
         self._add_settings()
         self.add_start(training.start, lambda: training.command)

@@ -97,11 +97,13 @@ class TourModel(QObject):
         self.changed.emit()
 
     def skip(self) -> None:
-        """Go to the next step, or end the tour."""
+        """Go to the next step that has what it needs, or end the tour."""
         if not self.wanted:
             return
-        self.over = self.kept + 1 == len(self.steps)
-        self._settings.set_value(_STEP, 0 if self.over else self.kept + 1)
+        later = range(self.kept + 1, len(self.steps))
+        number = next((one for one in later if self.steps[one].needs()), None)
+        self.over = number is None
+        self._settings.set_value(_STEP, number or 0)
         self._enter()
 
     def back(self) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from PySide6.QtCore import QSize
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
@@ -16,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from sd2core.files.figure_files import SUFFIXES
 
+_TITLE_PX = 40
 Answer = QMessageBox.StandardButton
 FIGURES = ";;".join(f"{suffix[1:].upper()} (*{suffix})" for suffix in SUFFIXES)
 
@@ -48,6 +51,14 @@ def accepted(dialog: QDialog) -> bool:
     result = dialog.exec()
     dialog.deleteLater()
     return bool(result == QDialog.DialogCode.Accepted)
+
+
+def take_room(window: QWidget, width_px: int, height_px: int) -> None:
+    """Give a window its usual size, or what its screen has room for below a title."""
+    usual = QSize(width_px, height_px)
+    if QGuiApplication.platformName() != "offscreen":  # whose screen says nothing
+        usual = usual.boundedTo(window.screen().availableSize() - QSize(0, _TITLE_PX))
+    window.resize(usual)
 
 
 def closing(dialog: QDialog) -> QDialogButtonBox:

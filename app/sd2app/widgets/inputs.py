@@ -285,6 +285,7 @@ class SearchLine(QLineEdit):
         super().__init__(parent)
         self.setPlaceholderText(hint)
         self.setAccessibleName(hint)
+        self.setToolTip(hint)  # which a narrow panel cuts
         self.setClearButtonEnabled(True)
 
     def event(self, event: QEvent) -> bool:

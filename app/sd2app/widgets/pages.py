@@ -29,7 +29,7 @@ class InnerPages(QWidget):
         self, pages: Sequence[InnerPage], beside: QWidget | None = None, inset_px: int = 0
     ) -> None:
         super().__init__()
-        self._names = [page.name for page in pages]
+        self.names = [page.name for page in pages]
         self._pages = QStackedWidget(self)
         self._pages.currentChanged.connect(self.turned)
         self._buttons = QButtonGroup(self)
@@ -56,11 +56,11 @@ class InnerPages(QWidget):
     @property
     def page(self) -> str:
         """First name of the page that is shown."""
-        return self._names[self.shown]
+        return self.names[self.shown]
 
     def turn_to(self, page: str) -> None:
         """Show a page by its first name."""
-        place = self._names.index(page)
+        place = self.names.index(page)
         self._buttons.button(place).setChecked(True)
         self._pages.setCurrentIndex(place)
 

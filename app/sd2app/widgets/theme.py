@@ -57,6 +57,7 @@ def _style_sheet(c: Palette) -> str:
     QSplitter::handle {{ background: {c.window}; }}
     QToolTip {{ border: 1px solid {c.border}; padding: 4px; }}
     QFrame#panel {{ background: {c.panel}; border: 1px solid {c.border}; border-radius: 6px; }}
+    QAbstractSpinBox {{ min-height: 16px; }}
     QDoubleSpinBox#marked {{ color: {c.warning}; font-weight: 600; }}
     QFrame#notice {{
         background: {c.panel}; border: 1px solid {c.muted}; border-left: 3px solid {c.accent};
@@ -97,7 +98,7 @@ def _style_sheet(c: Palette) -> str:
     QToolButton#fold:checked {{ background: transparent; border-color: transparent; }}
     QToolButton#preset {{ border-color: {c.border}; padding: 3px 0; }}
     QToolButton#preset:checked {{ border-color: {c.accent}; background: {c.well}; }}
-    QFrame#rail {{ border: none; border-left: 1px solid {c.border}; border-radius: 0; }}
+    QFrame#opened {{ border: none; border-right: 1px solid {c.border}; border-radius: 0; }}
     QToolButton#rail {{ border-radius: 6px; }}
     QToolButton:focus {{ border-color: {c.accent}; }}
     QTabBar#layouts::tab {{

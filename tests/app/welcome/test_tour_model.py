@@ -129,3 +129,16 @@ def test_a_stored_step_that_there_is_not_is_the_first(make, settings, stored) ->
     settings.set_value("tour/step", stored)
 
     assert make().kept == 0
+
+
+def test_skipping_passes_over_what_lacks_what_it_needs(make, world) -> None:
+    tour = make()
+    tour.begin()
+    world.pairs = False
+
+    tour.skip()
+    assert title(tour) == "Two"
+    tour.skip()
+
+    assert tour.over  # "Three" has nothing to work on, and "Two" was not asked for again
+    assert tour.kept == 0

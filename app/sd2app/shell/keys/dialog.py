@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 from sd2app.manual.help import help_button
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.model import KEYS, KeyListModel
-from sd2app.widgets.dialogs import closing
+from sd2app.widgets.dialogs import closing, take_room
 from sd2app.widgets.inputs import SearchLine
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import sentence
@@ -70,7 +70,7 @@ class KeysDialog(QDialog):
         buttons = row_of(*changing, STRETCH, every, close)
         head = row_of((self._search, 1), help_button("Keys", self))
         self.setLayout(column_of(head, (self._table, 1), self._said, buttons))
-        self.resize(760, 620)
+        take_room(self, 760, 620)
         self._find()
 
     def _button(self, text: str, tip: str, run: Callable[[], object]) -> QPushButton:
