@@ -21,9 +21,7 @@ class OnScreen(QWidget):
         return QSize(1000, 640)
 
 
-@pytest.mark.parametrize(
-    ("usual", "given"), [((1240, 820), (1000, 600)), ((900, 320), (900, 320))]
-)
+@pytest.mark.parametrize(("usual", "given"), [((1240, 820), (1000, 600)), ((900, 320), (900, 320))])
 def test_a_window_takes_no_more_than_its_screen_has(qtbot, monkeypatch, usual, given) -> None:
     monkeypatch.setattr(dialogs.QGuiApplication, "platformName", lambda: "xcb")
     window = OnScreen()

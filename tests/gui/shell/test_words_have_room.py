@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from finding import button_of
 from kept_window import opened
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
@@ -78,7 +79,7 @@ def test_words_of_all_panels_have_room(empty_window, qtbot, small_recording, siz
 def test_a_choice_without_effect_is_not_offered(empty_window, qtbot, small_recording) -> None:
     window = opened(empty_window, qtbot, small_recording)
     window.bring_up("Sensor")
-    (over,) = [one for one in window.side.findChildren(QAbstractButton) if one.text() == "Over maps"]
+    over = button_of(window.side, "Over maps")
     for width_px, offered in ((1280, True), (1000, False), (1280, True)):
         window.resize(width_px, 700)
         QApplication.processEvents()
