@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.histogram import Counting, Paths
 from sd2core.doppler.prepared import Block, PreparedMesh
+from sd2core.mesh.things import Surface, before_wall
 from sd2core.mesh.walls import Wall
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering import depth_plain, exact_plain
@@ -422,13 +423,15 @@ class VisibilityMasks:
     ) -> None:
         """Set ``visible`` to 0 of what things hide, and of the needed vertices that others hide."""
         # Of all vertices: what hides them is soon looked at, and the share that is seen is right.
-        if (around := self._prepared.mesh.surroundings) is not None:
-            for t, seen in enumerate(visible):
-                view.hide(t, *around.surface, seen)
+        around = self._prepared.mesh.surroundings
+        if around is not None and around.things:
+            boxes_m = self._prepared.boxes(view.first, view.first + len(view.points))
+            _hide_behind_things(around.surface, around.boxes_m, view, boxes_m, visible)
         if self.others:
             marked = needed()
+            boxes_m = view.boxes_m(visible & marked)
             for other in self.others:
-                self._hide_behind_body(other, view, marked, visible)
+                self._hide_behind_body(other, view, boxes_m, marked, visible)
 
     def _hide_by_way_of(
         self,
@@ -441,41 +444,41 @@ class VisibilityMasks:
 
         Where visibility is not needed, too: no share is reported of what comes by a wall.
         """
-        around, faces = self._prepared.mesh.surroundings, self._prepared.faces
+        around = self._prepared.mesh.surroundings
         assert around is not None
-        assert faces is not None
-        own_m = self._prepared.boxes(view.first, view.first + len(view.points))
-        corners_m = wall.mirrored(own_m[:, CORNERS, [0, 1, 2]])
+        visible &= needed
+        surface, boxes_m = before_wall(wall, *around.surface), view.boxes_m(visible)
+        corners_m = wall.mirrored(boxes_m[:, CORNERS, [0, 1, 2]])
         image_m = np.stack([corners_m.min(axis=1), corners_m.max(axis=1)], axis=1)
-        near = may_hide(image_m, own_m, view.places_m + view.origins_m)
-        for t, seen in enumerate(visible):
-            frame = view.first + t
-            others = [
-                (other.frame_m(frame), other.faces)
-                for other in self.others
-                if other.faces is not None and other.mesh.presence.there[frame]
-            ]
-            own = (view.points[t].T + view.origins_m[t], faces) if near[t] else None
-            seen &= needed[t]
-            view.hide(t, *around.by_way_of(wall, own, others), seen)
+        # The sensor's image sees images as the sensor sees what they are images of.
+        image = view.mirrored(wall)
+        self._hide_behind_body(self._prepared, image, image_m, needed, visible)
+        for seen, seen_boxes_m in ((view, boxes_m), (image, image_m)):
+            if around.things:
+                _hide_behind_things(surface, around.boxes_m, seen, seen_boxes_m, visible)
+            for other in self.others:
+                self._hide_behind_body(other, seen, seen_boxes_m, needed, visible)
 
     def _hide_behind_body(
         self,
         other: PreparedMesh,
         view: _View,
+        boxes_m: NDArray[np.float64],
         needed: NDArray[np.uint8],
         visible: NDArray[np.uint8],
     ) -> None:
         """Set ``visible`` of the needed vertices to 0 where another body hides them."""
         assert other.faces is not None  # MeshSequence refuses others without
         start, stop = view.first, view.first + len(view.points)
-        boxes_m = other.boxes(start, stop), self._prepared.boxes(start, stop)
-        near = may_hide(*boxes_m, view.places_m + view.origins_m)
+        near = may_hide(other.boxes(start, stop), boxes_m, view.places_m + view.origins_m)
         asked = visible & needed
         near &= other.mesh.presence.there[start:stop] & asked.any(axis=1)
         for t in np.flatnonzero(near).tolist():
             seen = asked[t].copy()
-            view.hide(t, other.frame_m(start + t), other.faces, seen)
+            surface = other.frame_m(start + t), other.faces
+            if self._wall is not None and other is not self._prepared:
+                surface = before_wall(self._wall, *surface)
+            view.hide(t, *surface, seen)
             visible[t][asked[t] > seen] = 0
 
     def _test_body(
@@ -518,6 +521,21 @@ class _View:
     origins_m: NDArray[np.float64]  # these points, in the camera frame, (n, 3)
     first: int  # number of the first frame in the clip
 
+    def boxes_m(self, marks: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """Lowest and highest corner of the marked vertices in the camera frame, (n, 2, 3)."""
+        boxes = np.repeat(self.origins_m[:, None], 2, axis=1)
+        for box, points, marked in zip(boxes, self.points, marks > 0, strict=True):
+            if marked.any():
+                few = points[:, marked]
+                box += few.min(axis=1), few.max(axis=1)
+        return boxes
+
+    def mirrored(self, wall: Wall) -> _View:
+        """Image behind a wall."""
+        turn = np.eye(3) - 2.0 * np.outer(wall.outward, wall.outward)
+        points = turn.astype(np.float32) @ self.points
+        return _View(points, self.places_m @ turn, wall.mirrored(self.origins_m), self.first)
+
     def hide(
         self,
         t: int,
@@ -533,6 +551,25 @@ class _View:
         if (self.places_m == self.places_m[0]).all():
             return [(0, len(self.points))]
         return [(t, t + 1) for t in range(len(self.points))]
+
+
+def _hide_behind_things(
+    surface: Surface,
+    things_m: NDArray[np.float64],
+    view: _View,
+    boxes_m: NDArray[np.float64],
+    visible: NDArray[np.uint8],
+) -> None:
+    """Set ``visible`` (n, V) to 0 where things, in boxes (things, 2, 3), hide a body in others."""
+    things, places_m = len(things_m), view.places_m + view.origins_m
+    pairs = np.tile(things_m, (len(boxes_m), 1, 1)), np.repeat(boxes_m, things, axis=0)
+    near = (
+        may_hide(*pairs, np.repeat(places_m, things, axis=0))
+        .reshape(len(boxes_m), things)
+        .any(axis=1)
+    )
+    for t in np.flatnonzero(near).tolist():
+        view.hide(t, *surface, visible[t])
 
 
 def position_of(place_m: NDArray[np.float64]) -> Position:

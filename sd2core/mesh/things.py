@@ -195,6 +195,12 @@ class Surroundings:
         """That of all things."""
         return self.vertices_m, self.faces
 
+    @cached_property
+    def boxes_m(self) -> NDArray[np.float64]:
+        """Lowest and highest corner of each thing, (things, 2, 3)."""
+        ends = [(vertices.min(axis=0), vertices.max(axis=0)) for vertices, _ in self.surfaces]
+        return np.array(ends).reshape(-1, 2, 3)
+
     def by_way_of(
         self, wall: Wall, own: Surface | None = None, others: Sequence[Surface] = ()
     ) -> Surface:
@@ -203,10 +209,7 @@ class Surroundings:
         Things and other bodies before the wall, and their images and the body's own: the sensor's
         image sees the latter as the sensor sees the former.
         """
-        hiding = [
-            (vertices_m, faces[(wall.before_m(vertices_m)[faces] > 0).any(axis=1)])
-            for vertices_m, faces in (self.surface, *others)
-        ]
+        hiding = [before_wall(wall, *surface) for surface in (self.surface, *others)]
         images = hiding if own is None else [*hiding, own]
         return joined([*hiding, *((wall.mirrored(vertices), faces) for vertices, faces in images)])
 
@@ -226,6 +229,12 @@ class Surroundings:
         things, walls = [asdict(one) for one in self.things], [asdict(one) for one in self.walls]
         every = {"things": things, "walls": walls}
         return {name: found for name, found in every.items() if found}
+
+
+def before_wall(wall: Wall, vertices_m: NDArray[np.float64], faces: NDArray[np.int32]) -> Surface:
+    """Surface without the faces that are wholly behind a wall."""
+    before = wall.before_m(vertices_m) > 0
+    return vertices_m, faces if before.all() else faces[before[faces].any(axis=1)]
 
 
 def joined(surfaces: Sequence[Surface]) -> Surface:

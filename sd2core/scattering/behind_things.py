@@ -17,6 +17,9 @@ CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 _ROOM = 1e-5
 """Tangent by which pictures are taken to be larger than they are, for roundings."""
 
+_NEAR_M = 1e-3
+"""Depth from which on a picture tells what is where."""
+
 
 def hide_behind(
     vertices_m: NDArray[np.float64],
@@ -48,17 +51,18 @@ def hide_behind(
     asked = np.flatnonzero(seen)
     if not len(asked) or not len(faces):
         return
-    count = len(asked)
-    both = np.concatenate([points[:, asked], (vertices_m - origin_m).T], axis=1).astype(np.float32)
-    faces = faces + np.int32(count)
+    count = len(vertices_m)
+    both = np.empty((3, count + len(asked)), np.float32)
+    np.subtract(vertices_m.T, origin_m[:, None], out=both[:, :count], casting="same_kind")
+    both[:, count:] = points[:, asked]
     needed = np.zeros((1, both.shape[1]), np.uint8)
-    needed[0, :count] = 1
+    needed[0, count:] = 1
     if not kernels_ready():
-        seen[asked] = exact_visibility(both, faces, sensor, needed[0] > 0)[:count]
+        seen[asked] = exact_visibility(both, faces, sensor, needed[0] > 0)[count:]
         return
     visible = np.zeros_like(needed)
     exact_visibility_kernel(both[None], faces, sensor, needed, 0, 1, visible)
-    seen[asked] = visible[0, :count]
+    seen[asked] = visible[0, count:]
 
 
 def may_hide(
@@ -75,26 +79,22 @@ def may_hide(
     places_m : float64 array, shape (n, 3)
         Of the sensor.
     """
-    away = hidden_m.mean(axis=1) - places_m
-    axes = np.empty((len(away), 3, 3))  # right, up and forward
-    axes[:, 2] = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
-    # A direction that is not along forward.
-    aside = np.eye(3)[np.abs(axes[:, 2]).argmin(axis=1)]
-    axes[:, 0] = np.cross(aside, axes[:, 2])
-    axes[:, 0] /= np.maximum(np.linalg.norm(axes[:, 0], axis=1, keepdims=True), 1e-12)
-    axes[:, 1] = np.cross(axes[:, 2], axes[:, 0])
+    # The picture is that along the axis of the frame which points most towards the second boxes.
+    away = (hidden_m.mean(axis=1) - places_m).sum(axis=0)
+    forward = int(np.abs(away).argmax())
+    aside, sign = [axis for axis in range(3) if axis != forward], -1.0 if away[forward] < 0 else 1.0
 
     def seen(ends_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-        """Depths (n, 8) of a box's corners, and their places in the picture, (n, 2, 8)."""
-        corners = ends_m[:, CORNERS, [0, 1, 2]] - places_m[:, None]  # (n, 8, 3)
-        turned = axes @ corners.transpose(0, 2, 1)
-        return turned[:, 2], turned[:, :2] / np.maximum(turned[:, 2:], 1e-9)
+        """Depths (n, 8) of a box's corners, and their places in the picture, (n, 8, 2)."""
+        corners = (ends_m - places_m[:, None])[:, CORNERS, [0, 1, 2]]  # (n, 8, 3)
+        depth = sign * corners[:, :, forward]
+        return depth, corners[:, :, aside] / np.maximum(depth, 1e-9)[:, :, None]
 
     (depth, picture), (far, behind) = seen(hiding_m), seen(hidden_m)
-    overlap = (picture.min(axis=2) <= behind.max(axis=2) + _ROOM) & (
-        picture.max(axis=2) >= behind.min(axis=2) - _ROOM
+    overlap = (picture.min(axis=1) <= behind.max(axis=1) + _ROOM) & (
+        picture.max(axis=1) >= behind.min(axis=1) - _ROOM
     )
     nearer = depth.min(axis=1) <= far.max(axis=1)
     # Of a box that reaches around the sensor or behind it, no picture tells.
-    around = (depth.min(axis=1) <= 1e-3) | (far.min(axis=1) <= 1e-3)
+    around = (depth.min(axis=1) <= _NEAR_M) | (far.min(axis=1) <= _NEAR_M)
     return around | (overlap.all(axis=1) & nearer)
