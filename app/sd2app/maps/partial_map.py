@@ -138,7 +138,8 @@ class PartialMap:
         if part.limbs is None:
             limbs = None
         else:
-            limbs = part.limbs.empty(self.frames) if limbs is None else limbs
+            if limbs is None or limbs.parts != part.limbs.parts:  # somebody came or went
+                limbs = part.limbs.empty(self.frames)
             limbs.put(part.start, part.limbs)
         self.quality[inside] = part.quality
         if part.quality >= FINAL:

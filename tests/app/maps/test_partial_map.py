@@ -113,3 +113,16 @@ def test_parts_are_painted_whole_also_where_they_become_zero(strokes):
         wanted[..., start:stop], kinematics[..., start:stop] = limbs, moves
         np.testing.assert_array_equal(track.map.limbs.values, wanted)
         np.testing.assert_array_equal(track.map.limbs.kinematics, kinematics)
+
+
+def test_parts_of_somebody_who_comes_take_the_place_of_the_others():
+    partial, track = partial_map(6)
+
+    def limbs(names):
+        return LimbMaps(names, np.ones((len(names), 2, 3), np.float32), None)
+
+    paint(partial, VirtualSensor(), 0, values_of(3, 1.0), FINAL, limbs(("arm",)))
+    paint(partial, VirtualSensor(), 3, values_of(3, 2.0), FINAL, limbs(("arm", "anna: arm")))
+    found = track.map.limbs
+    assert found.parts == ("arm", "anna: arm")
+    np.testing.assert_array_equal(found.values[:, 0], [[0, 0, 0, 1, 1, 1]] * 2)
