@@ -23,8 +23,10 @@ from sd2app.mesh_comparison.window import ComparisonWindow
 from sd2app.shell.app import wait_until_settled
 from sd2app.shell.window import MainWindow
 from sd2core.files.resources import resource_path
+from sd2core.mesh.walls import Wall
 from sd2core.placements.placements import PlacementCloud
-from sd2core.sensor import VirtualSensor, aimed_at
+from sd2core.sensor import Beam, VirtualSensor, aimed_at
+from sd2core.simulate.two_people import two_people
 from tools.documentation.learning_screenshots import learning
 from tools.documentation.places import IMAGES, REPOSITORY, SHARED
 from tools.documentation.windows import LIMIT_S, opened, save, wait_for
@@ -62,6 +64,22 @@ def accuracy(window: MainWindow) -> None:
     window.session.playback.seek(1.9)
     window.features.accuracy.model.set_tolerance(0.02)
     window.features.accuracy.measure()
+
+
+def room(application: QApplication) -> None:
+    """Two people, a table and a wall on the right, with a beam that follows Anna."""
+    with tempfile.TemporaryDirectory() as folder:
+        recording = two_people(Path(folder) / "two.sd2")
+
+        def arrange(window: MainWindow) -> None:
+            edits = window.session.edits
+            edits.add_to_scene(Wall.named("right", 2.5))
+            sensor = VirtualSensor((1.2, 0.0, 0.4), beam=Beam(56.0, 28.0))
+            edits.place_sensor(aimed_at(sensor, window.features.maps.synthesis.torso_m))
+            window.session.playback.seek(4.0)
+            window.features.scene.view.set_view("overview")
+
+        take(application, "room.png", [recording.folder], arrange)
 
 
 def labels(window: MainWindow) -> None:
@@ -216,6 +234,7 @@ def main() -> None:
     take(application, "beside.png", swipes, beside)
     take(application, "dark.png", swipes, far_in_the_dark)
     take(application, "accuracy.png", swipes, accuracy)
+    room(application)
     sizes(application)
     take(application, "labels.png", swipes, labels)
     take(application, "placements.png", swipes, placements)
