@@ -158,7 +158,7 @@ def make_recording(
     names = [f"person {number} of {request.video.stem}" for number in request.people]
     others = zip(request.meshes[1:], names[1:], strict=True)
     bodies = tuple(Body(str(mesh), person=name) for mesh, name in others)
-    given = {"mesh": request.mesh, "camera": camera}
+    given: dict[str, Any] = {"mesh": request.mesh, "camera": camera}
     if bodies:
         given["subject"] = names[0]
     if (request.folder / FILE_NAME).exists():
