@@ -33,7 +33,7 @@ class Compared:
     def __init__(self, qtbot) -> None:
         self._qtbot = qtbot
         self.labels, self.playback, self.span = LabelsModel(), PlaybackModel(), TimeWindow()
-        session = SimpleNamespace(playback=self.playback, span=self.span)
+        session = SimpleNamespace(document=None, playback=self.playback, span=self.span)
         self.playback.set_timebase(FRAMES)
         self.span.set_extent(0.0, 10.0)
         self.labels.open(MINE)
