@@ -16,7 +16,7 @@ from sd2core.body.blazepose import PoseDetector, PoseLandmarker
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.people_following import PeopleFollower
 from sd2core.body.people_joining import Somebody, joined
-from sd2core.body.roi import PLACES, Floats, Roi, Sightings, roi_of
+from sd2core.body.roi import PLACES, Floats, Roi, Sightings, roi_numbers, roi_of
 from sd2core.body.tracking import SEARCH_STEP_S, looked_at
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_cache
@@ -24,7 +24,7 @@ from sd2core.io.video import VideoReader
 from sd2core.numerics.compiled import worker_count
 from sd2core.progress import Progress, silent
 
-_VERSION = 3
+_VERSION = 4
 _SHORTEST_S = 1.0
 """Time for which somebody has to be seen, if the video is longer."""
 _SURELY_SEEN = 0.75
@@ -155,6 +155,11 @@ def _followed(
         for stretch in person.stretches:
             rois[row, stretch.numbers] = stretch.rois
             confidence[row, stretch.numbers] = stretch.confidence
+        # Whose of one person's stretches a body is does not matter.
+        for doubt in follower.doubts:
+            if set(doubt.stretches) <= set(person.stretches):
+                rois[row, doubt.number] = roi_numbers(doubt.sight.roi)
+                confidence[row, doubt.number] = doubt.sight.pose.confidence
     return {
         "frames": frames,
         "rois": rois,

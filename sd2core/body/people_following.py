@@ -98,6 +98,15 @@ def against(trail: Trail, roi: Roi, time_s: float, likeness: float) -> float:
     return float(sum(min(each, _MOST) for each in (0.5 * away**2, 0.5 * grew**2, unlike)))
 
 
+@dataclass(frozen=True, eq=False)
+class Doubt:
+    """One body alone in a picture, and the stretches whose person it may be."""
+
+    number: int
+    sight: Sight
+    stretches: list[Stretch]
+
+
 class PeopleFollower:
     """Follows everybody from picture to picture; times only ever increase."""
 
@@ -109,6 +118,7 @@ class PeopleFollower:
         self.stretches: list[Stretch] = []
         self.doubtful: list[int] = []
         """Pictures in which it is not sure whom a body shows."""
+        self.doubts: list[Doubt] = []
 
     def step(self, picture: Pixels, number: int, time_s: float) -> None:
         """Find everybody in the next picture."""
@@ -125,6 +135,9 @@ class PeopleFollower:
         order, doubtful = assigned(costs)
         self._doubted = [sights[order[row]].roi for row in doubtful]
         self.doubtful += [number] * bool(doubtful)
+        if doubtful and len(sights) == 1:
+            may_be = np.flatnonzero(costs[:, 0] < costs.min() + _SURELY)
+            self.doubts.append(Doubt(number, sights[0], [self._active[row] for row in may_be]))
         for row, column in order.items():
             if row not in doubtful:
                 alone = self._is_alone(sights[column], self._active[row])

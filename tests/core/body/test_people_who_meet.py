@@ -36,4 +36,4 @@ def test_six_real_people_are_six(shared_data: Path, models: LandmarkModels) -> N
         frames = person.sightings.frames[person.seen]
         assert first - 6 <= frames[0] <= first + 10
         assert last - 10 <= frames[-1] <= last + 6
-        assert len(frames) > 0.8 * (last - first)
+        assert len(frames) > 0.9 * (last - first)
