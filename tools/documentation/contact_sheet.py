@@ -1,8 +1,7 @@
 """Pictures of all panels and dialogs on one sheet, to be looked at: `make contact-sheet`.
 
 Draws the sample's window into ``build/contact-sheet``, each picture for itself and all of them on
-a sheet for each theme. On a screen of double density, and in other sizes:
-``python -m tools.documentation.contact_sheet --size 1600x1000 --scale 2 --theme dark``.
+a sheet for each theme; ``--size 1600x1000 --scale 2 --theme dark`` asks for others.
 """
 
 from __future__ import annotations
@@ -12,9 +11,9 @@ import os
 import sys
 from collections.abc import Iterator
 
-from PySide6.QtCore import QPoint, Qt, QTimer
+from PySide6.QtCore import QPoint, QTimer
 from PySide6.QtGui import QColor, QPainter, QPixmap
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
 from sd2app.palette import palette_for
 from sd2app.session.layouts import LAYOUTS
@@ -37,30 +36,27 @@ SHEET_PX, CAPTION_PX, GAP_PX = 2800, 24, 16
 
 def pictures(application: QApplication, window: MainWindow) -> Iterator[tuple[str, QPixmap]]:
     """The start page, the layouts, the panels page by page, the dialogs and the tour."""
-    yield "start", window.grab()
+
+    def grab(widget: QWidget) -> QPixmap:
+        wait_until_settled(application, window, LIMIT_S)
+        return widget.grab()
+
+    yield "start", grab(window)
     window.open_paths([resource_path("swipes.sd2")])
-    wait_until_settled(application, window, LIMIT_S)
-    window.session.playback.seek(1.9)
     for layout in LAYOUTS:
         window.session.layouts.choose(layout)
-        wait_until_settled(application, window, LIMIT_S)
-        yield f"layout {layout}", window.grab()
-    window.session.layouts.choose("Look")
+        yield f"layout {layout}", grab(window)
     for panel in window.side.names:
         window.bring_up(panel)
-        wait_until_settled(application, window, LIMIT_S)
         inner = next((one for one in window.side.findChildren(InnerPages) if one.isVisible()), None)
         for page in inner.names if inner else [""]:
             if inner:
                 inner.turn_to(page)
-            wait_until_settled(application, window, LIMIT_S)
-            yield f"{panel} {page}".rstrip(), window.side.grab()
+            yield f"{panel} {page}".rstrip(), grab(window.side)
     window.fold_side(True)
-    for name in DIALOGS:
-        yield name, dialog(application, window, name)
+    yield from ((name, dialog(application, window, name)) for name in DIALOGS)
     window.action("tour").trigger()
-    wait_until_settled(application, window, LIMIT_S)
-    yield "tour", window.grab()
+    yield "tour", grab(window)
 
 
 def dialog(application: QApplication, window: MainWindow, action: str) -> QPixmap:
@@ -117,15 +113,13 @@ def main() -> None:
         folder = FOLDER / f"{arguments.size} x{arguments.scale:g} {theme}"
         folder.mkdir(parents=True, exist_ok=True)
         window = opened(application, [])
-        window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         window.resize(width, height)
         window.features.program.set_dark(theme == "dark")
-        wait_until_settled(application, window, LIMIT_S)
-        shown = [(name, picture) for name, picture in pictures(application, window)]
+        shown = list(pictures(application, window))
         for name, picture in shown:
             picture.save(str(folder / f"{name}.png"))
-        sheet(shown, theme == "dark").save(str(folder.with_suffix(".png")))
-        print(folder.with_suffix(".png").relative_to(REPOSITORY))
+        sheet(shown, theme == "dark").save(f"{folder}.png")
+        print(f"{folder}.png")
         window.session.document.undo_stack.setClean()
         window.close()
 
