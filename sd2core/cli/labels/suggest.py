@@ -69,9 +69,9 @@ def _suggest(options: Suggest) -> None:
     """Find spans in which something moves.
 
     Measures the energy of every frame of a Doppler map over the map's own quiet level.
-    It finds motion, not gestures: raising an arm is suggested as well. The confidence
-    is how far the high threshold could be raised before the span was lost, 1 from
-    20 dB on; it is no probability. At least a quarter of the recording must be quiet.
+    It finds motion, not gestures: raising an arm is suggested as well. The confidence is 1 less
+    the share of the peak's energy that the high threshold is: it ranks spans, it is no
+    probability. At least a quarter of the recording must be quiet.
 
       sd2 labels suggest map.npz
       sd2 labels suggest walk.sd2 --out suggested.json

@@ -96,7 +96,7 @@ def test_limb_maps_are_exported_on_request(sd2: Sd2, tmp_path: Path) -> None:
     assert "trunk, upper_arm.L" in sd2("info", out).out
     refused = sd2(*asked)
     assert refused.code == 1
-    assert "begun with parts" in refused.err
+    assert "begun with limb maps" in refused.err
 
 
 @pytest.mark.slow
