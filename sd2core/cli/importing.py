@@ -368,7 +368,10 @@ def _thing(text: str) -> Thing:
         raise Sd2Error(f"--thing is {text!r}", "SHAPE@X,Y,Z[,TURN[,W,H,D]], e.g. box@0,1,2,30")
     path = shape if shape in SHELF or "." not in shape else str(plain_path(Path(shape)))
     x, y, z, turn_deg, *size = (*numbers, 0.0) if len(numbers) == 3 else numbers
-    return Thing(path, (x, y, z), turn_deg, (size[0], size[1], size[2]) if size else None)
+    thing = Thing(path, (x, y, z), turn_deg, (size[0], size[1], size[2]) if size else None)
+    if thing.is_file and not Path(path).is_file():
+        raise Sd2Error(f"The mesh {path} of a thing is not there", "a file")
+    return thing
 
 
 def _body(text: str) -> Body:

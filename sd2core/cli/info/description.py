@@ -100,17 +100,15 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
 
 def describe_parts(recording: Recording) -> list[Description]:
     """Open and describe each file of a recording, as far as it is there."""
-    from sd2core.recording.relinking import ROLES
-
     missing = recording.missing()
     parts: list[Description] = []
     if recording.video is not None and "video" not in missing:
         with recording.open_video() as video:
             parts.append(describe_video(recording.video, video))
-    bodies = {role for role in missing if role not in ROLES}
-    if recording.mesh is not None and not missing.keys() & {"mesh", "faces", *bodies}:
+    if recording.mesh is not None and not missing.keys() & {"mesh", "faces"}:
+        things, bodies = recording.things_there, recording.bodies_there
         with progress_bar("Reading the mesh") as progress:
-            mesh = replace(recording, things=recording.things_there).load_mesh(progress)
+            mesh = replace(recording, things=things, bodies=bodies).load_mesh(progress)
         parts.append(describe_mesh(recording.mesh, mesh))
     if recording.radar is not None and "radar" not in missing:
         parts.append(

@@ -44,6 +44,7 @@ SEVERAL_MEANINGS = {
     "--protocol": {"FILE|paper", None},  # of a session; how simulated people swipe
     "--radar": {"CAPTURE", "NAME|CONFIG.json", "SOURCE"},  # recorded; to simulate; live
     "--rate": {"FPS", "HZ"},  # of maps; of an inertial sensor
+    "--wall": {"DIRECTION@M[,DB]", "Z[,C]"},  # of a recording's scene; of one simulated signal
 }
 """Options whose value differs between commands. Of all others a metavar says it for all."""
 

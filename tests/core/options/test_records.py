@@ -47,6 +47,7 @@ TYPED: dict[str, st.SearchStrategy[Any]] = {
     "span_m": st.tuples(st.floats(0.0, 4.0), st.floats(4.5, 9.0)),
     "assignment": st.tuples(NAMES, st.integers() | st.booleans() | NAMES),
     "parsed": st.builds(LabelledSource, PATHS, NAMES | st.just("")),
+    "_people": st.just(("all",)) | st.lists(st.integers(1, 9).map(str), unique=True).map(tuple),
     "_shares": st.sets(st.floats(0.001, 1.0), min_size=1).map(lambda them: tuple(sorted(them))),
 }
 """Values of what is typed in a way of its own, by the reader."""
@@ -84,6 +85,8 @@ def records(draw: st.DrawFn, kind: type[OptionRecord]) -> OptionRecord:
     """A record of a kind, with options that go together."""
     options = typed_options(kind)
     needed = {one.name for one in options if one.default is MISSING and not one.section}
+    # Most commands cannot do without, though some have another way.
+    needed |= {one.name for one in options if one.name == "out" and one.kind is Path}
     if either := [one.name for one in options if one.place.needed]:
         needed.add(draw(st.sampled_from(either)))
     values: dict[str, Any] = {}
