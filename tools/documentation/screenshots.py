@@ -170,7 +170,7 @@ def comparison(application: QApplication) -> None:
         window.session.playback.seek(2.1)
         window.features.mesh_comparison.compare(mesh)
         compared = window.findChild(ComparisonWindow)
-        wait_for(application, lambda: compared._model.comparison is not None)
+        wait_for(application, lambda: compared.model.comparison is not None)
         wait_until_settled(application, window, LIMIT_S)
         save(compared, "comparison.png")
         window.close()
