@@ -30,7 +30,7 @@ def cut(window, qtbot, which: str, *left_out: str) -> None:
         for box in dialog.findChildren(QCheckBox):
             if box.text() in left_out:
                 box.click()
-        button = next(one for one in dialog.findChildren(QPushButton) if "folder" in one.text())
+        button = next(one for one in dialog.findChildren(QPushButton) if one.text() == "Export…")
         qtbot.mouseClick(button, LEFT)
 
     window.messages.dismiss()
