@@ -76,7 +76,7 @@ def test_going_elsewhere_ends_the_loop_and_staying_does_not(labelled) -> None:
     key(labelled, "Left")
     assert "back" in looping(labelled)
     ruler = labelled.findChild(TimeRuler)
-    QTest.mouseClick(ruler, LEFT, NONE, QPoint(round(ruler.scale.x_of(0.5)), 12))
+    QTest.mouseClick(ruler, LEFT, NONE, QPoint(round(ruler.scale.x_of(0.515)), 12))
     assert looping(labelled) == ""
     assert playback.frame == 15
 
