@@ -20,7 +20,7 @@ from sd2core.body.track import LANDMARK, Landmarks, parts
 
 _STANDING = 0.8
 _SEEN = 0.5
-_FEWEST = 8
+_MIN_FEET = 8
 """Looks at standing feet from which on they say where the floor is."""
 _DEPTH_SD = 0.05
 """Error of a person's depth in statures, as a share."""
@@ -59,7 +59,7 @@ def standing_feet(track: Landmarks, camera: PinholeCamera) -> StandingFeet | Non
         shoulders, ankles = (places[:, rows].mean(axis=1) for rows in _UP)
         downs.append((ankles - shoulders)[stands.any(axis=1)])
     feet, down = np.concatenate(points), np.concatenate(downs)
-    if len(feet) < _FEWEST:
+    if len(feet) < _MIN_FEET:
         return None
     mean = np.median(down, axis=0)
     return StandingFeet(feet, mean / np.linalg.norm(mean))

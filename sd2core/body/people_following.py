@@ -28,7 +28,7 @@ _UNLIKE = 0.04
 added each second; deviation of the similarity of their looks from 1."""
 _KNOWN_S = 1.5
 """Time after which place and size are no less known."""
-_MOST = 8.0
+_MAX_AGAINST = 8.0
 """Most that one of place, size and looks can speak against somebody."""
 _SURELY = 3.0
 """How much worse every other order of people has to be (logarithm of odds)."""
@@ -36,7 +36,7 @@ _NOBODY = 6.0
 """What has to speak against somebody for another person to be there, or nobody."""
 _BESIDE = 0.35
 """Distance in squares within which colours of two are mixed up."""
-FEWEST = 3
+MIN_LOOKS = 3
 """Looks from which on a stretch is somebody, and no slip."""
 _MAP_PX = 96
 """Longer side of the small pictures in which bodies are compared."""
@@ -95,7 +95,7 @@ def against(trail: Trail, roi: Roi, time_s: float, likeness: float) -> float:
     away = trail.away(roi, time_s) / (_AWAY + _AWAY_PER_S * gap_s)
     grew = trail.growth(roi) / (_GREW + _GREW_PER_S * gap_s)
     unlike = (1.0 - likeness) / _UNLIKE
-    return float(sum(min(each, _MOST) for each in (0.5 * away**2, 0.5 * grew**2, unlike)))
+    return float(sum(min(each, _MAX_AGAINST) for each in (0.5 * away**2, 0.5 * grew**2, unlike)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,7 @@ class PeopleFollower:
             each
             for each in self._active
             if time_s - each.trail.time_s
-            <= (_HIDDEN_S if len(each.numbers) >= FEWEST else _UNSEEN_S)
+            <= (_HIDDEN_S if len(each.numbers) >= MIN_LOOKS else _UNSEEN_S)
         ]
         sights = self._sights(picture, time_s)
         costs = np.array(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sd2core.body.identity import Trail
-from sd2core.body.people_following import FEWEST, Stretch, against
+from sd2core.body.people_following import MIN_LOOKS, Stretch, against
 from sd2core.body.roi import Floats, Roi, roi_of
 
 _LEFT = 1.0
@@ -48,7 +48,7 @@ def joined(stretches: list[Stretch], width: int) -> list[Somebody]:
     Stretches are joined where every other way to join them is much less likely. Where one is
     not, the later one is another person, who may be the earlier.
     """
-    long = [each for each in stretches if len(each.numbers) >= FEWEST]
+    long = [each for each in stretches if len(each.numbers) >= MIN_LOOKS]
     people: list[Somebody] = []
     whose: dict[int, Somebody] = {}
     before = {later: (earlier, odds) for earlier, later, odds in _joins(long, width)}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sd2core.body.blazepose import PoseDetector, PoseLandmarker
-from sd2core.body.roi import Pixels, Roi
+from sd2core.body.roi import MARGIN, Pixels, Roi
 from sd2core.errors import Sd2Error
 from sd2core.io.video import VideoReader
 from sd2core.progress import Progress, silent
@@ -177,7 +177,7 @@ def _squares(rectangle: Rectangle, picture: Pixels, detector: PoseDetector) -> l
     x = rectangle.x_px + rectangle.width_px / 2
     y = rectangle.y_px + rectangle.height_px / 2
     size = max(rectangle.width_px, rectangle.height_px)
-    around = Roi(x, y, 1.25 * size)
+    around = Roi(x, y, MARGIN * size)
     # A small person shows only where a part of the picture is looked at.
     part = Roi(x, y, 1.6 * size)
     people = detector.people(picture) + detector.look(picture, part)[0]

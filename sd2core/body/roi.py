@@ -19,7 +19,7 @@ CROP_PX = 256
 _CENTRE_S = 0.2
 _SIZE_S = 0.5
 _ANGLE_S = 0.5
-_MARGIN = 1.25
+MARGIN = 1.25
 """Side of the square over the diameter of the person's circle."""
 
 
@@ -47,7 +47,7 @@ class Roi:
         return cls(
             float(centre_px[0]),
             float(centre_px[1]),
-            2.0 * _MARGIN * math.hypot(dx, dy),
+            2.0 * MARGIN * math.hypot(dx, dy),
             math.remainder(angle, math.tau),
         )
 

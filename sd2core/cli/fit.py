@@ -266,8 +266,10 @@ def _list(options: Fit) -> None:
 
 def _about(person: SeenPerson) -> dict[str, Any]:
     """What the list says of somebody."""
+    from sd2core.body.roi import MARGIN
+
     frame, roi = person.portrait
-    side = roi.size_px / 1.25
+    side = roi.size_px / MARGIN
     corner = roi.centre_x_px - side / 2.0, roi.centre_y_px - side / 2.0
     return {
         **picked(person, "number", "from_s", "to_s", "seen_s", "certainty", "may_be"),

@@ -14,12 +14,11 @@ from sd2app.session.session import Session
 from sd2app.widgets.canvas import Canvas, image_of
 from sd2app.widgets.colour_maps import lookup_table, uncertain_table
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
-from sd2app.widgets.layouts import STRETCH, column_of, row_of
+from sd2app.widgets.layouts import ANY_WIDTH_PX, STRETCH, column_of, row_of
 from sd2app.widgets.panel import outlined
 
 _STRIP_PX = 14
 _SCALE_PX = 32
-_ANY_WIDTH_PX = (1 << 24) - 1  # Qt's largest
 
 
 class _ColourStrip(Canvas):
@@ -103,7 +102,7 @@ class MapEdge(QWidget):
         self._frame.setVisible(not folded)
         edge = self.parentWidget()
         assert edge is not None
-        edge.setMaximumWidth(_SCALE_PX + 2 if folded else _ANY_WIDTH_PX)
+        edge.setMaximumWidth(_SCALE_PX + 2 if folded else ANY_WIDTH_PX)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Keep the button in the corner."""

@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from sd2app.scene.colours import SceneColours, fractions, mixed
 from sd2app.scene.parts import Body
-from sd2app.scene.things import first_meeting
+from sd2app.scene.things import Movables
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.things import Surface
 
 PERSON_COLOURS = ("#d08a3c", "#5f9e6e", "#9b74b3", "#c4627c", "#4f98ad")
 """Of the second person of a scene, the third and so on; from the sixth they repeat."""
 
 
-class People:
+class People(Movables):
     """Bodies beside the first one, one of which may be lit up or shifted while it is dragged."""
 
     def __init__(self, renderer: vtkRenderer) -> None:
-        self._renderer = renderer
+        super().__init__(renderer)
         self.meshes: tuple[MeshSequence, ...] = ()
         self._shapes: list[Body] = []
         self._there: list[bool] = []
         self._frame: int | None = None
-        self._colours: SceneColours | None = None
-        self._hot: int | None = None
 
     @property
     def points_m(self) -> NDArray[np.float64]:
@@ -60,12 +61,6 @@ class People:
         """Draw one elsewhere than it is."""
         self._shapes[number].place(np.eye(3), np.asarray(offset_m, np.float64))
 
-    def set_hot(self, number: int | None) -> None:
-        """Light up the one that the pointer is on or drags."""
-        if number != self._hot and self._colours is not None:
-            self._hot = number
-            self.set_colours(self._colours)
-
     def set_colours(self, colours: SceneColours) -> None:
         """Colours of the theme."""
         self._colours = colours
@@ -74,19 +69,13 @@ class People:
             shape.set_colour(mixed(own, colours.sensor, 0.4 if number == self._hot else 0.0))
             shape.shadow.GetProperty().SetColor(*fractions(colours.shadow))
 
-    def under(
-        self, eye_m: NDArray[np.float64], ray: NDArray[np.float64]
-    ) -> tuple[int, NDArray[np.float64]] | None:
-        """Number of the nearest body that a ray meets, and where; None if it meets none."""
-        met = [
-            first_meeting(eye_m, ray, shape.points.astype(np.float64), mesh.faces)
+    def _to_meet(self) -> Sequence[Surface | None]:
+        return [
+            (shape.points.astype(np.float64), mesh.faces)
             if there and mesh.faces is not None
-            else np.inf
+            else None
             for mesh, shape, there in zip(self.meshes, self._shapes, self._there, strict=True)
         ]
-        if not met or not np.isfinite(nearest := min(met)):
-            return None
-        return met.index(nearest), eye_m + nearest * ray
 
     def _shown(self) -> list[Body]:
         return [one for one, there in zip(self._shapes, self._there, strict=True) if there]

@@ -17,16 +17,49 @@ _SHARP_COSINE = 0.9
 _NEAREST_M = 0.01
 
 
-class Things:
-    """Surfaces of things, one of which may be lit up or shifted while it is dragged."""
+class Movables:
+    """Surfaces of which the pointer finds one, which is lit up while it is on it or drags it."""
 
     def __init__(self, renderer: vtkRenderer) -> None:
         self._renderer = renderer
+        self._colours: SceneColours | None = None
+        self._hot: int | None = None
+
+    def set_hot(self, number: int | None) -> None:
+        """Light up the one that the pointer is on or drags."""
+        if number != self._hot and self._colours is not None:
+            self._hot = number
+            self.set_colours(self._colours)
+
+    def set_colours(self, colours: SceneColours) -> None:
+        """Colours of the theme."""
+        raise NotImplementedError
+
+    def under(
+        self, eye_m: NDArray[np.float64], ray: NDArray[np.float64]
+    ) -> tuple[int, NDArray[np.float64]] | None:
+        """Number of the nearest one that a ray meets, and where; None if it meets none."""
+        met = [
+            np.inf if surface is None else first_meeting(eye_m, ray, *surface)
+            for surface in self._to_meet()
+        ]
+        if not met or not np.isfinite(nearest := min(met)):
+            return None
+        return met.index(nearest), eye_m + nearest * ray
+
+    def _to_meet(self) -> Sequence[Surface | None]:
+        """Surface of each; None of one that cannot be met."""
+        raise NotImplementedError
+
+
+class Things(Movables):
+    """Surfaces of things, one of which may be lit up or shifted while it is dragged."""
+
+    def __init__(self, renderer: vtkRenderer) -> None:
+        super().__init__(renderer)
         self.things: tuple[Thing, ...] = ()
         self.surfaces: tuple[Surface, ...] = ()
         self._shapes: list[tuple[Shape, Shape]] = []
-        self._colours: SceneColours | None = None
-        self._hot: int | None = None
 
     @property
     def shapes(self) -> list[Shape]:
@@ -58,12 +91,6 @@ class Things:
         for shape in self._shapes[number]:
             shape.place(np.eye(3), np.asarray(offset_m, np.float64))
 
-    def set_hot(self, number: int | None) -> None:
-        """Light up the one that the pointer is on or drags."""
-        if number != self._hot and self._colours is not None:
-            self._hot = number
-            self.set_colours(self._colours)
-
     def set_colours(self, colours: SceneColours) -> None:
         """Colours of the theme."""
         self._colours = colours
@@ -74,14 +101,8 @@ class Things:
                 colours.sensor if hot else mixed(colours.muted, colours.background, 0.2)
             )
 
-    def under(
-        self, eye_m: NDArray[np.float64], ray: NDArray[np.float64]
-    ) -> tuple[int, NDArray[np.float64]] | None:
-        """Number of the nearest thing that a ray meets, and where; None if it meets none."""
-        met = [first_meeting(eye_m, ray, *surface) for surface in self.surfaces]
-        if not met or not np.isfinite(nearest := min(met)):
-            return None
-        return met.index(nearest), eye_m + nearest * ray
+    def _to_meet(self) -> Sequence[Surface | None]:
+        return self.surfaces
 
 
 def sharp_edges(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> NDArray[np.int32]:

@@ -8,11 +8,11 @@ from PySide6.QtWidgets import QSplitter, QWidget
 from sd2app.session.layouts import Layouts
 from sd2app.settings import Settings
 from sd2app.shell.side_panel import SidePanel
+from sd2app.widgets.layouts import ANY_WIDTH_PX
 
 _SHOWN, _FOLDED = "panel", "folded"
 _MAX_SHARE = 0.44
 """Share of the window that a panel with a width of its own takes before the user says so."""
-_ANY_WIDTH_PX = (1 << 24) - 1  # Qt's largest
 _EDGES_PX = 2
 _BESIDE_FROM_PX, _WORDED_FROM_PX = 1100, 1200
 """Widths of the window that have room for a panel beside the maps, and for words at its icons."""
@@ -129,7 +129,7 @@ class SideDock(QObject):
         """Give the panel its room."""
         rail_px = self._side.rail_px + _EDGES_PX
         wide_px = self._wide_px if self._beside else rail_px
-        self._room.setMaximumWidth(_ANY_WIDTH_PX if self._beside else rail_px)
+        self._room.setMaximumWidth(ANY_WIDTH_PX if self._beside else rail_px)
         self._room.setMinimumWidth(self._frame.minimumSizeHint().width() if self._beside else 0)
         *others, beside, now_px = self._splitter.sizes()
         self._splitter.setSizes([*others, beside + now_px - wide_px, wide_px])

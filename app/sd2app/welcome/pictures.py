@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from hashlib import sha256
 from pathlib import Path
 
-from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QObject, QPoint, QRect, QSize, Qt, Signal
-from PySide6.QtGui import QImage, QImageWriter
+from PySide6.QtCore import QObject, QPoint, QRect, QSize, Qt, Signal
+from PySide6.QtGui import QImage
 
 from sd2app.background.latest import LatestRunner, delayed
 from sd2app.maps.heatmap_image import heatmap_image
 from sd2app.session.session import Session
+from sd2app.widgets.picture import png_of
 from sd2core.files.atomic import atomic_write
 from sd2core.files.paths import plain_path
 
@@ -21,8 +22,8 @@ _PATIENCE_MS = 700
 """Delay after which what has just been opened is worth a picture."""
 _ABOVE = 0.2
 """Share of what is cut off a high picture that is cut above: people have their heads there."""
-_MOST = 60
-"""Number of pictures that are kept."""
+_MAX_PICTURES = 60
+"""Number that are kept."""
 
 
 class RecordingPictures(QObject):
@@ -107,12 +108,9 @@ def _write(picture: QImage, path: Path) -> None:
     )
     over_px = fitted.size() - SIZE_PX
     part = QRect(QPoint(over_px.width() // 2, round(_ABOVE * over_px.height())), SIZE_PX)
-    buffer = QBuffer()
-    buffer.open(QIODevice.OpenModeFlag.WriteOnly)
-    QImageWriter(buffer, QByteArray(b"png")).write(fitted.copy(part))
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_write(path) as stream:
-        stream.write(bytes(buffer.data().data()))
+        stream.write(png_of(fitted.copy(part)))
     kept = sorted(path.parent.glob("*.png"), key=lambda one: one.stat().st_mtime)
-    for old in kept[:-_MOST]:
+    for old in kept[:-_MAX_PICTURES]:
         old.unlink(missing_ok=True)

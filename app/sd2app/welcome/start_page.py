@@ -18,7 +18,7 @@ from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import outlined, sentence, title
 from sd2core.files.resources import is_bundled
 
-_COLUMNS, _MOST_RECENT, _WIDTH_PX, _GAP_PX = 4, 8, 1040, 16
+_COLUMNS, _MAX_RECENT, _WIDTH_PX, _GAP_PX = 4, 8, 1040, 16
 _ROOMY_PX = 800
 """Height from which a second row of recordings is shown."""
 
@@ -85,7 +85,7 @@ class StartPage(QScrollArea):
         for column in range(_COLUMNS):
             self._recent.setColumnStretch(column, 1)
             # A column without anything would have no gap beside it.
-            self._recent.addWidget(QWidget(self), _MOST_RECENT, column)
+            self._recent.addWidget(QWidget(self), _MAX_RECENT, column)
         self._nothing = sentence("What you open is listed here, with a picture of it.")
         page = QWidget(self)
         page.setObjectName("page")
@@ -113,7 +113,7 @@ class StartPage(QScrollArea):
             self._recent.removeWidget(card)
             card.deleteLater()
         self.recent = []
-        groups = self._settings.recent[:_MOST_RECENT]
+        groups = self._settings.recent[:_MAX_RECENT]
         self._nothing.setVisible(not groups)
         for at, paths in enumerate(groups):
             picture = QPixmap(str(self._pictures.path_of(paths)))

@@ -20,6 +20,8 @@ STRETCH: Part = (None, 1)
 """Empty room."""
 Margins = int | tuple[int, int, int, int]
 """All four, or left, top, right and bottom, in pixels."""
+ANY_WIDTH_PX = (1 << 24) - 1
+"""Greatest width of a widget that has none: Qt's largest."""
 
 
 def row_of(

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from PySide6.QtCore import QBuffer, QIODevice, QPoint, QPointF, QRect, QSize, Qt
-from PySide6.QtGui import QGuiApplication, QPainter, QPixmap
+from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QPoint, QPointF, QRect, QSize, Qt
+from PySide6.QtGui import QGuiApplication, QImage, QImageWriter, QPainter, QPixmap
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QMenu, QMessageBox, QWidget
 
@@ -70,15 +70,20 @@ def pixmap_of(widget: QWidget) -> QPixmap:
     return pixmap
 
 
+def png_of(picture: QImage) -> bytes:
+    """A picture as PNG."""
+    buffer = QBuffer()
+    buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+    QImageWriter(buffer, QByteArray(b"png")).write(picture)
+    return bytes(buffer.data().data())
+
+
 def write_picture(widget: QWidget, path: Path) -> None:
     """Write a picture of a widget; raises Sd2Error for another ending than .png or .svg."""
     if path.suffix.lower() == ".svg":
         content = _drawing(widget)
     elif path.suffix.lower() == ".png":
-        buffer = QBuffer()
-        buffer.open(QIODevice.OpenModeFlag.WriteOnly)
-        pixmap_of(widget).save(buffer, "PNG")
-        content = bytes(buffer.data().data())
+        content = png_of(pixmap_of(widget).toImage())
     else:
         raise Sd2Error(
             f"{path.name} is no picture that can be written", "a name that ends in .png or .svg"
