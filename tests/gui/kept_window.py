@@ -39,10 +39,14 @@ _PASSING = (
     *("_lister", "_thread", "_synthesizers._made", "_kept"),  # made in the background, or kept
     *("edits._before", "_last_px", "_pressed_px", "_drops"),  # of a drag that is over
     *("_tabbed", "_behind"),  # where Tab went last; actions that are followed soon
-    "_notices]._at",  # found anew when a notice appears
+    *("_notices._at", "limb_menu._offered"),  # found anew when a notice or the menu appears
+    *("start.recent", "_pictures._wanted", "_pictures._writer.busy"),  # of the start page, hidden
+    *("_tour._before", "]._target"),  # of a tour that is over
+    *("edges_s", "limb_hand._model._found"),  # worked out once, when first asked for
     *("inertial_hand._model._chosen", "].found"),  # of places and a search that are no more
     *("._body", "scene.inertial.points"),  # what places were last drawn about, and their markers
     *("scene.markers.points", "scene.markers._colours", "scene.markers._colour_array"),
+    "scene.markers._length_m",
     # Tables that are filled when they are next on screen.
     *("spans.table._model.rows", "spans.table._model._row_of"),
     *("_label_set._model.rows", "_label_set._model._counts", "_label_set._model._alike"),
@@ -54,11 +58,8 @@ _HASHED_BYTES = 1 << 20
 
 def new_window(qtbot: Any, fake: Any, fake_models: Any, fake_classes: Any) -> MainWindow:
     """Window without a recording, all views in place."""
-    settings = Settings.forgetful()
-    for name in ("folded", "over"):  # the panel at the side is open and beside the maps
-        settings.set_value(f"layouts/Look/{name}", False)
     window = MainWindow(
-        settings,
+        _set_as_for_a_test(Settings.forgetful()),
         Parts(
             accuracy=fake.library,
             denoisers=fake_models.library,
@@ -72,6 +73,12 @@ def new_window(qtbot: Any, fake: Any, fake_models: Any, fake_classes: Any) -> Ma
     window.populate()
     qtbot.waitUntil(lambda: window.settled, timeout=120_000)
     return window
+
+
+def _set_as_for_a_test(settings: Settings) -> Settings:
+    for name in ("folded", "over"):  # the panel at the side is open and beside the maps
+        settings.set_value(f"layouts/Look/{name}", False)
+    return settings
 
 
 def close_window(window: MainWindow) -> None:
@@ -167,7 +174,7 @@ class KeptWindow:
         models.trade.measured.set_family("histogram")
         for table in window.findChildren(QTableView):
             table.setCurrentIndex(QModelIndex())
-        window.side.bring_up("Sensor")
+        window.side.bring_up("Sensor", "Sensor")
         window.messages.dismiss()
         window.messages.forget()
         for splitter, state in self._splitters:
@@ -176,6 +183,7 @@ class KeptWindow:
         if self._focus is not None:
             self._focus.setFocus()
         window.session.settings._store._values.clear()
+        _set_as_for_a_test(window.session.settings)
         opened(window, qtbot, recording)
         models.labels.set_label(models.labels.labels.label_set.labels[0].name)
         held = models.label_session._place._folder

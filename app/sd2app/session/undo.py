@@ -167,6 +167,7 @@ class Edits:
         if self._dragged is not None:
             self._document.assign(self._moved(by_m))
             self._push_change(f"Move {self._dragged.name}", self._before)
+            self._dragged = None
 
     def _moved(self, by_m: Vector) -> dict[str, tuple[Any, ...]]:
         """All that is like what is dragged, with that elsewhere."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import time
@@ -58,6 +59,7 @@ def run(
         # Loading Qt's reader of SVG does not delay the skeleton.
         application.setWindowIcon(QIcon(str(ICON)))
         window.populate()
+        gc.freeze()  # what is there by now stays
         if paths:
             window.open_paths(paths)
         else:

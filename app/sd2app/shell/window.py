@@ -190,7 +190,6 @@ class MainWindow(QMainWindow):
         # VTK last, imported in a thread: everything else is usable while it loads.
         self._importer = LatestRunner("import", self, lambda _: self._add_scene())
         self._importer.submit(lambda emit: import_module("sd2app.scene.view"))
-        gc.freeze()
         gc.enable()
 
     def _fill_panels(self) -> None:
