@@ -3,8 +3,9 @@
 A mesh that was fitted to a video states how badly the velocity of each limb is known
 (:class:`~sd2core.mesh.velocity_uncertainty.VelocityUncertainty`). Of the vertices of a limb, each
 is spread over the bins as N(v, σ²) around its own velocity (docs/decisions/0071). They are counted
-on a finer axis first, and each of its parts is spread from the mean velocity of what lies in it;
-where σ is small, each vertex is spread by itself. Of a raw map that is right to 1e-3.
+on a finer axis first, and each of its parts is spread from the mean velocity of what lies in it, by
+their deviation, too; where σ is very small, each vertex is spread by itself. Of a raw map that is
+right to 1e-3.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from sd2core.doppler.histogram import (
 )
 from sd2core.doppler.kernels import CLIP, WRAP
 from sd2core.doppler.limb_histograms import FineAxis
-from sd2core.doppler.limb_kernels import REACH, fine_kernel, spread_kernel
+from sd2core.doppler.limb_kernels import REACH, fine_kernel
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.sensor import VelocityAxis
@@ -34,9 +35,6 @@ from sd2core.sensor import VelocityAxis
 SIGMA_FACTOR = 0.5
 """Factor on the deviations that a mesh states: with it maps of calibrating clips came nearest to
 the true ones (docs/decisions/0071). What covers two errors of three spreads most too far."""
-
-_FRAMES = 16
-"""Frames counted together: their fine histograms stay in the second-level cache."""
 
 
 def sigma_bins(
@@ -107,18 +105,14 @@ def count_expected(
         _count_plain(frames, ends, counting, scatterers, sigma_bins[:, vertex_limb], into)
         return
     place, axis = ends.astype(frames.positions.dtype), counting.arguments()
-    count = len(frames)
-    for first in range(0, count, _FRAMES):
-        rows = slice(first, min(first + _FRAMES, count))
-        some, counts, sigma = frames.rows(rows), into.rows(rows), sigma_bins[rows, limb]
-        room = 0 if counting.beyond == WRAP else math.ceil(REACH * sigma.max()) + 1
-        fine = np.zeros((rows.stop - first, len(pairs), FineAxis(counting, room).parts, 2))
-        fine_kernel(
-            tuple(some.paths()), counting.scale(some.duration_s, place.dtype),
-            scatterers.rows(rows).arguments(), place, axis, group, room,
-            sigma, part, fine, counts.histogram, counts.visible, counts.beyond,
-        )  # fmt: skip
-        spread_kernel(fine, sigma, part, counting.bins, room, counting.beyond, counts.histogram)
+    sigma = sigma_bins[:, limb]
+    room = 0 if counting.beyond == WRAP else math.ceil(REACH * sigma.max()) + 1
+    fine_kernel(
+        tuple(frames.paths()), counting.scale(frames.duration_s, place.dtype),
+        scatterers.arguments(), place, axis, group, room, sigma, part,
+        np.empty((0, len(pairs), FineAxis(counting, room).parts)), into.histogram, into.visible,
+        into.beyond,
+    )  # fmt: skip
 
 
 def _count_plain(

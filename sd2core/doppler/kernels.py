@@ -248,7 +248,7 @@ def _projected(x, y, z, ax, ay, az, sx, sy, sz, weight):  # type: ignore[no-unty
 
 
 @compiled
-def _multiplicity_beyond(f, seen, multiplicity, bins):  # type: ignore[no-untyped-def]
+def multiplicity_beyond(f, seen, multiplicity, bins):  # type: ignore[no-untyped-def]
     """Number of vertices that the visible ones beyond the axis stand for."""
     end, total = np.float32(bins), np.int32(0)
     for v in range(f.shape[0]):
@@ -489,7 +489,7 @@ def count_kernel(  # type: ignore[no-untyped-def]
                 b = ranges_at(here, after[frame, sample], ends, distances, ranges, held)
                 axis_positions(a[p:q], b[p:q], scale[t, sample], offset, f[:n])
                 if grouped:
-                    outside_count += _multiplicity_beyond(f[:n], sight, multiplicity[p:q], bins)
+                    outside_count += multiplicity_beyond(f[:n], sight, multiplicity[p:q], bins)
                     _slots_of(f[:n], sight, bins, beyond, slot[:n])
                 else:
                     outside_count += _slots_of(f[:n], sight, bins, beyond, slot[:n])

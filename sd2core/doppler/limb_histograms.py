@@ -99,15 +99,15 @@ def fine_histograms(
     limb, counting = scatterers.parts, axis.counting
     assert limb is not None
     if kernels_ready() and velocity_mps is None:
-        both = np.zeros((len(frames), limbs, axis.parts, 2))
+        fine = np.zeros((len(frames), limbs, axis.parts))
         place = ends.astype(frames.positions.dtype)
         fine_kernel(
             tuple(frames.paths()), counting.scale(frames.duration_s, place.dtype),
             scatterers.arguments(), place, counting.arguments(), limb.astype(np.intp),
-            axis.room_bins, np.full((len(frames), limbs), np.inf), np.zeros(limbs, np.intp), both,
-            np.empty((len(frames), 1, 0)), np.zeros(len(frames)), np.zeros(len(frames)),
+            axis.room_bins, np.zeros((len(frames), limbs)), np.zeros(limbs, np.intp), fine,
+            np.empty((0, 1, 0)), np.zeros(len(frames)), np.zeros(len(frames)),
         )  # fmt: skip
-        return both[..., 0]
+        return fine
     fine = np.zeros((len(frames), limbs, axis.parts))
     for t, knot in enumerate(frames.centre):
         points = frames.positions[knot]

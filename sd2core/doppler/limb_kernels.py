@@ -18,6 +18,8 @@ from sd2core.doppler.kernels import (
     axis_positions,
     distances_of,
     group_of,
+    multiplicity_beyond,
+    multiplicity_seen,
     ranges_at,
     weigh_run,
 )
@@ -30,7 +32,7 @@ PARTS = 8
 REACH = 4
 """Half width at which the normal distribution is cut, in standard deviations."""
 
-SPREAD_AT_ONCE = 0.6
+SPREAD_AT_ONCE = 0.05
 """Deviation in bins below which each vertex is spread by itself: parts would be too coarse."""
 
 _STEPS = 256
@@ -45,7 +47,10 @@ def fine_kernel(  # type: ignore[no-untyped-def]
     paths, scale, scatterers, ends, law, limb, room, sigma, part, fine, histogram, visible,
     outside,
 ) -> None:  # fmt: skip
-    """Count every limb on a fine axis, or spread its vertices at once.
+    """Count every limb on a fine axis, and spread its parts over the bins.
+
+    Each part is spread from the mean place of what lies in it, by what deviation that has itself
+    and by that of its limb.
 
     Parameters
     ----------
@@ -56,15 +61,16 @@ def fine_kernel(  # type: ignore[no-untyped-def]
     room : int
         Bins beyond each end of the axis.
     sigma : float64 (n, limbs)
-        Deviation of each limb in bins: of those below ``SPREAD_AT_ONCE`` the vertices go to
-        ``histogram``, spread, all others to ``fine``.
+        Deviation of each limb in bins; of those below ``SPREAD_AT_ONCE`` that are not 0 each
+        vertex is spread by itself.
     part : intp (limbs,)
         Part of the body of each limb.
-    fine : float64 (n, limbs, parts, 2)
-        Sum of the weights in a part, and that of weights times the place within the part. This
-        and what follows is written, and zero at first.
+    fine : float64 (n, limbs, parts)
+        Sum of the weights in each part of the axis; what is written here is not spread. Of no
+        frames, it only says how many parts there are. This and what follows is written, and zero
+        at first.
     histogram : float64 (n, body parts, bins)
-        Of what is spread at once.
+        Of what is spread.
     visible, outside : float64 (n,)
         Number of visible vertices, and of those of them beyond the axis.
     """
@@ -78,6 +84,10 @@ def fine_kernel(  # type: ignore[no-untyped-def]
     ranges, held = np.empty((samples + 2, most), places.dtype), np.full(samples + 2, -1)
     f, seen = np.empty(min(most, RUN), places.dtype), np.ones(min(most, RUN), np.uint8)
     weight, spare = np.ones(min(most, RUN), np.float32), np.empty(min(most, RUN), np.float32)
+    number, within = np.empty(min(most, RUN), np.int32), np.empty(min(most, RUN), places.dtype)
+    parts, spreads, grouped = fine.shape[2], fine.shape[0] == 0, multiplicity.shape[0] > 0
+    table = np.zeros((sigma.shape[1] * parts, 3))
+    row = (limb * parts).astype(np.uint32)
     for t in range(scale.shape[0]):
         if which == MASK:
             marks = mask[t]
@@ -86,6 +96,7 @@ def fine_kernel(  # type: ignore[no-untyped-def]
             measured += scale[t, sample] > 0
         share = 1.0 / max(measured, 1)
         knot = centre[t]
+        low, high = parts, 0
         for p in range(0, most, RUN):
             q = min(p + RUN, most)
             n = q - p
@@ -95,80 +106,123 @@ def fine_kernel(  # type: ignore[no-untyped-def]
                 marks, areas, vectors, which, weighting, beam, ends, distances, exponent,
                 reference, seen[:n], weight[:n], spare[:n],
             )  # fmt: skip
-            for i in range(n):
-                if sight[i] != 0:
-                    visible[t] += multiplicity[p + i] if multiplicity.shape[0] > 0 else 1.0
+            if grouped:
+                visible[t] += multiplicity_seen(sight, multiplicity[p:q])
+            else:
+                visible[t] += sight.sum()
             for sample in range(samples):
                 if scale[t, sample] <= 0:
                     continue
                 a = ranges_at(here, before[t, sample], ends, distances, ranges, held)
                 b = ranges_at(here, after[t, sample], ends, distances, ranges, held)
                 axis_positions(a[p:q], b[p:q], scale[t, sample], offset, f[:n])
-                outside[t] += share * _tally(
-                    f[:n], sight, weight[:n], share, limb[p:q], multiplicity[p:q], bins, room,
-                    beyond, sigma[t], part, fine[t], histogram[t],
-                )  # fmt: skip
+                if grouped:
+                    outside[t] += share * multiplicity_beyond(f[:n], sight, multiplicity[p:q], bins)
+                else:
+                    outside[t] += share * _number_beyond(f[:n], sight, bins)
+                least, last = _find_parts(f[:n], bins, room, beyond, parts, number[:n], within[:n])
+                low, high = min(low, least), max(high, last + 1)
+                if spreads:
+                    _spread_alone(
+                        number[:n], within[:n], sight, weight[:n], share, limb[p:q], sigma[t], part,
+                        bins, room, beyond, histogram[t],
+                    )  # fmt: skip
+                _add_parts(number[:n], within[:n], sight, weight[:n], row[p:q], table)
+        if spreads:
+            _spread_parts(table, low, high, share, sigma[t], part, bins, room, beyond, histogram[t])
+        else:
+            fine[t] = share * table[:, 0].copy().reshape(fine.shape[1:])
+            table[:] = 0
 
 
 @compiled
-def _tally(  # type: ignore[no-untyped-def]
-    f, sight, weight, share, limb, multiplicity, bins, room, beyond, sigma, part, fine, histogram
-):
-    """Add a run of vertices; returns the number of visible ones beyond the axis."""
-    parts = fine.shape[1]
-    end = np.float32(bins)
-    inner = end - np.float32(1e-3)
-    least, most = np.float32(-room - 1), np.float32(bins + room + 1)
-    outside = 0.0
+def _number_beyond(f, seen, bins):  # type: ignore[no-untyped-def]
+    """Return the number of visible vertices beyond the axis."""
+    outside, zero, end = np.int32(0), np.float32(0), np.float32(bins)
     for v in range(f.shape[0]):
-        if sight[v] == 0:
-            continue
-        x, amount, number = f[v], weight[v] * share, limb[v]
-        inside = (x >= np.float32(0)) & (x <= end)
-        if not inside:
-            outside += multiplicity[v] if multiplicity.shape[0] > 0 else 1.0
-            if beyond == WRAP:
-                x = min(max(x - end * np.floor(x / end), np.float32(0)), end)
-            else:
-                x = max(min(x, most), least)
-        if not np.isfinite(x):
-            continue
-        if sigma[number] == 0 and (inside or beyond == WRAP):
-            x = min(x, inner)  # the axis is closed at both ends
-        if sigma[number] < SPREAD_AT_ONCE:
-            _spread(np.float64(x), amount, sigma[number], bins, beyond, histogram[part[number]])
-            continue
-        x *= np.float32(PARTS)
-        place = min(max(int(np.floor(x)) + room * PARTS, 0), parts - 1)
-        fine[number, place, 0] += amount
-        fine[number, place, 1] += amount * (x - np.float32(place - room * PARTS))
+        inside = (f[v] >= zero) & (f[v] <= end)
+        outside += np.int32((not inside) & (seen[v] != 0))
     return outside
 
 
 @compiled
-def spread_kernel(fine, sigma, part, bins, room, beyond, histogram):  # type: ignore[no-untyped-def]
-    """Add the fine histograms of :func:`fine_kernel` to coarse ones, spread.
+def _find_parts(f, bins, room, beyond, parts, number, within):  # type: ignore[no-untyped-def]
+    """Set the part of the axis that each vertex lies in (-1: nowhere), and its place within it.
 
-    Each part is spread from the mean place of what lies in it.
-
-    Parameters
-    ----------
-    fine, sigma, part, room
-        As for :func:`fine_kernel`.
-    bins, beyond : int
-        Those of the axis.
-    histogram : float64 (n, body parts, bins)
-        Added to.
+    Returns the first and the last of these parts. ``f``, places in bins, is work space.
     """
-    for t in range(fine.shape[0]):
-        for limb in range(fine.shape[1]):
-            if sigma[t, limb] < SPREAD_AT_ONCE:
+    zero, end = np.float32(0), np.float32(bins)
+    least, most = np.float32(-room - 1), np.float32(bins + room + 1)
+    # The axis is closed at both ends.
+    inner, last = end - np.float32(1e-3), np.float32(parts - 1)
+    if beyond == WRAP:
+        for v in range(f.shape[0]):
+            x = f[v]
+            y = x - end * np.floor(x / end)
+            f[v] = x if (x >= zero) & (x <= end) else y
+    low, high = np.int32(parts - 1), np.int32(0)
+    for v in range(f.shape[0]):
+        x = f[v]
+        x = inner if (x > inner) & (x <= end) else x
+        x = x if x > least else least
+        x = x if x < most else most
+        x = (x + np.float32(room)) * np.float32(PARTS)
+        place = x if x > zero else zero
+        place = place if place < last else last
+        whole = np.int32(place)
+        number[v] = whole if f[v] == f[v] else np.int32(-1)
+        within[v] = x - np.float32(whole)
+        low, high = min(low, whole), max(high, whole)
+    return low, high
+
+
+@compiled
+def _spread_alone(  # type: ignore[no-untyped-def]
+    number, within, seen, weight, share, limb, sigma, part, bins, room, beyond, histogram
+):
+    """Spread each vertex of limbs with a small deviation, which then are nowhere."""
+    for one in range(sigma.shape[0]):
+        if not 0 < sigma[one] < SPREAD_AT_ONCE:
+            continue
+        for v in range(limb.shape[0]):
+            if limb[v] == one and number[v] >= 0:
+                if seen[v] != 0:
+                    place = np.float64(number[v] + within[v]) / PARTS - room
+                    amount = share * weight[v]
+                    _spread(place, amount, sigma[one], bins, beyond, histogram[part[one]])
+                number[v] = -1
+
+
+@compiled
+def _add_parts(number, within, seen, weight, row, table):  # type: ignore[no-untyped-def]
+    """Add weights, and their first and second moments within a part, to the row of its limb."""
+    for v in range(number.shape[0]):
+        if seen[v] != 0 and number[v] >= 0:
+            at = row[v] + np.uint32(number[v])
+            amount, place = np.float64(weight[v]), np.float64(within[v])
+            table[at, 0] += amount
+            table[at, 1] += amount * place
+            table[at, 2] += amount * place * place
+
+
+@compiled
+def _spread_parts(  # type: ignore[no-untyped-def]
+    table, low, high, share, sigma, part, bins, room, beyond, histogram
+):
+    """Move what :func:`_add_parts` has gathered in some parts of the axis to the bins, spread."""
+    parts = table.shape[0] // sigma.shape[0]
+    for limb in range(sigma.shape[0]):
+        for number in range(low, high):
+            weight, first, second = row = table[limb * parts + number]
+            if weight == 0:
                 continue
-            for number in range(fine.shape[2]):
-                weight = fine[t, limb, number, 0]
-                if weight != 0:
-                    place = (number + fine[t, limb, number, 1] / weight) / PARTS - room
-                    _spread(place, weight, sigma[t, limb], bins, beyond, histogram[t, part[limb]])
+            row[:] = 0
+            place, deviation = first / weight, 0.0
+            if sigma[limb] > 0:
+                variance = max(second / weight - place * place, 0.0) / PARTS**2
+                deviation = np.sqrt(sigma[limb] ** 2 + variance)
+            at = (number + place) / PARTS - room
+            _spread(at, share * weight, deviation, bins, beyond, histogram[part[limb]])
 
 
 @compiled
@@ -207,12 +261,11 @@ def compile_kernels() -> None:
     beam = (tables.axes[None], tables.across, tables.up)
     scatterers = (np.zeros(12, np.int8), marks, areas, areas, areas[:4], marks[0], ALL, ONE, beam)
     sigma, part = np.ones((1, 1)), np.zeros(1, np.intp)
-    fine, coarse = np.zeros((1, 1, 256, 2)), np.zeros((1, 1, 32))
+    coarse = np.zeros((1, 1, 32))
     for precision in (np.float32, np.float64):
         paths = (numbers, first, np.ones(12, precision), knots[0], knots, knots, 1, 4)
         fine_kernel(
             paths, np.ones((1, 1), precision), scatterers, np.zeros((1, 3), precision),
-            (32, DROP, 4.0, np.float32(2.2)), part[[0, 0, 0, 0]], 0, sigma, part, fine, coarse,
-            np.zeros(1), np.zeros(1),
+            (32, DROP, 4.0, np.float32(2.2)), part[[0, 0, 0, 0]], 0, sigma, part,
+            np.zeros((1, 1, 256)), coarse, np.zeros(1), np.zeros(1),
         )  # fmt: skip
-    spread_kernel(fine, sigma, part, 32, 0, DROP, coarse)
