@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from sd2app.command_line import full_parser
@@ -17,7 +17,9 @@ def write_command_pages(folder: Path) -> None:
     """Make ``folder`` hold a page per command and ``index.md``, and nothing else."""
     parser = full_parser()
     pages = {"index.md": _index(parser)}
-    pages |= {f"{name}.md": _page(command) for name, command in commands_of(parser).items()}
+    told: dict[tuple[str, ...], str] = {}
+    for name, command in commands_of(parser).items():
+        pages[f"{name}.md"] = "\n".join(_sections(command, 1, told)) + "\n"
     folder.mkdir(exist_ok=True)
     for path in folder.glob("*.md"):
         if path.name not in pages:
@@ -40,8 +42,8 @@ def _index(parser: argparse.ArgumentParser) -> str:
         [
             "# Command line",
             "",
-            "Commands do what the window does, by the same library. These pages are"
-            " what `sd2 COMMAND --help` prints, of this version.",
+            "Commands do what the window does, by the same library. `sd2 COMMAND --help` prints"
+            " the same as these pages.",
             "",
             "Exit codes are 0, 1 (explained in a sentence) and 2 (usage).",
             "",
@@ -59,39 +61,66 @@ def _index(parser: argparse.ArgumentParser) -> str:
     )
 
 
-def _page(parser: argparse.ArgumentParser) -> str:
-    return "\n".join(_sections(parser, 1)) + "\n"
+def _sections(
+    parser: argparse.ArgumentParser, level: int, told: dict[tuple[str, ...], str]
+) -> Iterator[str]:
+    """Heading, description, examples, usage and arguments of a command and of those in it.
 
-
-def _sections(parser: argparse.ArgumentParser, level: int) -> Iterator[str]:
-    """Heading, description, examples, usage and arguments of a command and of those in it."""
+    ``told`` links, by its lines, to each titled group of options that stands on the pages so far.
+    """
     yield from (f"{'#' * level} {parser.prog}", "", *_paragraphs(parser.description or ""))
     examples = (parser.epilog or "").removeprefix("examples:\n")
     if examples:
         yield from ("```sh", *_example_lines(examples), "```", "")
-    # Which options exclude each other is only said here.
     yield from ("**Usage**", "", "```text", _usage(parser), "```", "")
     for group in parser._action_groups:
-        actions = [one for one in group._group_actions if one.help != argparse.SUPPRESS]
-        actions = [
-            one
-            for one in actions
-            if not isinstance(one, argparse._HelpAction | argparse._SubParsersAction)
-        ]
-        if actions:
-            # Not a heading: names of groups come again in every command of a page.
-            yield from (f"**{_escaped(_sentence_case(group.title or ''))}**", "")
-            yield from _paragraphs(group.description or "")
-            for action in actions:
-                yield from (_term(action), f": {_explanation(action)}", "")
+        actions = [one for one in group._group_actions if _is_shown(one)]
+        if not actions:
+            continue
+        # Not a heading: names of groups come again in every command of a page.
+        yield from (f"**{_escaped(_sentence_case(group.title or ''))}**", "")
+        lines = (*_paragraphs(group.description or ""), *_explained(actions))
+        if group in (parser._positionals, parser._optionals):
+            yield from lines
+        elif lines in told:
+            options = ", ".join(f"`{action.option_strings[0]}`" for action in actions)
+            yield from (f"{options}: as of {told[lines]}", "")
+        else:
+            page, anchor = parser.prog.split()[1], parser.prog.replace(" ", "-")
+            told[lines] = f"[`{parser.prog}`]({page}.md#{anchor})"
+            yield from lines
     for command in commands_of(parser).values():
-        yield from _sections(command, level + 1)
+        yield from _sections(command, level + 1, told)
+
+
+def _is_shown(action: argparse.Action) -> bool:
+    own = isinstance(action, argparse._HelpAction | argparse._SubParsersAction)
+    return action.help != argparse.SUPPRESS and not own
 
 
 def _usage(parser: argparse.ArgumentParser) -> str:
-    formatter = argparse.HelpFormatter(parser.prog, width=WIDTH)
-    formatter.add_usage(parser.usage, parser._actions, parser._mutually_exclusive_groups, prefix="")
+    """Usage with what is needed and what excludes each other: the rest is listed below it."""
+    exclusive = [
+        group
+        for group in parser._mutually_exclusive_groups
+        if sum(map(_is_shown, group._group_actions)) > 1
+    ]
+    excluding = [action for group in exclusive for action in group._group_actions]
+    named = [
+        action
+        for action in parser._actions
+        if not action.option_strings or action.required or action in excluding
+    ]
+    more = any(_is_shown(action) for action in parser._actions if action not in named)
+    name = f"{parser.prog} [options]" if more else parser.prog
+    formatter = argparse.HelpFormatter(name, width=WIDTH)
+    formatter.add_usage(None, named, exclusive, prefix="")
     return formatter.format_help().strip()
+
+
+def _explained(actions: Iterable[argparse.Action]) -> Iterator[str]:
+    for action in actions:
+        yield from (_term(action), f": {_explanation(action)}", "")
 
 
 def _term(action: argparse.Action) -> str:
