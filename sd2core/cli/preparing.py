@@ -40,7 +40,7 @@ class Doctor(Json):
     Parameters
     ----------
     json
-        print JSON, for other programs; an error as well
+        print JSON; an error as well
     warm_up
         compile the numerical kernels
     fetch_models

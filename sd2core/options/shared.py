@@ -18,7 +18,7 @@ class Json(OptionRecord):
     Parameters
     ----------
     json
-        print JSON, for other programs; an error as well
+        print JSON; an error as well
     """
 
     json: bool = False
