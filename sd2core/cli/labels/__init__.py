@@ -42,7 +42,7 @@ class Convert(LabelFile, Overwrite, Json):
     out : FILE
         the file to write
     to : NAME
-        the format of --out, likewise
+        the format of --out, by a name as of --format
     """
 
     out: Path

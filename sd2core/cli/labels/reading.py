@@ -42,13 +42,11 @@ class FrameTimes(OptionRecord):
     fps: Annotated[Positive | None, Place(one_of="clock")] = None
 
 
-class LabelFile(FrameTimes):
-    """A file with labels, and how it is read; see :func:`read_named`.
+class LabelReading(FrameTimes):
+    """How a file with labels is read.
 
     Parameters
     ----------
-    file : FILE
-        the file with labels
     format : NAME
         the format of FILE: sd2, csv, audacity, elan, textgrid, boris, mne, subtitles,
         label-studio
@@ -58,10 +56,23 @@ class LabelFile(FrameTimes):
         length of marks without a duration; by default the frame that is shown then
     """
 
-    file: Annotated[Path, ARGUMENT]
+    GROUP = Group("label file", "what it may not say about itself")
+
     format: str | None = None
     observation: str | None = None
     mark_s: Positive | None = None
+
+
+class LabelFile(LabelReading):
+    """A file with labels, and how it is read; see :func:`read_named`.
+
+    Parameters
+    ----------
+    file : FILE
+        the file with labels
+    """
+
+    file: Annotated[Path, ARGUMENT]
 
 
 def read_named(options: LabelFile) -> tuple[Labels, Timebase | None]:

@@ -58,7 +58,8 @@ UNITS = {"_s": "S", "_m": "M", "_hz": "HZ", "_deg": "DEG", "_db": "DB", "_px": "
 
 GROUPS = {
     "positional arguments", "options", "data", "description", "frame times", "machine", "maps",
-    "mesh file", "network", "network and training", "people", "segments", "sensor", "sensor errors",
+    "label file", "mesh file", "network", "network and training", "people", "segments", "sensor",
+    "sensor errors",
 }  # fmt: skip
 
 
