@@ -12,12 +12,14 @@ import pytest
 from cli_outcome import Sd2
 from swinging_recordings import FRAMES, recording
 
+from sd2core.batch import run as batch_run
 from sd2core.batch.folder import BatchFolder
 from sd2core.datasets.reading import open_dataset
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.maps import DopplerMap
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.pairs.store import read_pairs
+from tests.core.batch.pools import in_this_process
 
 PLAN = """
 out = "made"
@@ -25,6 +27,14 @@ out = "made"
 files = ["anna.sd2"]
 [synthesise]
 """
+
+
+@pytest.fixture(autouse=True)
+def batches_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have batches work in this process; ``test_batch_command.py`` has them start their own."""
+    monkeypatch.setattr(
+        batch_run, "local_pool", lambda folder, processes: in_this_process(folder.path)
+    )
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ from cli_outcome import Sd2
 
 from sd2core.pairs.store import read_pairs
 from sd2core.radar_profiles import RADARS
+from sd2core.simulate.campaign import radar as campaign_radar
 
 
 def test_a_campaign_is_made_and_told(sd2: Sd2, tmp_path: Path) -> None:
@@ -64,7 +65,10 @@ def test_varied_takes_have_no_order(sd2: Sd2, tmp_path: Path) -> None:
     assert not (tmp_path / "x.zarr").exists()
 
 
-def test_a_radar_by_its_name_has_its_own_sweep_and_rate(sd2: Sd2, tmp_path: Path) -> None:
+def test_a_radar_by_its_name_has_its_own_sweep_and_rate(
+    sd2: Sd2, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(campaign_radar, "_EMPTY_FRAMES", 8)  # how well noise is known is not asked
     short = ["--people", 1, "--minutes", 0.03, "--take-seconds", 2, "--workers", 1]
     for options, rate in (([], 20.0), (["--rate", 24], 24.0)):
         out = tmp_path / f"{rate:g}.zarr"
