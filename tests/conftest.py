@@ -9,11 +9,16 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from sd2app.plain_imports import plain_imports
 from sd2core.body.landmark_models import LandmarkModels, landmark_models
 from sd2core.errors import Sd2Error
 from sd2core.files.lock import FileLock
 from sd2core.numerics.compiled import cache_directory, kernels_ready, warm_up
 from sd2core.runs import pace
+
+# Before pytest-qt imports it, so that the modules that tests import are not read for its sake.
+with plain_imports():
+    import PySide6.QtCore  # noqa: F401
 
 # A busy machine is no failure: no test asserts a time.
 settings.register_profile("sd2", deadline=None)

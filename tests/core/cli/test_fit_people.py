@@ -68,7 +68,7 @@ def test_nobody_is_fitted_where_one_is_missing(video: Path, sd2: Sd2, tmp_path: 
 
 
 def test_who_is_alone_is_fitted_as_without_a_list(sd2: Sd2, tmp_path: Path) -> None:
-    video = film(tmp_path / "one.mp4", swiping()[0])
+    video = film(tmp_path / "one.mp4", swiping()[0][:6])
     fits = []
     for name, people in (
         ("plain", ()),
@@ -80,7 +80,7 @@ def test_who_is_alone_is_fitted_as_without_a_list(sd2: Sd2, tmp_path: Path) -> N
         assert sd2("fit", video, *people, *words).code == 0
         fits.append(load_mesh(out))
     for fit in fits[1:]:
-        np.testing.assert_array_equal(fit.read(0, 12), fits[0].read(0, 12))
+        np.testing.assert_array_equal(fit.read(0, 6), fits[0].read(0, 6))
 
 
 def test_a_stopped_run_makes_what_is_left(video: Path, sd2: Sd2, tmp_path: Path) -> None:
