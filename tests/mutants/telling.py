@@ -12,8 +12,8 @@ from sd2core.cli.parser import build_parser
 
 def sd2(*command: object) -> None:
     """Run a command and print what it prints as a terminal in UTF-8 would."""
-    parser, _ = build_parser()
-    options = parser.parse_args(list(map(str, command)))
+    words = list(map(str, command))
+    options = build_parser(typed=words)[0].parse_args(words)
     terminal = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
     with redirect_stdout(terminal), redirect_stderr(terminal):
         options.handler(record_of(options))
