@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -25,10 +27,18 @@ from sd2core.timebase import Timebase
 from tests.core.datasets.made_sources import source
 
 
+@cache
+def written() -> dict[str, bytes]:
+    with TemporaryDirectory() as folder:
+        sources = [source("r1", "anna"), source("r1", "ben")]
+        write_dataset(Path(folder) / "set.npz", sources, DatasetOptions(length=20))
+        return {file.name: file.read_bytes() for file in Path(folder).iterdir()}
+
+
 def dataset(folder: Path) -> Path:
-    path = folder / "set.npz"
-    write_dataset(path, [source("r1", "anna"), source("r1", "ben")], DatasetOptions(length=20))
-    return path
+    for name, content in written().items():
+        (folder / name).write_bytes(content)
+    return folder / "set.npz"
 
 
 def changed(path: Path, **arrays: Any) -> None:
