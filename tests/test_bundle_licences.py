@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib.util
+import os
 import re
 import sys
 import sysconfig
@@ -37,8 +38,9 @@ def part(licence: str, name: str = "thing", text: str = ""):
 @functools.cache
 def installed() -> list[tuple[str, str]]:
     """Every shared library of the environment, more than the recipe carries."""
-    paths = (path for path in SITE.rglob("*") if LIBRARY.search(path.name) and path.is_file())
-    return [(path.relative_to(SITE).as_posix(), str(path)) for path in sorted(paths)]
+    walked = ((at, name) for at, _, names in os.walk(SITE) for name in names)
+    paths = sorted(Path(at, name) for at, name in walked if LIBRARY.search(name))
+    return [(path.relative_to(SITE).as_posix(), str(path)) for path in paths]
 
 
 @functools.cache

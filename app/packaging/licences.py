@@ -87,7 +87,13 @@ def allowed(licence: str, among: frozenset[str]) -> bool:
 def place(path: str) -> str:
     """Path by which files are compared: in its real folder, by the name that is used."""
     folder, name = os.path.split(path)
-    return os.path.join(os.path.realpath(folder), name)
+    return os.path.join(real_folder(folder), name)
+
+
+@functools.cache
+def real_folder(folder: str) -> str:
+    """A folder without links in its path; asked once, as most hold many files."""
+    return os.path.realpath(folder)
 
 
 @functools.cache

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from full_disk import full_disk
+from matplotlib.figure import Figure
 
 from sd2core.body.model import Body
 from sd2core.body.rotations import about
@@ -174,9 +175,13 @@ def test_the_figure_shows_every_mesh(mesh: MeshSequence, tmp_path: Path, suffix:
     assert {".png": b"PNG", ".svg": b"<?xml"}[suffix] in start
 
 
+@pytest.fixture(scope="module")
+def figure(mesh: MeshSequence) -> Figure:
+    return draw_comparison(compare_meshes([mesh, mesh], ["a", "b"]))
+
+
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_a_figure_is_whole_or_not_there(mesh: MeshSequence, tmp_path: Path, suffix: str) -> None:
-    figure = draw_comparison(compare_meshes([mesh, mesh], ["a", "b"]))
+def test_a_figure_is_whole_or_not_there(figure: Figure, tmp_path: Path, suffix: str) -> None:
     with full_disk(), pytest.raises(OSError, match="figure"):
         save_figure(figure, tmp_path / f"figure{suffix}")
     assert not list(tmp_path.iterdir())
