@@ -137,7 +137,7 @@ def test_a_kill_loses_no_more_than_the_second_in_flight(tmp_path: Path) -> None:
     for line in process.stdout:
         told = json.loads(line)
         last = told if told["event"] == "frames" else last
-        if last["recorded"] > 90 and last["pictures"] > 90:
+        if last["recorded"] > 45 and last["pictures"] > 45:
             break
     for child in _children(process.pid):
         os.kill(child, signal.SIGKILL)
@@ -202,7 +202,7 @@ def test_a_radar_that_is_silent_leaves_the_video(tmp_path: Path) -> None:
     out, setup = tmp_path / "take.sd2", tmp_path / "walk.cfg"
     setup.write_text(cfg_of(TiRecording()), encoding="utf-8")
     words = ["--camera", "test", "--radar", "127.0.0.1:0", "--setup", str(setup)]
-    words += ["--out", str(out), "--seconds", "2"]
+    words += ["--out", str(out), "--seconds", "1"]
     done = subprocess.run([*RECORD, *words], capture_output=True, text=True, check=True)
     assert "No frame of the radar came: the recording holds the video alone." in done.stdout
     recording = open_recording(out)
@@ -213,7 +213,7 @@ def test_a_radar_that_is_silent_leaves_the_video(tmp_path: Path) -> None:
 
 def test_a_place_that_was_found_is_the_recordings_plan(tmp_path: Path) -> None:
     folder = tmp_path / "take.sd2"
-    words = ["--camera", "test", "--radar", "test", "--seconds", "2", "--placement", "2.2,-15"]
+    words = ["--camera", "test", "--radar", "test", "--seconds", "1", "--placement", "2.2,-15"]
     command = [sys.executable, "-m", "sd2core.cli", "record", *words, "--out", str(folder)]
     subprocess.run(command, check=True, capture_output=True)
     assert open_recording(folder).placements == PlacementGrid((2.2,), (-15.0,), (0.0,))
