@@ -68,12 +68,18 @@ def recording_copy(small_recording, tmp_path) -> Path:
     return Path(shutil.copytree(small_recording, tmp_path / small_recording.name))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def kept():
-    """Keeps a window for the tests of a file that take ``window`` or ``labelled``."""
+    """Keeps a window for the tests that take ``window`` or ``labelled``."""
     kept = KeptWindow()
     yield kept
     kept.close()
+
+
+@pytest.fixture(autouse=True, scope="module")
+def first_of_file(request, kept) -> None:
+    """Another file begins."""
+    kept.begin_file()
 
 
 def shares(request) -> bool:
@@ -84,6 +90,8 @@ def shares(request) -> bool:
 @pytest.fixture(autouse=True)
 def own_data(request, kept, tmp_path_factory, monkeypatch) -> Path:
     """Runs and models of whoever runs the tests are left alone."""
+    if kept.of_another_file and not shares(request):
+        kept.close()
     folder = kept.data if shares(request) else None
     if folder is None:
         folder = tmp_path_factory.mktemp("data")

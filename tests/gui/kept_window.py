@@ -1,4 +1,4 @@
-"""One window for the tests of a file, for as long as each of them leaves it as it was found.
+"""One window for many tests, for as long as each of them leaves it as it was found.
 
 A new window takes longer than most of what is asked of it. Here the next test gets the window of
 the last one with a recording opened in it anew, if all that the window remembers (models, views,
@@ -20,7 +20,7 @@ import fake_class_command
 import numpy as np
 from PySide6.QtCore import QByteArray, QCoreApplication, QEvent, QModelIndex
 from PySide6.QtGui import QAction, QUndoStack
-from PySide6.QtWidgets import QApplication, QSplitter, QTableView, QWidget
+from PySide6.QtWidgets import QApplication, QSplitter, QTableView, QToolTip, QWidget
 from window_models import models_of
 
 from sd2app.session.display import HeatmapLevels
@@ -28,6 +28,7 @@ from sd2app.settings import DEFAULT_TOLERANCE, Settings
 from sd2app.shell.parts import Parts
 from sd2app.shell.status_bar import StatusLine
 from sd2app.shell.window import MainWindow
+from sd2core.doppler.alignment import WITHIN_S
 from sd2core.files.paths import user_data
 from sd2core.labels.recovery import recovery_folder
 
@@ -37,7 +38,8 @@ _PASSING = (
     *("_image", "_picture", "_strongest", "_dirty", "_fine"),  # painted when it is next on screen
     "_prefetcher",  # looked ahead, for the next frame
     *("_lister", "_thread", "_synthesizers._made", "_kept"),  # made in the background, or kept
-    *("edits._before", "_last_px", "_pressed_px", "_drops"),  # of a drag that is over
+    # Of a drag that is over, or of typing.
+    *("edits._before", "edits._dragged", "_last_px", "_pressed_px", "_drops", "_name._before"),
     *("_tabbed", "_behind"),  # where Tab went last; actions that are followed soon
     *("_notices._at", "limb_menu._offered"),  # found anew when a notice or the menu appears
     *("start.recent", "_pictures._wanted", "_pictures._writer.busy"),  # of the start page, hidden
@@ -46,7 +48,8 @@ _PASSING = (
     *("inertial_hand._model._chosen", "].found"),  # of places and a search that are no more
     *("._body", "scene.inertial.points"),  # what places were last drawn about, and their markers
     *("scene.markers.points", "scene.markers._colours", "scene.markers._colour_array"),
-    "scene.markers._length_m",
+    *("scene.markers._length_m", "scene.view._planned[2].wavelength_m"),
+    *("sensor_glyph.shapes[0].points", "sensor_glyph.shapes[1].points"),  # of the last beam
     # Tables that are filled when they are next on screen.
     *("spans.table._model.rows", "spans.table._model._row_of"),
     *("_label_set._model.rows", "_label_set._model._counts", "_label_set._model._alike"),
@@ -104,7 +107,7 @@ def opened(window: MainWindow, qtbot: Any, recording: Path) -> MainWindow:
 
 
 class KeptWindow:
-    """The window that the tests of a file share, or None, and what it shares with them."""
+    """The window that tests share, or None, and what it shares with them."""
 
     def __init__(self) -> None:
         self.window: MainWindow | None = None
@@ -113,6 +116,12 @@ class KeptWindow:
         self._focus: QWidget | None = None
         self._splitters: list[tuple[QSplitter, QByteArray]] = []
         self._remembered: dict[str, str] = {}
+        self.of_another_file = False
+        self._reused = self._in_vain = 0
+
+    def begin_file(self) -> None:
+        """Count anew how often the tests of a file leave the window as they found it."""
+        self.of_another_file = self.window is not None
         self._reused = self._in_vain = 0
 
     def fake(self, name: str, kind: Callable[[], Any]) -> Any:
@@ -126,6 +135,7 @@ class KeptWindow:
 
     def open(self, qtbot: Any, recording: Path, data: Path, fakes: dict[str, Any]) -> MainWindow:
         """Window on a recording as a new one would be: the one that is kept, or a new one."""
+        self.of_another_file = False
         if self.window is not None:
             before = {name: _copied(fake) for name, fake in fakes.items()}
             # Models that are there from the start have been listed by then.
@@ -156,7 +166,7 @@ class KeptWindow:
             for fake in self.fakes.values():
                 fake.gate.set()
             close_window(self.window)
-        self.window, self.data = None, None
+        self.window, self.data, self.of_another_file = None, None, False
 
     def _as_new(self, qtbot: Any, recording: Path) -> bool:
         window = self.window
@@ -168,6 +178,11 @@ class KeptWindow:
         models.playback.set_speed(1.0)
         models.playback.set_loop(False)
         models.display.set_levels(**vars(HeatmapLevels()))
+        models.display.set_mesh_colour("velocity")
+        window.features.sensor.alignment.within_s = WITHIN_S
+        window.features.sensor.alignment.problem = ""
+        window.features.scene.view.scene._followed = None
+        QToolTip.hideText()
         models.pointer.leave()
         models.keys.reset_all()
         models.trade.tolerance = DEFAULT_TOLERANCE
@@ -288,6 +303,8 @@ def _widgets(widget: QWidget, place: str) -> list[str]:
     for child in widget.children():
         if isinstance(child, StatusLine):
             continue  # it says what is being worked on
+        if child.objectName() == "qtooltip_label":
+            continue  # it goes soon
         if isinstance(child, QWidget) and child.isVisible():
             found += _widgets(child, place)
         elif isinstance(child, QAction):
