@@ -45,7 +45,8 @@ _PASSING = (
     *("start.recent", "_pictures._wanted", "_pictures._writer.busy"),  # of the start page, hidden
     *("_tour._before", "]._target"),  # of a tour that is over
     *("edges_s", "limb_hand._model._found"),  # worked out once, when first asked for
-    *("inertial_hand._model._chosen", "].found"),  # of places and a search that are no more
+    # Of places and a search that are no more.
+    *("inertial_hand._model._chosen", "limb_hand._surface._model._chosen", "].found"),
     *("._body", "scene.inertial.points"),  # what places were last drawn about, and their markers
     *("scene.markers.points", "scene.markers._colours", "scene.markers._colour_array"),
     *("scene.markers._length_m", "scene.view._planned[2].wavelength_m"),
