@@ -110,9 +110,11 @@ class PageView(QTextBrowser):
         return image
 
     def changeEvent(self, event: QEvent) -> None:
-        """Follow the theme."""
+        """Follow the theme; many changes of the palette are told that are none."""
         super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and self.page:
+        if event.type() != QEvent.Type.PaletteChange or not self.page:
+            return
+        if QColor(self._colours.well) != self._ground:
             scrolled = self.verticalScrollBar().value()
             self.reload()
             self.verticalScrollBar().setValue(scrolled)
@@ -127,10 +129,14 @@ class PageView(QTextBrowser):
 
     # --- how it looks ---------------------------------------------------------------------
 
+    @property
+    def _colours(self) -> Palette:
+        return palette_for(self.palette().base().color().lightness() < 128)
+
     def _dress(self) -> None:
         """Give text its sizes, room and colours."""
         document = self.document()
-        colours = palette_for(self.palette().base().color().lightness() < 128)
+        colours = self._colours
         cursor = QTextCursor(document)
         cursor.beginEditBlock()
         anchors = iter(self._manual.sections(self.page))
