@@ -26,6 +26,7 @@ from sd2core.doppler.smoothing import smooth
 from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.mesh.decimation import decimate
+from sd2core.mesh.made_vertices import shifted_like, unshifted
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import workers
 from sd2core.progress import Progress, silent
@@ -50,8 +51,8 @@ def synthesizer_for(
     options : SynthesisOptions
         For what a plan does not choose: axis, nulled bins, range law, smoothing.
     like : Synthesizer, optional
-        That of a plan that keeps as many vertices; its decimated mesh, and its prepared frames
-        where possible, are shared.
+        That of a plan that keeps as many vertices, of the same people; its decimated mesh, and its
+        prepared frames where possible, are shared.
 
     Raises
     ------
@@ -62,8 +63,12 @@ def synthesizer_for(
         raise Sd2Error(f"The plan is {plan}", "a plan that counts vertices")
     if like is None:
         counted = decimate(mesh, plan.vertices_kept)
-    else:  # whose plan may leave out other things
-        counted = replace(like.mesh, surroundings=mesh.surroundings)
+    else:  # whose plan may leave out other things, and whose people may stand elsewhere
+        others = tuple(
+            shifted_like(unshifted(kept)[0], body)
+            for kept, body in zip(like.mesh.others, mesh.others, strict=True)
+        )
+        counted = replace(like.mesh, surroundings=mesh.surroundings, others=others)
     beam = "beam" not in plan.left_out
     return Synthesizer(plan.scene(counted), plan.options(options), blocks_of=like, beam=beam)
 

@@ -22,6 +22,7 @@ from sd2core.body.model import Body, Resolution, own_resolution
 from sd2core.body.rotations import Floats
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
+from sd2core.mesh.made_vertices import unshifted
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS, WHOLE, VertexParts, other_side
 from sd2core.progress import Progress, silent
@@ -65,23 +66,23 @@ def body_parts(mesh: MeshSequence) -> VertexParts | None:
     >>> parts.names[parts.numbers[0]]
     'trunk'
     """
-    if mesh not in _FOUND:
-        # The same surface among other things is the same body.
-        alike = [
-            parts
-            for other, parts in list(_FOUND.items())
-            if other.vertices is mesh.vertices and not (other.others or mesh.others)
-        ]
-        found = alike[0] if alike else _find_parts(mesh)
-        if mesh.others:
-            each = [found, *map(body_parts, mesh.others)]
-            first, *others = (
-                VertexParts((WHOLE,), np.zeros(body.vertex_count, np.uint8)) if one is None else one
-                for body, one in zip(mesh.bodies, each, strict=True)
-            )
-            found = replace(first, others=tuple(others))
-        _FOUND[mesh] = found
-    return _FOUND[mesh]
+    found = [_parts_of(body) for body in mesh.bodies]
+    if not mesh.others:
+        return found[0]
+    first, *others = (
+        VertexParts((WHOLE,), np.zeros(body.vertex_count, np.uint8)) if one is None else one
+        for body, one in zip(mesh.bodies, found, strict=True)
+    )
+    return replace(first, others=tuple(others))
+
+
+def _parts_of(body: MeshSequence) -> VertexParts | None:
+    """Parts of one of the bodies of a scene, searched once wherever it is put."""
+    if body not in _FOUND:
+        own = unshifted(body)[0].vertices
+        alike = [one for other, one in list(_FOUND.items()) if unshifted(other)[0].vertices is own]
+        _FOUND[body] = alike[0] if alike else _find_parts(body)
+    return _FOUND[body]
 
 
 _FOUND: WeakKeyDictionary[MeshSequence, VertexParts | None] = WeakKeyDictionary()

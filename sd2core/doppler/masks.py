@@ -32,6 +32,10 @@ Occlusion = Literal["depth", "exact"]
 
 Position = tuple[float, float, float]
 
+_Place = Position
+"""Place of a sensor in the frame of the prepared positions: a body that is moved takes its own
+frame along."""
+
 _PLACES_KEPT = 4
 
 
@@ -108,10 +112,11 @@ class VisibilityMasks:
         quality : str
             Visibility that was used.
         """
+        place = position_of(self._prepared.sensor(position_m))
         if visibility == "exact" or visibility == "depth":
-            return self._compute(block, rows, position_m, visibility, among), visibility
+            return self._compute(block, rows, place, visibility, among), visibility
         if visibility == "frozen":
-            mask = self._frozen(block, rows, position_m)
+            mask = self._frozen(block, rows, place)
             return mask, "facing" if mask is None else "frozen"
         return None, visibility
 
@@ -184,23 +189,29 @@ class VisibilityMasks:
         alone : bool
             True for what the body itself hides, whatever stands around it.
         """
+        place = position_of(self._prepared.sensor(position_m))
+        return self._kept(index, rows, place, occlusion, alone)
+
+    def _kept(
+        self, index: int, rows: slice, place: _Place, occlusion: Occlusion, alone: bool = False
+    ) -> NDArray[np.uint8] | None:
         if self._stride == 1:
             mask: _BlockMask | None = self._prepared.budget.get(
-                self._key(occlusion, index, position_m, alone)
+                self._key(occlusion, index, place, alone)
             )
             return mask.visible[rows] if mask is not None and mask.done[rows].all() else None
         served = []
         serving, which = np.unique(self._serving(self._frames(index, rows)), return_inverse=True)
         for frame in serving.tolist():
             home, local = divmod(frame, self._prepared.block_frames)
-            mask = self._prepared.budget.get(self._key(occlusion, home, position_m, alone))
+            mask = self._prepared.budget.get(self._key(occlusion, home, place, alone))
             if mask is None or not mask.done[local]:
                 return None
             served.append(mask.visible[local])
         return np.stack(served)[which]
 
     def _key(
-        self, occlusion: Occlusion, index: int, position_m: Position, alone: bool = False
+        self, occlusion: Occlusion, index: int, place: _Place, alone: bool = False
     ) -> Hashable:
         # Prepared blocks, and with them the budget, may serve several options: those with the
         # same masks share them. Which vertices are tested depends on the bins they fall into.
@@ -209,15 +220,18 @@ class VisibilityMasks:
         needed = options.axis, options.null_bins, options.beyond, self._prepared.spreads
         around = self._prepared.mesh.surroundings
         hiding: tuple[Hashable, ...] = ()
-        if not alone:
-            digest = None if around is None else around.digest
-            hiding = digest, *(one.number for one in self.others)
+        if self._walls or (self._has_others and not alone):
+            hiding = (
+                self._prepared.stand,
+                alone
+                or (None if around is None else around.digest, *(one.stand for one in self.others)),
+            )
         return (
             *("mask", occlusion, pixels, self._stride, needed, hiding, self._walls, self._wall),
-            *(index, position_m),
+            *(index, place),
         )
 
-    def _places(self, index: int) -> list[tuple[Occlusion, Position]]:
+    def _places(self, index: int) -> list[tuple[Occlusion, _Place]]:
         """Where masks of a block were made, the newest first."""
         options = self._prepared.options
         kind = options.depth_resolution, self._stride, self._prepared.spreads, options.axis
@@ -241,50 +255,57 @@ class VisibilityMasks:
             return nearest
         return np.clip(nearest, presence.first[frames], presence.last[frames])
 
-    def _frozen(self, block: Block, rows: slice, position_m: Position) -> NDArray[np.uint8] | None:
+    def _frozen(self, block: Block, rows: slice, place: _Place) -> NDArray[np.uint8] | None:
         """Complete mask of these rows that was made nearest to this place.
 
         Its error grows with the distance (docs/decisions/0010); of equally near ones
         the newest. Not all are complete: a drag that goes on cancels what its pause began.
         """
         kept = self._places(block.index)
-        for occlusion, place in sorted(kept, key=lambda here: math.dist(here[1], position_m)):
-            mask = self.kept(block.index, rows, place, occlusion)
+        for occlusion, near in sorted(kept, key=lambda here: math.dist(here[1], place)):
+            mask = self._kept(block.index, rows, near, occlusion)
             if mask is not None:
                 return mask
-            # Things that moved hide something else; what the body hides is known.
-            if self.kept(block.index, rows, place, occlusion, alone=True) is not None:
+            # What moved hides something else; what the body hides itself is known.
+            alone = self._kept(block.index, rows, near, occlusion, alone=True)
+            if alone is None:
+                continue
+            if near == place:
                 return self._compute(block, rows, place, occlusion, None)
+            visible = alone.copy()
+            view = self._view(block, rows, np.asarray(place))
+            self._hide(view, lambda: self._needed(block, rows, np.asarray(place)), visible)
+            return visible
         return None
 
     def _compute(
         self,
         block: Block,
         rows: slice,
-        position_m: Position,
+        place: _Place,
         occlusion: Occlusion,
         among: NDArray[np.uint8] | None,
     ) -> NDArray[np.uint8]:
         """Mask of these rows, kept or computed now."""
-        here, places = (occlusion, position_m), self._places(block.index)
-        places[:] = (here, *[place for place in places if place != here][: _PLACES_KEPT - 1])
+        here, places = (occlusion, place), self._places(block.index)
+        places[:] = (here, *[one for one in places if one != here][: _PLACES_KEPT - 1])
         if self._stride > 1:
             frames = self._serving(self._frames(block.index, rows))
             serving, which = np.unique(frames, return_inverse=True)
-            masks = [self._serving_mask(frame, position_m, occlusion) for frame in serving.tolist()]
+            masks = [self._serving_mask(frame, place, occlusion) for frame in serving.tolist()]
             return np.stack(masks)[which]
 
         def needed() -> NDArray[np.uint8]:
-            marked = self._needed(block, rows, self._prepared.sensor(position_m))
+            marked = self._needed(block, rows, np.asarray(place))
             return marked if among is None else marked & among
 
-        return self._mask(block, rows, position_m, occlusion, needed)
+        return self._mask(block, rows, place, occlusion, needed)
 
     def _mask(
         self,
         block: Block,
         rows: slice,
-        position_m: Position,
+        place: _Place,
         occlusion: Occlusion,
         needed: Callable[[], NDArray[np.uint8]],
     ) -> NDArray[np.uint8]:
@@ -292,13 +313,13 @@ class VisibilityMasks:
 
         ``needed`` marks the vertices that are tested.
         """
-        mask = self._block_mask(block.index, position_m, occlusion)
+        mask = self._block_mask(block.index, place, occlusion)
         if mask.done[rows].all():
             return mask.visible[rows]
-        view = self._view(block, rows, self._prepared.sensor(position_m))
+        view = self._view(block, rows, np.asarray(place))
         alone, apart = mask, self._wall is None and self._has_others
         if apart:
-            alone = self._block_mask(block.index, position_m, occlusion, alone=True)
+            alone = self._block_mask(block.index, place, occlusion, alone=True)
         if not alone.done[rows].all():
             visible, marked = _facing(view, self._prepared.normals(block)[rows]), needed()
             self._test_alone(view, marked, visible, occlusion)
@@ -314,22 +335,19 @@ class VisibilityMasks:
         """True if there is something around the body that may hide it."""
         return self._prepared.mesh.surroundings is not None or bool(self.others)
 
-    def _serving_mask(
-        self, frame: int, position_m: Position, occlusion: Occlusion
-    ) -> NDArray[np.uint8]:
+    def _serving_mask(self, frame: int, place: _Place, occlusion: Occlusion) -> NDArray[np.uint8]:
         """Mask of one frame that serves its neighbours, uint8 (V,).
 
         The vertices that can change the map in any frame it serves are tested, also across
         block boundaries.
         """
         home, local = divmod(frame, self._prepared.block_frames)
-        mask = self._block_mask(home, position_m, occlusion)
+        mask = self._block_mask(home, place, occlusion)
         if mask.done[local]:  # its block need not be in memory
             return mask.visible[local]
         first = max(frame - self._stride, 0)
 
         def needed() -> NDArray[np.uint8]:
-            place = self._prepared.sensor(position_m)
             around = np.arange(first, min(frame + self._stride, self._prepared.mesh.frame_count))
             served = around[self._serving(around) == frame]
             marked = np.zeros((1, self._prepared.mesh.vertex_count), np.uint8)
@@ -337,11 +355,12 @@ class VisibilityMasks:
                 start, stop = self._prepared.span(index)
                 low, high = max(int(served[0]), start), min(int(served[-1]) + 1, stop)
                 rows = slice(low - start, high - start)
-                marked |= self._needed(self._counted(index), rows, place).max(axis=0)
+                served_from = self._needed(self._counted(index), rows, np.asarray(place))
+                marked |= served_from.max(axis=0)
             return marked
 
         rows = slice(local, local + 1)
-        return self._mask(self._counted(home), rows, position_m, occlusion, needed)[0]
+        return self._mask(self._counted(home), rows, place, occlusion, needed)[0]
 
     def _view_of(self, frame: int, place: NDArray[np.float64]) -> _View:
         """View of one frame of the clip."""
@@ -357,7 +376,7 @@ class VisibilityMasks:
         return self._prepared.counted(index, self._counting, points=True)
 
     def _block_mask(
-        self, index: int, position_m: Position, occlusion: Occlusion, *, alone: bool = False
+        self, index: int, place: _Place, occlusion: Occlusion, *, alone: bool = False
     ) -> _BlockMask:
         """Mask of a block from a place, as far as it has been computed."""
 
@@ -367,7 +386,7 @@ class VisibilityMasks:
             return _BlockMask(visible, np.zeros(stop - start, bool)), visible.nbytes
 
         mask: _BlockMask = self._prepared.budget.get_or_make(
-            self._key(occlusion, index, position_m, alone), make
+            self._key(occlusion, index, place, alone), make
         )
         return mask
 
@@ -427,11 +446,19 @@ class VisibilityMasks:
         if around is not None and around.things:
             boxes_m = self._prepared.boxes(view.first, view.first + len(view.points))
             _hide_behind_things(around.surface, around.boxes_m, view, boxes_m, visible)
-        if self.others:
-            marked = needed()
+        if self.others and (near := self._near_others(view)).any():
+            marked = needed() & near[:, None]
             boxes_m = view.boxes_m(visible & marked)
             for other in self.others:
                 self._hide_behind_body(other, view, boxes_m, marked, visible)
+
+    def _near_others(self, view: _View) -> NDArray[np.bool_]:
+        """Frames (n,) in which others may hide something, by the boxes of all their vertices."""
+        start, stop = view.first, view.first + len(view.points)
+        own_m, places_m = self._prepared.boxes(start, stop), view.places_m + view.origins_m
+        return np.logical_or.reduce(
+            [may_hide(other.boxes(start, stop), own_m, places_m) for other in self.others]
+        )
 
     def _hide_by_way_of(
         self,
@@ -523,11 +550,12 @@ class _View:
 
     def boxes_m(self, marks: NDArray[np.uint8]) -> NDArray[np.float64]:
         """Lowest and highest corner of the marked vertices in the camera frame, (n, 2, 3)."""
-        boxes = np.repeat(self.origins_m[:, None], 2, axis=1)
-        for box, points, marked in zip(boxes, self.points, marks > 0, strict=True):
-            if marked.any():
-                few = points[:, marked]
-                box += few.min(axis=1), few.max(axis=1)
+        marked = marks[:, None] > 0
+        low = np.where(marked, self.points, np.float32(np.inf)).min(axis=2)
+        high = np.where(marked, self.points, np.float32(-np.inf)).max(axis=2)
+        ends = np.stack([low, high], axis=1)
+        ends[~marked.any(axis=(1, 2))] = 0
+        boxes: NDArray[np.float64] = ends + self.origins_m[:, None]
         return boxes
 
     def mirrored(self, wall: Wall) -> _View:

@@ -22,6 +22,7 @@ from sd2core.doppler.moving_kernels import (
     steadiness_kernel,
 )
 from sd2core.doppler.options import SynthesisOptions
+from sd2core.mesh.made_vertices import unshifted
 from sd2core.mesh.sequence import MeshSequence, refuse_missing
 from sd2core.mesh.walls import Wall
 from sd2core.numerics.byte_budget import ByteBudget
@@ -52,7 +53,10 @@ class Block:
 
 @dataclass(eq=False)
 class PreparedMesh:
-    """Mesh as the kernels take it, block by block."""
+    """Mesh as the kernels take it, block by block.
+
+    One that was put elsewhere is prepared where it was before: its origin alone moves.
+    """
 
     mesh: MeshSequence
     options: SynthesisOptions
@@ -66,6 +70,7 @@ class PreparedMesh:
     number: int = field(init=False)  # the same for all that share its blocks, and for no other
 
     def __post_init__(self) -> None:
+        self._still, by_m = unshifted(self.mesh)
         self._reading = threading.Lock()
         self.number = next(_NUMBERS)
         self._compatible = self.options.velocity == "vid2doppler"
@@ -87,13 +92,14 @@ class PreparedMesh:
         # is enough (see _positions), so that large coordinates cost nothing. The origin
         # is a number that the mesh's own precision has. The compatible rule works on the
         # numbers as they come, so that its bin edges fall where that tool's do.
-        points = self.mesh.frame(0).astype(np.float64)
+        points = self._still.frame(0).astype(np.float64)
         self.reach_m = float(np.abs(points).max())
-        self.origin_m = np.zeros(3)
+        self._middle_m = np.zeros(3)
         if not self._compatible:
             middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
             finite = np.where(np.isfinite(middle), middle, 0.0)
-            self.origin_m = finite.astype(self.mesh.vertices.dtype).astype(np.float64)
+            self._middle_m = finite.astype(self.mesh.vertices.dtype).astype(np.float64)
+        self.origin_m = self._middle_m + by_m
         per_frame = self.mesh.vertex_count * 12 * self.options.oversampling
         # Several blocks with their normals must fit, or each would push out the other.
         bytes_per_block = min(_BLOCK_BYTES, self.budget.limit_bytes // 8)
@@ -101,12 +107,13 @@ class PreparedMesh:
         self.block_frames = self.asked_frames or usual
 
     def shared(self, mesh: MeshSequence, options: SynthesisOptions) -> PreparedMesh | None:
-        """Same blocks, in the same budget, for other options, or other things around the mesh.
+        """Same blocks, in the same budget, for other options or things, or for the mesh elsewhere.
 
         None for another mesh, and if the options need other knots or have other bin widths, on
         which the precision of a block depends.
         """
-        if mesh.vertices is not self.mesh.vertices or mesh.faces is not self.mesh.faces:
+        still, by_m = unshifted(mesh)
+        if still.vertices is not self._still.vertices or still.faces is not self._still.faces:
             return None
         for name in ("oversampling", "trajectory_smoothing_s", "velocity"):
             if getattr(options, name) != getattr(self.options, name):
@@ -115,7 +122,13 @@ class PreparedMesh:
             return None
         other = copy.copy(self)
         other.mesh, other.options = mesh, options
+        other.origin_m = self._middle_m + by_m
         return other
+
+    @property
+    def stand(self) -> Hashable:
+        """The same for all that share its blocks and stand in the same place, and for no other."""
+        return self.number, *self.origin_m.tolist()
 
     @property
     def spreads(self) -> bool:
@@ -219,12 +232,12 @@ class PreparedMesh:
 
         def ends(block: Block) -> NDArray[np.float64]:
             points = self.points(block)
-            return np.stack([points.min(axis=2), points.max(axis=2)], axis=1) + self.origin_m
+            return np.stack([points.min(axis=2), points.max(axis=2)], axis=1)
 
         size = self.block_frames
         first, last = start // size, (stop - 1) // size
         found = [self._kept("boxes", self.block(at), ends) for at in range(first, last + 1)]
-        return np.concatenate(found)[start - first * size : stop - first * size]
+        return np.concatenate(found)[start - first * size : stop - first * size] + self.origin_m
 
     def normals(self, block: Block, moving: MovingVertices | None = None) -> NDArray[np.int8]:
         """Vertex normals of a block's frames, int8 (n, 3, V).
@@ -288,7 +301,7 @@ class PreparedMesh:
 
     def limb_places(self, block: Block) -> NDArray[np.float64]:
         """Mean vertex of every limb with an uncertainty, in the camera's frame, (n, L, 3)."""
-        return self._kept("limb places", block, self._limb_places)
+        return self._kept("limb places", block, self._limb_places) + self.origin_m
 
     def before_wall(self, block: Block, wall: Wall) -> NDArray[np.uint8] | None:
         """Vertices of a block's frames that are before a wall, uint8 (n, V); None: all are."""
@@ -300,7 +313,7 @@ class PreparedMesh:
 
         plane = wall.distance_m, wall.azimuth_deg, wall.elevation_deg
         kept: tuple[NDArray[np.uint8] | None] = self.budget.get_or_make(
-            ("before", plane, block.index), make
+            ("before", plane, self.stand, block.index), make
         )
         return kept[0]
 
@@ -406,14 +419,14 @@ class PreparedMesh:
         share = multiplicity / multiplicity.sum(dtype=np.float64)
         return np.stack([points @ share for points in self.points(block)])
 
-    def _limb_places(self, block: Block) -> NDArray[np.float64]:
+    def _limb_places(self, block: Block) -> NDArray[Any]:
         known = self.mesh.uncertainty
         assert known is not None
         limb, count = known.vertex_limb, len(known.limbs)
         member = np.zeros((len(limb), count), np.float32)
         member[np.arange(len(limb)), limb] = 1.0
         member /= np.maximum(member.sum(axis=0), 1.0)
-        return (self.points(block) @ member).transpose(0, 2, 1) + self.origin_m
+        return (self.points(block) @ member).transpose(0, 2, 1)
 
     def _areas(self, block: Block) -> NDArray[np.float32]:
         points, faces = self._at_frames(block), self._faces()
@@ -480,7 +493,7 @@ class PreparedMesh:
         """
         low, high = self._trajectory.frames_needed(first, last)
         with self._reading:
-            vertices = self.mesh.read(low, high)
+            vertices = self._still.read(low, high)
         precision: Any = np.float32
         if self._compatible and (vertices.dtype != np.float32 or self._trajectory.smoothing_s > 0):
             precision = np.float64
@@ -502,7 +515,7 @@ class PreparedMesh:
     def _around_origin(
         self, vertices: NDArray[Any], low: int, first: int, last: int, precision: Any
     ) -> tuple[NDArray[Any], float]:
-        """Knots ``first`` to ``last`` less the clip's origin, (knots, 3, V), and their extent.
+        """Knots ``first`` to ``last`` less their own origin, (knots, 3, V), and their extent.
 
         The extent is the largest coordinate. Vertices are those of the frames from ``low``.
         """
@@ -513,7 +526,7 @@ class PreparedMesh:
             stop = min(start + _KNOTS_AT_ONCE, last)
             a, b = self._trajectory.frames_needed(start, stop)
             knots = self._trajectory.knots(vertices[a - low : b - low], a, start, stop)
-            origin = self.origin_m.astype(knots.dtype)
+            origin = self._middle_m.astype(knots.dtype)
             into = positions[start - first : stop - first]
             # What single precision cannot even hold is infinite in it, and then not enough.
             with np.errstate(over="ignore"):

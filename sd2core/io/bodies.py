@@ -16,7 +16,7 @@ from sd2core.files.digests import signature
 from sd2core.files.paths import files_at
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.bodies import MAX_BODIES, Body
-from sd2core.mesh.made_vertices import MadeVertices
+from sd2core.mesh.made_vertices import MadeVertices, shifted, unshifted
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.things import turn_matrix
 from sd2core.scattering.resampling import resample_mesh
@@ -46,7 +46,7 @@ def with_bodies(
 ) -> MeshSequence:
     """Put other bodies into the scene of a mesh, in place of those that were there.
 
-    One that is there already, in the same place, stays as it is.
+    The file of one that is there already, turned like that, is not read again.
 
     They are brought to the times of the mesh: a file of the same times is taken as it is, another
     is interpolated, and nobody is there before its first frame and after its last one. Maps are
@@ -85,12 +85,23 @@ def with_bodies(
         raise Sd2Error(f"There are {len(named)} more bodies", f"up to {MAX_BODIES}")
     if mesh.faces is None:
         raise _no_surface(mesh.source or "The mesh")
-    there = [other for other in mesh.others if other.placed is not None]
-    others = []
-    for body in named:
-        same = (other for other in there if other.placed == body)
-        others.append(next(same, None) or _placed(body, mesh))
-    return replace(first, others=tuple(others))
+    return replace(first, others=tuple(_there(body, mesh) or _placed(body, mesh) for body in named))
+
+
+def _there(body: Body, scene: MeshSequence) -> MeshSequence | None:
+    """Body that is in the scene already, moved to its new place; None if its file is to be read."""
+    there = [(other.placed, other) for other in scene.others if other.placed is not None]
+    for placed, other in there:
+        if placed == body:
+            return other
+    for placed, other in there:
+        if replace(placed, moved_m=body.moved_m, person=body.person) == body:
+            return _named(shifted(unshifted(other)[0], body.moved_m), body)
+    return None
+
+
+def _named(mesh: MeshSequence, body: Body) -> MeshSequence:
+    return replace(mesh, person=body.person, surroundings=None, placed=body)
 
 
 def _placed(body: Body, first: MeshSequence) -> MeshSequence:
@@ -119,7 +130,7 @@ def _placed(body: Body, first: MeshSequence) -> MeshSequence:
             f"some within those of the first body, {spans[1]}",
             "Shift it in time",
         )
-    return replace(moved(on_clock, own, body), person=body.person, surroundings=None, placed=body)
+    return _named(shifted(_turned(on_clock, own, body.turn_deg), body.moved_m), body)
 
 
 @lru_cache(maxsize=4)
@@ -128,14 +139,14 @@ def _read(path: Path, reading: tuple[tuple[str, Any], ...], _signature: str) -> 
     return load_mesh(path, **dict(reading))
 
 
-def moved(mesh: MeshSequence, own: MeshSequence, body: Body) -> MeshSequence:
-    """Mesh where a body is put; ``own`` is as its file has it, whose first frame it turns about."""
-    if not any(body.moved_m) and not body.turn_deg:
+def _turned(mesh: MeshSequence, own: MeshSequence, turn_deg: float) -> MeshSequence:
+    """Mesh turned about the middle of its first frame in ``own``, which is as its file has it."""
+    if not turn_deg:
         return mesh
-    turn = turn_matrix(body.turn_deg)
+    turn = turn_matrix(turn_deg)
     points = own.frame(int(np.argmax(own.presence.there))).astype(np.float64)
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    by_m = middle + body.moved_m - turn @ middle
+    by_m = middle - turn @ middle
     x, y, z = by_m.tolist()
 
     def made(rows: NDArray[np.intp]) -> NDArray[Any]:

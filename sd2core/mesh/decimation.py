@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
+from sd2core.mesh.made_vertices import shifted_like, unshifted
 from sd2core.mesh.sequence import MeshSequence, VertexArray, refuse_missing
 
 _MIN_FACES = 4
@@ -72,6 +73,8 @@ def decimate(mesh: MeshSequence, kept: float, *, frame: int | None = None) -> Me
         raise Sd2Error(f"{kept:g} of the vertices are to be kept", "a share above 0 and up to 1")
     if kept == 1:
         return mesh
+    if (still := unshifted(mesh)[0]) is not mesh:  # the same vertices wherever it stands
+        return shifted_like(decimate(still, kept, frame=frame), mesh)
     if mesh.faces is None:
         raise Sd2Error(
             f"{name} has no faces, it is a point cloud",

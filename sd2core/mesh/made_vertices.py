@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.sensor import Vector
 
 
 class MadeVertices:
@@ -43,3 +47,47 @@ class MadeVertices:
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         return np.asarray(self[:], dtype)
+
+
+class ShiftedVertices(MadeVertices):
+    """Vertices of a mesh that is put elsewhere, and not turned.
+
+    Whatever is known of ``mesh`` need not be found again: it is as if the sensor had moved.
+    """
+
+    def __init__(self, mesh: MeshSequence, by_m: Vector) -> None:
+        self.mesh, self.by_m = mesh, by_m
+
+        def made(rows: NDArray[np.intp]) -> NDArray[Any]:
+            low, high = int(rows.min()), int(rows.max()) + 1
+            moved: NDArray[Any] = mesh.read(low, high)[rows - low].astype(np.float64) + by_m
+            return moved
+
+        super().__init__((mesh.frame_count, mesh.vertex_count, 3), mesh.vertices.dtype, made)
+
+
+def shifted(mesh: MeshSequence, by_m: Vector) -> MeshSequence:
+    """A mesh put elsewhere; the camera that saw it moves with it."""
+    if not any(by_m):
+        return mesh
+    known = mesh.uncertainty
+    if known is not None:
+        x, y, z = (a + b for a, b in zip(known.camera_m, by_m, strict=True))
+        known = replace(known, camera_m=(x, y, z))
+    return replace(mesh, vertices=ShiftedVertices(mesh, by_m), uncertainty=known)
+
+
+def unshifted(mesh: MeshSequence) -> tuple[MeshSequence, Vector]:
+    """The mesh before it was put elsewhere, and by how much it was moved."""
+    made = mesh.vertices
+    return (made.mesh, made.by_m) if isinstance(made, ShiftedVertices) else (mesh, (0.0, 0.0, 0.0))
+
+
+def shifted_like(mesh: MeshSequence, other: MeshSequence) -> MeshSequence:
+    """A mesh that was not shifted yet put where another one is, as the same person."""
+    return replace(
+        shifted(mesh, unshifted(other)[1]),
+        person=other.person,
+        placed=other.placed,
+        surroundings=other.surroundings,
+    )

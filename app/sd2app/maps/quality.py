@@ -19,6 +19,7 @@ from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, Part, View, pieces
 from sd2core.body.parts import body_parts
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.synthesizer import Stretch, Synthesizer, Visibility
+from sd2core.mesh.made_vertices import unshifted
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import VertexParts
 from sd2core.sensor import VirtualSensor
@@ -65,16 +66,20 @@ class SynthesizerCache:
         self._lock = threading.Lock()
 
     def among(self, mesh: MeshSequence, options: SynthesisOptions) -> SynthesizerCache:
-        """Those of the same mesh among other things, or with other options.
+        """Those of the same mesh among other things and people, or with other options.
 
-        Whatever is the same is shared: of things that move, all but what they hide.
+        Whatever is the same is shared: of things and people that move, all but what they hide.
         """
         other = SynthesizerCache(mesh, options, self.full)
         other.limbs = self.limbs
-        if options == self.options and mesh.others == self.mesh.others:
+        people, before = (
+            [id(unshifted(one)[0].vertices) for one in of.others] for of in (mesh, self.mesh)
+        )
+        if options == self.options and people == before:
+            from sd2core.accuracy.trial import synthesizer_for
+
             for plan, made in list(self._made.items()):
-                counted = replace(made.mesh, surroundings=mesh.surroundings)
-                other._made[plan] = Synthesizer(counted, made.options, blocks_of=made)
+                other._made[plan] = synthesizer_for(plan, mesh, options, like=made)
         return other
 
     def key(self, plan: AccuracyPlan | None, sensor: VirtualSensor) -> Hashable:

@@ -151,21 +151,21 @@ class Edits:
         mesh = self._document.mesh
         assert mesh is not None
         things = () if mesh.surroundings is None else mesh.surroundings.things
-        on_thing = number < len(things)
-        self._dragged = things[number] if on_thing else mesh.others[number - len(things)].placed
-        self._before = self._fields(["things" if on_thing else "bodies"])
-        self._sensor.set_dragging(on_thing)
+        movable = [*things, *(other.placed for other in mesh.others)]
+        self._dragged = movable[number]
+        self._before = self._fields(["things" if number < len(things) else "bodies"])
+        self._sensor.set_dragging(True)
 
     def drag_in_scene(self, by_m: Vector) -> None:
-        """Move a thing from where it was when the drag began; a body, once it is let go."""
-        if isinstance(self._dragged, Thing):
+        """Move a thing or body from where it was when the drag began."""
+        if self._dragged is not None:
             self._document.assign(self._moved(by_m))
 
     def end_scene_drag(self, by_m: Vector) -> None:
         """End the drag of a thing or body; it becomes one step in the history."""
         self._sensor.set_dragging(False)
+        self.drag_in_scene(by_m)
         if self._dragged is not None:
-            self._document.assign(self._moved(by_m))
             self._push_change(f"Move {self._dragged.name}", self._before)
             self._dragged = None
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QFileDialog, QLineEdit, QToolButton
+from PySide6.QtWidgets import QFileDialog, QLineEdit, QToolButton, QWidget
 from window_models import models_of
 
 from sd2app.maps.limb_menu import LimbMenu
+from sd2app.maps.partial_map import FINAL
 from sd2app.scene.view import SceneView
 from sd2app.sensor.bodies_page import BodiesPage
 from sd2app.widgets.inputs import NumberBox
@@ -103,19 +104,55 @@ def test_one_person_of_two_is_shown_alone(window, qtbot):
     np.testing.assert_allclose(first + second, both, atol=1e-6 * both.max())
 
 
-def test_it_is_dragged_on_the_floor_and_kept(window, qtbot, tmp_path):
-    models = models_of(window)
-    press(window, "Add a copy")
+def pointed_at(window, qtbot) -> tuple[QWidget, QPoint, np.ndarray]:
+    """Widget and pixel where the pointer is on the only other body, and the middle of that."""
     view = window.findChild(SceneView)
-    scene, stack = view.scene, models.document.undo_stack
+    scene = view.scene
     qtbot.waitUntil(lambda: scene.pose.size_px == (view.width(), view.height()), timeout=5_000)
     qtbot.wait(300)  # until the view shows both
     middle = scene.people.points_m.mean(axis=0)
     x, y, _ = scene.pose.project(middle)[0]
     start = QPoint(round(x), round(y))
     widget = view.childAt(start)
-    QTest.mouseMove(widget, start)
+    for place in (start + QPoint(1, 1), start):  # a pointer that is there already does not move
+        QTest.mouseMove(widget, place)
     assert view.navigator.thing == 0
+    return widget, start, middle
+
+
+def test_the_map_follows_a_body_while_it_is_dragged_and_settles(window, qtbot):
+    models = models_of(window)
+    synthesis, stack = models.synthesis, models.document.undo_stack
+    press(window, "Add a copy")
+    before = shown(window, qtbot)
+    widget, start, _ = pointed_at(window, qtbot)
+    count, ranks = stack.count(), []
+    synthesis.painted.connect(lambda part: ranks.append(part.quality))
+    QTest.mousePress(widget, LEFT, Qt.KeyboardModifier.NoModifier, start)
+    for part in (0.5, 1.0):
+        QTest.mouseMove(widget, start + QPoint(50, -20) * part)
+    assert synthesis.moving
+    qtbot.waitUntil(lambda: bool(ranks), timeout=10_000)
+    assert ranks[0] < FINAL
+    settled = shown(window, qtbot)  # a hand that holds still
+    assert models.sensor.dragging
+    assert stack.count() == count
+    assert not np.array_equal(settled, before)
+    maker = synthesis.made_by()[0]()
+    made = Synthesizer(models.document.mesh, maker.options).map(models.sensor.sensor)
+    np.testing.assert_array_equal(made.values, settled)
+    QTest.mouseRelease(widget, LEFT, Qt.KeyboardModifier.NoModifier, start + QPoint(50, -20))
+    np.testing.assert_array_equal(shown(window, qtbot), settled)
+    assert stack.count() == count + 1
+    window.action("undo").trigger()
+    np.testing.assert_array_equal(shown(window, qtbot), before)
+
+
+def test_it_is_dragged_on_the_floor_and_kept(window, qtbot, tmp_path):
+    models = models_of(window)
+    press(window, "Add a copy")
+    stack = models.document.undo_stack
+    widget, start, middle = pointed_at(window, qtbot)
     (before,) = bodies(window)
     count = stack.count()
     QTest.mousePress(widget, LEFT, Qt.KeyboardModifier.NoModifier, start)
