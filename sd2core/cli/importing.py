@@ -296,7 +296,8 @@ def _set(options: Set) -> None:
     """Change what a recording is made of: its files, its clocks, where its radar is.
 
     What is not named stays. Pairs, alignment, exports and the window use what is set.
-    Every file is opened before anything is written, and the labels stay as they are.
+    Every file is opened before anything is written. Labels stay as they are, but for the names of
+    persons who are called otherwise.
 
       sd2 set walk.sd2 --sensor 0.1,0,0
       sd2 set walk.sd2 --range-m 3 --azimuth-deg 30
@@ -311,6 +312,8 @@ def _set(options: Set) -> None:
     from sd2core.cli.reading import mesh_reading, refuse_unused_mesh_options
     from sd2core.files.paths import plain_path
     from sd2core.files.resources import is_bundled
+    from sd2core.labels.field_edits import rename_persons
+    from sd2core.mesh.bodies import renamed
     from sd2core.recording.recording import open_recording
 
     recording = open_recording(options.recording)
@@ -319,7 +322,9 @@ def _set(options: Set) -> None:
     for name in options.without:
         setattr(recording, _LEFT_OUT[name], () if name in _SEVERAL else None)
     if options.body:
-        recording.bodies = tuple(map(_body, options.body))
+        others, recording.bodies = recording.bodies, tuple(map(_body, options.body))
+        if names := renamed(recording.subject, others, recording.bodies):
+            recording.labels = rename_persons(recording.labelled, names).labels
     if options.thing:
         recording.things = tuple(map(_thing, options.thing))
     if options.wall:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 from typing import Any, Literal
@@ -43,6 +43,13 @@ def set_field(labels: Labels, ids: Iterable[int], field: SpanField, value: Any) 
         labels.track(value)
     changed = [replace(span, **{field: value}) for span in labels.these(ids)]
     return Edit(f"Change {field}", labels.with_spans(changed), tuple(one.id for one in changed))
+
+
+def rename_persons(labels: Labels, names: Mapping[str, str]) -> Edit:
+    """Give the spans of persons their new names, by the old ones."""
+    theirs = [span.id for span in labels.spans if span.person in names]
+    changed = [replace(span, person=names[span.person]) for span in labels.these(theirs)]
+    return Edit("Rename person", labels.with_spans(changed) if changed else labels)
 
 
 def _name(verb: str, count: int) -> str:

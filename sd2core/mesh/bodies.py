@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -88,3 +88,33 @@ class Body:
         if self.start_s:
             told.append(f"{abs(self.start_s):g} s {'later' if self.start_s > 0 else 'earlier'}")
         return ", ".join(told)
+
+
+def persons_of(names: Iterable[str]) -> tuple[str, ...]:
+    """Name of each body of a scene: its own, or ``person 2`` by its number; each once.
+
+    Examples
+    --------
+    >>> from sd2core.mesh.bodies import persons_of
+    >>> persons_of(["", "anna", "anna"])
+    ('person 1', 'anna', 'anna (3)')
+    """
+    persons: list[str] = []
+    for number, given in enumerate(names, 1):
+        name = given.strip() or f"person {number}"
+        persons.append(f"{name} ({number})" if name in persons else name)
+    return tuple(persons)
+
+
+def renamed(first: str, before: Sequence[Body], after: Sequence[Body]) -> dict[str, str]:
+    """Old and new names of those beside ``first`` who are called otherwise, of the same files."""
+    if len(before) != len(after):
+        return {}
+    old, new = (
+        persons_of([first, *(one.person for one in bodies)])[1:] for bodies in (before, after)
+    )
+    return {
+        name: other
+        for one, then, name, other in zip(before, after, old, new, strict=True)
+        if (one.path, one.reading) == (then.path, then.reading) and name not in new
+    }

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.mesh.bodies import Body
+from sd2core.mesh.bodies import Body, persons_of
 from sd2core.mesh.presence import Presence, checked
 from sd2core.mesh.things import Surroundings
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
@@ -203,11 +203,7 @@ class MeshSequence:
     @property
     def persons(self) -> tuple[str, ...]:
         """Name of each of the bodies: its own, or ``person 2`` by its number; each once."""
-        names: list[str] = []
-        for number, body in enumerate(self.bodies, 1):
-            name = body.person.strip() or f"person {number}"
-            names.append(f"{name} ({number})" if name in names else name)
-        return tuple(names)
+        return persons_of(body.person for body in self.bodies)
 
     def read(self, start: int, stop: int) -> NDArray[Any]:
         """Vertices of frames ``start`` to ``stop`` (exclusive) in memory, (n, V, 3)."""

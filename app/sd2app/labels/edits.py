@@ -79,6 +79,7 @@ class LabelEdits(QObject):
         self.labels, self.playback = labels, playback
         self.undo_stack = document.undo_stack
         self._document, self._session = document, session
+        document.renamed.connect(self._rename)
 
     @property
     def refusal(self) -> str:
@@ -108,6 +109,11 @@ class LabelEdits(QObject):
         """Say whose the selected spans are; nobody's with an empty name."""
         ids = self._ids()
         self.apply(lambda labels, base: field_edits.set_field(labels, ids, "person", person))
+
+    def _rename(self, names: dict[str, str]) -> None:
+        """Call the persons whose spans are by their new names."""
+        if any(span.person in names for span in self.labels.labels.spans):
+            self.apply(lambda labels, base: field_edits.rename_persons(labels, names))
 
     def edge_here(self, side: Side) -> None:
         """Put an edge of the selected span at the frame on screen."""

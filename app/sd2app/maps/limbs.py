@@ -32,6 +32,7 @@ class LimbsModel(QObject):
         self._finder.failed.connect(lambda error: self.failed.emit(str(error)))
         synthesis.completed.connect(self._check)
         session.document.opened.connect(self.show)
+        session.document.changed.connect(self._leave_out)
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -103,6 +104,11 @@ class LimbsModel(QObject):
     def _take(self, found: tuple[MeshSequence, VertexParts | None]) -> None:
         self._found = found
         self.changed.emit()
+
+    def _leave_out(self) -> None:
+        """Show no part of who is no longer in the scene, or is called otherwise."""
+        if not {*self.parts} <= {*self.all_parts}:
+            self.show(*self.parts)
 
     def _check(self) -> None:
         known = self._synthesis.split and len(self.track.split) == len(self.parts)

@@ -53,6 +53,7 @@ class DocumentModel(QObject):
     grown = Signal()  # frames were added at its end
     saved = Signal()  # on disk with all edits, maybe in another place than before
     offered = Signal()  # to read the mesh another way, or no longer
+    renamed = Signal(dict)  # old names of persons and their new ones, within a step of the history
     noted = Signal(str)
     failed = Signal(str)
 

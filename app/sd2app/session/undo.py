@@ -16,7 +16,7 @@ from sd2app.session.maps import MapModel
 from sd2app.session.mesh_reading import ReadMesh
 from sd2app.session.sensor import SensorModel
 from sd2core.errors import Cure
-from sd2core.mesh.bodies import Body
+from sd2core.mesh.bodies import Body, renamed
 from sd2core.mesh.things import Thing
 from sd2core.mesh.walls import Wall
 from sd2core.options.synthesis import HowCounted
@@ -140,8 +140,23 @@ class Edits:
         self._set_in_scene("Add", one, lambda kept: (*kept, one))
 
     def change_in_scene(self, number: int, one: Thing | Body | Wall) -> None:
-        """Replace one by another, or by itself at another place."""
+        """Replace one by another, or by itself elsewhere; labels follow the name of a person."""
+        stack, names = self._document.undo_stack, self._renamed(number, one)
+        if names:
+            stack.beginMacro(f"Rename {' and '.join(names)}")
         self._set_in_scene("Change", one, lambda kept: (*kept[:number], one, *kept[number + 1 :]))
+        if names:
+            self._document.renamed.emit(names)
+            stack.endMacro()
+
+    def _renamed(self, number: int, one: Thing | Body | Wall) -> dict[str, str]:
+        """Old and new names of the persons who are called otherwise once a body is another."""
+        recording = self._document.recording
+        if recording is None or not isinstance(one, Body):
+            return {}
+        before, changed = recording.bodies_there, recording.bodies[number]
+        after = [one if body is changed else body for body in before]
+        return renamed(recording.subject, before, after)
 
     def begin_scene_drag(self, number: int) -> None:
         """Begin to drag a thing, or (counted on after the things) a body beside the first one.

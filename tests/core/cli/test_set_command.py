@@ -12,6 +12,7 @@ from cli_outcome import Sd2
 from swinging_recordings import recording
 
 from sd2core.files.resources import resource_path
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.pairs.store import read_pairs
 from sd2core.placements.body_extent import BodyExtent
 from sd2core.recording.recording import Recording, open_recording
@@ -94,6 +95,25 @@ def test_things_are_put_into_the_scene_and_taken_out(
     assert told["things"][1]["size_m"] == [0.2, 0.3, 0.4]
     assert sd2("set", one.folder, "--without", "things").code == 0
     assert content(one) == before
+
+
+def test_labels_follow_the_name_of_their_person(sd2: Sd2, one: Recording) -> None:
+    def persons(*named: str) -> list[str]:
+        place = [part for name in named for part in ("--body", f"{name}={one.mesh}@1,0,0")]
+        assert sd2("set", one.folder, *place).code == 0
+        return [span.person for span in open_recording(one.folder).labelled.spans]
+
+    persons("dora", "bert")
+    recording = open_recording(one.folder)
+    spans = (Span(k + 1, "all", k, k + 1, "turn", person=name) for k, name in enumerate(NAMES))
+    recording.labels = Labels((LabelTrack("all"),), tuple(spans))
+    recording.save()
+    assert persons("dorothy", "bert") == ["dorothy", "bert", ""]
+    assert persons("bert", "dorothy") == ["dorothy", "bert", ""]  # in another order
+    assert persons("carl") == ["dorothy", "bert", ""]  # who went keeps what is theirs
+
+
+NAMES = ("dora", "bert", "")
 
 
 def test_people_are_put_beside_the_first_and_taken_out(

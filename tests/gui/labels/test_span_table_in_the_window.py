@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from finding import splitter_around
 from PySide6.QtCore import QPoint, Qt
@@ -138,6 +140,18 @@ def test_the_column_of_persons_is_there_where_there_are_several(labelled, qtbot)
     assert [editor.itemText(k) for k in range(editor.count())] == ["Not told", "person 1", "anna"]
     QTest.keyClick(editor, Qt.Key.Key_A)
     press(labelled, "Return")
+    assert [span.person for span in c.labels.labels.spans] == ["anna", ""]
+    count, (anna,) = c.document.undo_stack.count(), c.document.recording.bodies
+    c.limbs.show("anna")
+    c.session.edits.change_in_scene(0, replace(anna, person="anne"))
+    assert [span.person for span in c.labels.labels.spans] == ["anne", ""]
+    assert c.limbs.parts == ()  # nobody is called anna any more
+    c.session.edits.change_in_scene(0, replace(anna, person=""))
+    assert [span.person for span in c.labels.labels.spans] == ["person 2", ""]
+    assert c.document.undo_stack.count() == count + 2
+    c.document.undo_stack.undo()
+    c.document.undo_stack.undo()
+    assert c.document.recording.bodies == (anna,)
     assert [span.person for span in c.labels.labels.spans] == ["anna", ""]
     c.document.undo_stack.undo()
     c.document.undo_stack.undo()
