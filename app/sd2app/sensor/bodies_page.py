@@ -63,9 +63,9 @@ class BodiesPage(SceneList):
         for name in ("things", "walls", "bodies", "called"):
             reading.pop(name, None)
         path = str(Path(recording.mesh).absolute())
-        self.take(lambda: Body(path, (_BESIDE_M, 0.0, 0.0), reading=reading))
+        self._session.edits.add_body(Body(path, (_BESIDE_M, 0.0, 0.0), reading=reading))
 
     def _add_file(self) -> None:
         path = ask_file(self, "Mesh of somebody else", _KINDS)
         if path is not None:
-            self.take(lambda: Body(str(Path(path).absolute())))
+            self._session.edits.add_body(Body(str(Path(path).absolute())))

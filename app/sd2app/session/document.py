@@ -32,6 +32,7 @@ from sd2core.io.bodies import with_bodies
 from sd2core.io.things import with_things, with_walls
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
+from sd2core.mesh.bodies import Body
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.options.synthesis import HowCounted
 from sd2core.radar_config import CLUTTER, Clutter
@@ -204,6 +205,11 @@ class DocumentModel(QObject):
         """
         if self.recording is not None:
             self._meshes.read(self.recording, fields, then)
+
+    def read_body(self, body: Body, then: Callable[[], object]) -> None:
+        """Read the file of another body of the scene in the background, and call ``then``."""
+        if self.mesh is not None:
+            self._meshes.read_body(self.mesh, body, then)
 
     def decline_offers(self) -> None:
         """Leave the mesh as it was read."""

@@ -11,6 +11,9 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.background.latest import Emit
 from sd2app.session.content import OfferedCure, offers_of, words_of
 from sd2app.session.tasks import ListedRunner, TaskList
+from sd2core.errors import Sd2Error
+from sd2core.io.bodies import with_bodies
+from sd2core.mesh.bodies import Body
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.edited import MESH
 from sd2core.recording.recording import Recording
@@ -42,6 +45,9 @@ class MeshReader(QObject):
     def __init__(self, jobs: TaskList, parent: QObject) -> None:
         super().__init__(parent)
         self._kept: list[ReadMesh] = []  # the newest first
+        self._awaited: list[tuple[Body, Callable[[], object]]] = []  # and what is done then
+        self._bodies = ListedRunner("bodies", jobs, self, self._take_bodies)
+        self._bodies.cancelled.connect(lambda: self._awaited.clear())
         self._take: Callable[[ReadMesh], object] = self._tell  # what is done with the next one
         self._refuse: Callable[[Exception], object] = self._say
         self._runner = ListedRunner(
@@ -54,8 +60,9 @@ class MeshReader(QObject):
 
     def reset(self, read: ReadMesh) -> None:
         """Begin with the mesh of another recording."""
-        self._runner.cancel()
-        self._kept = [read]
+        for runner in (self._runner, self._bodies):
+            runner.cancel()
+        self._kept, self._awaited = [read], []
 
     def keep(self, read: ReadMesh) -> None:
         """Have a mesh ready, the last but one no more."""
@@ -77,6 +84,32 @@ class MeshReader(QObject):
         self._take, self._refuse = take, self._say
         self._submit(replace(recording, **fields))
 
+    def read_body(self, mesh: MeshSequence, body: Body, then: Callable[[], object]) -> None:
+        """Read the file of another body beside a mesh, and call ``then``: it is then at hand.
+
+        Those that are awaited already are waited for together.
+        """
+        self._awaited.append((body, then))
+        bodies = [one for one, _ in self._awaited]
+
+        def read(emit: Emit) -> list[Exception | None]:
+            found: list[Exception | None] = []
+            for one in bodies:
+                emit((len(found), len(bodies)))
+                try:
+                    with_bodies(mesh, [one])
+                    found.append(None)
+                except (Sd2Error, OSError) as error:
+                    found.append(error)
+            return found
+
+        self._bodies.submit(read, f"Reading {body.file_name}")
+
+    def _take_bodies(self, found: list[Exception | None]) -> None:
+        awaited, self._awaited = self._awaited, []
+        for (_, then), error in zip(awaited, found, strict=True):
+            then() if error is None else self._say(error)
+
     def follow(self, recording: Recording) -> None:
         """Say that the mesh of a recording's fields is ready, at once or once it is read."""
         fields = mesh_fields(recording)
@@ -95,7 +128,8 @@ class MeshReader(QObject):
 
     def close(self) -> None:
         """Stop reading, for good."""
-        self._runner.close()
+        for runner in (self._runner, self._bodies):
+            runner.close()
         self._kept = []
 
     def _submit(self, asked: Recording) -> None:

@@ -139,6 +139,10 @@ class Edits:
         """Put one more thing, body or wall into the scene."""
         self._set_in_scene("Add", one, lambda kept: (*kept, one))
 
+    def add_body(self, body: Body) -> None:
+        """Put another body into the scene, a step once its file was read."""
+        self._document.read_body(body, partial(self.add_to_scene, body))
+
     def change_in_scene(self, number: int, one: Thing | Body | Wall) -> None:
         """Replace one by another, or by itself elsewhere; labels follow the name of a person."""
         stack, names = self._document.undo_stack, self._renamed(number, one)

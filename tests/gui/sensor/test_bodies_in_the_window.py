@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+import threading
+
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
@@ -15,6 +18,7 @@ from sd2app.scene.view import SceneView
 from sd2app.sensor.bodies_page import BodiesPage
 from sd2app.widgets.inputs import NumberBox
 from sd2core.doppler import Synthesizer
+from sd2core.io import bodies as bodies_of_files
 from sd2core.mesh.bodies import Body
 from sd2core.recording.recording import open_recording
 
@@ -29,6 +33,12 @@ def page_of(window) -> BodiesPage:
 def press(window, text: str) -> None:
     buttons = page_of(window).findChildren(QToolButton)
     QTest.mouseClick(next(one for one in buttons if one.text() == text), LEFT)
+
+
+def add_copy(window, qtbot) -> None:
+    count = len(bodies(window))
+    press(window, "Add a copy")
+    qtbot.waitUntil(lambda: len(bodies(window)) > count, timeout=10_000)
 
 
 def type_into(window, tip: str, text: str) -> None:
@@ -56,7 +66,7 @@ def test_a_second_body_is_added_moved_named_and_undone(window, qtbot):
     models = models_of(window)
     document = models.document
     alone = shown(window, qtbot)
-    press(window, "Add a copy")
+    add_copy(window, qtbot)
     (copy,) = bodies(window)
     assert copy.moved_m == (0.8, 0, 0)
     assert document.undo_stack.undoText().startswith("Add ")
@@ -88,7 +98,7 @@ def test_a_second_body_is_added_moved_named_and_undone(window, qtbot):
 def test_one_person_of_two_is_shown_alone(window, qtbot):
     models = models_of(window)
     alone = shown(window, qtbot)
-    press(window, "Add a copy")
+    add_copy(window, qtbot)
     type_into(window, "x: to the right", "3")
     both = shown(window, qtbot)
     menu = window.findChild(LimbMenu) or LimbMenu(models.limbs, window)
@@ -123,7 +133,7 @@ def pointed_at(window, qtbot) -> tuple[QWidget, QPoint, np.ndarray]:
 def test_the_map_follows_a_body_while_it_is_dragged_and_settles(window, qtbot):
     models = models_of(window)
     synthesis, stack = models.synthesis, models.document.undo_stack
-    press(window, "Add a copy")
+    add_copy(window, qtbot)
     before = shown(window, qtbot)
     widget, start, _ = pointed_at(window, qtbot)
     count, ranks = stack.count(), []
@@ -150,7 +160,7 @@ def test_the_map_follows_a_body_while_it_is_dragged_and_settles(window, qtbot):
 
 def test_it_is_dragged_on_the_floor_and_kept(window, qtbot, tmp_path):
     models = models_of(window)
-    press(window, "Add a copy")
+    add_copy(window, qtbot)
     stack = models.document.undo_stack
     widget, start, middle = pointed_at(window, qtbot)
     (before,) = bodies(window)
@@ -171,11 +181,30 @@ def test_it_is_dragged_on_the_floor_and_kept(window, qtbot, tmp_path):
     assert open_recording(tmp_path / "duo.sd2").bodies == (after,)
 
 
-def test_a_file_that_is_no_body_is_not_taken(window, tmp_path, monkeypatch: pytest.MonkeyPatch):
+def test_files_are_read_in_the_background_and_what_is_no_body_is_not_taken(
+    window, qtbot, tmp_path, monkeypatch: pytest.MonkeyPatch
+):
+    models, gate, readers = models_of(window), threading.Event(), set()
     path = tmp_path / "points.npz"
     np.savez(path, vertices=np.zeros((5, 4, 3)), times_s=np.arange(5) / 30)
-    monkeypatch.setattr(
-        QFileDialog, "getOpenFileName", lambda *_, **__: (str(path), ""), raising=True
-    )
-    press(window, "Add file…")
+    load, now = bodies_of_files.load_mesh, threading.get_ident
+
+    def wait(*args, **options):
+        readers.add(now())
+        assert gate.wait(10)
+        return load(*args, **options)
+
+    monkeypatch.setattr(bodies_of_files, "load_mesh", wait)
+    shutil.copy(models.document.recording.mesh, tmp_path / "anna.npz")
+    for name in ("points.npz", "anna.npz"):
+        answer = (str(tmp_path / name), "")
+        monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_, answer=answer, **__: answer)
+        press(window, "Add file…")
+    assert "Reading anna.npz" in [job.title for job in models.jobs.jobs]
     assert bodies(window) == ()
+    gate.set()
+    qtbot.waitUntil(lambda: bool(bodies(window)), timeout=10_000)
+    assert [one.file_name for one in bodies(window)] == ["anna.npz"]
+    assert "points.npz has no faces" in window.messages.text
+    assert now() not in readers
+    assert models.document.undo_stack.count() == 1
