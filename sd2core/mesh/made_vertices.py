@@ -83,6 +83,12 @@ def unshifted(mesh: MeshSequence) -> tuple[MeshSequence, Vector]:
     return (made.mesh, made.by_m) if isinstance(made, ShiftedVertices) else (mesh, (0.0, 0.0, 0.0))
 
 
+def same_bodies(one: MeshSequence, other: MeshSequence) -> bool:
+    """True if the bodies of two scenes have the same vertices, wherever they are put."""
+    ids = [[id(unshifted(body)[0].vertices) for body in scene.bodies] for scene in (one, other)]
+    return ids[0] == ids[1]
+
+
 def shifted_like(mesh: MeshSequence, other: MeshSequence) -> MeshSequence:
     """A mesh that was not shifted yet put where another one is, as the same person."""
     return replace(

@@ -9,6 +9,7 @@ from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
 from sd2core.body.parts import body_parts
 from sd2core.maps import OF
+from sd2core.mesh.made_vertices import same_bodies
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS, WHOLE, VertexParts
 
@@ -78,21 +79,22 @@ class LimbsModel(QObject):
         elif not adds:
             self.show(*(() if part is None or self.parts == (part,) else (part,)))
 
-    def part_of(self, vertex: int) -> str | None:
-        """Part that a vertex of the first body belongs to; None while that is not known."""
-        known, person = self.vertex_parts, self.persons[:1]
+    def part_of(self, vertex: int, body: int = 0) -> str | None:
+        """Part that a vertex of a body, the first is 0, belongs to; None while that is unknown."""
+        known, person = self.vertex_parts, self.persons[body : body + 1]
         if known is None:
             return None
-        name = known.names[known.numbers[vertex]]
+        its = (known, *known.others)[body]
+        name = its.names[its.numbers[vertex]]
         return OF.join([*person, name]) if name != WHOLE else "".join(person) or None
 
     @property
     def vertex_parts(self) -> VertexParts | None:
-        """Parts of the body by vertex; looked for in the background when first asked for."""
+        """Parts of the bodies by vertex; looked for in the background when first asked for."""
         mesh = self._document.mesh
         if mesh is None:
             return None
-        if self._found is None or self._found[0].vertices is not mesh.vertices:
+        if self._found is None or not same_bodies(self._found[0], mesh):
             self._found = mesh, None
             self._finder.submit(lambda _: (mesh, body_parts(mesh)))
         return self._found[1]

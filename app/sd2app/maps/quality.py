@@ -19,7 +19,7 @@ from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, Part, View, pieces
 from sd2core.body.parts import body_parts
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.synthesizer import Stretch, Synthesizer, Visibility
-from sd2core.mesh.made_vertices import unshifted
+from sd2core.mesh.made_vertices import same_bodies
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import VertexParts
 from sd2core.sensor import VirtualSensor
@@ -72,10 +72,7 @@ class SynthesizerCache:
         """
         other = SynthesizerCache(mesh, options, self.full)
         other.limbs = self.limbs
-        people, before = (
-            [id(unshifted(one)[0].vertices) for one in of.others] for of in (mesh, self.mesh)
-        )
-        if options == self.options and people == before:
+        if options == self.options and same_bodies(mesh, self.mesh):
             from sd2core.accuracy.trial import synthesizer_for
 
             for plan, made in list(self._made.items()):

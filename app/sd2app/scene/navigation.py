@@ -40,6 +40,7 @@ class _HeldThing:
     number: int  # of those that are shown, bodies after things
     at_m: Vector  # where it was taken hold of
     moved_m: Vector
+    start_px: tuple[float, float]
 
 
 class Navigator:
@@ -222,13 +223,15 @@ class Navigator:
     def _take_thing(self, x_px: float, y_px: float) -> bool:
         found = None if self.marker_at(x_px, y_px) is not None else self.thing_at(x_px, y_px)
         if found is not None:
-            self._held_thing = _HeldThing(*found, np.zeros(3))
+            self._held_thing = _HeldThing(*found, np.zeros(3), (x_px, y_px))
             self._edits.begin_scene_drag(found[0])
         return found is not None
 
     def _drag_thing(
         self, held: _HeldThing, x_px: float, y_px: float, constraint: Constraint
     ) -> None:
+        if not held.moved_m.any() and math.dist(held.start_px, (x_px, y_px)) < _CLICK_PX:
+            return
         pose, now = self._scene.pose, held.at_m + held.moved_m
         if constraint == "vertical":
             at = drag_along(now, np.array([0.0, 1.0, 0.0]), pose, x_px, y_px)

@@ -142,10 +142,12 @@ class Overlay(Canvas):
             self._paint_beside(painter, self._words_of_held(number, moved_m), at_m)
         elif self._navigator.hovers_sensor:
             self._paint_hint(painter, HINT)
+        elif (thing := self._navigator.thing) is not None and thing < len(self.thing_names):
+            words = THING_HINT.format(self.thing_names[thing])
+            both = f"{words}  ·  {self.hint}" if self.hint else words
+            self._paint_hint(painter, both) or self._paint_hint(painter, words)
         elif self.hint:
             self._paint_hint(painter, self.hint)
-        elif (thing := self._navigator.thing) is not None and thing < len(self.thing_names):
-            self._paint_hint(painter, THING_HINT.format(self.thing_names[thing]))
         elif marker is not None:
             place_m = self._scene.markers.positions_m[marker]
             self._paint_beside(painter, self.marker_words[marker], place_m)
@@ -346,15 +348,16 @@ class Overlay(Canvas):
         painter.drawPolygon([tip, back + across * 5.0, back - across * 5.0])
         painter.setBrush(Qt.BrushStyle.NoBrush)
 
-    def _paint_hint(self, painter: QPainter, text: str) -> None:
-        """Paint a text at the lower edge, on a chip, where there is room."""
+    def _paint_hint(self, painter: QPainter, text: str) -> bool:
+        """Paint a text at the lower edge, on a chip; False where there is no room."""
         box = self._chip_box(painter, text)
         if box.width() > self.width() - 16.0:
-            return
+            return False
         box.moveCenter(QPointF(self.width() / 2, 0.0))
         box.moveBottom(self.height() - 8.0)
         self._chip(painter, box)
         self._write(painter, box, text, colour=self._colours.text)
+        return True
 
     def _chip_box(self, painter: QPainter, text: str) -> QRectF:
         metrics = QFontMetricsF(painter.font())

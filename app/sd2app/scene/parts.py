@@ -99,9 +99,13 @@ class Shape:
         self.data.SetPolys(_cells(triangles))
         self.data.SetLines(_cells(segments))
         self.data.SetVerts(_cells(None))
+        self.clear_point_colours()
+        self.moved()
+
+    def clear_point_colours(self) -> None:
+        """Draw all of it in one colour."""
         self.data.GetPointData().SetScalars(None)
         self._colours = None
-        self.moved()
 
     def moved(self) -> None:
         """Tell VTK that ``points`` changed."""

@@ -11,6 +11,7 @@ from vtkmodules.vtkRenderingCore import vtkRenderer
 from sd2app.scene.colours import SceneColours, fractions, mixed
 from sd2app.scene.parts import Body
 from sd2app.scene.things import Movables
+from sd2core.figures.colours import rgb
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.things import Surface
 
@@ -26,6 +27,8 @@ class People(Movables):
         self.meshes: tuple[MeshSequence, ...] = ()
         self._shapes: list[Body] = []
         self._there: list[bool] = []
+        self._limb_colours: Sequence[str] = ()
+        self._limbs: Sequence[NDArray[np.intp] | None] = ()
         self._frame: int | None = None
 
     @property
@@ -57,6 +60,16 @@ class People(Movables):
                 shape.set_vertices(mesh.frame(frame))
         self._frame = frame if shown else None
 
+    def set_limbs(self, colours: Sequence[str], limbs: Sequence[NDArray[np.intp]]) -> None:
+        """Colour limbs of some: of each the number of a colour by vertex, from 1, or 0."""
+        self._limb_colours, self._limbs = colours, limbs
+        if self._colours is not None:
+            self.set_colours(self._colours)
+
+    def vertex_near(self, number: int, place_m: NDArray[np.float64]) -> int:
+        """Vertex of one that is nearest to a place."""
+        return int(np.linalg.norm(self._shapes[number].points - place_m, axis=1).argmin())
+
     def shift(self, number: int, offset_m: ArrayLike) -> None:
         """Draw one elsewhere than it is."""
         self._shapes[number].place(np.eye(3), np.asarray(offset_m, np.float64))
@@ -66,7 +79,14 @@ class People(Movables):
         self._colours = colours
         for number, shape in enumerate(self._shapes):
             own = PERSON_COLOURS[number % len(PERSON_COLOURS)]
-            shape.set_colour(mixed(own, colours.sensor, 0.4 if number == self._hot else 0.0))
+            own = mixed(own, colours.sensor, 0.4 if number == self._hot else 0.0)
+            shape.set_colour(own)
+            limb = self._limbs[number] if number < len(self._limbs) else None
+            if limb is not None and len(limb) == len(shape.points):
+                shades = np.stack([rgb(shade) for shade in (own, *self._limb_colours)])
+                shape.set_point_colours(shades[limb].astype(np.uint8))
+            else:
+                shape.clear_point_colours()
             shape.shadow.GetProperty().SetColor(*fractions(colours.shadow))
 
     def _to_meet(self) -> Sequence[Surface | None]:

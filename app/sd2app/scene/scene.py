@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -167,20 +167,33 @@ class Scene:
         found = [one for one in (thing, person) if one is not None]
         return min(found, key=lambda one: float(np.linalg.norm(one[1] - eye_m)), default=None)
 
+    def person_of(self, movable: int) -> int | None:
+        """Number of the other body that a movable is, from 0; None of a thing."""
+        return None if movable < (things := len(self.things.surfaces)) else movable - things
+
+    def set_limbs(
+        self, limbs: Sequence[tuple[str, str]], vertex_limbs: Sequence[NDArray[np.intp]]
+    ) -> None:
+        """Colour parts of bodies: their words and colours, and which each vertex has, from 1.
+
+        Nothing is coloured of bodies that ``vertex_limbs``, the first body's first, has none of.
+        """
+        first, *others = vertex_limbs or (None,)
+        self.change_colours(limbs=tuple(limbs), vertex_limb=first)
+        self.people.set_limbs([colour for _, colour in limbs], others)
+
     def shift_movable(self, number: int, offset_m: NDArray[np.float64]) -> None:
         """Draw a thing or another body elsewhere than it is."""
-        things = len(self.things.surfaces)
-        if number < things:
+        if (person := self.person_of(number)) is None:
             self.things.shift(number, offset_m)
         else:
-            self.people.shift(number - things, offset_m)
+            self.people.shift(person, offset_m)
 
     def set_hot_movable(self, number: int | None) -> None:
         """Light up a thing or another body."""
-        things = len(self.things.surfaces)
-        on_thing = number is not None and number < things
-        self.things.set_hot(number if on_thing else None)
-        self.people.set_hot(None if number is None or on_thing else number - things)
+        person = None if number is None else self.person_of(number)
+        self.things.set_hot(number if person is None else None)
+        self.people.set_hot(person)
 
     def set_inertial(self, vertices: Iterable[int]) -> None:
         """Show inertial sensors on vertices of the mesh."""

@@ -21,6 +21,7 @@ from sd2app.scene.limbs import LIMB_HINT, LimbHand
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.overlay import Overlay
 from sd2app.scene.scene import Scene
+from sd2app.session.limbs import part_words
 from sd2app.widgets.canvas import MenuPart
 from sd2app.widgets.picture import picture_menu
 from sd2core.errors import Sd2Error
@@ -80,7 +81,7 @@ class SceneView(QWidget):
         self.navigator = Navigator(self.scene, session.edits, placements.use, self.request_render)
         self.overlay = Overlay(self.scene, self.navigator, session.display, self)
         self.inertial_hand = InertialHand(self.scene, session, inertial)
-        self.limb_hand = LimbHand(self.scene, self.inertial_hand, limbs)
+        self.limb_hand = LimbHand(self.scene, self.navigator, self.inertial_hand, limbs)
         self._pressed_px = (0.0, 0.0)
         self.setAccessibleName("Scene")
         self._frame: int | None = None
@@ -177,9 +178,9 @@ class SceneView(QWidget):
         if kind == QEvent.Type.MouseMove:
             self.navigator.move(*place, event.modifiers())
             at_body = not event.buttons() and not self._at_something(place)
-            self.overlay.show_reading(place, self._words_at(place) if at_body else "")
+            part = self.limb_hand.part_at(*place) if at_body else None
+            self.overlay.show_reading(place, self._words_at(place, part) if at_body else "")
             if not self.inertial_hand.placing:
-                part = self.limb_hand.part_at(*place) if at_body else None
                 self.overlay.hint = "" if part is None else LIMB_HINT
         elif kind == QEvent.Type.MouseButtonRelease:
             self.navigator.release(*place, event.button())
@@ -193,7 +194,11 @@ class SceneView(QWidget):
             elif event.button() == Qt.MouseButton.RightButton:
                 menu = picture_menu(self, self.menu_parts, QPointF(*place))
                 menu.popup(event.globalPosition().toPoint())
-        elif kind == QEvent.Type.MouseButtonDblClick and not self._at_something(place):
+        elif (
+            kind == QEvent.Type.MouseButtonDblClick
+            and not self._at_something(place)
+            and self.navigator.thing is None
+        ):
             self._pressed_px = (math.inf, math.inf)  # its release is no click
             self.set_view("overview")
         else:
@@ -201,14 +206,13 @@ class SceneView(QWidget):
             self._pressed_px = place
             self.navigator.press(*place, event.button(), event.modifiers())
 
-    def _words_at(self, place: tuple[float, float]) -> str:
+    def _words_at(self, place: tuple[float, float], part: str | None) -> str:
         """What is under the pointer, or what a click would place there, in words."""
         words = self.inertial_hand.words_at(*place)
         if words or self.inertial_hand.placing:
             return words
-        return "  ·  ".join(
-            filter(None, [self.limb_hand.words_at(*place), self.reading_at(*place)])
-        )
+        reading = "" if self.navigator.thing is not None else self.reading_at(*place)
+        return "  ·  ".join(filter(None, [part and part_words(part), reading]))
 
     def reading_at(self, x_px: float, y_px: float) -> str:
         """Range, radial velocity and visibility of the vertex in front at a pixel, in words."""
@@ -234,8 +238,9 @@ class SceneView(QWidget):
         copy.setEnabled(bool(words))
 
     def _at_something(self, place: tuple[float, float]) -> bool:
-        at_marker = self.navigator.marker_at(*place) is not None
-        at_thing = self.navigator.thing_at(*place) is not None
+        """True at what is no body."""
+        at_marker, found = self.navigator.marker_at(*place) is not None, self.navigator.thing
+        at_thing = found is not None and self.scene.person_of(found) is None
         return at_marker or at_thing or self.navigator.sensor_at(*place)
 
     # What changed
@@ -309,6 +314,7 @@ class SceneView(QWidget):
         self.scene.set_things(around)
         with self._explaining():
             self.scene.set_people(others, self._frame or 0)
+        self.limb_hand.show()
         named = [one.name for one in self.scene.things.things]
         self.overlay.thing_names = named + ([] if mesh is None else list(mesh.persons[1:]))
         self.navigator.look_again()

@@ -15,6 +15,7 @@ from sd2app.session.display import DisplayModel
 from sd2app.session.mode import Mode
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
+from sd2core.maps import OF
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import VertexParts
 from sd2core.placements.body_extent import SensorCoverage
@@ -98,9 +99,12 @@ class Limbs(QObject):
         self.persons: tuple[str, ...] = ()
         self.picked: list[tuple[str | None, bool]] = []
 
-    def part_of(self, vertex: int) -> str | None:
+    def part_of(self, vertex: int, body: int = 0) -> str | None:
         known = self.vertex_parts
-        return None if known is None else known.names[known.numbers[vertex]]
+        if known is None:
+            return None
+        its = (known, *known.others)[body]
+        return OF.join([*self.persons[body : body + 1], its.names[its.numbers[vertex]]])
 
     def pick(self, part: str | None, *, adds: bool) -> None:
         self.picked.append((part, adds))
@@ -123,6 +127,15 @@ class Drag:
     def end_sensor_drag(self) -> None:
         self._log.append("end")
         self._sensor.set_dragging(False)
+
+    def begin_scene_drag(self, number: int) -> None:
+        self._log.append(f"take {number}")
+
+    def drag_in_scene(self, by_m: tuple[float, float, float]) -> None:
+        self._log.append("move")
+
+    def end_scene_drag(self, by_m: tuple[float, float, float]) -> None:
+        self._log.append(f"put by {by_m}")
 
 
 @dataclass

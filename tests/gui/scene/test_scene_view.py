@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -648,6 +649,31 @@ def test_chosen_parts_have_their_colours_and_the_rest_is_plain(limbed: Stage) ->
     limbed.limbs.parts = ()
     limbed.limbs.changed.emit()
     assert greyness(limbed.colour_at(LEFT)) > 60
+
+
+def test_limbs_of_another_person_are_picked_on_their_body(limbed: Stage) -> None:
+    """Anna's plates stand 0.5 m below the first person's: a forearm and a thigh."""
+    first = limbed.limbs.vertex_parts
+    anna = VertexParts(("forearm.L", "thigh.L"), np.repeat([0, 1], 4))
+    limbed.limbs.persons = ("person 1", "anna")
+    limbed.limbs.vertex_parts = replace(first, others=(anna,))
+    mesh = two_plates()
+    below = replace(mesh, vertices=mesh.vertices + np.float32([0, 0.55, 0]), person="anna")
+    limbed.document.mesh = replace(mesh, others=(below,))
+    limbed.document.changed.emit()
+    limbed.view.grab()
+    lower = [tuple(np.add(place, (0, 0.55, 0))) for place in (LEFT, RIGHT)]
+    for place in (LEFT, *lower):
+        click(limbed, limbed.pixel_of(place))
+    names = ["person 1: trunk", "anna: forearm.L", "anna: thigh.L"]
+    assert limbed.limbs.picked == [(name, False) for name in names]
+    assert limbed.log == ["take 0", "put by (0.0, 0.0, 0.0)"] * 2
+    limbed.limbs.parts = ("anna: thigh.L",)
+    limbed.limbs.changed.emit()
+    hue = limbed.colour_at(lower[1]).hue()
+    assert abs(hue - QColor(LIMB_COLOURS["thigh.L"]).hue()) < 8
+    assert limbed.colour_at(lower[0]) != limbed.colour_at(lower[1])
+    assert greyness(limbed.colour_at(LEFT)) < 25
 
 
 def test_the_pointer_names_the_part(limbed: Stage) -> None:

@@ -114,6 +114,11 @@ def test_one_person_of_two_is_shown_alone(window, qtbot):
     np.testing.assert_allclose(first + second, both, atol=1e-6 * both.max())
 
 
+def hover(widget, place: QPoint) -> None:
+    for near in (place + QPoint(1, 1), place):  # a pointer that is there already does not move
+        QTest.mouseMove(widget, near)
+
+
 def pointed_at(window, qtbot) -> tuple[QWidget, QPoint, np.ndarray]:
     """Widget and pixel where the pointer is on the only other body, and the middle of that."""
     view = window.findChild(SceneView)
@@ -124,8 +129,7 @@ def pointed_at(window, qtbot) -> tuple[QWidget, QPoint, np.ndarray]:
     x, y, _ = scene.pose.project(middle)[0]
     start = QPoint(round(x), round(y))
     widget = view.childAt(start)
-    for place in (start + QPoint(1, 1), start):  # a pointer that is there already does not move
-        QTest.mouseMove(widget, place)
+    hover(widget, start)
     assert view.navigator.thing == 0
     return widget, start, middle
 
@@ -179,6 +183,32 @@ def test_it_is_dragged_on_the_floor_and_kept(window, qtbot, tmp_path):
     )
     models.document.save_as(tmp_path / "duo.sd2")
     assert open_recording(tmp_path / "duo.sd2").bodies == (after,)
+
+
+def test_a_click_on_a_body_shows_it_alone_and_moves_nothing(window, qtbot):
+    models = models_of(window)
+    add_copy(window, qtbot)
+    widget, start, _ = pointed_at(window, qtbot)
+    view, count = window.findChild(SceneView), models.document.undo_stack.count()
+    qtbot.waitUntil(lambda: models.limbs.vertex_parts is not None, timeout=10_000)
+    before, plain = bodies(window), view.grab().toImage().pixelColor(start)
+    QTest.mousePress(widget, LEFT, Qt.KeyboardModifier.NoModifier, start)
+    QTest.mouseMove(widget, start + QPoint(2, 1))  # a hand is not that still
+    QTest.mouseRelease(widget, LEFT, Qt.KeyboardModifier.NoModifier, start + QPoint(2, 1))
+    assert models.limbs.parts == ("person 2",)
+    assert (bodies(window), models.document.undo_stack.count()) == (before, count)
+    chosen = view.grab().toImage().pixelColor(start)
+    assert chosen != plain
+    x, y, _ = view.scene.pose.project(view.scene.body.points.mean(axis=0))[0]
+    first = QPoint(round(x), round(y))
+    QTest.mouseClick(widget, LEFT, Qt.KeyboardModifier.ControlModifier, first)
+    assert models.limbs.parts == ("person 1", "person 2")
+    hover(widget, start)
+    assert view.overlay.reading == "person 2"
+    QTest.mouseClick(widget, LEFT, Qt.KeyboardModifier.NoModifier, QPoint(5, 300))
+    assert models.limbs.parts == ()
+    hover(widget, start)  # which lights it up, as before
+    assert view.grab().toImage().pixelColor(start) == plain
 
 
 def test_files_are_read_in_the_background_and_what_is_no_body_is_not_taken(
