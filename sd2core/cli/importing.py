@@ -395,18 +395,16 @@ def _body(text: str) -> Body:
         raise Sd2Error(f"--body is {text!r}", expected)
     x, y, z, turn_deg, start_s = numbers + [0.0] * (5 - len(numbers))
     person, _, file = ("", "", what) if Path(what).exists() else what.rpartition("=")
-    path, reading = plain_path(Path(file)), {}
+    path, reading, faces = plain_path(Path(file)), {}, None
     if not is_there(path):
         raise Sd2Error(f"The mesh {file} does not exist", "a file or folder")
     if is_recording(path):
         of = open_recording(path)
-        if of.mesh is None or of.faces is not None:
-            raise Sd2Error(
-                f"{path} holds no mesh that tells its own faces",
-                "a recording with a mesh of that kind",
-            )
+        if of.mesh is None:
+            raise Sd2Error(f"{path} holds no mesh", "a recording with one")
         path, person, reading = of.mesh, person or of.subject, of.mesh_reading.options()
-    return Body(str(path), (x, y, z), turn_deg, start_s, person, reading)
+        faces = None if of.faces is None else str(of.faces)
+    return Body(str(path), (x, y, z), turn_deg, start_s, person, reading, faces)
 
 
 def _wall(text: str) -> Wall:

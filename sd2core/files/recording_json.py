@@ -135,7 +135,7 @@ class MeshReading(BaseModel):
 
 
 class BodyEntry(BaseModel):
-    """Fields of :class:`sd2core.mesh.bodies.Body`; its path is relative."""
+    """Fields of :class:`sd2core.mesh.bodies.Body`; its paths are relative."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -145,6 +145,7 @@ class BodyEntry(BaseModel):
     start_s: Time = 0.0
     person: str = ""
     reading: MeshReading = MeshReading()
+    faces: StoredPath | None = None
 
 
 class CameraEntry(BaseModel):

@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import signature
 from sd2core.files.paths import files_at
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.bodies import MAX_BODIES, Body
-from sd2core.mesh.made_vertices import MadeVertices, shifted, unshifted
+from sd2core.mesh.made_vertices import ChangedVertices, shifted, unshifted
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.things import turn_matrix
 from sd2core.scattering.resampling import resample_mesh
@@ -106,9 +105,12 @@ def _named(mesh: MeshSequence, body: Body) -> MeshSequence:
 
 def _placed(body: Body, first: MeshSequence) -> MeshSequence:
     """Body of a file, in its place and at the times of the first."""
-    path = Path(body.path)
+    path, reading, files = Path(body.path), dict(body.reading), files_at(Path(body.path))
+    if body.faces is not None:
+        reading["faces"] = body.faces
+        files.append(Path(body.faces))
     try:
-        own = _read(path, tuple(body.reading.items()), str(signature(files_at(path))))
+        own = _read(path, tuple(reading.items()), str(signature(files)))
     except Sd2Error as error:
         if path.exists():
             raise
@@ -148,16 +150,10 @@ def _turned(mesh: MeshSequence, own: MeshSequence, turn_deg: float) -> MeshSeque
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     by_m = middle - turn @ middle
     x, y, z = by_m.tolist()
-
-    def made(rows: NDArray[np.intp]) -> NDArray[Any]:
-        low, high = int(rows.min()), int(rows.max()) + 1
-        placed: NDArray[Any] = mesh.read(low, high)[rows - low].astype(np.float64) @ turn.T + by_m
-        return placed
-
     known = mesh.uncertainty
     return replace(
         mesh,
-        vertices=MadeVertices((mesh.frame_count, mesh.vertex_count, 3), mesh.vertices.dtype, made),
+        vertices=ChangedVertices(mesh, lambda points: points @ turn.T + by_m),
         # What is known badly is so along the line from where the camera was.
         uncertainty=None if known is None else replace(known, camera_m=(x, y, z)),
     )

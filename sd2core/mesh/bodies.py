@@ -36,6 +36,8 @@ class Body:
         Name of the person.
     reading : mapping
         Further arguments with which :func:`sd2core.load_mesh` reads the file.
+    faces : str, optional
+        File with its faces, where the mesh file has none.
 
     Examples
     --------
@@ -50,6 +52,7 @@ class Body:
     start_s: float = 0.0
     person: str = ""
     reading: Mapping[str, Any] = field(default_factory=dict)
+    faces: str | None = None
 
     def __post_init__(self) -> None:
         moved = tuple(map(float, self.moved_m))

@@ -49,21 +49,28 @@ class MadeVertices:
         return np.asarray(self[:], dtype)
 
 
-class ShiftedVertices(MadeVertices):
+class ChangedVertices(MadeVertices):
+    """Vertices that ``change`` makes of those of some frames of a mesh, (n, V, 3)."""
+
+    def __init__(
+        self, mesh: MeshSequence, change: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    ) -> None:
+        def made(rows: NDArray[np.intp]) -> NDArray[Any]:
+            low, high = int(rows.min()), int(rows.max()) + 1
+            return change(mesh.read(low, high)[rows - low].astype(np.float64))
+
+        super().__init__((mesh.frame_count, mesh.vertex_count, 3), mesh.vertices.dtype, made)
+
+
+class ShiftedVertices(ChangedVertices):
     """Vertices of a mesh that is put elsewhere, and not turned.
 
     Whatever is known of ``mesh`` need not be found again: it is as if the sensor had moved.
     """
 
     def __init__(self, mesh: MeshSequence, by_m: Vector) -> None:
+        super().__init__(mesh, lambda points: points + by_m)
         self.mesh, self.by_m = mesh, by_m
-
-        def made(rows: NDArray[np.intp]) -> NDArray[Any]:
-            low, high = int(rows.min()), int(rows.max()) + 1
-            moved: NDArray[Any] = mesh.read(low, high)[rows - low].astype(np.float64) + by_m
-            return moved
-
-        super().__init__((mesh.frame_count, mesh.vertex_count, 3), mesh.vertices.dtype, made)
 
 
 def shifted(mesh: MeshSequence, by_m: Vector) -> MeshSequence:

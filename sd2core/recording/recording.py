@@ -55,6 +55,7 @@ from sd2core.recording.relinking import (
     Role,
     body_role,
     exists,
+    faces_role,
     find_again,
     is_many,
     role_words,
@@ -267,7 +268,7 @@ class Recording:
                 folder=folder,
                 **{role: path for role, path in files.items() if role in ROLES},  # type: ignore[arg-type]
                 things=things,
-                bodies=_at_paths(self.bodies, files),
+                bodies=_with_paths(self.bodies, files.get),
                 title=self.title or folder.stem,
                 labels_elsewhere=False,
                 _base=None,
@@ -295,7 +296,9 @@ class Recording:
         """Those of the other bodies whose meshes are where the recording says."""
         missing = self.missing()
         return tuple(
-            one for index, one in enumerate(self.bodies) if body_role(index) not in missing
+            one
+            for index, one in enumerate(self.bodies)
+            if not {body_role(index), faces_role(index)} & missing.keys()
         )
 
     @property
@@ -344,7 +347,7 @@ class Recording:
         moved = {str(missing[role]): path for role, path in relinked.found.items()}
         for role in relinked.found.keys() & set(ROLES):
             setattr(self, role, relinked.found[role])
-        self.bodies = _at_paths(self.bodies, relinked.found)
+        self.bodies = _with_paths(self.bodies, relinked.found.get)
         self.things = _with_files(self.things, lambda path: moved.get(path, path))
         if relinked.found and (self.folder / FILE_NAME).exists():
             self.save()
@@ -398,10 +401,10 @@ class Recording:
             for one in _with_files(self.things, lambda path: stored_path(Path(path), self.folder))
         )
         document.bodies = tuple(
-            BodyEntry.model_validate(
-                asdict(one) | {"path": stored_path(Path(one.path), self.folder)}
+            BodyEntry.model_validate(asdict(one))
+            for one in _with_paths(
+                self.bodies, lambda _, path: stored_path(Path(path), self.folder)
             )
-            for one in self.bodies
         )
         document.walls = tuple(WallEntry.model_validate(asdict(one)) for one in self.walls)
         document.spans = () if self._writes_labels else tuple(self.spans)
@@ -565,7 +568,9 @@ class Recording:
 
     def _files(self) -> dict[Role, Path]:
         paths = {role: getattr(self, role) for role in ROLES}
-        paths |= {body_role(index): Path(one.path) for index, one in enumerate(self.bodies)}
+        for index, one in enumerate(self.bodies):
+            paths |= {body_role(index): Path(one.path)}
+            paths |= {faces_role(index): None if one.faces is None else Path(one.faces)}
         return {role: path for role, path in paths.items() if path is not None}
 
     def _present(self, role: Role) -> Path:
@@ -640,22 +645,25 @@ def settings_of(document: Document, folder: Path) -> dict[str, Any]:
             (Thing(**entry.model_dump()) for entry in document.things),
             lambda path: located_path(path, folder),
         ),
-        "bodies": tuple(
-            Body(
-                **entry.model_dump(exclude={"path", "reading"}),
-                path=str(located_path(entry.path, folder)),
-                reading=entry.reading.options(),
-            )
-            for entry in document.bodies
+        "bodies": _with_paths(
+            (
+                Body(**entry.model_dump(exclude={"reading"}), reading=entry.reading.options())
+                for entry in document.bodies
+            ),
+            lambda _, path: located_path(path, folder),
         ),
         "walls": tuple(Wall(**entry.model_dump()) for entry in document.walls),
     }
 
 
-def _at_paths(bodies: tuple[Body, ...], files: Mapping[Role, Path]) -> tuple[Body, ...]:
-    """The same bodies with the paths of their roles."""
+def _with_paths(bodies: Iterable[Body], path_of: Callable[[Role, str], object]) -> tuple[Body, ...]:
+    """The same bodies with other paths of their files."""
     return tuple(
-        replace(one, path=str(files.get(body_role(index), one.path)))
+        replace(
+            one,
+            path=str(path_of(body_role(index), one.path)),
+            faces=None if one.faces is None else str(path_of(faces_role(index), one.faces)),
+        )
         for index, one in enumerate(bodies)
     )
 

@@ -26,6 +26,11 @@ def body_role(index: int) -> Role:
     return f"{_BODY}{index + 2}"
 
 
+def faces_role(index: int) -> Role:
+    """Role of the file with the faces of one of the other bodies, counted from 0."""
+    return f"faces of {body_role(index)}"
+
+
 _THING = "thing "
 
 

@@ -57,13 +57,12 @@ class BodiesPage(SceneList):
         if recording is None or recording.mesh is None:
             return
         reading = recording.mesh_options()
-        if reading.pop("faces", None) is not None:
-            self._warn("The mesh of this recording has its faces in another file: save it as one.")
-            return
-        for name in ("things", "walls", "bodies", "called"):
+        for name in ("faces", "things", "walls", "bodies", "called"):
             reading.pop(name, None)
-        path = str(Path(recording.mesh).absolute())
-        self._session.edits.add_body(Body(path, (_BESIDE_M, 0.0, 0.0), reading=reading))
+        path = str(recording.mesh.absolute())
+        faces = None if recording.faces is None else str(recording.faces.absolute())
+        beside_m = (_BESIDE_M, 0.0, 0.0)
+        self._session.edits.add_body(Body(path, beside_m, reading=reading, faces=faces))
 
     def _add_file(self) -> None:
         path = ask_file(self, "Mesh of somebody else", _KINDS)

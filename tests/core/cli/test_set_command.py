@@ -113,6 +113,35 @@ def test_labels_follow_the_name_of_their_person(sd2: Sd2, one: Recording) -> Non
     assert persons("carl") == ["dorothy", "bert", ""]  # who went keeps what is theirs
 
 
+def test_a_body_takes_its_faces_along(sd2: Sd2, one: Recording, tmp_path: Path) -> None:
+    mesh = one.load_mesh()
+    (there := tmp_path / "there").mkdir()
+    np.savez(there / "points.npz", vertices=np.asarray(mesh.vertices), times_s=mesh.times_s)
+    np.save(there / "faces.npy", mesh.faces)
+    bert = Recording.create(
+        there / "bert.sd2", mesh=there / "points.npz", faces=there / "faces.npy", subject="bert"
+    )
+    outcome = sd2("set", one.folder, "--body", f"{bert.folder}@1,0,0")
+    assert outcome.code == 0, outcome.err
+    assert content(one)["bodies"][0]["faces"] == "../there/faces.npy"
+
+    def faces_of(recording: Recording) -> object:
+        (other,) = open_recording(recording.folder).load_mesh().others
+        return other.faces
+
+    np.testing.assert_array_equal(faces_of(one), mesh.faces)
+    copied = open_recording(one.folder).save_as(tmp_path / "copy.sd2", copy=True)
+    assert content(copied)["bodies"][0]["faces"] == "faces.npy"
+    (tmp_path / "store").mkdir()
+    (there / "faces.npy").rename(tmp_path / "store" / "faces.npy")
+    np.testing.assert_array_equal(faces_of(copied), mesh.faces)
+    moved = open_recording(one.folder)
+    assert set(moved.missing()) == {"faces of body 2"}
+    assert moved.bodies_there == ()
+    assert sd2("relink", one.folder, tmp_path / "store").code == 0
+    np.testing.assert_array_equal(faces_of(one), mesh.faces)
+
+
 NAMES = ("dora", "bert", "")
 
 

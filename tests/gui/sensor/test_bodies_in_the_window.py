@@ -20,7 +20,7 @@ from sd2app.widgets.inputs import NumberBox
 from sd2core.doppler import Synthesizer
 from sd2core.io import bodies as bodies_of_files
 from sd2core.mesh.bodies import Body
-from sd2core.recording.recording import open_recording
+from sd2core.recording.recording import Recording, open_recording
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -209,6 +209,22 @@ def test_a_click_on_a_body_shows_it_alone_and_moves_nothing(window, qtbot):
     assert models.limbs.parts == ()
     hover(widget, start)  # which lights it up, as before
     assert view.grab().toImage().pixelColor(start) == plain
+
+
+def test_a_copy_has_its_faces_from_the_same_file(window, qtbot, tmp_path):
+    document = models_of(window).document
+    mesh = document.mesh
+    np.savez(tmp_path / "points.npz", vertices=mesh.read(0, 9), times_s=mesh.times_s[:9])
+    np.save(tmp_path / "faces.npy", mesh.faces)
+    made = Recording.create(
+        tmp_path / "apart.sd2", mesh=tmp_path / "points.npz", faces=tmp_path / "faces.npy"
+    )
+    with qtbot.waitSignal(document.opened, timeout=10_000):
+        window.open_paths([made.folder])
+    add_copy(window, qtbot)
+    (copy,) = bodies(window)
+    assert copy.faces == str(tmp_path / "faces.npy")
+    np.testing.assert_array_equal(document.mesh.others[0].faces, mesh.faces)
 
 
 def test_files_are_read_in_the_background_and_what_is_no_body_is_not_taken(
