@@ -32,7 +32,7 @@ Occlusion = Literal["depth", "exact"]
 
 Position = tuple[float, float, float]
 
-_Place = Position
+Place = Position
 """Place of a sensor in the frame of the prepared positions: a body that is moved takes its own
 frame along."""
 
@@ -166,13 +166,7 @@ class VisibilityMasks:
         return _facing(view, self._prepared.normals(block)[rows])
 
     def kept(
-        self,
-        index: int,
-        rows: slice,
-        position_m: Position,
-        occlusion: Occlusion,
-        *,
-        alone: bool = False,
+        self, index: int, rows: slice, place: Place, occlusion: Occlusion, alone: bool = False
     ) -> NDArray[np.uint8] | None:
         """Mask of a block's frames from this place, uint8 (n, V), if all are in memory.
 
@@ -182,19 +176,13 @@ class VisibilityMasks:
             Number of the block.
         rows : slice
             Its n frames.
-        position_m : tuple of 3 float
-            Place of the sensor in the camera frame; no other one will do.
+        place : tuple of 3 float
+            Of the sensor; no other one will do.
         occlusion : {"depth", "exact"}
             Kind of mask.
         alone : bool
             True for what the body itself hides, whatever stands around it.
         """
-        place = position_of(self._prepared.sensor(position_m))
-        return self._kept(index, rows, place, occlusion, alone)
-
-    def _kept(
-        self, index: int, rows: slice, place: _Place, occlusion: Occlusion, alone: bool = False
-    ) -> NDArray[np.uint8] | None:
         if self._stride == 1:
             mask: _BlockMask | None = self._prepared.budget.get(
                 self._key(occlusion, index, place, alone)
@@ -210,9 +198,7 @@ class VisibilityMasks:
             served.append(mask.visible[local])
         return np.stack(served)[which]
 
-    def _key(
-        self, occlusion: Occlusion, index: int, place: _Place, alone: bool = False
-    ) -> Hashable:
+    def _key(self, occlusion: Occlusion, index: int, place: Place, alone: bool = False) -> Hashable:
         # Prepared blocks, and with them the budget, may serve several options: those with the
         # same masks share them. Which vertices are tested depends on the bins they fall into.
         options = self._prepared.options
@@ -231,7 +217,7 @@ class VisibilityMasks:
             *(index, place),
         )
 
-    def _places(self, index: int) -> list[tuple[Occlusion, _Place]]:
+    def _places(self, index: int) -> list[tuple[Occlusion, Place]]:
         """Where masks of a block were made, the newest first."""
         options = self._prepared.options
         kind = options.depth_resolution, self._stride, self._prepared.spreads, options.axis
@@ -255,7 +241,7 @@ class VisibilityMasks:
             return nearest
         return np.clip(nearest, presence.first[frames], presence.last[frames])
 
-    def _frozen(self, block: Block, rows: slice, place: _Place) -> NDArray[np.uint8] | None:
+    def _frozen(self, block: Block, rows: slice, place: Place) -> NDArray[np.uint8] | None:
         """Complete mask of these rows that was made nearest to this place.
 
         Its error grows with the distance (docs/decisions/0010); of equally near ones
@@ -263,11 +249,11 @@ class VisibilityMasks:
         """
         kept = self._places(block.index)
         for occlusion, near in sorted(kept, key=lambda here: math.dist(here[1], place)):
-            mask = self._kept(block.index, rows, near, occlusion)
+            mask = self.kept(block.index, rows, near, occlusion)
             if mask is not None:
                 return mask
             # What moved hides something else; what the body hides itself is known.
-            alone = self._kept(block.index, rows, near, occlusion, alone=True)
+            alone = self.kept(block.index, rows, near, occlusion, alone=True)
             if alone is None:
                 continue
             if near == place:
@@ -282,7 +268,7 @@ class VisibilityMasks:
         self,
         block: Block,
         rows: slice,
-        place: _Place,
+        place: Place,
         occlusion: Occlusion,
         among: NDArray[np.uint8] | None,
     ) -> NDArray[np.uint8]:
@@ -305,7 +291,7 @@ class VisibilityMasks:
         self,
         block: Block,
         rows: slice,
-        place: _Place,
+        place: Place,
         occlusion: Occlusion,
         needed: Callable[[], NDArray[np.uint8]],
     ) -> NDArray[np.uint8]:
@@ -335,7 +321,7 @@ class VisibilityMasks:
         """True if there is something around the body that may hide it."""
         return self._prepared.mesh.surroundings is not None or bool(self.others)
 
-    def _serving_mask(self, frame: int, place: _Place, occlusion: Occlusion) -> NDArray[np.uint8]:
+    def _serving_mask(self, frame: int, place: Place, occlusion: Occlusion) -> NDArray[np.uint8]:
         """Mask of one frame that serves its neighbours, uint8 (V,).
 
         The vertices that can change the map in any frame it serves are tested, also across
@@ -376,7 +362,7 @@ class VisibilityMasks:
         return self._prepared.counted(index, self._counting, points=True)
 
     def _block_mask(
-        self, index: int, place: _Place, occlusion: Occlusion, *, alone: bool = False
+        self, index: int, place: Place, occlusion: Occlusion, *, alone: bool = False
     ) -> _BlockMask:
         """Mask of a block from a place, as far as it has been computed."""
 

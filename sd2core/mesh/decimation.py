@@ -3,39 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
-from sd2core.mesh.made_vertices import shifted_like, unshifted
-from sd2core.mesh.sequence import MeshSequence, VertexArray, refuse_missing
+from sd2core.mesh.made_vertices import MadeVertices, read_frames, shifted_like, unshifted
+from sd2core.mesh.sequence import MeshSequence, refuse_missing
 
 _MIN_FACES = 4
 """Least number of faces that enclose anything."""
 
 _SIZE = 100.0
 """Size that a surface is brought to: the library's thresholds are absolute, and finer there."""
-
-
-class _Columns:
-    """Some of the vertices of a moving mesh, picked when frames are read."""
-
-    def __init__(self, vertices: VertexArray, columns: NDArray[np.intp]) -> None:
-        self._vertices = vertices
-        self._columns = columns
-        self.shape = (vertices.shape[0], len(columns), 3)
-        self.dtype = vertices.dtype
-
-    def __getitem__(self, key: Any) -> NDArray[Any]:
-        frames, *rest = key if isinstance(key, tuple) else (key,)
-        picked = np.take(np.asarray(self._vertices[frames]), self._columns, axis=-2)
-        part: NDArray[Any] = picked[(slice(None),) * (picked.ndim - 2) + tuple(rest)]
-        return part
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
-        return np.asarray(self[:], dtype)
 
 
 def decimate(mesh: MeshSequence, kept: float, *, frame: int | None = None) -> MeshSequence:
@@ -94,7 +74,11 @@ def decimate(mesh: MeshSequence, kept: float, *, frame: int | None = None) -> Me
     done = f"decimated to {len(columns)} of {mesh.vertex_count} vertices"
     return replace(
         mesh,
-        vertices=_Columns(mesh.vertices, columns),
+        vertices=MadeVertices(
+            (mesh.frame_count, len(columns), 3),
+            mesh.vertices.dtype,
+            lambda frames: np.take(read_frames(mesh, frames), columns, axis=1),
+        ),
         faces=faces,
         vertex_counts=counts,
         uncertainty=None if mesh.uncertainty is None else mesh.uncertainty.of_vertices(columns),

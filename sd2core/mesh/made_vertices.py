@@ -49,17 +49,23 @@ class MadeVertices:
         return np.asarray(self[:], dtype)
 
 
+def read_frames(mesh: MeshSequence, frames: NDArray[np.intp]) -> NDArray[Any]:
+    """Vertices of some frames of a mesh, which is read from the first of them to the last."""
+    low, high = int(frames.min()), int(frames.max()) + 1
+    return mesh.read(low, high)[frames - low]
+
+
 class ChangedVertices(MadeVertices):
     """Vertices that ``change`` makes of those of some frames of a mesh, (n, V, 3)."""
 
     def __init__(
         self, mesh: MeshSequence, change: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     ) -> None:
-        def made(rows: NDArray[np.intp]) -> NDArray[Any]:
-            low, high = int(rows.min()), int(rows.max()) + 1
-            return change(mesh.read(low, high)[rows - low].astype(np.float64))
-
-        super().__init__((mesh.frame_count, mesh.vertex_count, 3), mesh.vertices.dtype, made)
+        super().__init__(
+            (mesh.frame_count, mesh.vertex_count, 3),
+            mesh.vertices.dtype,
+            lambda frames: change(read_frames(mesh, frames).astype(np.float64)),
+        )
 
 
 class ShiftedVertices(ChangedVertices):

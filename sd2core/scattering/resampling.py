@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.mesh.made_vertices import MadeVertices
+from sd2core.mesh.made_vertices import MadeVertices, read_frames
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.scattering.trajectory import cubic_weights
 from sd2core.timebase import Timebase
@@ -35,10 +35,6 @@ def resample_mesh(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[Mes
     # Between two frames there is a person where both of them have one.
     there = presence.there[frames] & presence.there[following] & within
 
-    def picked(rows: NDArray[np.intp]) -> NDArray[Any]:
-        low, high = int(nearest[rows].min()), int(nearest[rows].max()) + 1
-        return mesh.read(low, high)[nearest[rows] - low]
-
     def made(rows: NDArray[np.intp]) -> NDArray[Any]:
         ends = frames[rows]
         low = int(max(presence.first[ends].min(), ends.min() - 1))
@@ -62,7 +58,9 @@ def resample_mesh(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[Mes
         mesh,
         vertices=MadeVertices(shape, np.float64, made)
         if interpolated
-        else MadeVertices(shape, mesh.vertices.dtype, picked),
+        else MadeVertices(
+            shape, mesh.vertices.dtype, lambda rows: read_frames(mesh, nearest[rows])
+        ),
         timebase=Timebase(times_s),
         present=there if interpolated else presence.there[nearest] & within,
         uncertainty=known,

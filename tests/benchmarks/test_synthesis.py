@@ -21,6 +21,7 @@ from timing import best_s, spent_s
 
 from sd2core.body.parts import known_parts
 from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.doppler.masks import position_of
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import warm_up, worker_count
 from sd2core.scattering.exact import exact_visibility_kernel
@@ -213,7 +214,8 @@ def test_against_vid2doppler(
     chosen = replace(PAPER, range_exponent=0.0, velocity_sigma_bins=5.0, time_sigma_s=0.0)
     maker = Synthesizer(mesh, chosen)
     maker.map(VirtualSensor(), visibility="exact")
-    counts, place = maker._frames, VirtualSensor().position_m
+    counts = maker._frames
+    place = position_of(counts.prepared.sensor(VirtualSensor().position_m))
     masks = [
         counts.masks.kept(index, slice(None), place, "exact")
         for index, *_ in counts.blocks_between(0, FRAMES)

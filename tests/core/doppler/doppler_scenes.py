@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
-from sd2core.doppler.masks import Occlusion
+from sd2core.doppler.masks import Occlusion, position_of
 from sd2core.doppler.reference import at_frames
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
@@ -96,10 +96,11 @@ def cached_mask(
     Vertices that cannot change the map hold the facing test.
     """
     counts, parts = maker._frames, []
+    place = position_of(counts.prepared.sensor(sensor.position_m))
     for index, low, high in counts.blocks_between(*(frames or (0, maker.mesh.frame_count))):
         start, _ = counts.prepared.span(index)
         rows = slice(low - start, high - start)
-        mask = counts.masks.kept(index, rows, sensor.position_m, visibility)
+        mask = counts.masks.kept(index, rows, place, visibility)
         if mask is None:
             return None
         parts.append(mask)
