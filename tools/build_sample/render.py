@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.model import Body, vertex_normals
+from sd2core.figures.surface import Frame, find_visible_triangles
 from sd2core.numerics.compiled import compiled
-from sd2core.numerics.raster import interpolate, rasterise
+from sd2core.numerics.raster import rasterise
 from tools.build_sample.clothing import Clothes, linear, srgb
 
 Singles = NDArray[np.float32]
@@ -97,22 +98,13 @@ class Renderer:
         """Linear colours times coverage, and coverage, at picture resolution."""
         n = _OVERSAMPLING
         height, width = n * self.camera.height, n * self.camera.width
-        points = (n * self.camera.project(vertices_m)).astype(np.float32)
-        nearness = (1.0 / vertices_m[:, 2]).astype(np.float32)
-        buffer = np.zeros((height, width), np.float32)
-        owner = np.full((height, width), -1, np.int32)
-        rasterise(points, nearness, self.body.faces, buffer, owner)
-        rows, columns = np.nonzero(owner >= 0)
-        attributes = np.concatenate(
-            [vertices_m, vertex_normals(vertices_m, self.body.faces), self.clothes.attributes],
-            axis=1,
-        ).astype(np.float32)
-        values = np.empty((len(rows), attributes.shape[1]), np.float32)
-        interpolate(points, nearness, self.body.faces, rows, columns, owner, attributes, values)
+        faces, whole = self.body.faces, Frame(0.0, 0.0, width, height, n)
+        seen = find_visible_triangles(vertices_m, faces, self.camera, whole)
+        normals = vertex_normals(vertices_m, faces)
+        values = seen.interpolated(np.hstack([vertices_m, normals, self.clothes.attributes]))
         colours = np.zeros((height, width, 3), np.float32)
-        colours[rows, columns] = self._shade(values[:, :3], values[:, 3:6], values[:, 6:], shadow)
-        coverage = (owner >= 0).astype(np.float32)
-        return _shrunk(colours, n), _shrunk(coverage, n)
+        colours[seen.shown] = self._shade(values[:, :3], values[:, 3:6], values[:, 6:], shadow)
+        return _shrunk(colours, n), _shrunk(seen.shown.astype(np.float32), n)
 
     def _shade(
         self, positions: Singles, normals: Singles, attributes: Singles, shadow: Singles

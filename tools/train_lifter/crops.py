@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
+from sd2core.body.model import vertex_normals
 from sd2core.body.roi import CROP_PX, Roi
-from sd2core.numerics.compiled import compiled
+from sd2core.figures.surface import VisibleTriangles
 from sd2core.numerics.raster import rasterise
-from tools.train_lifter.wardrobe import Wardrobe
+from tools.train_lifter.wardrobe import REGIONS, Wardrobe
 
 Singles = NDArray[np.float32]
 Pixels = NDArray[np.uint8]
@@ -147,9 +148,6 @@ class CropPainter:
         self._look = look
         self._background = background
         self._rng = rng
-        side = CROP_PX * _OVERSAMPLING
-        self._buffer = np.empty((side, side), np.float32)
-        self._owner = np.empty((side, side), np.int32)
         shade = np.arange(_GAMMA_STEPS) / (_GAMMA_STEPS - 1)
         self._srgb = (255.0 * shade ** (1.0 / 2.2)).astype(np.uint8)
 
@@ -171,23 +169,11 @@ class CropPainter:
         )
         inverse = np.linalg.inv(matrix[:, :2])
         points = ((picture_px - matrix[:, 2]) @ inverse.T).astype(np.float32)
-        self._buffer.fill(0.0)
-        self._owner.fill(-1)
-        nearness = (1.0 / ahead).astype(np.float32)
-        rasterise(points, nearness, self._faces, self._buffer, self._owner)
+        nearness, owner = (1.0 / ahead).astype(np.float32), np.full((side, side), -1, np.int32)
+        rasterise(points, nearness, self._faces, np.zeros(owner.shape, np.float32), owner)
+        seen = VisibleTriangles(owner, points, nearness, self._faces)
         fine = cv2.resize(roi.cut(self._background), (side, side), interpolation=cv2.INTER_LINEAR)
-        paint(
-            points,
-            nearness,
-            self._faces,
-            self._owner,
-            self._wardrobe.fields,
-            self._wardrobe.texture,
-            self._wardrobe.palette,
-            self._light(vertices_m),
-            self._srgb,
-            fine,
-        )
+        fine[seen.shown] = self._painted(seen, vertices_m)
         if self._furniture is not None:
             picture, mask = (
                 cv2.resize(roi.cut(layer), (side, side), interpolation=cv2.INTER_LINEAR)
@@ -199,9 +185,23 @@ class CropPainter:
         self._blacken(crop, roi)
         return crop
 
+    def _painted(self, seen: VisibleTriangles, vertices_m: Singles) -> Pixels:
+        """Colours (N, 3) of the pixels that the body covers."""
+        clothes = self._wardrobe
+        light = self._light(vertices_m)[:, None]
+        values = seen.interpolated(np.hstack([clothes.fields, clothes.texture.T, light]))
+        inside, bright = values[:, :8] > 0.0, values[:, 10]
+        inside[:, 6] &= inside[:, 5]  # the iris lies in the white of the eye
+        regions = (inside * np.arange(1, 9)).max(axis=1)
+        for cloth, texture in ((REGIONS.index("shirt"), 8), (REGIONS.index("trousers"), 9)):
+            bright[regions == cloth] *= values[regions == cloth, texture]
+        top = len(self._srgb) - 1
+        shades = (clothes.palette[regions] * bright[:, None] * top).astype(np.intp)
+        return np.asarray(self._srgb[shades.clip(0, top)])
+
     def _light(self, vertices_m: Singles) -> Singles:
         """Light on every vertex."""
-        normals = _normals(vertices_m, self._faces)
+        normals = vertex_normals(vertices_m.astype(np.float64), self._faces).astype(np.float32)
         light = np.full(len(vertices_m), self._look.ambient, np.float32)
         for direction, strength in self._look.lights:
             cosine = normals @ np.array(direction, np.float32)
@@ -232,115 +232,3 @@ class CropPainter:
         for axis in (0, 1):
             along = matrix[axis, 0] * at[None, :] + matrix[axis, 1] * at[:, None] + matrix[axis, 2]
             crop[(along < 0.0) | (along > size[axis])] = 0
-
-
-def _normals(vertices_m: Singles, faces: NDArray[np.int32]) -> Singles:
-    """Unit normals of vertices, (V, 3)."""
-    normals = np.zeros_like(vertices_m)
-    add_normals(vertices_m, faces, normals)
-    length = np.sqrt(np.einsum("vi,vi->v", normals, normals))
-    return np.asarray(normals / np.maximum(length, 1e-12)[:, None])
-
-
-@compiled
-def add_normals(vertices: Singles, faces: NDArray[np.int32], normals: Singles) -> None:
-    """Add to every vertex (V, 3) the area normals of its faces (F, 3)."""
-    for f in range(faces.shape[0]):
-        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-        ax, ay, az = (
-            vertices[j, 0] - vertices[i, 0],
-            vertices[j, 1] - vertices[i, 1],
-            vertices[j, 2] - vertices[i, 2],
-        )
-        bx, by, bz = (
-            vertices[k, 0] - vertices[i, 0],
-            vertices[k, 1] - vertices[i, 1],
-            vertices[k, 2] - vertices[i, 2],
-        )
-        nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-        for v in (i, j, k):
-            normals[v, 0] += nx
-            normals[v, 1] += ny
-            normals[v, 2] += nz
-
-
-@compiled
-def paint(
-    points: Singles,
-    nearness: Singles,
-    faces: NDArray[np.int32],
-    owner: NDArray[np.int32],
-    fields: Singles,
-    texture: Singles,
-    palette: Singles,
-    light: Singles,
-    srgb: NDArray[np.uint8],
-    picture: Pixels,
-) -> None:
-    """Colour every pixel that a triangle owns.
-
-    Parameters
-    ----------
-    points, nearness, faces, owner
-        As :func:`sd2core.simulate.raster.rasterise` takes and leaves them.
-    fields : float32 array, shape (V, 8)
-    texture : float32 array, shape (2, V)
-    palette : float32 array, shape (9, 3)
-        See :class:`Wardrobe`.
-    light : float32 array, shape (V,)
-    srgb : uint8 array, shape (N,)
-        Grey level of linear light from 0 to 1.
-    picture : uint8 array, shape (H, W, 3)
-        Updated.
-    """
-    height, width = owner.shape
-    top = srgb.shape[0] - 1
-    for r in range(height):
-        y = np.float32(r + 0.5)
-        for c in range(width):
-            f = owner[r, c]
-            if f < 0:
-                continue
-            x = np.float32(c + 0.5)
-            i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-            x0, y0 = points[i, 0] - x, points[i, 1] - y
-            x1, y1 = points[j, 0] - x, points[j, 1] - y
-            x2, y2 = points[k, 0] - x, points[k, 1] - y
-            w0 = (x1 * y2 - x2 * y1) * nearness[i]
-            w1 = (x2 * y0 - x0 * y2) * nearness[j]
-            w2 = (x0 * y1 - x1 * y0) * nearness[k]
-            inverse = np.float32(1.0) / (w0 + w1 + w2)
-            w0, w1, w2 = w0 * inverse, w1 * inverse, w2 * inverse
-            region = 0
-            for a in range(fields.shape[1]):
-                inside = w0 * fields[i, a] + w1 * fields[j, a] + w2 * fields[k, a]
-                # The iris lies in the white of the eye.
-                if inside > 0.0 and (a != 6 or region == 6):
-                    region = a + 1
-            bright = w0 * light[i] + w1 * light[j] + w2 * light[k]
-            if region == 1 or region == 2:
-                pattern = texture[2 - region]
-                bright *= w0 * pattern[i] + w1 * pattern[j] + w2 * pattern[k]
-            for colour in range(3):
-                value = palette[region, colour] * bright
-                picture[r, c, colour] = srgb[min(max(int(value * top), 0), top)]
-
-
-def compile_kernels() -> None:
-    """Call every kernel of this module once."""
-    faces = np.array([[0, 1, 2]], np.int32)
-    points = np.array([[0, 0], [0, 2], [2, 0]], np.float32)
-    vertices = np.zeros((3, 3), np.float32)
-    add_normals(vertices, faces, vertices.copy())
-    paint(
-        points,
-        np.ones(3, np.float32),
-        faces,
-        np.zeros((1, 1), np.int32),
-        np.ones((3, 8), np.float32),
-        np.ones((2, 3), np.float32),
-        np.ones((9, 3), np.float32),
-        np.ones(3, np.float32),
-        np.zeros(2, np.uint8),
-        np.zeros((1, 1, 3), np.uint8),
-    )
