@@ -1,13 +1,12 @@
 """Makes ``denoiser.md`` and its pictures: ``make denoiser``, hours of training.
 
-Campaigns, pairs and runs stay in ``build/denoiser`` (or ``--folder``); what is there is not made
-again, a run that was broken off goes on. Runs are as many at once as the machine has cores, one
-thread each. Motion capture comes from ``build/fitting``, which ``make fitting`` fills.
+Campaigns, pairs and runs stay in ``build/denoiser``; what is there is not made again, a run that
+was broken off goes on. Runs are as many at once as the machine has cores, one thread each. Motion
+capture comes from ``build/fitting``, which ``make fitting`` fills.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -31,24 +30,28 @@ from sd2core.simulate.campaign.radar import TargetOptions, radar_target
 from sd2core.simulate.campaign.takes import OPTIONS
 from sd2core.train.evaluation import Evaluation, Group, Score, evaluate
 from tools.documentation.long_sequences import long_sequences
-from tools.documentation.pages import page_parser, spread, table, write_filled
+from tools.documentation.pages import spread, table, write_filled
 from tools.documentation.places import BUILD, SHARED
 from tools.documentation.runs import (
     ERRORS,
     Job,
     campaign_of,
+    epochs_in,
     errors_of,
     evaluated,
     run_of,
     sd2,
     settings,
-    timed,
     train,
 )
 from tools.documentation.textures import texture_table
 from tools.fitting.clips import REAL_MOTION
 
+FOLDER = BUILD / "denoiser"
 FITTING = BUILD / "fitting"
+SEEDS, MINUTES = 3, 2.0
+"""Trainings of each network, and minutes of each."""
+
 WALKS = ("walk-towards", "towards-2", "towards-3", "walk-away", "away-2", "away-3")
 NETWORKS = {
     "s4": ("s4",),
@@ -56,6 +59,7 @@ NETWORKS = {
     "gru": ("gru", *settings({"dropout": 0.3})),
     "unet": ("unet", *settings({"dropout": 0.3})),
 }
+MARS_PAIRS = FOLDER / "mars.zarr"
 MARS = tuple(SHARED / "paired" / f"mars_subject{person}" for person in (1, 2, 4))
 # At 10 frames/s the S4's steps are longer.
 _MARS_S4 = ("s4", *settings({"dt_min": 0.2, "dt_max": 2.0, "dropout": 0.5, "live": "false"}))
@@ -68,34 +72,21 @@ _WEIGHT = ("--velocity-weight", "1")
 _WORSE = 1.05
 
 
-NOT_LONG = """\
-**Not measured yet**: this page was made with `--no-long`. Whether a state space leads on segments
-of 288 to 4,608 frames is open."""
-
-
 def main() -> None:
     """Make what is missing, measure everything and write the page."""
-    parser = page_parser(__doc__, "denoiser")
-    parser.add_argument("--minutes", type=float, default=2.0, help="of training, each run")
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument(
-        "--no-long", action="store_true", help="leave out long sequences, a quarter of an hour"
-    )
-    options = parser.parse_args()
-    folder: Path = options.folder
     motions = ("--movements", "both", "--motions", FITTING / "motions", "--radars", "drawn")
-    known = campaign_of(folder / "known", 20, *motions, "--limbs", "--fit-error-sizes", "0,2")
+    known = campaign_of(FOLDER / "known", 20, *motions, "--limbs", "--fit-error-sizes", "0,2")
     bundled = [load_model(name) for name in (MAP_MODEL, LIMBS_MODEL)]
     pairs = read_pairs(known)
     exact, fitted = (_judged(bundled, pairs, _clips(fit)) for fit in (False, True))
-    paper = campaign_of(folder / "paper", 72, "--protocol", "paper", "--limbs", "--seed", 3)
-    networks = _networks(folder, paper, options)
-    mars = _mars(folder, options)
-    whole, live = _live_errors(folder, options.seeds)
+    paper = campaign_of(FOLDER / "paper", 72, "--protocol", "paper", "--limbs", "--seed", 3)
+    networks = _networks(paper)
+    mars = _mars()
+    whole, live = _live_errors()
     write_filled(
         "denoiser.md",
-        seeds=options.seeds,
-        minutes=options.minutes,
+        seeds=SEEDS,
+        minutes=MINUTES,
         sample=_sample(_judged(bundled, pairs, _sample_takes())),
         clips=len(REAL_MOTION),
         motion=_motion(exact, fitted),
@@ -106,17 +97,11 @@ def main() -> None:
         live=live,
         mars=_mars_table(mars),
         gain=_gain(mars),
-        long=NOT_LONG
-        if options.no_long
-        else long_sequences(folder / "long", 0.4 * options.minutes),
+        long=long_sequences(FOLDER / "long", 0.4 * MINUTES),
         texture=texture_table(
             {
-                "simulated radar, the paper's protocol": (folder / "s4-0", paper, None),
-                "real radar, MARS person 2": (
-                    folder / "mars-2-s4-kinematics-0",
-                    _mars_pairs(folder),
-                    "2",
-                ),
+                "simulated radar, the paper's protocol": (FOLDER / "s4-0", paper, None),
+                "real radar, MARS person 2": (FOLDER / "mars-2-s4-kinematics-0", MARS_PAIRS, "2"),
             }
         ),
     )
@@ -249,16 +234,12 @@ def _walks(*evaluations: Evaluation) -> str:
 # --- networks ---------------------------------------------------------------------------------
 
 
-def _networks(folder: Path, campaign: Path, options: argparse.Namespace) -> dict[str, Any]:
-    jobs = [
-        timed(folder, Job(name, campaign, ("--model", *how, *_WEIGHT)), options.minutes).seeded(
-            seed
-        )
-        for name, how in NETWORKS.items()
-        for seed in range(options.seeds)
-    ]
-    train(folder, jobs)
-    return evaluated([folder / job.name for job in jobs], campaign)
+def _networks(campaign: Path) -> dict[str, Any]:
+    jobs = []
+    for name, how in NETWORKS.items():
+        job = Job(name, campaign, ("--model", *how, *_WEIGHT))
+        jobs += job.seeds(SEEDS, epochs_in(FOLDER, job, MINUTES))
+    return evaluated(train(FOLDER, jobs), campaign)
 
 
 def _table(evaluation: Mapping[str, Any]) -> str:
@@ -283,10 +264,10 @@ def _leader(evaluation: Mapping[str, Any]) -> str:
     )
 
 
-def _live_errors(folder: Path, seeds: int) -> tuple[str, str]:
+def _live_errors() -> tuple[str, str]:
     metrics = [
-        load_model(folder / f"s4-{seed}" / "best.safetensors").card.about["metrics"]
-        for seed in range(seeds)
+        load_model(FOLDER / f"s4-{seed}" / "best.safetensors").card.about["metrics"]
+        for seed in range(SEEDS)
     ]
     return (
         f"{np.mean([one['validation_mae_mps'] for one in metrics]):.3f}",
@@ -297,28 +278,19 @@ def _live_errors(folder: Path, seeds: int) -> tuple[str, str]:
 # --- a real radar -----------------------------------------------------------------------------
 
 
-def _mars_pairs(folder: Path) -> Path:
-    path = folder / "mars.zarr"
-    sd2("pairs", "mars", *MARS, "--limbs", "--out", path)
-    return path
-
-
-def _mars(folder: Path, options: argparse.Namespace) -> dict[str, Mapping[str, Any]]:
-    mars = _mars_pairs(folder)
-    people = read_pairs(mars).subjects
-    runs: dict[str, list[Job]] = {}
-    for judged in people:
+def _mars() -> dict[str, Mapping[str, Any]]:
+    sd2("pairs", "mars", *MARS, "--limbs", "--out", MARS_PAIRS)
+    evaluations = {}
+    for judged in read_pairs(MARS_PAIRS).subjects:
         kept = ("--validation-subjects", "none", "--test-subjects", judged)
+        jobs = []
         for name, how in ON_MARS.items():
             words = ("--model", *how, *kept, *_WEIGHT, "--batch-size", "16")
-            job = Job(f"mars-{judged}-{name}", mars, words)
-            known = timed(folder, job, options.minutes)
-            runs.setdefault(judged, []).extend(known.seeded(seed) for seed in range(options.seeds))
-    train(folder, [job for own in runs.values() for job in own])
-    return {
-        judged: evaluated([folder / job.name for job in own], mars, "--subjects", judged)
-        for judged, own in runs.items()
-    }
+            job = Job(f"mars-{judged}-{name}", MARS_PAIRS, words)
+            jobs += job.seeds(SEEDS, epochs_in(FOLDER, job, MINUTES))
+        runs = train(FOLDER, jobs)
+        evaluations[judged] = evaluated(runs, MARS_PAIRS, "--subjects", judged)
+    return evaluations
 
 
 def _mars_table(evaluations: Mapping[str, Mapping[str, Any]]) -> str:

@@ -1,8 +1,8 @@
 """Makes ``fitting.md`` and its pictures: ``make fitting``, about fifteen minutes.
 
-Every figure is measured when this runs. Clips and fits stay in ``build/fitting`` (or the
-folder that is named); what is there is not made again, and its time is not known. The
-real videos are left out where the recordings are not there (``SD2_SHARED_DATA``).
+Every figure is measured when this runs. Clips and fits stay in ``build/fitting``; what is there is
+not made again, and its time is not known. The real videos are left out where the recordings are not
+there (``SD2_SHARED_DATA``).
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ COMPARED = "all-normal"
 def main() -> None:
     """Make what is missing, measure everything and write the page."""
     warm_up()
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else BUILD / "fitting"
+    folder = BUILD / "fitting"
     folder.mkdir(parents=True, exist_ok=True)
     clips, fits, tables = folder / "clips", folder / "fits", folder / "tables.md"
     motions = []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -13,18 +12,8 @@ import numpy as np
 from sd2core.accuracy.cache import this_machine
 from sd2core.files.tables import markdown_table
 from tools.documentation.measured import write_page
-from tools.documentation.places import BUILD
 
 TEXTS = Path(__file__).with_name("texts")
-
-
-def page_parser(about: str | None, folder: str) -> argparse.ArgumentParser:
-    """Parser of a page's program, which keeps what it makes in ``build/FOLDER``."""
-    parser = argparse.ArgumentParser(description=about)
-    parser.add_argument(
-        "--folder", type=Path, default=BUILD / folder, help="of what is not made again"
-    )
-    return parser
 
 
 def filled(name: str, **values: object) -> str:

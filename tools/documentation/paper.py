@@ -1,9 +1,9 @@
 """Makes ``paper.md`` and its pictures: ``make paper``, half an hour after ``make classifier``.
 
 The SD² paper's figures and tables, and its sentences in ``texts/paper-lines.md`` with their places
-in the program. Runs and campaigns stay in ``build/paper`` (or ``--folder``), the study of
-classifiers where ``make classifier`` keeps it; what is there is not made again. ``--only`` renews
-some sections, and leaves the others as the page has them.
+in the program. Runs and campaigns stay in ``build/paper``, the study of classifiers where
+``make classifier`` keeps it; what is there is not made again. ``--only`` renews some sections, and
+leaves the others as the page has them.
 """
 
 from __future__ import annotations
@@ -32,14 +32,18 @@ from sd2core.simulate.campaign.protocol import PAPER, Protocol
 from sd2core.simulate.campaign.takes import Campaign
 from sd2core.timebase import Timebase
 from tools.documentation.measured import write_page
-from tools.documentation.pages import TEXTS, filled, page_parser, sections, spread, spread_of, table
+from tools.documentation.pages import TEXTS, filled, sections, spread, spread_of, table
 from tools.documentation.paper_bodies import draw_bodies
 from tools.documentation.places import BUILD, DOCS, IMAGES, REPOSITORY
-from tools.documentation.runs import Job, evaluated, settings, timed, train
+from tools.documentation.runs import Job, epochs_in, evaluated, settings, train
 
 PAGE = DOCS / "paper.md"
+FOLDER, STUDY = BUILD / "paper", BUILD / "classifier" / "to-and-fro"
 LINES = TEXTS / "paper-lines.md"
 DROPOUT = 0.1
+SEEDS, MINUTES, CAMPAIGN_MINUTES = 3, 2.0, 18.0
+"""Trainings of each denoiser, minutes of each, and minutes of all people."""
+
 TITLES = {"s4": "S4", "swin": "Swin transformer", "unet": "U-Net"}
 PRINTED = {"s4": (1.0126, 1.6329), "swin": (1.1640, 1.8734), "unet": (1.5835, 2.6549)}
 """The paper's Table 1: MAE and σ in m/s."""
@@ -64,18 +68,20 @@ class Section:
     """Part of the page that is measured."""
 
     heading: str
-    make: Callable[[argparse.Namespace], str]
+    make: Callable[[], str]
 
 
 def main() -> None:
     """Measure what is asked for and write the page."""
-    options = _options()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", nargs="+", choices=SECTIONS, default=tuple(SECTIONS))
+    options = parser.parse_args()
     page = filled("paper-head.md", machine=this_machine())
     kept = sections(PAGE.read_text("utf-8")) if PAGE.exists() else {}
     for name, section in SECTIONS.items():
         missing = f"\nNot measured yet: `python -m tools.documentation.paper --only {name}`.\n\n"
         made = name in options.only
-        text = section.make(options) if made else kept.get(section.heading, missing)
+        text = section.make() if made else kept.get(section.heading, missing)
         page += f"## {section.heading}\n{text}"
     write_page(PAGE.name, page + linked(LINES.read_text("utf-8")))
 
@@ -102,31 +108,10 @@ def _link(match: re.Match[str]) -> str:
     return f"[`{name or path}`](../sd2core/{path})"
 
 
-def _options() -> argparse.Namespace:
-    parser = page_parser(__doc__, "paper")
-    parser.add_argument("--only", nargs="+", choices=SECTIONS, default=tuple(SECTIONS))
-    parser.add_argument(
-        "--protocols",
-        type=Path,
-        default=BUILD / "paper" / "protocols",
-        help="of campaigns",
-    )
-    parser.add_argument(
-        "--study",
-        type=Path,
-        default=BUILD / "classifier" / "to-and-fro",
-        help="of classifiers, as `make classifier` keeps it",
-    )
-    parser.add_argument("--campaign-minutes", type=float, default=18.0, help="of all people")
-    parser.add_argument("--minutes", type=float, default=2.0, help="of a denoiser's training")
-    parser.add_argument("--seeds", type=int, default=3, help="of denoisers")
-    return parser.parse_args()
-
-
-def _pictures(options: argparse.Namespace) -> str:
+def _pictures() -> str:
     """Figures 2, 4 and 7."""
     bodies = draw_bodies(IMAGES / "paper-mesh.png", IMAGES / "paper-range.png")
-    pairs = read_pairs(protocol_campaign(options.protocols, PAPER, SHOWN_MINUTES))
+    pairs = read_pairs(protocol_campaign(PAPER, SHOWN_MINUTES))
     takes = {
         "Horizontal": _first(pairs, ("left-to-right", "right-to-left")),
         "Vertical": _first(pairs, ("up-to-down", "down-to-up")),
@@ -143,9 +128,9 @@ def _pictures(options: argparse.Namespace) -> str:
     return filled("paper-pictures.md", **bodies)
 
 
-def protocol_campaign(out: Path, protocol: Protocol, minutes: float) -> Path:
+def protocol_campaign(protocol: Protocol, minutes: float) -> Path:
     """A campaign of six people; what is there of it is not made again."""
-    path = out / f"{protocol.order}.zarr"
+    path = FOLDER / "protocols" / f"{protocol.order}.zarr"
     with progress_bar(f"Simulating {path.stem}", unit="take") as progress:
         make_campaign(path, Campaign(SEED, protocol=protocol), minutes=minutes, progress=progress)
     return path
@@ -170,30 +155,27 @@ def _save_maps(name: str, rows: Sequence[MapRow], heading: str) -> None:
     save_figure(figure, IMAGES / name, pixels_per_inch=PIXELS_PER_INCH)
 
 
-def _denoisers(options: argparse.Namespace) -> str:
+def _denoisers() -> str:
     """Figure 6 and Table 1."""
-    folder: Path = options.folder
-    campaign = protocol_campaign(options.protocols, RANDOM, options.campaign_minutes)
+    campaign = protocol_campaign(RANDOM, CAMPAIGN_MINUTES)
     how = settings({"dropout": DROPOUT})
-    jobs = {
-        name: timed(folder, Job(name, campaign, ("--model", name, *how)), options.minutes)
-        for name in PRINTED
-    }
-    runs = {name: [job.seeded(seed) for seed in range(options.seeds)] for name, job in jobs.items()}
-    train(folder, [run for those in runs.values() for run in those])
-    models = [folder / run.name for those in runs.values() for run in those]
-    evaluation = evaluated(models, campaign)
+    runs, epochs = [], {}
+    for name, title in TITLES.items():
+        job = Job(name, campaign, ("--model", name, *how))
+        epochs[title] = epochs_in(FOLDER, job, MINUTES)
+        runs += job.seeds(SEEDS, epochs[title])
+    evaluation = evaluated(train(FOLDER, runs), campaign)
     judged = read_pairs(campaign).of(evaluation["subjects"])
-    _compare(judged, {name: folder / those[0].name for name, those in runs.items()})
+    _compare(judged, {name: FOLDER / f"{name}-0" for name in PRINTED})
     bin_mps = judged.axis.bin_width_mps
     return filled(
         "paper-denoisers.md",
         seed=SEED,
-        campaign_minutes=options.campaign_minutes,
-        seeds=options.seeds,
-        minutes=options.minutes,
+        campaign_minutes=CAMPAIGN_MINUTES,
+        seeds=SEEDS,
+        minutes=MINUTES,
         dropout=DROPOUT,
-        epochs=", ".join(f"{TITLES[name]} {job.epochs} epochs" for name, job in jobs.items()),
+        epochs=", ".join(f"{title} {count} epochs" for title, count in epochs.items()),
         frames=evaluation["frames"],
         moving=evaluation["moving_frames"],
         table=table_1(evaluation, _nothing_moves(judged)),
@@ -265,9 +247,9 @@ def _change(value: float, reference: float) -> str:
     return "" if value == reference else f"{100 * (value / reference - 1):+.0f} %".replace("-", "−")
 
 
-def _classifiers(options: argparse.Namespace) -> str:
+def _classifiers() -> str:
     """Tables 2 and 3."""
-    told = json.loads((options.study / "study.json").read_text("utf-8"))
+    told = json.loads((STUDY / "study.json").read_text("utf-8"))
     totals = {one["title"]: one["seeds"] for one in told["totals"]}
     return filled(
         "paper-classifiers.md",

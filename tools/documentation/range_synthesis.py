@@ -1,7 +1,7 @@
 """Makes ``range-synthesis.md``: ``make range-synthesis``, about half an hour.
 
 Whether a denoiser profits from seeing each motion from several places. Campaign and runs
-stay in ``build/range-synthesis`` (or ``--folder``); what is there is not made again.
+stay in ``build/range-synthesis``; what is there is not made again.
 """
 
 from __future__ import annotations
@@ -11,37 +11,23 @@ from itertools import chain
 from typing import Any
 
 from sd2core.pairs.store import read_pairs
-from tools.documentation.pages import page_parser, table, write_filled
+from tools.documentation.pages import table, write_filled
+from tools.documentation.places import BUILD
 from tools.documentation.runs import ERRORS, Job, campaign_of, errors_of, evaluated, settings, train
 
+FOLDER = BUILD / "range-synthesis"
 PLACES = 3
+SEEDS, EPOCHS, MINUTES = 2, 80, 24.0
+"""Trainings of each kind, epochs of all sensors, and minutes of all people."""
 
 
 def main() -> None:
     """Make what is missing, measure and write the page."""
-    parser = page_parser(__doc__, "range-synthesis")
-    parser.add_argument("--minutes", type=float, default=24.0, help="of all people")
-    parser.add_argument("--epochs", type=int, default=80, help="of all sensors")
-    parser.add_argument("--seeds", type=int, default=2)
-    options = parser.parse_args()
-    folder = options.folder
-    campaign = campaign_of(folder, options.minutes, "--seed", 3, "--sensors", PLACES)
-    jobs = {
-        which: [
-            Job(
-                f"s4-{which}-{seed}",
-                campaign,
-                (
-                    *("--model", "s4", "--seed", str(seed), "--placements", which),
-                    *("--epochs", str(epochs), *settings({"dropout": 0.1})),
-                ),
-            )
-            for seed in range(options.seeds)
-        ]
-        for which, epochs in (("first", PLACES * options.epochs), ("all", options.epochs))
-    }
-    train(folder, [job for runs in jobs.values() for job in runs])
-    runs = {which: [folder / job.name for job in those] for which, those in jobs.items()}
+    campaign = campaign_of(FOLDER, MINUTES, "--seed", 3, "--sensors", PLACES)
+    runs = {}
+    for which, epochs in (("first", PLACES * EPOCHS), ("all", EPOCHS)):
+        how = ("--model", "s4", *settings({"dropout": 0.1}), "--placements", which)
+        runs[which] = train(FOLDER, Job(f"s4-{which}", campaign, how).seeds(SEEDS, epochs))
     evaluations = {
         (which, judged): evaluated(models, campaign, "--placements", judged)
         for which, models in runs.items()
@@ -51,8 +37,8 @@ def main() -> None:
     write_filled(
         "range-synthesis.md",
         minutes=pairs.placements(first_only=True).frames / pairs.frame_rate_hz / 60.0,
-        epochs=options.epochs,
-        seeds=options.seeds,
+        epochs=EPOCHS,
+        seeds=SEEDS,
         places=PLACES,
         **results(evaluations),
     )

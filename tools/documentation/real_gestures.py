@@ -1,7 +1,7 @@
 """Makes ``real-gestures.md``: ``make real-gestures``, about five minutes.
 
 Suggestions and classifiers on gestures that a real radar saw, on the same five splits of the
-files. Trainings stay in ``build/real-gestures`` (or ``--folder``).
+files. Trainings stay in ``build/real-gestures``.
 """
 
 from __future__ import annotations
@@ -30,10 +30,12 @@ from sd2core.labels.matching import match_spans
 from sd2core.labels.suggest import suggest_spans
 from sd2core.options.suggesting import SuggestOptions
 from sd2core.study.plan import Learner
-from tools.documentation.pages import page_parser, spread_of, table, write_filled
-from tools.documentation.places import SHARED
+from tools.documentation.pages import spread_of, table, write_filled
+from tools.documentation.places import BUILD, SHARED
 from tools.documentation.runs import sd2
 
+FOLDER = BUILD / "real-gestures"
+DATA = [SHARED / "radar" / f"kkt_gestures{more}" for more in ("", "_more", "_study")]
 SPLITS = 3
 KERNEL = TrainOptions(model="kernel", delay_s=0.9)
 KERNEL_NAME = "kernel, columns, after 0.9 s"
@@ -81,17 +83,7 @@ class Found:
 
 def main() -> None:
     """Measure and write the page."""
-    parser = page_parser(__doc__, "real-gestures")
-    parser.add_argument(
-        "--data",
-        type=Path,
-        nargs="+",
-        default=[SHARED / "radar" / f"kkt_gestures{more}" for more in ("", "_more", "_study")],
-        metavar="FOLDER",
-        help="folders of K60168A files",
-    )
-    options = parser.parse_args()
-    sources = [LabelledSource(folder) for folder in options.data]
+    sources = [LabelledSource(folder) for folder in DATA]
     paths = [one.path for one in unfolded(sources)]
     recorded = [load_kkt(path) for path in paths]
     known = clips_of(sources, None)
@@ -105,9 +97,9 @@ def main() -> None:
     tried = [Found.of(recorded, one) for one in GRID]
     best = [tried[int(np.argmax([one.f1(~files).mean() for one in tried]))] for files in judged]
     how = ("--seeds", SPLITS, "--shares", "100%")
-    sd2("classify", "table", *options.data, "--out", options.folder, *how)
-    names = " ".join(folder.name for folder in options.data)
-    told = json.loads((options.folder / "study.json").read_text("utf-8"))
+    sd2("classify", "table", *DATA, "--out", FOLDER, *how)
+    names = " ".join(folder.name for folder in DATA)
+    told = json.loads((FOLDER / "study.json").read_text("utf-8"))
     networks, best_network, classes = _classified(told)
     write_filled(
         "real-gestures.md",

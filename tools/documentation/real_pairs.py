@@ -4,14 +4,13 @@ Ways to turn the Kinect's skeleton into synthetic Doppler are compared by the me
 frame with that of the radar's points, before any denoising. Then the least denoiser learns from the
 pairs: a linear map of five frames, of the whole body or of its parts. At last, how far the radar's
 own points agree with one another, which no denoiser can exceed. The pairs stay in
-``build/real-pairs`` (or ``--folder``); what is there is not made again.
+``build/real-pairs``; what is there is not made again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +33,8 @@ from sd2core.mocap.radar_place import RadarPlace, estimate_place
 from sd2core.pairs.store import PairSet, read_pairs
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
-from tools.documentation.pages import page_parser, table, write_filled
-from tools.documentation.places import SHARED
+from tools.documentation.pages import table, write_filled
+from tools.documentation.places import BUILD, SHARED
 from tools.documentation.runs import sd2
 
 Maps = list[NDArray[np.float32]]
@@ -43,6 +42,7 @@ Floats = NDArray[np.float64]
 Parts = list[MarsPart]
 """Recordings of one person."""
 
+FOLDER = BUILD / "real-pairs"
 DEFAULT = MarsChoices()
 RIDGE = 10.0
 HALVINGS = 8
@@ -253,16 +253,10 @@ def ceiling(people: Sequence[Parts]) -> str:
 
 def main() -> None:
     """Make the pairs if they are missing, measure and write the page."""
-    parser = page_parser(__doc__.splitlines()[0], "real-pairs")
-    parser.add_argument("recordings", type=Path, nargs="*", default=MARS, help="folders of MARS")
-    options = parser.parse_args()
-    options.folder.mkdir(parents=True, exist_ok=True)
-    pairs = options.folder / "mars.zarr"
-    if not pairs.exists():
-        sd2("pairs", "mars", *options.recordings, "--limbs", "--out", pairs)
-    people = [
-        [read_mars(folder, name) for name in mars_parts(folder)] for folder in options.recordings
-    ]
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    pairs = FOLDER / "mars.zarr"
+    sd2("pairs", "mars", *MARS, "--limbs", "--out", pairs)
+    people = [[read_mars(folder, name) for name in mars_parts(folder)] for folder in MARS]
     of_inputs, places = inputs(people)
     write_filled(
         "real-pairs.md",

@@ -6,7 +6,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -28,19 +28,12 @@ class Job:
     data: Path
     options: tuple[str, ...]
 
-
-@dataclass(frozen=True)
-class TimedJob:
-    """A run, and how many epochs it has time for."""
-
-    job: Job
-    epoch_s: float
-    epochs: int
-
-    def seeded(self, seed: int) -> Job:
-        """The run with this seed."""
-        length = ("--epochs", str(self.epochs), "--seed", str(seed))
-        return replace(self.job, name=f"{self.job.name}-{seed}", options=self.job.options + length)
+    def seeds(self, count: int, epochs: int) -> list[Job]:
+        """The run of so many epochs with so many seeds."""
+        options = (*self.options, "--epochs", str(epochs), "--seed")
+        return [
+            Job(f"{self.name}-{seed}", self.data, (*options, str(seed))) for seed in range(count)
+        ]
 
 
 def settings(given: Mapping[str, object]) -> list[str]:
@@ -69,25 +62,21 @@ def campaign_of(folder: Path, minutes: float, *options: object) -> Path:
     return path
 
 
-def timed(folder: Path, job: Job, minutes: float) -> TimedJob:
-    """Run with the number of epochs that take these minutes of processor time, by a short run."""
+def epochs_in(folder: Path, job: Job, minutes: float) -> int:
+    """Number of epochs that take these minutes of processor time, by a short run."""
     pilots = folder / "pilots"
     train(pilots, [replace(job, options=(*job.options, "--epochs", str(PILOT_EPOCHS)))])
-    ends_s = epoch_ends_s(pilots / job.name)
+    events = effective(read_events(TrainingFolder(pilots / job.name).progress))
+    # Processor time that the run had used by the end of each epoch.
+    ends_s = [event["processor_s"] for event in events if event["event"] == "epoch"]
     # The first epoch has the start in it; the shortest has least of what else went on.
     # Where it was broken off and went on, the processor time began again.
     epoch_s = min(after - before for before, after in pairwise(ends_s) if after > before)
-    return TimedJob(job, epoch_s, max(1, round(60.0 * minutes / epoch_s)))
+    return max(1, round(60.0 * minutes / epoch_s))
 
 
-def epoch_ends_s(run: Path) -> list[float]:
-    """Processor time that a run had used by the end of each epoch."""
-    events = effective(read_events(TrainingFolder(run).progress))
-    return [event["processor_s"] for event in events if event["event"] == "epoch"]
-
-
-def train(folder: Path, jobs: Iterable[Job]) -> None:
-    """Train what is not trained yet, as many at once as there are cores, one thread each."""
+def train(folder: Path, jobs: Sequence[Job]) -> list[Path]:
+    """Train what is not trained yet, as many at once as there are cores; the runs' folders."""
     folder.mkdir(parents=True, exist_ok=True)
     pending = [job for job in jobs if not _finished(folder / job.name)]
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
@@ -95,6 +84,7 @@ def train(folder: Path, jobs: Iterable[Job]) -> None:
         failed = [job.name for job, code in zip(pending, codes, strict=True) if code]
     if failed:
         sys.exit(f"{', '.join(failed)} failed; what is done is kept")
+    return [folder / job.name for job in jobs]
 
 
 def evaluated(models: Sequence[Path], data: Path, *options: object) -> dict[str, Any]:
