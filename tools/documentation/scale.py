@@ -1,12 +1,10 @@
 """Makes ``scale.md``: ``make scale``, about ten minutes on two idle cores.
 
 Every figure is measured when this runs; what a million recordings need follows from them.
-``--quick`` measures little, to see that it works.
 """
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import statistics
 import subprocess
@@ -17,7 +15,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from sd2core.accuracy.cache import this_machine
 from sd2core.batch.denoising import denoise
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import find_origins, glance
@@ -26,14 +23,12 @@ from sd2core.batch.plan_file import plan_from_text
 from sd2core.batch.synthesis import Choosing, synthesise
 from sd2core.batch.task_graph import TaskGraph
 from sd2core.cli.batch import bytes_words
-from sd2core.files.atomic import atomic_write_text
 from sd2core.files.limits import size_bytes
 from sd2core.files.resources import resource_path
 from sd2core.numerics.compiled import warm_up
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
-from tools.documentation.measured import write_page
-from tools.documentation.pages import filled, table
+from tools.documentation.pages import table, write_filled
 from tools.documentation.places import BENCHMARKS
 
 sys.path.insert(0, str(BENCHMARKS))
@@ -56,29 +51,9 @@ CHOSEN = "synthesise, 2 %"
 
 _TIMED_FRAMES = (450, 120)
 
-LITTLE = """
-**Measured in little (`--quick`), beside other work: these are not the final figures.**
-"""
-
-
-@dataclass(frozen=True)
-class Sizes:
-    """Amounts that are measured."""
-
-    recordings: int
-    places: int
-    frames: int
-    rounds: int
-    tenth: int
-    tenth_places: int
-    minutes: tuple[float, ...]
-    many: int
-    fit_frames: tuple[int, ...]
-    long_frames: tuple[int, ...]
-
-
-FULL = Sizes(4, 55, 600, 2, 10, 8, (1.0, 12.0, 90.0), 20, (150, 750), (3600, 9000))
-QUICK = Sizes(2, 5, 60, 1, 2, 3, (0.2, 0.5), 2, (20, 40), (60, 120))
+_MAP_FRAMES, _ROUNDS, _TENTH, _TENTH_PLACES = 600, 2, 10, 8
+_MEMORY_MIN = (1.0, 12.0, 90.0)
+_FIT_FRAMES, _LONG_FRAMES = (150, 750), (3600, 9000)
 
 
 @dataclass(frozen=True)
@@ -112,61 +87,47 @@ class Fitted:
 
 def main() -> None:
     """Measure, and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--out", type=Path, help="instead of docs/scale.md")
-    options = parser.parse_args()
-    sizes = QUICK if options.quick else FULL
     warm_up()
     with tempfile.TemporaryDirectory(prefix="sd2-scale-") as name:
-        page = _page(Path(name), sizes)
-    if options.out is None:
-        write_page("scale.md", page)
-    else:
-        atomic_write_text(options.out, page)
+        write_filled("scale.md", **_measured(Path(name)))
 
 
-def _page(root: Path, sizes: Sizes) -> str:
+def _measured(root: Path) -> dict[str, object]:
+    """Tables and figures of the page."""
+
     def folder(what: str) -> Path:
         _say(what)
         made = root / what.replace(" ", "-")
         made.mkdir()
         return made
 
-    two = two_against_one(
-        folder("two processes"), sizes.recordings, sizes.places, sizes.rounds, sizes.frames
-    )
-    ten = ten_times_the_tasks(
-        folder("ten times the tasks"), sizes.tenth, sizes.tenth_places, sizes.rounds
-    )
-    there_s = nothing_to_do(folder("nothing to do"), 10 * sizes.tenth, sizes.tenth_places)
+    two = two_against_one(folder("two processes"), 4, 55, _ROUNDS, _MAP_FRAMES)
+    ten = ten_times_the_tasks(folder("ten times the tasks"), _TENTH, _TENTH_PLACES, _ROUNDS)
+    there_s = nothing_to_do(folder("nothing to do"), 10 * _TENTH, _TENTH_PLACES)
     place = folder("memory")
-    used = [memory(place, minutes, 1, 1229, "facing") for minutes in sizes.minutes]
-    used.append(memory(place, sizes.minutes[0], sizes.many, 1229, "facing"))
-    used.append(memory(place, sizes.minutes[0], 1, 13348, ""))
-    fits = _fits(folder("fits"), sizes.fit_frames)
-    long = _long_fits(folder("long fits"), sizes.long_frames) if fits else []
+    used = [memory(place, minutes, 1, 1229, "facing") for minutes in _MEMORY_MIN]
+    used.append(memory(place, _MEMORY_MIN[0], 20, 1229, "facing"))
+    used.append(memory(place, _MEMORY_MIN[0], 1, 13348, ""))
+    fits = _fits(folder("fits"))
+    long = _long_fits(folder("long fits")) if fits else []
     costs = _costs(folder("costs"), fits)
     files_per_s = files_per_second(folder("files"))[0]
     own_s = statistics.median(ten.own_s) / ten.tasks
-    return filled(
-        "scale.md",
-        machine=this_machine(),
-        little=LITTLE if sizes is QUICK else "",
-        processes=_processes(two, ten, there_s, sizes.frames),
-        memory=_memory(used),
-        fits=_fit_memory(fits, long),
-        recordings=RECORDINGS,
-        frames=FRAMES,
-        places=PLACES,
-        together=two.ratio / 2,
+    return {
+        "processes": _processes(two, ten, there_s),
+        "memory": _memory(used),
+        "fits": _fit_memory(fits, long),
+        "recordings": RECORDINGS,
+        "frames": FRAMES,
+        "places": PLACES,
+        "together": two.ratio / 2,
         **_million(costs, own_s, files_per_s),
-    )
+    }
 
 
-def _processes(two: Compared, ten: Compared, there_s: float, frames: int) -> str:
+def _processes(two: Compared, ten: Compared, there_s: float) -> str:
     rows = [["what", "measured", "wanted"]]
-    what = f"{two.tasks} maps of 5,000 vertices and {frames} frames: two processes against one"
+    what = f"{two.tasks} maps of 5,000 vertices and {_MAP_FRAMES} frames: two processes against one"
     rows.append([what, f"{two.ratio:.2f} times as fast", "≥ 1.8"])
     what = f"{ten.tasks} quick maps against a tenth of them"
     rows.append([what, f"{ten.ratio:.2f} times the time", "≤ 10.5"])
@@ -297,12 +258,12 @@ def _cost(title: str, work: Callable[[int], None], out: Callable[[int], Path]) -
     return Cost(title, frame_s, task_s, frame_bytes, max(sizes[short] - frame_bytes * short, 0.0))
 
 
-def _fits(folder: Path, frames: tuple[int, ...]) -> list[Fitted]:
+def _fits(folder: Path) -> list[Fitted]:
     """Fits of the sample's video; none where the landmark models are missing."""
     video = open_recording(resource_path("swipes.sd2")).video
     assert video is not None
     fits = []
-    for count in frames:
+    for count in _FIT_FRAMES:
         try:
             seconds, peak_mb = fit_of(video, count, folder)
         except subprocess.CalledProcessError as error:
@@ -313,9 +274,9 @@ def _fits(folder: Path, frames: tuple[int, ...]) -> list[Fitted]:
     return fits
 
 
-def _long_fits(folder: Path, frames: tuple[int, ...]) -> list[LongFit]:
+def _long_fits(folder: Path) -> list[LongFit]:
     track = sample_landmarks(folder)
-    return [long_fit(track, count, folder) for count in frames]
+    return [long_fit(track, count, folder) for count in _LONG_FRAMES]
 
 
 def _say(text: str) -> None:
