@@ -9,18 +9,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Literal
 
-from sd2core.cli.output import print_json, progress_bar
+from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.options.kinds import Names
 from sd2core.options.records import ARGUMENT, OptionRecord, Place
-from sd2core.options.shared import Json
 from tools.command_line import Commands, run_tool
 from tools.fitting.clips import CLIPS, REAL_MOTION, TUNING, clip_named, make_fit_truth
 from tools.fitting.error_measurement import measure_errors
 from tools.fitting.people import OTHERS, as_table, measure_people, meetings
-from tools.fitting.report import as_dict
-from tools.fitting.report_text import as_markdown, as_text
+from tools.fitting.report import as_markdown, as_text
 from tools.fitting.scoring import MeshSource
 from tools.fitting.truth import read_truth, truth_folders
 
@@ -45,7 +43,7 @@ class Clips(OptionRecord):
     motions: Path | None = None
 
 
-class Score(Json):
+class Score(OptionRecord):
     """Options of ``score``.
 
     Parameters
@@ -159,10 +157,7 @@ def _score(options: Score) -> None:
         real = [source.score_real(video) for video in options.real]
     if options.markdown is not None:
         atomic_write_text(options.markdown, as_markdown(scores, real))
-    if options.json:
-        print_json(as_dict(scores, real))
-    else:
-        print(as_text(scores, real))
+    print(as_text(scores, real))
 
 
 def _errors(options: Errors) -> None:

@@ -99,7 +99,6 @@ class StrokeScore:
 
     stroke: Stroke
     speed: str
-    hand: str
     velocity: dict[str, Pair]
     tempo: dict[str, Pair]
     map_difference: float
@@ -112,8 +111,6 @@ class ClipScore:
 
     Parameters
     ----------
-    frames : int
-        That were compared.
     distance_m : float64 array, shape (J,)
         Mean distance of each joint.
     aligned_m : float64 array, shape (J,)
@@ -154,7 +151,6 @@ class ClipScore:
 
     name: str
     kind: str
-    frames: int
     strokes: tuple[StrokeScore, ...]
     distance_m: Floats
     aligned_m: Floats
@@ -174,7 +170,6 @@ class ClipScore:
     seconds_per_frame: float | None = None
     processor_s_per_frame: float | None = None
     residual_m: float | None = None
-    notes: tuple[str, ...] = ()
 
 
 def score_clip(
@@ -226,16 +221,10 @@ def score_clip(
     apart = np.linalg.norm(joints[1] - joints[0], axis=-1)
     root = JOINTS.index("pelvis")
     aligned = [one - one[:, root : root + 1] for one in joints]
-    notes = []
-    if not presence.whole:
-        notes.append(f"{int((~measured).sum())} frames without a person are left out")
-    if pair[0].vertex_count != pair[1].vertex_count:
-        notes.append("the surfaces have different vertices, so their maps differ for that alone")
     strokes = []
     for stroke in truth.strokes:
         during = (times_s >= stroke.start_s) & (times_s < stroke.end_s) & measured
         if not during.any():
-            notes.append(f"{stroke.label} at {stroke.start_s:.2f} s is not in the fitted mesh")
             continue
         rows = {limb: JOINTS.index(f"{limb}.{truth.hand}") for limb in LIMBS}
         difference = np.abs(maps[1].values - maps[0].values)[:, during].sum(dtype=np.float64)
@@ -243,7 +232,6 @@ def score_clip(
             StrokeScore(
                 stroke,
                 truth.speed,
-                truth.hand,
                 {k: Pair(velocity[1][during, j], velocity[0][during, j]) for k, j in rows.items()},
                 {k: Pair(tempo[1][during, j], tempo[0][during, j]) for k, j in rows.items()},
                 float(difference),
@@ -264,7 +252,6 @@ def score_clip(
     return ClipScore(
         name=truth.name,
         kind=truth.kind,
-        frames=len(times_s),
         strokes=tuple(strokes),
         distance_m=apart[measured].mean(axis=0),
         aligned_m=np.linalg.norm(aligned[1] - aligned[0], axis=-1)[measured].mean(axis=0),
@@ -286,7 +273,6 @@ def score_clip(
         residual_m=None
         if track is None
         else float(reprojection(fitted, track, truth.camera)[1].mean()),
-        notes=tuple(notes),
     )
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,20 +34,12 @@ class RealScore:
     reprojection_px, reprojection_m : float
         Mean distance of joints from their landmarks in the picture, and the same at
         the joint's depth. Landmarks that are hidden or outside the picture are left out.
-    landmarks : int
-        That were compared.
     """
 
     name: str
     overlap: float
-    overlap_least: float
     reprojection_px: float
     reprojection_m: float
-    landmarks: int
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return asdict(self)
 
 
 def score_real(
@@ -86,10 +77,8 @@ def score_real(
     return RealScore(
         name,
         float(np.nanmean(overlaps)) if overlaps else float("nan"),
-        float(np.nanmin(overlaps)) if overlaps else float("nan"),
         float(away_px.mean()) if away_px.size else float("nan"),
         float(away_m.mean()) if away_m.size else float("nan"),
-        len(away_px),
     )
 
 

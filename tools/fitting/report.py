@@ -1,310 +1,21 @@
-"""Tables of the scores of many clips, each figure beside its target."""
+"""The tables of a scored fit, as text and as Markdown; each figure beside what is wanted."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from sd2core.compare.joints import JOINTS
 from sd2core.compare.measures import correlation, rms
-from tools.fitting.clip_score import ClipScore, Pair, StrokeScore, pooled
+from sd2core.files.tables import markdown_table, text_table
+from tools.fitting.clip_score import ClipScore, StrokeScore, pooled
 from tools.fitting.measures import coverage
 from tools.fitting.real_score import RealScore
 
-Reach = tuple[str, float] | None
-"""``"<="`` or ``">="`` and what is wanted."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """One figure.
-
-    Parameters
-    ----------
-    value : float
-        NaN when nothing could be measured.
-    unit : str
-        Empty for a ratio.
-    reach : (str, float) or None
-        ``"<="`` or ``">="`` and what is wanted.
-    upper : float
-        Upper end of a range that is wanted, with ``reach`` its lower end.
-    """
-
-    what: str
-    value: float
-    unit: str = ""
-    reach: Reach = None
-    upper: float = math.inf
-    detail: str = ""
-
-    @property
-    def met(self) -> bool | None:
-        """True if the value meets its target; None without a target or a value."""
-        if self.reach is None or not math.isfinite(self.value):
-            return None
-        sign, wanted = self.reach
-        return self.value <= wanted if sign == "<=" else wanted <= self.value <= self.upper
-
-    @property
-    def wanted(self) -> str:
-        """The reach in words."""
-        if self.reach is None:
-            return ""
-        if math.isfinite(self.upper):
-            return f"{self.reach[1]:g} to {self.upper:g}"
-        return f"{'≤' if self.reach[0] == '<=' else '≥'} {self.reach[1]:.3g}"
-
-
-def reach_table(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> list[Row]:
-    """The figures that the fit is judged by.
-
-    Parameters
-    ----------
-    scores : sequence of ClipScore
-        Of clips whose motion is known.
-    real : sequence of RealScore
-        Of real videos.
-    """
-    strokes = [stroke for score in scores for stroke in score.strokes]
-    fast = [stroke for stroke in strokes if stroke.speed == "fast"]
-    residuals = [one.residual_m for one in scores if one.residual_m is not None]
-    rows = [
-        Row(
-            "fit residual: joints to the landmarks found, in the picture, mean",
-            100.0 * _mean(residuals),
-            "cm",
-            ("<=", 3.0),
-            detail="at the joint's depth" if residuals else "no landmarks are kept",
-        )
-    ]
-    limits: dict[str, tuple[Reach, Reach]] = {
-        "hand": (("<=", 0.215), (">=", 0.957)),
-        "wrist": (None, None),
-        "elbow": (None, (">=", 0.8)),
-    }
-    for limb, (error, same) in limits.items():
-        pair = pooled([stroke.velocity[limb] for stroke in strokes])
-        what = f"{limb}s during gestures, line-of-sight velocity"
-        detail = f"true RMS {rms(pair.truth):.2f} m/s, {len(strokes)} gestures"
-        value = pair.error if strokes else math.nan
-        rows.append(Row(f"{what}: RMS error", value, "m/s", error, detail=detail))
-        rows.append(Row(f"{what}: correlation", pair.correlation, "", same))
-    for name, kept in (
-        ("along the line of sight", [stroke.velocity["hand"].peak_kept for stroke in fast]),
-        ("in space", [stroke.tempo["hand"].peak_kept for stroke in fast]),
-    ):
-        detail = f"median of {len(kept)}; least {min(kept):.2f}" if kept else ""
-        rows.append(
-            Row(
-                f"fast swipes: peak hand speed kept, {name}",
-                _median(kept),
-                "",
-                (">=", 0.85),
-                detail=detail,
-            )
-        )
-    still = [score for score in scores if score.kind == "still"]
-    worst = max((score.vertex_velocity_mps for score in still), default=math.nan)
-    rows.append(
-        Row(
-            "who stands still: false velocity, RMS over vertices",
-            worst,
-            "m/s",
-            ("<=", 0.015),
-            detail=", ".join(f"{one.name} {one.vertex_velocity_mps:.3f}" for one in still),
-        )
-    )
-    rows.append(
-        Row(
-            "Doppler map of the gestures, relative L1",
-            _map_l1(strokes),
-            "",
-            ("<=", 0.40),
-            detail="fitted against true mesh, after smoothing",
-        )
-    )
-    rows += _edge_rows(scores)
-    rows += _walk_rows(scores) + _captured_rows(scores) + _coverage_rows(scores)
-    stated = [one for one in scores if one.stated_l1 is not None and not one.quiet]
-    if stated:
-        within = [one.map_l1 <= (one.stated_l1 or 0.0) for one in stated]
-        what = "clips whose map is as near to the truth as it states"
-        rows.append(Row(what, _mean(within), "", (">=", 0.6), 0.8, f"{len(stated)} clips"))
-    rows += _unseen_rows(scores)
-    taken = [one.seconds_per_frame for one in scores if one.seconds_per_frame is not None]
-    worked = [one.processor_s_per_frame for one in scores if one.processor_s_per_frame is not None]
-    detail = f"with the program's start; processor time {_mean(worked):.3f} s/frame"
-    rows.append(
-        Row(
-            "time for a fit",
-            _mean(taken),
-            "s/frame",
-            ("<=", 1.0 / 30.0),
-            detail=detail if taken else "",
-        )
-    )
-    rows += _place_rows(scores)
-    return rows + _real_rows(real)
-
-
-def gesture_table(scores: Sequence[ClipScore]) -> list[dict[str, Any]]:
-    """Figures per gesture and speed, and of each over all speeds."""
-    strokes = [stroke for score in scores for stroke in score.strokes]
-    table = []
-    labels = list(dict.fromkeys(stroke.stroke.label for stroke in strokes))
-    speeds = [one for one in ("slow", "normal", "fast") if any(s.speed == one for s in strokes)]
-    for label in labels:
-        for speed in (*speeds, "all"):
-            some = [
-                stroke
-                for stroke in strokes
-                if stroke.stroke.label == label and speed in (stroke.speed, "all")
-            ]
-            if not some:
-                continue
-            hand = pooled([stroke.velocity["hand"] for stroke in some])
-            elbow = pooled([stroke.velocity["elbow"] for stroke in some])
-            table.append(
-                {
-                    "gesture": label,
-                    "speed": speed,
-                    "count": len(some),
-                    "hand_rms_mps": hand.error,
-                    "hand_true_rms_mps": rms(hand.truth),
-                    "hand_correlation": hand.correlation,
-                    "elbow_rms_mps": elbow.error,
-                    "elbow_true_rms_mps": rms(elbow.truth),
-                    "elbow_correlation": elbow.correlation,
-                    "peak_kept": _median([stroke.velocity["hand"].peak_kept for stroke in some]),
-                    "map_l1": _map_l1(some),
-                }
-            )
-    return table
-
-
-def clip_table(scores: Sequence[ClipScore]) -> list[dict[str, Any]]:
-    """Figures per clip."""
-    return [
-        {
-            "clip": one.name,
-            "frames": one.frames,
-            "joint_distance_m": float(one.distance_m.mean()),
-            "joint_distance_from_pelvis_m": float(one.aligned_m.mean()),
-            "velocity_rms_mps": one.velocity.error,
-            "velocity_correlation": one.velocity.correlation,
-            "spread_ratio": one.spread,
-            "peak_kept": one.velocity.peak_kept,
-            "vertex_velocity_rms_mps": one.vertex_velocity_mps,
-            "map_l1": one.map_l1,
-            "plain_l1": one.plain_l1,
-            "stated_l1": one.stated_l1,
-            "edge_velocity_ratio": _ratio(one.edge[0], one.middle[0]),
-            "edge_place_ratio": _ratio(one.edge[1], one.middle[1]),
-            "silhouette_overlap": one.overlap,
-            "sigma_coverage": None
-            if one.sigma is None
-            else coverage(one.sigma.truth, one.sigma.fitted),
-            "residual_m": one.residual_m,
-            "seconds_per_frame": one.seconds_per_frame,
-            "processor_s_per_frame": one.processor_s_per_frame,
-            "notes": list(one.notes),
-        }
-        for one in scores
-    ]
-
-
-def as_dict(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> dict[str, Any]:
-    """All tables, for JSON."""
-    return {
-        "reach": [
-            {
-                "what": row.what,
-                "value": row.value,
-                "unit": row.unit,
-                "wanted": row.wanted,
-                "met": row.met,
-                "detail": row.detail,
-            }
-            for row in reach_table(scores, real)
-        ],
-        "gestures": gesture_table(scores),
-        "clips": clip_table(scores),
-        "real": [one.as_dict() for one in real],
-    }
-
-
-def _edge_rows(scores: Sequence[ClipScore]) -> list[Row]:
-    rows = []
-    for number, name in enumerate(("line-of-sight velocity", "place")):
-        ratio = _ratio(
-            rms(np.array([one.edge[number] for one in scores])),
-            rms(np.array([one.middle[number] for one in scores])),
-        )
-        each = {one.name: _ratio(one.edge[number], one.middle[number]) for one in scores}
-        each = {clip: value for clip, value in each.items() if math.isfinite(value)}
-        worst = max(each, key=lambda clip: each[clip], default="")
-        rows.append(
-            Row(
-                f"error at both ends over the middle, {name}",
-                ratio if scores else math.nan,
-                "",
-                ("<=", 1.5),
-                detail=f"worst clip: {worst} {each[worst]:.2f}" if each else "",
-            )
-        )
-    return rows
-
-
-def _walk_rows(scores: Sequence[ClipScore]) -> list[Row]:
-    rows = []
-    for one in scores:
-        if one.kind == "walk":
-            what = f"{one.name}, all joints, line-of-sight velocity"
-            rows.append(Row(f"{what}: RMS error", one.velocity.error, "m/s", ("<=", 0.28)))
-            rows.append(Row(f"{what}: correlation", one.velocity.correlation, "", (">=", 0.88)))
-    return rows
-
-
-def _captured_rows(scores: Sequence[ClipScore]) -> list[Row]:
-    """Clips with the motion of real people, but those in which nothing moves."""
-    moving = [one for one in scores if one.kind == "captured" and not one.quiet]
-    clips = {one.name: one.velocity for one in moving}
-    if not clips:
-        return []
-    spread = {one.name: one.spread for one in moving}
-    narrow, wide = min(spread, key=lambda k: spread[k]), max(spread, key=lambda k: spread[k])
-    what = f"motion of real people, all joints, {len(clips)} clips"
-    errors = {name: velocity.error for name, velocity in clips.items()}
-    same = {name: velocity.correlation for name, velocity in clips.items()}
-    worst, least = max(errors, key=lambda k: errors[k]), min(same, key=lambda k: same[k])
-    median, median_same = _median(list(errors.values())), _median(list(same.values()))
-    return [
-        Row(f"{what}: median RMS error", median, "m/s", ("<=", 0.22)),
-        Row(f"{what}: worst", errors[worst], "m/s", ("<=", 0.35), detail=worst),
-        Row(f"{what}: median correlation", median_same, "", (">=", 0.90)),
-        Row(f"{what}: least", same[least], "", (">=", 0.80), detail=least),
-        Row(
-            f"{what}: median spread of the joints' velocities within a frame, fitted over true",
-            _median(list(spread.values())),
-            "",
-            (">=", 0.9),
-            1.1,
-        ),
-        Row(f"{what}: least spread", spread[narrow], "", (">=", 0.9), 1.1, narrow),
-        Row(f"{what}: greatest spread", spread[wide], "", (">=", 0.9), 1.1, wide),
-        Row(
-            f"{what}: Doppler map, relative L1, median",
-            _median([one.map_l1 for one in moving]),
-            "",
-            ("<=", 0.50),
-        ),
-    ]
-
+Table = list[list[str]]
 
 _KINDS = {
     "gestures": ("swipes",),
@@ -313,104 +24,262 @@ _KINDS = {
 }
 
 
-def _coverage_rows(scores: Sequence[ClipScore]) -> list[Row]:
-    """Share of errors within one and two standard deviations, for each kind of clip."""
-    rows = []
-    for name, kinds in _KINDS.items():
-        known = [one.sigma for one in scores if one.sigma is not None and one.kind in kinds]
-        if not known:
-            continue
-        both = pooled(known)
-        within = coverage(both.truth, both.fitted)
-        twice = coverage(both.truth, 2.0 * both.fitted)
-        detail = f"{len(both.truth)} joints in frames"
-        what = "of the velocity covers"
-        rows.append(Row(f"{name}: 1σ {what}", within, "", (">=", 0.60), 0.75, detail))
-        rows.append(Row(f"{name}: 2σ {what}", twice, "", (">=", 0.90)))
-    return rows + _joint_rows([one.sigma for one in scores if one.sigma is not None])
+@dataclass(frozen=True)
+class Row:
+    """One figure, NaN when nothing could be measured, and between what it is wanted."""
+
+    what: str
+    value: float
+    unit: str = ""
+    least: float = -math.inf
+    most: float = math.inf
+    detail: str = ""
+
+    @property
+    def met(self) -> bool | None:
+        """True if the value is as wanted; None if nothing is wanted or measured."""
+        if not self.wanted or not math.isfinite(self.value):
+            return None
+        return self.least <= self.value <= self.most
+
+    @property
+    def wanted(self) -> str:
+        """What is wanted in words."""
+        if math.isfinite(self.least) and math.isfinite(self.most):
+            return f"{self.least:g} to {self.most:g}"
+        if math.isfinite(self.most):
+            return f"≤ {self.most:.3g}"
+        return f"≥ {self.least:.3g}" if math.isfinite(self.least) else ""
+
+    @property
+    def measured(self) -> str:
+        """The value with its unit."""
+        return f"{_number(self.value)} {self.unit}".strip()
 
 
-def _joint_rows(known: Sequence[Pair]) -> list[Row]:
-    """How σ of each joint fits its errors, over all clips in which it moves."""
-    if not known:
-        return []
-    sigma, errors = pooled(list(known))
-    cover = {
-        joint: coverage(errors[:, row], sigma[:, row])
-        for row, joint in enumerate(JOINTS)
-        if np.isfinite(errors[:, row]).any()
+def as_text(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> str:
+    """Tables for a terminal."""
+    reach = [["what", "measured", "wanted", "met", "remarks"]]
+    for row in reach_rows(scores, real):
+        met = {None: "", True: "yes", False: "no"}[row.met]
+        reach.append([row.what, row.measured, row.wanted, met, row.detail])
+    tables = _tables(reach, scores, real, ("slow", "normal", "fast", "all"))
+    return "\n\n".join(
+        "\n".join([heading, *(f"  {line}" for line in text_table(rows, ()))])
+        for heading, rows in tables.items()
+    )
+
+
+def as_markdown(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> str:
+    """Tables for docs/fitting.md: what is wanted, in bold where missed, gestures at all speeds."""
+    reach = [["what", "measured", "wanted"]]
+    for row in reach_rows(scores, real):
+        if row.wanted:
+            mark = "**" if row.met is False else ""
+            reach.append([row.what, f"{mark}{row.measured}{mark}", row.wanted])
+    tables = _tables(reach, scores, real, ("all",))
+    return (
+        "\n\n".join(
+            "\n".join([f"**{heading}**", "", *markdown_table(rows)])
+            for heading, rows in tables.items()
+        )
+        + "\n"
+    )
+
+
+def _tables(
+    reach: Table, scores: Sequence[ClipScore], real: Sequence[RealScore], speeds: Sequence[str]
+) -> dict[str, Table]:
+    clips = ["clip", "joints (m)", "velocity error RMS (m/s)", "correlation", "spread"]
+    videos = ["video", "silhouette", "landmarks (m)"]
+    tables = {
+        "Gestures": list(_gesture_rows(scores, speeds)),
+        "Clips": [[*clips, "peak kept", "map L1", "plain", "stated"], *map(_clip_row, scores)],
+        "Real videos": [
+            videos,
+            *([one.name, *_numbers(one.overlap, one.reprojection_m)] for one in real),
+        ],
     }
-    least, most = min(cover, key=lambda k: cover[k]), max(cover, key=lambda k: cover[k])
-    there = np.isfinite(errors) & (sigma > 0) & (errors != 0)
-    same = correlation(np.log(sigma[there]), np.log(np.abs(errors[there])))
-    return [
-        Row("1σ of a joint's velocity covers: least", cover[least], "", (">=", 0.5), 0.8, least),
-        Row("1σ of a joint's velocity covers: most", cover[most], "", (">=", 0.5), 0.8, most),
-        Row("correlation of the logarithms of σ and error", same, "", (">=", 0.5)),
-    ]
+    return {"Reach": reach} | {name: rows for name, rows in tables.items() if len(rows) > 1}
 
 
-def _unseen_rows(scores: Sequence[ClipScore]) -> list[Row]:
+def _gesture_rows(scores: Sequence[ClipScore], speeds: Sequence[str]) -> Iterator[list[str]]:
+    hand_headings = ["hand: true RMS (m/s)", "error RMS (m/s)", "correlation", "peak kept"]
+    yield ["gesture", "speed", "n", *hand_headings, "map L1"]
+    strokes = [stroke for score in scores for stroke in score.strokes]
+    for label in dict.fromkeys(stroke.stroke.label for stroke in strokes):
+        for speed in speeds:
+            some = [
+                one for one in strokes if one.stroke.label == label and speed in (one.speed, "all")
+            ]
+            if some:
+                hand = pooled([stroke.velocity["hand"] for stroke in some])
+                kept = _median([stroke.velocity["hand"].peak_kept for stroke in some])
+                figures = (rms(hand.truth), hand.error, hand.correlation, kept, _map_l1(some))
+                yield [label, speed, str(len(some)), *_numbers(*figures)]
+
+
+def _clip_row(one: ClipScore) -> list[str]:
+    velocity = one.velocity
+    of_velocity = velocity.error, velocity.correlation, one.spread, velocity.peak_kept
+    maps = _numbers(one.map_l1, one.plain_l1)
+    stated = "" if one.stated_l1 is None else _number(one.stated_l1)
+    return [one.name, *_numbers(float(one.distance_m.mean()), *of_velocity), *maps, stated]
+
+
+def reach_rows(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> Iterator[Row]:
+    """Figures that the fit is judged by, of clips whose motion is known and of real videos."""
+    residuals = [one.residual_m for one in scores if one.residual_m is not None]
+    detail = "at the joint's depth" if residuals else "no landmarks are kept"
+    what = "fit residual: joints to the landmarks found, in the picture, mean"
+    yield Row(what, 100.0 * _mean(residuals), "cm", most=3.0, detail=detail)
+    yield from _stroke_rows([stroke for score in scores for stroke in score.strokes], scores)
+    yield from _edge_rows(scores)
+    for one in scores:
+        if one.kind == "walk":
+            what = f"{one.name}, all joints, line-of-sight velocity"
+            yield Row(f"{what}: RMS error", one.velocity.error, "m/s", most=0.28)
+            yield Row(f"{what}: correlation", one.velocity.correlation, least=0.88)
+    yield from _captured_rows(scores)
+    yield from _coverage_rows(scores)
+    stated = [one for one in scores if one.stated_l1 is not None and not one.quiet]
+    if stated:
+        within = [one.map_l1 <= (one.stated_l1 or 0.0) for one in stated]
+        what = "clips whose map is as near to the truth as it states"
+        yield Row(what, _mean(within), "", 0.6, 0.8, f"{len(stated)} clips")
+    yield from _unseen_rows(scores)
+    taken = [one.seconds_per_frame for one in scores if one.seconds_per_frame is not None]
+    worked = [one.processor_s_per_frame for one in scores if one.processor_s_per_frame is not None]
+    detail = f"with the program's start; processor time {_mean(worked):.3f} s/frame"
+    detail = detail if taken else ""
+    yield Row("time for a fit", _mean(taken), "s/frame", most=1.0 / 30.0, detail=detail)
+    yield Row("joints: mean distance", _mean([one.distance_m.mean() for one in scores]), "m")
+    aligned_m = _mean([one.aligned_m.mean() for one in scores])
+    yield Row("joints: mean distance from the pelvis", aligned_m, "m")
+    same = _mean([one.overlap for one in scores])
+    yield Row("silhouette overlap with the true body", same, detail="simulated clips")
+    if real:
+        what = "real videos: silhouette overlap with the landmark model's mask"
+        detail = ", ".join(f"{one.name} {one.overlap:.2f}" for one in real)
+        yield Row(what, _mean([one.overlap for one in real]), least=0.80, detail=detail)
+        what = "real videos: landmarks to joints in the picture, mean"
+        detail = ", ".join(f"{one.name} {one.reprojection_px:.1f} px" for one in real)
+        away_cm = 100.0 * _mean([one.reprojection_m for one in real])
+        yield Row(what, away_cm, "cm", most=3.0, detail=detail)
+
+
+def _stroke_rows(strokes: Sequence[StrokeScore], scores: Sequence[ClipScore]) -> Iterator[Row]:
+    for limb, most, least in (
+        ("hand", 0.215, 0.957),
+        ("wrist", math.inf, -math.inf),
+        ("elbow", math.inf, 0.8),
+    ):
+        pair = pooled([stroke.velocity[limb] for stroke in strokes])
+        what = f"{limb}s during gestures, line-of-sight velocity"
+        detail = f"true RMS {rms(pair.truth):.2f} m/s, {len(strokes)} gestures"
+        error = pair.error if strokes else math.nan
+        yield Row(f"{what}: RMS error", error, "m/s", most=most, detail=detail)
+        yield Row(f"{what}: correlation", pair.correlation, least=least)
+    fast = [stroke for stroke in strokes if stroke.speed == "fast"]
+    for name, kept in (
+        ("along the line of sight", [stroke.velocity["hand"].peak_kept for stroke in fast]),
+        ("in space", [stroke.tempo["hand"].peak_kept for stroke in fast]),
+    ):
+        detail = f"median of {len(kept)}; least {min(kept):.2f}" if kept else ""
+        what = f"fast swipes: peak hand speed kept, {name}"
+        yield Row(what, _median(kept), least=0.85, detail=detail)
+    still = {one.name: one.vertex_velocity_mps for one in scores if one.kind == "still"}
+    what = "who stands still: false velocity, RMS over vertices"
+    detail = ", ".join(f"{name} {false_mps:.3f}" for name, false_mps in still.items())
+    yield Row(what, max(still.values(), default=math.nan), "m/s", most=0.015, detail=detail)
+    detail = "fitted against true mesh, after smoothing"
+    what = "Doppler map of the gestures, relative L1"
+    yield Row(what, _map_l1(strokes), most=0.40, detail=detail)
+
+
+def _edge_rows(scores: Sequence[ClipScore]) -> Iterator[Row]:
+    for number, name in enumerate(("line-of-sight velocity", "place")):
+        edge, middle = (
+            rms(np.array([errors[number] for errors in part]))
+            for part in ([one.edge for one in scores], [one.middle for one in scores])
+        )
+        each = {one.name: _ratio(one.edge[number], one.middle[number]) for one in scores}
+        each = {clip: value for clip, value in each.items() if math.isfinite(value)}
+        value = _ratio(edge, middle) if scores else math.nan
+        detail = f"worst clip: {_top(each)} {max(each.values()):.2f}" if each else ""
+        what = f"error at both ends over the middle, {name}"
+        yield Row(what, value, most=1.5, detail=detail)
+
+
+def _captured_rows(scores: Sequence[ClipScore]) -> Iterator[Row]:
+    """Clips with the motion of real people, but those in which nothing moves."""
+    moving = [one for one in scores if one.kind == "captured" and not one.quiet]
+    if not moving:
+        return
+    errors = {one.name: one.velocity.error for one in moving}
+    same = {one.name: one.velocity.correlation for one in moving}
+    spread = {one.name: one.spread for one in moving}
+    what = f"motion of real people, all joints, {len(moving)} clips"
+    yield Row(f"{what}: median RMS error", _median(list(errors.values())), "m/s", most=0.22)
+    worst, least = _top(errors), _bottom(same)
+    yield Row(f"{what}: worst", errors[worst], "m/s", most=0.35, detail=worst)
+    yield Row(f"{what}: median correlation", _median(list(same.values())), least=0.90)
+    yield Row(f"{what}: least", same[least], least=0.80, detail=least)
+    within = "median spread of the joints' velocities within a frame, fitted over true"
+    yield Row(f"{what}: {within}", _median(list(spread.values())), "", 0.9, 1.1)
+    narrow, wide = _bottom(spread), _top(spread)
+    yield Row(f"{what}: least spread", spread[narrow], "", 0.9, 1.1, narrow)
+    yield Row(f"{what}: greatest spread", spread[wide], "", 0.9, 1.1, wide)
+    median = _median([one.map_l1 for one in moving])
+    yield Row(f"{what}: Doppler map, relative L1, median", median, most=0.50)
+
+
+def _coverage_rows(scores: Sequence[ClipScore]) -> Iterator[Row]:
+    """Share of errors within one and two standard deviations: kinds of clips, then joints."""
+    known = [(one.kind, one.sigma) for one in scores if one.sigma is not None]
+    for name, kinds in _KINDS.items():
+        if own := [sigma for kind, sigma in known if kind in kinds]:
+            sigma, errors = pooled(own)
+            what, detail = "σ of the velocity covers", f"{len(errors)} joints in frames"
+            yield Row(f"{name}: 1{what}", coverage(errors, sigma), "", 0.60, 0.75, detail)
+            yield Row(f"{name}: 2{what}", coverage(errors, 2.0 * sigma), least=0.90)
+    if known:
+        sigma, errors = pooled([sigma for _, sigma in known])
+        cover = {
+            joint: coverage(errors[:, row], sigma[:, row])
+            for row, joint in enumerate(JOINTS)
+            if np.isfinite(errors[:, row]).any()
+        }
+        for word, joint in (("least", _bottom(cover)), ("most", _top(cover))):
+            what = f"1σ of a joint's velocity covers: {word}"
+            yield Row(what, cover[joint], "", 0.5, 0.8, joint)
+        there = np.isfinite(errors) & (sigma > 0) & (errors != 0)
+        same = correlation(np.log(sigma[there]), np.log(np.abs(errors[there])))
+        yield Row("correlation of the logarithms of σ and error", same, least=0.5)
+
+
+def _unseen_rows(scores: Sequence[ClipScore]) -> Iterator[Row]:
     """Limbs while they are out of the picture."""
     clips = [one for one in scores if len(one.unseen.truth)]
     if not clips:
-        return []
+        return
     both = pooled([one.unseen for one in clips])
     each = ", ".join(f"{one.name} {rms(one.unseen.fitted):.2f}" for one in clips)
-    rows = [
-        Row(
-            "limbs out of the picture, velocity against what they hang on: RMS",
-            rms(both.fitted),
-            "m/s",
-            detail=f"true {rms(both.truth):.2f} m/s; {each}",
-        )
-    ]
-    known = [one.unseen_sigma for one in clips if one.unseen_sigma is not None]
-    if known:
-        sigma = pooled(known)
-        what = "limbs out of the picture"
-        rows.append(Row(f"{what}: 1σ covers", coverage(sigma.truth, sigma.fitted)))
-        rows.append(Row(f"{what}: 2σ covers", coverage(sigma.truth, 2.0 * sigma.fitted)))
-    return rows
+    what, detail = "limbs out of the picture", f"true {rms(both.truth):.2f} m/s; {each}"
+    against = f"{what}, velocity against what they hang on: RMS"
+    yield Row(against, rms(both.fitted), "m/s", detail=detail)
+    if known := [one.unseen_sigma for one in clips if one.unseen_sigma is not None]:
+        sigma, errors = pooled(known)
+        yield Row(f"{what}: 1σ covers", coverage(errors, sigma))
+        yield Row(f"{what}: 2σ covers", coverage(errors, 2.0 * sigma))
 
 
-def _place_rows(scores: Sequence[ClipScore]) -> list[Row]:
-    return [
-        Row("joints: mean distance", _mean([one.distance_m.mean() for one in scores]), "m"),
-        Row(
-            "joints: mean distance from the pelvis",
-            _mean([one.aligned_m.mean() for one in scores]),
-            "m",
-        ),
-        Row(
-            "silhouette overlap with the true body",
-            _mean([one.overlap for one in scores]),
-            "",
-            detail="simulated clips",
-        ),
-    ]
+def _top(each: Mapping[str, float]) -> str:
+    return max(each, key=lambda name: each[name])
 
 
-def _real_rows(real: Sequence[RealScore]) -> list[Row]:
-    if not real:
-        return []
-    names = ", ".join(f"{one.name} {one.overlap:.2f}" for one in real)
-    return [
-        Row(
-            "real videos: silhouette overlap with the landmark model's mask",
-            _mean([one.overlap for one in real]),
-            "",
-            (">=", 0.80),
-            detail=names,
-        ),
-        Row(
-            "real videos: landmarks to joints in the picture, mean",
-            100.0 * _mean([one.reprojection_m for one in real]),
-            "cm",
-            ("<=", 3.0),
-            detail=", ".join(f"{one.name} {one.reprojection_px:.1f} px" for one in real),
-        ),
-    ]
+def _bottom(each: Mapping[str, float]) -> str:
+    return min(each, key=lambda name: each[name])
 
 
 def _map_l1(strokes: Sequence[StrokeScore]) -> float:
@@ -432,4 +301,11 @@ def _median(values: Sequence[float]) -> float:
     return float(np.median(values)) if len(values) else math.nan
 
 
-__all__ = ["Pair", "Row", "as_dict", "clip_table", "gesture_table", "reach_table"]
+def _numbers(*values: float) -> list[str]:
+    return [_number(value) for value in values]
+
+
+def _number(value: float) -> str:
+    if not math.isfinite(value):
+        return "–" if math.isnan(value) else "∞"
+    return f"{value:.3f}" if abs(value) < 10 else f"{value:.1f}"
