@@ -7,6 +7,7 @@ lies exactly on the person.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,8 +17,10 @@ from numpy.typing import NDArray
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.model import Body, vertex_normals
 from sd2core.figures.surface import Frame, find_visible_triangles
-from sd2core.numerics.compiled import compiled
+from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import compiled, worker_count, workers
 from sd2core.numerics.raster import rasterise
+from sd2core.progress import Progress, silent
 from tools.build_sample.clothing import Clothes, linear, srgb
 
 Singles = NDArray[np.float32]
@@ -93,6 +96,21 @@ class Renderer:
         picture = stamp(picture, "Simulated")
         # Half a step of fixed dither, or the wall's gradient shows bands.
         return (picture * 255.0 + self._dither[..., None]).astype(np.uint8)
+
+    def frames(
+        self, mesh: MeshSequence, seed: int = 0, progress: Progress = silent
+    ) -> Iterator[NDArray[np.uint8]]:
+        """Pictures of a moving body, several at once; the noise of each has a seed of its own."""
+
+        def draw(frame: int) -> NDArray[np.uint8]:
+            return self.frame(mesh.frame(frame).astype(np.float64), seed + frame)
+
+        step = worker_count()
+        progress(0, mesh.frame_count)
+        yield draw(0)  # alone: it fills what all frames share
+        for start in range(1, mesh.frame_count, step):
+            progress(start, mesh.frame_count)
+            yield from workers().map(draw, range(start, min(start + step, mesh.frame_count)))
 
     def person(self, vertices_m: NDArray[np.float64], shadow: Singles) -> tuple[Singles, Singles]:
         """Linear colours times coverage, and coverage, at picture resolution."""

@@ -7,7 +7,6 @@ surface. Coordinates of both are rounded so that they are small.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -28,7 +27,6 @@ from sd2core.io.mesh_arrays import write_small
 from sd2core.io.radar.infineon import write_capture
 from sd2core.io.video_writing import write_video
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.numerics.compiled import worker_count, workers
 from sd2core.progress import Progress, silent
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import SUFFIX, Recording, Span
@@ -59,7 +57,7 @@ _RECEIVERS_M = ((-0.03, 0.0, 0.0), (0.0, 0.0, 0.0), (0.03, 0.0, 0.0))
 _SNR_DB = 34.0
 """Against the whole body; the hand echoes some 20 dB weaker than the torso."""
 _SEED = 2
-_STAGES = 4
+_STAGES = 2
 _CHUNK_FRAMES = 150
 
 
@@ -67,9 +65,9 @@ def make_sample(out: Path, progress: Progress = silent, *, duration_s: float = D
     """Make the sample recording and return its folder; the same bytes, except for the video.
 
     ``.sd2`` is appended to a name without it; the folder appears when it is complete. ``progress``
-    counts frames over four stages: posed, drawn, posed for the recording, and seen by the radar;
-    before the last the video is fitted. ``duration_s`` keeps the motion's beginning only; gestures
-    that do not fit are left out. Raises Sd2Error when the folder exists and is not empty.
+    counts frames twice: drawn, and seen by the radar; in between the video is fitted.
+    ``duration_s`` keeps the motion's beginning only; gestures that do not fit are left out. Raises
+    Sd2Error when the folder exists and is not empty.
     """
     out = Path(out)
     if out.suffix != SUFFIX:
@@ -92,14 +90,10 @@ def _fill(folder: Path, times_s: NDArray[np.float64], progress: Progress) -> Non
         return lambda done, _: progress(number * frames + done, _STAGES * frames)
 
     camera = Camera()
-    fine = body_sequence("high", times_s, camera, stage(0))
-    write_video(
-        folder / "video.mp4",
-        _pictures(fine, camera, stage(1)),
-        FRAMES_PER_S,
-        (camera.width, camera.height),
-    )
-    recorded = body_sequence(RECORDED, times_s, camera, stage(2))
+    fine = body_sequence("high", times_s, camera)
+    pictures = Renderer(Body.load("high"), camera).frames(fine, progress=stage(0))
+    write_video(folder / "video.mp4", pictures, FRAMES_PER_S, (camera.width, camera.height))
+    recorded = body_sequence(RECORDED, times_s, camera)
     write_compact_mesh(_rounded(recorded, _ROUNDING_M), folder / "mesh.zarr")
     fit = _fitted(folder / "video.mp4", camera)
     write_compact_mesh(_rounded(fit, _FIT_ROUNDING_M), folder / "fit.zarr")
@@ -110,7 +104,7 @@ def _fill(folder: Path, times_s: NDArray[np.float64], progress: Progress) -> Non
         visibility="exact",
         wave=WaveOptions(coherent=False, receiver_offsets_m=_RECEIVERS_M),
         options=SignalOptions(snr_db=_SNR_DB, reflectors=_ROOM, seed=_SEED),
-        progress=stage(3),
+        progress=stage(1),
     )
     write_capture(
         folder / "radar",
@@ -154,34 +148,14 @@ def _rounded(mesh: MeshSequence, to_m: float) -> MeshSequence:
 
 
 def body_sequence(
-    resolution: Resolution,
-    times_s: NDArray[np.float64],
-    camera: Camera,
-    progress: Progress = silent,
+    resolution: Resolution, times_s: NDArray[np.float64], camera: Camera
 ) -> MeshSequence:
     """The moving body in the camera frame, (T, V, 3) float64, not rounded."""
     body = Body.load(resolution)
     motion = swipes(body.skeleton, times_s)
     place = np.array([_PLACE_ACROSS_M, camera.above_floor_m, DISTANCE_M])
-    vertices = np.empty((len(times_s), len(body.vertices_m), 3))
-    for frame in range(len(times_s)):
-        progress(frame, len(times_s))
-        one = slice(frame, frame + 1)
-        vertices[one] = posed(body, motion.rotations[one], motion.translation_m[one] + place)
+    vertices = posed(body, motion.rotations, motion.translation_m + place)
     return MeshSequence(vertices, body.faces, Timebase(times_s), source="simulated body")
-
-
-def _pictures(
-    mesh: MeshSequence, camera: Camera, progress: Progress
-) -> Iterator[NDArray[np.uint8]]:
-    renderer = Renderer(Body.load("high"), camera)
-    progress(0, mesh.frame_count)
-    yield renderer.frame(mesh.frame(0))
-    step = worker_count()
-    for start in range(1, mesh.frame_count, step):
-        progress(start, mesh.frame_count)
-        stop = min(start + step, mesh.frame_count)
-        yield from workers().map(renderer.frame, mesh.read(start, stop))
 
 
 def write_compact_mesh(mesh: MeshSequence, path: Path) -> None:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import astuple
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -86,15 +86,39 @@ def swipes(skeleton: Skeleton, times_s: ArrayLike) -> Motion:
     Before 0.3 s and after 14.95 s the arm hangs.
     """
     times = np.asarray(times_s, dtype=np.float64)
-    arm = arm_poses(_MOVES, times)  # (T, parameters)
-    rotations = np.tile(np.eye(3), (len(times), len(skeleton), 1, 1))
-    turn_torso(skeleton, rotations, times, arm[:, 8])
+    return with_one_arm(skeleton, times, arm_poses(_MOVES, times))
+
+
+def with_one_arm(
+    skeleton: Skeleton,
+    times_s: Floats,
+    arm: Floats,
+    hand: Literal["L", "R"] = "R",
+    arm_scale: float = 1.0,
+    sway_s: float = 0.0,
+) -> Motion:
+    """Motion of a standing body that moves one arm; the other one hangs.
+
+    Parameters
+    ----------
+    arm : float64 array, shape (T, parameters)
+        Of :func:`arm_poses`, as for the right arm.
+    hand : {"L", "R"}
+        Whose arm.
+    arm_scale : float
+        Length of this skeleton's arm to the bundled one's.
+    sway_s : float
+        Added to the clock by which the body sways.
+    """
+    rotations = np.tile(np.eye(3), (len(times_s), len(skeleton), 1, 1))
+    across, other = (1.0, "L") if hand == "R" else (-1.0, "R")
+    turn_torso(skeleton, rotations, times_s + sway_s, across * arm[:, 8])
     relax_fingers(skeleton, rotations)
-    reach(skeleton, rotations, "R", arm)
-    hanging = np.tile(np.array(astuple(HANGING)), (len(times), 1))
-    hanging[:, 0] += 1.2 * np.sin(0.9 * times)
-    reach(skeleton, rotations, "L", hanging)
-    return Motion(rotations, np.zeros((len(times), 3)))
+    reach(skeleton, rotations, hand, arm, arm_scale)
+    hanging = np.tile(np.array(astuple(HANGING)), (len(times_s), 1))
+    hanging[:, 0] += 1.2 * np.sin(0.9 * times_s)
+    reach(skeleton, rotations, other, hanging, arm_scale)
+    return Motion(rotations, np.zeros((len(times_s), 3)))
 
 
 def arm_poses(moves: Sequence[Move], times: Floats) -> Floats:

@@ -28,9 +28,10 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.scattering.resampling import resample_mesh
 from sd2core.sensor import VirtualSensor
+from tools.build_sample.swipes import GestureSpan
 from tools.fitting.measures import EDGE_FRAMES, medium_in_high, peak_kept, speed_mps
 from tools.fitting.real_score import reprojection
-from tools.fitting.truth import Stroke, Truth
+from tools.fitting.truth import Truth
 
 Floats = NDArray[np.float64]
 
@@ -97,7 +98,7 @@ class StrokeScore:
         Doppler maps, and of the true one.
     """
 
-    stroke: Stroke
+    stroke: GestureSpan
     speed: str
     velocity: dict[str, Pair]
     tempo: dict[str, Pair]

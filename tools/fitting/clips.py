@@ -8,9 +8,7 @@ is known besides (``truth.json``).
 from __future__ import annotations
 
 import json
-import shutil
-import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,10 +22,9 @@ from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.body.track import LANDMARKS
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write, atomic_write_text
+from sd2core.files.atomic import atomic_folder
 from sd2core.io.video_writing import write_video
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.numerics.compiled import worker_count, workers
 from sd2core.progress import Progress, silent
 from sd2core.simulate.limbs import arm_length_m
 from sd2core.timebase import Timebase
@@ -109,17 +106,9 @@ CLIPS = (
 """Clips that fits are scored on; the weights of the fit were chosen by others."""
 
 
-def _captured(
-    trial: str, start_s: float, length_s: float, heading_deg: float, **more: Any
-) -> Action:
-    return Action(
-        "captured",
-        trial=trial,
-        start_s=start_s,
-        length_s=length_s,
-        heading_deg=heading_deg,
-        **more,
-    )
+def _captured(trial: str, start_s: float, length_s: float, heading_deg: float) -> Action:
+    action = Action("captured", trial=trial, start_s=start_s, length_s=length_s)
+    return replace(action, heading_deg=heading_deg)
 
 
 REAL_MOTION = (
@@ -203,20 +192,11 @@ ALL_CLIPS = (*CLIPS, *REAL_MOTION, *TUNING)
 
 
 def clip_named(name: str) -> Clip:
-    """One of :data:`CLIPS` or :data:`TUNING`.
-
-    Raises
-    ------
-    Sd2Error
-        When there is none of this name.
-    """
-    for clip in ALL_CLIPS:
-        if clip.name == name:
-            return clip
-    raise Sd2Error(
-        f"There is no clip {name!r}",
-        ", ".join(clip.name for clip in (*CLIPS, *REAL_MOTION)),
-    )
+    """The clip of a name; Sd2Error if there is none."""
+    known = {clip.name: clip for clip in ALL_CLIPS}
+    if name not in known:
+        raise Sd2Error(f"There is no clip {name!r}", ", ".join(known))
+    return known[name]
 
 
 def make_fit_truth(
@@ -225,27 +205,17 @@ def make_fit_truth(
     progress: Progress = silent,
     motions: Path | None = None,
 ) -> list[Path]:
-    """Make clips that are not there yet.
+    """Make clips that are not there yet, and return the folders of all, in order.
 
     Parameters
     ----------
     out : Path
-        A folder, made if need be; every clip becomes a folder in it, and appears
-        there when it is complete.
+        A folder, made if need be; every clip becomes a folder in it, and appears there when it is
+        complete. Sd2Error if one of that name is there and is not this clip.
     progress : Progress
         Counts frames of the clips to be made.
     motions : Path, optional
         Folder made by ``python -m tools.motion_capture``, for clips of :data:`REAL_MOTION`.
-
-    Returns
-    -------
-    list of Path
-        The folders of all clips, in order.
-
-    Raises
-    ------
-    Sd2Error
-        When a folder of that name is there and is not this clip.
     """
     out = Path(out)
     if not out.absolute().parent.is_dir():
@@ -255,7 +225,8 @@ def make_fit_truth(
     total, done = sum(_frame_count(clip) for clip in missing), 0
     for clip in missing:
         before = done
-        _make(out, clip, motions, lambda frames, _: progress(before + frames, total))  # noqa: B023
+        with atomic_folder(out / clip.name) as folder:
+            _fill(folder, clip, motions, lambda frames, _: progress(before + frames, total))  # noqa: B023
         done += _frame_count(clip)
     progress(total, total)
     return [out / clip.name for clip in clips]
@@ -303,14 +274,13 @@ def scene(clip: Clip, space: ShapeSpace, motions: Path | None = None) -> Scene:
     skeleton = space.skeleton(shape)
     times_s = np.arange(_frame_count(clip)) / FRAMES_PER_S
     camera = Camera(above_floor_m=clip.camera_m)
+    place = np.array([clip.across_m, clip.camera_m, clip.distance_m])
     if clip.action.kind == "captured":
-        place = np.array([clip.across_m, clip.camera_m, clip.distance_m])
         role: Role = "calibrate" if clip in TUNING else "measure"
         transforms = captured_transforms(space, shape, clip.action, place, motions, role)
         return Scene(shape, times_s, transforms, skeleton, (), camera)
     scale = arm_length_m(skeleton) / arm_length_m(space.base_skeleton)
     motion, spans = perform(skeleton, clip.action, times_s, clip.seed, scale)
-    place = np.array([clip.across_m, clip.camera_m, clip.distance_m])
     transforms = skeleton.transforms(motion.rotations, motion.translation_m + place)
     return Scene(shape, times_s, transforms, skeleton, spans, camera)
 
@@ -350,54 +320,26 @@ def _is_made(folder: Path, clip: Clip) -> bool:
     return True
 
 
-def _make(out: Path, clip: Clip, motions: Path | None, progress: Progress) -> None:
-    workspace = Path(tempfile.mkdtemp(prefix=f".{clip.name}.", suffix=".tmp", dir=out))
-    try:
-        folder = workspace / clip.name
-        folder.mkdir()
-        _fill(folder, clip, motions, progress)
-        folder.rename(out / clip.name)
-    finally:
-        shutil.rmtree(workspace, ignore_errors=True)
-
-
 def _fill(folder: Path, clip: Clip, motions: Path | None, progress: Progress) -> None:
     space = ShapeSpace()
     known = scene(clip, space, motions)
     camera = known.camera
-    write_video(
-        folder / "video.mp4",
-        _pictures(known.mesh(space, "high"), renderer(clip, space, known), clip, progress),
-        FRAMES_PER_S,
-        (camera.width, camera.height),
+    pictures = renderer(clip, space, known).frames(
+        known.mesh(space, "high"), 1000 * clip.seed, progress
     )
+    write_video(folder / "video.mp4", pictures, FRAMES_PER_S, (camera.width, camera.height))
     write_compact_mesh(known.mesh(space, RESOLUTION), folder / "mesh.zarr")
     keypoints = known.keypoints_m(space)
-    with atomic_write(folder / "keypoints.npz") as stream:
-        np.savez_compressed(
-            stream,
-            keypoints_m=keypoints.astype(np.float32),
-            names=np.array(LANDMARKS),
-            joints_m=known.joints_m().astype(np.float32),
-            joint_names=np.array(known.skeleton.names),
-            times_s=known.times_s,
-        )
+    np.savez_compressed(
+        folder / "keypoints.npz",
+        keypoints_m=keypoints.astype(np.float32),
+        names=np.array(LANDMARKS),
+        joints_m=known.joints_m().astype(np.float32),
+        joint_names=np.array(known.skeleton.names),
+        times_s=known.times_s,
+    )
     text = json.dumps(_truth(clip, known, keypoints), indent=1)
-    atomic_write_text(folder / "truth.json", text + "\n")
-
-
-def _pictures(
-    mesh: MeshSequence, drawer: Renderer, clip: Clip, progress: Progress
-) -> Iterator[NDArray[np.uint8]]:
-    def draw(frame: int) -> NDArray[np.uint8]:
-        return drawer.frame(mesh.frame(frame).astype(np.float64), seed=1000 * clip.seed + frame)
-
-    step = worker_count()
-    progress(0, mesh.frame_count)
-    yield draw(0)  # alone: it fills what all frames share
-    for start in range(1, mesh.frame_count, step):
-        progress(start, mesh.frame_count)
-        yield from workers().map(draw, range(start, min(start + step, mesh.frame_count)))
+    (folder / "truth.json").write_text(text + "\n", "utf-8")
 
 
 def _truth(clip: Clip, known: Scene, keypoints: NDArray[np.float64]) -> dict[str, Any]:
@@ -412,12 +354,7 @@ def _truth(clip: Clip, known: Scene, keypoints: NDArray[np.float64]) -> dict[str
         "clip": _description(clip),
         "frames_per_s": FRAMES_PER_S,
         "frames": len(known.times_s),
-        "camera": {
-            "width": known.camera.width,
-            "height": known.camera.height,
-            "focal_px": known.camera.focal_px,
-            "above_floor_m": known.camera.above_floor_m,
-        },
+        "camera": asdict(known.camera),
         "stature_m": known.shape.stature_m,
         "shape": {
             "coefficients": [float(value) for value in known.shape.coefficients],
@@ -441,11 +378,6 @@ def _notes(clip: Clip) -> list[str]:
     return notes
 
 
-def _description(clip: Clip) -> dict[str, Any]:
+def _description(clip: Clip) -> Any:
     """The clip as JSON gives it back."""
-    described = asdict(clip)
-    described["action"] = {
-        name: list(value) if isinstance(value, tuple) else value
-        for name, value in described["action"].items()
-    }
-    return described
+    return json.loads(json.dumps(asdict(clip)))

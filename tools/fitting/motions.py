@@ -6,7 +6,6 @@ them: whoever trains on simulated people uses other motions.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
 from typing import Literal, NamedTuple
 
@@ -23,9 +22,8 @@ from sd2core.simulate.limbs import (
     minimum_jerk,
     reach,
     relax_fingers,
-    turn_torso,
 )
-from tools.build_sample.swipes import GestureSpan, Move, arm_poses
+from tools.build_sample.swipes import GestureSpan, Move, arm_poses, with_one_arm
 
 Kind = Literal["swipes", "still", "walk", "turn", "captured"]
 Speed = Literal["slow", "normal", "fast"]
@@ -136,7 +134,8 @@ def perform(
         return Performance(_still(skeleton, action, len(times), arm_scale), ())
     moves = _moves(action, rng)
     spans = tuple(GestureSpan(move.start_s, move.end_s, move.label) for move in moves if move.label)
-    return Performance(_swiping(skeleton, action, moves, times, rng, arm_scale), spans)
+    arm, sway_s = arm_poses(moves, times), float(rng.uniform(0, 30))
+    return Performance(with_one_arm(skeleton, times, arm, action.hand, arm_scale, sway_s), spans)
 
 
 def _straight(start_s: float, distance_m: float, speed_mps: float, ramp_s: float = 0.7) -> Path:
@@ -210,26 +209,6 @@ def _varied(pose: ArmPose, rng: np.random.Generator) -> ArmPose:
         flexion_deg=pose.flexion_deg + 4.0 * float(flexion),
         torso_deg=pose.torso_deg + 2.0 * float(torso),
     )
-
-
-def _swiping(
-    skeleton: Skeleton,
-    action: Action,
-    moves: Sequence[Move],
-    times: Floats,
-    rng: np.random.Generator,
-    arm_scale: float,
-) -> Motion:
-    arm = arm_poses(moves, times)
-    rotations = np.tile(np.eye(3), (len(times), len(skeleton), 1, 1))
-    across = 1.0 if action.hand == "R" else -1.0
-    turn_torso(skeleton, rotations, times + float(rng.uniform(0, 30)), across * arm[:, 8])
-    relax_fingers(skeleton, rotations)
-    reach(skeleton, rotations, action.hand, arm, arm_scale)
-    hanging = np.tile(np.array(astuple(HANGING)), (len(times), 1))
-    hanging[:, 0] += 1.2 * np.sin(0.9 * times)
-    reach(skeleton, rotations, "L" if action.hand == "R" else "R", hanging, arm_scale)
-    return Motion(rotations, np.zeros((len(times), 3)))
 
 
 def _still(skeleton: Skeleton, action: Action, frames: int, arm_scale: float) -> Motion:

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.sequence import MeshSequence
+from tools.build_sample.swipes import GestureSpan
 
 FORMAT = "sd2-fit-truth"
 VERSION = 1
@@ -22,27 +19,12 @@ VERSION = 1
 _EXPECTED = "a clip made by `python -m tools.fitting clips`"
 
 
-@dataclass(frozen=True)
-class Stroke:
-    """A gesture's stroke: half-open ``[start_s, end_s)``."""
-
-    start_s: float
-    end_s: float
-    label: str
-
-
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """One clip.
-
-    Parameters
-    ----------
-    meta : dict
-        What ``truth.json`` holds; see docs/formats.md.
-    """
+    """One clip."""
 
     folder: Path
-    meta: dict[str, Any]
+    meta: dict[str, Any]  # what ``truth.json`` holds; see tools/README.md
 
     @property
     def name(self) -> str:
@@ -65,9 +47,9 @@ class Truth:
         return str(self.meta["clip"]["action"]["hand"])
 
     @property
-    def strokes(self) -> tuple[Stroke, ...]:
+    def strokes(self) -> tuple[GestureSpan, ...]:
         """The gestures."""
-        return tuple(Stroke(**span) for span in self.meta["spans"])
+        return tuple(GestureSpan(**span) for span in self.meta["spans"])
 
     @property
     def stature_m(self) -> float:
@@ -89,24 +71,9 @@ class Truth:
         """The true surface in the camera frame."""
         return load_mesh(self.folder / "mesh.zarr")
 
-    def keypoints_m(self) -> NDArray[np.float64]:
-        """The 33 landmarks in the camera frame, (T, 33, 3)."""
-        path = self.folder / "keypoints.npz"
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                return np.asarray(data["keypoints_m"], np.float64)
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-            raise Sd2Error(f"{path} cannot be read ({error})", _EXPECTED) from error
-
 
 def read_truth(folder: Path) -> Truth:
-    """Open one clip.
-
-    Raises
-    ------
-    Sd2Error
-        When the folder holds none, or one of a later version.
-    """
+    """Open one clip; Sd2Error if the folder holds none, or one of a later version."""
     path = Path(folder) / "truth.json"
     try:
         meta = json.loads(path.read_text("utf-8"))
@@ -121,13 +88,7 @@ def read_truth(folder: Path) -> Truth:
 
 
 def truth_folders(folder: Path) -> list[Path]:
-    """Clips in a folder, or the folder itself when it is one, by name.
-
-    Raises
-    ------
-    Sd2Error
-        When there is none.
-    """
+    """Clips in a folder by name, or the folder itself if it is one; Sd2Error if there is none."""
     folder = Path(folder)
     if (folder / "truth.json").is_file():
         return [folder]

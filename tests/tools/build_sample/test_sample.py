@@ -68,9 +68,9 @@ def test_everything_but_the_video_is_the_same_every_time(short: Path, tmp_path: 
 
 @pytest.mark.slow
 def test_progress_rises_to_its_total(short: Path, steps: list[tuple[int, int]]) -> None:
-    assert {total for _, total in steps} == {24}  # 6 frames, 4 stages
+    assert {total for _, total in steps} == {12}  # 6 frames, twice
     assert [done for done, _ in steps] == sorted(done for done, _ in steps)
-    assert steps[-1] == (24, 24)
+    assert steps[-1] == (12, 12)
 
 
 def test_the_suffix_is_appended(short: Path) -> None:
