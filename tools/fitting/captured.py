@@ -11,10 +11,10 @@ from sd2core.body.rig import KeypointSpace, Rig
 from sd2core.body.rotations import Floats, applied
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.errors import Sd2Error
+from sd2core.mocap.body_motion import RATE_HZ, BodyMotion, Role
 from sd2core.simulate.limbs import turn_about
 from tools.fitting.motions import Action
-from tools.motion_capture.bodies import BodyMotion, moved_transforms
-from tools.motion_capture.catalogue import RATE_HZ, Role
+from tools.motion_capture.bodies import moved_transforms
 
 _REMEDY = "Make it: python -m tools.motion_capture drive DATA/motion MOTIONS"
 

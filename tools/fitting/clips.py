@@ -25,6 +25,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder
 from sd2core.io.video_writing import write_video
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mocap.body_motion import Role
 from sd2core.progress import Progress, silent
 from sd2core.simulate.limbs import arm_length_m
 from sd2core.timebase import Timebase
@@ -37,7 +38,6 @@ from tools.fitting.captured import captured_transforms
 from tools.fitting.cast import PEOPLE, ROOMS
 from tools.fitting.motions import Action, duration_s, perform
 from tools.fitting.truth import FORMAT, VERSION, read_truth
-from tools.motion_capture.catalogue import Role
 
 FRAMES_PER_S = 30
 RESOLUTION: Resolution = "medium"

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections import defaultdict
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import partial
 from pathlib import Path
 
@@ -14,14 +12,12 @@ from numpy.typing import NDArray
 
 from sd2core.body.rotations import applied, product, to_vector
 from sd2core.errors import Sd2Error
-from sd2core.mocap.body_motion import BodyMotion, load_motions
+from sd2core.mocap.body_motion import BodyMotion
 from sd2core.mocap.driving import SkeletonClip, puppet_of, resample_pose
-from sd2core.processes import end_with_parent
 from sd2core.progress import Progress, silent
 from tools.motion_capture.catalogue import RATE_HZ, Trial, trials
 from tools.motion_capture.points import MARKERS
-
-__all__ = ["BodyMotion", "drive_bodies", "load_motions", "moved_transforms"]
+from tools.processes import finished
 
 Floats = NDArray[np.float64]
 
@@ -45,15 +41,13 @@ def drive_bodies(
         people[trial.person].append(trial)
     jobs = [one for one in people.values() if any(not path_of(out, t).exists() for t in one)]
     jobs.sort(key=len)
-    total, done, notes = sum(len(one) for one in jobs), 0, []
+    total, done = sum(len(one) for one in jobs), 0
+    notes: list[str] = []
     progress(0, total)
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, mp_context=context, initializer=end_with_parent) as pool:
-        futures = {pool.submit(partial(_drive, out), one): len(one) for one in jobs}
-        for future in as_completed(futures):
-            notes += future.result()
-            done += futures[future]
-            progress(done, total)
+    for own, left_out in finished(partial(_drive, out), jobs, processes):
+        notes += left_out
+        done += len(own)
+        progress(done, total)
     return sorted(notes)
 
 

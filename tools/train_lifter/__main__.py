@@ -8,84 +8,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from sd2core.body.landmark_models import DEFAULT_MODEL, LandmarkModel
 from sd2core.body.lifter import Lifter
 from sd2core.cli.output import print_json, progress_bar
-from sd2core.errors import Sd2Error
-from sd2core.mocap.body_motion import Role
+from sd2core.mocap.body_motion import load_motions
 from sd2core.options.kinds import Count
 from sd2core.options.records import ARGUMENT, ARGUMENTS, OptionRecord, Place
 from sd2core.options.shared import Json
 from tools.command_line import Commands, run_tool
-from tools.motion_capture.bodies import load_motions
-from tools.train_lifter.data import load_takes, make_lifter_data
-from tools.train_lifter.deeds import Manner
+from tools.train_lifter.data import Data, load_takes, make_lifter_data
 from tools.train_lifter.fits import fit_law, repaired
-from tools.train_lifter.pairs import make_pairs
+from tools.train_lifter.pairs import Pairs, make_pairs
 from tools.train_lifter.score import score
 from tools.train_lifter.swaps import score_sides
-from tools.train_lifter.takes import Take
-
-
-class Motion(OptionRecord):
-    """How the people of takes move.
-
-    Parameters
-    ----------
-    seed : S
-        seed of all random numbers
-    held_out
-        with the kinds of motion kept for testing
-    manner
-        how people move: with elbows any way they can be, as people have them, or gesturing before
-        the camera, with arms or with forearms alone
-    motions : FOLDER
-        people move as those recorded there do (made by python -m tools.motion_capture)
-    """
-
-    seed: int = 0
-    held_out: bool = False
-    manner: Manner = "any"
-    motions: Path | None = None
-
-
-class Data(Motion):
-    """Options of ``data``.
-
-    Parameters
-    ----------
-    out : OUT
-        folder of the takes
-    takes : N
-        how many
-    processes : P
-        at work at once
-    models : FOLDER
-        the landmark models
-    landmark_model
-        which of them looks
-    """
-
-    out: Annotated[Path, ARGUMENT]
-    takes: Count = 400
-    processes: Count = 2
-    models: Path | None = None
-    landmark_model: LandmarkModel = DEFAULT_MODEL
-
-
-class Pairs(Motion):
-    """Options of ``pairs``.
-
-    Parameters
-    ----------
-    data : DATA
-        folder of the takes
-    out : FILE
-        to write (.zarr)
-    """
-
-    data: Annotated[Path, ARGUMENT]
-    out: Path
 
 
 class Learning(OptionRecord):
@@ -150,18 +84,7 @@ def _data(options: Data) -> None:
     again it goes on where it was. The same seed makes the same takes.
     """
     with progress_bar("Drawing people", unit="take") as progress:
-        made = make_lifter_data(
-            options.out,
-            options.takes,
-            options.seed,
-            held_out=options.held_out,
-            manner=options.manner,
-            motions=options.motions,
-            processes=options.processes,
-            models=options.models,
-            landmark_model=options.landmark_model,
-            progress=progress,
-        )
+        made = make_lifter_data(options, progress)
     print(f"Made {made} takes in {options.out}")
 
 
@@ -170,24 +93,15 @@ def _pairs(options: Pairs) -> None:
 
     The other options are those that the takes were made with.
     """
-    role: Role = "calibrate" if options.held_out else "learn"
     with progress_bar("Fitting", unit="take") as progress:
-        made = make_pairs(
-            options.out,
-            options.data,
-            options.seed,
-            held_out=options.held_out,
-            manner=options.manner,
-            motions=load_motions(options.motions, role) if options.motions else (),
-            progress=progress,
-        )
+        made = make_pairs(options, progress)
     print(f"Added pairs of {made} takes to {options.out}")
 
 
 def _train(options: Train) -> None:
     """Train the lifter of `sd2 fit` on such takes."""
-    takes = [repaired(take) for folder in options.data for take in _takes(folder)]
-    kept = [take for folder in options.kept for take in _takes(folder)]
+    takes = [repaired(take) for folder in options.data for take in load_takes(folder)]
+    kept = [take for folder in options.kept for take in load_takes(folder)]
     motions = load_motions(options.motions, "learn") if options.motions else []
     from tools.train_lifter.training import Recipe, material, save_lifter, train  # needs torch
 
@@ -203,7 +117,7 @@ def _train(options: Train) -> None:
 
 def _sides(options: Learning) -> None:
     """Train what tells left from right, on such takes."""
-    takes = [take for folder in options.data for take in _takes(folder)]
+    takes = [take for folder in options.data for take in load_takes(folder)]
     motions = load_motions(options.motions, "learn") if options.motions else []
     from tools.train_lifter.network import save_network  # needs torch
     from tools.train_lifter.sides import SidesRecipe, train_sides
@@ -223,7 +137,7 @@ def _score(options: Score) -> None:
     Errors of the velocity along the line of sight, joint by joint, and frames in which left is
     taken for right.
     """
-    takes = _takes(options.data)
+    takes = load_takes(options.data)
     found, sides = score(Lifter.load(options.lifter), takes), score_sides(takes)
     if options.json:
         joints = {joint: values._asdict() for joint, values in found.joints.items()}
@@ -249,16 +163,6 @@ def _score(options: Score) -> None:
     for part, shares in sides.items():
         print(f"{part:15s}" + "".join(f"{100.0 * share:6.1f} %" for share in shares))
     print(f"Nothing moves: {found.still_mps:.3f} m/s over all landmarks")
-
-
-def _takes(folder: Path) -> list[Take]:
-    takes = load_takes(folder)
-    if not takes:
-        raise Sd2Error(
-            f"There are no takes in {folder}",
-            "a folder made by `python -m tools.train_lifter data`",
-        )
-    return takes
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -2,84 +2,58 @@
 
 from __future__ import annotations
 
-import multiprocessing
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import partial
 from pathlib import Path
+from typing import Annotated
 
 from sd2core.body.landmark_models import DEFAULT_MODEL, LandmarkModel, landmark_models
+from sd2core.errors import Sd2Error
+from sd2core.options.kinds import Count
+from sd2core.options.records import ARGUMENT
 from sd2core.processes import end_with_parent
 from sd2core.progress import Progress, silent
-from tools.motion_capture.bodies import BodyMotion, load_motions
-from tools.train_lifter.deeds import Manner
-from tools.train_lifter.takes import Take, TakeMaker
-
-_maker: TakeMaker | None = None
-_motions: list[BodyMotion] = []
+from tools.processes import finished
+from tools.train_lifter.takes import Motion, Take, TakeMaker
 
 
-def make_lifter_data(
-    folder: Path,
-    takes: int,
-    seed: int = 0,
-    *,
-    held_out: bool = False,
-    manner: Manner = "any",
-    motions: Path | None = None,
-    processes: int = 2,
-    models: Path | None = None,
-    landmark_model: LandmarkModel = DEFAULT_MODEL,
-    progress: Progress = silent,
-) -> int:
-    """Make the takes of a folder that are not there yet.
+class Data(Motion):
+    """Options of ``data``.
 
     Parameters
     ----------
-    folder : Path
-        Made when missing; ``take-NNNNN.npz`` are written whole or not at all.
-    takes : int
-        How many there shall be.
-    held_out : bool
-        With the motion that is kept for testing.
-    manner : {"any", "natural", "gestures", "forearms"}
-        How simulated people move.
-    motions : Path, optional
-        Folder made by ``python -m tools.motion_capture``: people move as those in it do. With
-        ``held_out``, as the people who are kept for calibration.
-    models : Path, optional
-        Folder of the landmark models.
-    landmark_model : {"full", "heavy"}
-        Which of them looks.
-
-    Returns
-    -------
-    int
-        How many were made.
+    out : OUT
+        folder of the takes
+    takes : N
+        how many
+    processes : P
+        at work at once
+    models : FOLDER
+        the landmark models
+    landmark_model
+        which of them looks
     """
-    landmark_models(models, model=landmark_model)
-    folder.mkdir(parents=True, exist_ok=True)
-    missing = [n for n in range(takes) if not take_path(folder, n).exists()]
-    job = partial(_make, folder, seed, held_out, manner)
-    if motions is not None:
-        job = partial(_make_captured, folder, seed, held_out)
-    done = takes - len(missing)
-    progress(done, takes)
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(
-        processes,
-        mp_context=context,
-        initializer=_start,
-        initargs=(models, landmark_model, motions, held_out),
-    ) as pool:
-        futures = [pool.submit(job, number) for number in missing]
-        try:
-            for future in as_completed(futures):
-                future.result()
-                done += 1
-                progress(done, takes)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+
+    out: Annotated[Path, ARGUMENT]
+    takes: Count = 400
+    processes: Count = 2
+    models: Path | None = None
+    landmark_model: LandmarkModel = DEFAULT_MODEL
+
+
+_maker: TakeMaker | None = None
+
+
+def make_lifter_data(options: Data, progress: Progress = silent) -> int:
+    """Make the takes of a folder that are not there yet, each whole or not at all; their number."""
+    landmark_models(options.models, model=options.landmark_model)
+    options.out.mkdir(parents=True, exist_ok=True)
+    missing = [n for n in range(options.takes) if not take_path(options.out, n).exists()]
+    done = options.takes - len(missing)
+    progress(done, options.takes)
+    work = partial(_make, options.out)
+    for _ in finished(work, missing, options.processes, _start, (options,)):
+        done += 1
+        progress(done, options.takes)
     return len(missing)
 
 
@@ -89,28 +63,25 @@ def take_path(folder: Path, number: int) -> Path:
 
 
 def load_takes(folder: Path) -> list[Take]:
-    """All takes of a folder, in the order of their numbers."""
-    return [Take.load(path) for path in sorted(folder.glob("take-*.npz"))]
+    """All takes of a folder, in the order of their numbers; Sd2Error if there are none."""
+    takes = [Take.load(path) for path in sorted(folder.glob("take-*.npz"))]
+    if not takes:
+        raise Sd2Error(
+            f"There are no takes in {folder}",
+            "a folder made by `python -m tools.train_lifter data`",
+        )
+    return takes
 
 
-def _start(
-    models: Path | None, landmark_model: LandmarkModel, motions: Path | None, held_out: bool
-) -> None:
+def _start(options: Data) -> None:
     end_with_parent()
     from sd2core.body.blazepose import PoseLandmarker
 
-    global _maker, _motions
-    _maker = TakeMaker(PoseLandmarker(landmark_models(models, model=landmark_model).landmarker))
-    if motions is not None:
-        _motions = load_motions(motions, "calibrate" if held_out else "learn")
+    global _maker
+    models = landmark_models(options.models, model=options.landmark_model)
+    _maker = TakeMaker(PoseLandmarker(models.landmarker), options)
 
 
-def _make(folder: Path, seed: int, held_out: bool, manner: Manner, number: int) -> None:
+def _make(folder: Path, number: int) -> None:
     assert _maker is not None
-    take = _maker.make((seed, int(held_out), number), held_out=held_out, manner=manner)
-    take.save(take_path(folder, number))
-
-
-def _make_captured(folder: Path, seed: int, held_out: bool, number: int) -> None:
-    assert _maker is not None
-    _maker.captured((seed, int(held_out), number), _motions).save(take_path(folder, number))
+    _maker.make(number).save(take_path(folder, number))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from sd2core.body.lifter_features import Seen
 from sd2core.body.rotations import applied
 from sd2core.body.track import LANDMARKS
-from tools.motion_capture.bodies import BodyMotion
+from sd2core.mocap.body_motion import BodyMotion
 from tools.train_lifter.deeds import Manner
 from tools.train_lifter.takes import Stage, Take
 
@@ -129,8 +129,7 @@ class Emulator:
         far = (((self._marks[drawn] - _marks(walk.places)) / self._spread) ** 2).sum(axis=1)
         donor = int(drawn[np.argmin(far)])
         size = np.float32(rng.uniform(0.3, 1.0))
-        start = 0
-        part = slice(start, start + len(walk.places))
+        part = slice(len(walk.places))
         depth = walk.places[..., 2]
         slopes = walk.apparent[..., :2] / walk.apparent[..., 2:]
         slopes = slopes + size * self._across[donor, part] / depth[..., None]
@@ -160,9 +159,9 @@ def captured_walks(
     emulator: Emulator, motions: Sequence[BodyMotion], count: int, seed: int
 ) -> list[Walk]:
     """Motions of random bodies that move as real people did, not drawn."""
-    stage, walks = Stage(), []
+    stage, walks = Stage(motions), []
     for number in range(count):
-        scene = stage.captured(np.random.default_rng((seed, _CAPTURED, number)), motions)
+        scene = stage.captured(np.random.default_rng((seed, _CAPTURED, number)))
         walks.append(emulator.walk(scene.keypoints_m, scene.bone_turns, scene.shape.stature_m))
     return walks
 

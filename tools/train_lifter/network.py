@@ -135,14 +135,17 @@ def trained(
     network: TemporalNetwork,
     steps: int,
     rate: float,
-    lost: Callable[[], tuple[torch.Tensor, Mapping[str, float]]],
+    lost: Callable[[], torch.Tensor],
     progress: Progress = silent,
-    log: Callable[[str], None] | None = None,
 ) -> Network:
     """The running mean of a network's weights after steps of AdamW.
 
-    ``lost`` draws a batch and gives its loss, and the parts of it that are told to ``log`` now and
-    then. The rate rises to ``rate`` and falls again, once.
+    Parameters
+    ----------
+    rate : float
+        Of learning, at its highest: it rises and falls again, once.
+    lost : callable
+        Draws a batch and gives its loss.
     """
     mean = copy.deepcopy(network)
     optimiser = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=0.02)
@@ -151,7 +154,7 @@ def trained(
     )
     network.train()
     for step in range(steps):
-        loss, parts = lost()
+        loss = lost()
         optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
@@ -161,8 +164,6 @@ def trained(
             for slow, fast in zip(mean.parameters(), network.parameters(), strict=True):
                 slow.lerp_(fast, 1.0 - min(0.995, step / (step + 20.0)))
         progress(step + 1, steps)
-        if log is not None and (step % 250 == 0 or step == steps - 1):
-            log(f"{step + 1}: " + ", ".join(f"{name} {value:.4f}" for name, value in parts.items()))
     mean.eval()
     return mean.exported()
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from sd2core.doppler import Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS
+from sd2core.options.records import ARGUMENT
 from sd2core.pairs.store import PairWriter
 from sd2core.pairs.store import Take as Pair
 from sd2core.pairs.summary import TakeKey
@@ -26,11 +27,9 @@ from sd2core.simulate.campaign.radar import TargetOptions, radar_target
 from sd2core.simulate.campaign.scene import RANGES_M
 from sd2core.simulate.campaign.takes import FITTED, OPTIONS, TRUE
 from tools.fitting.whole_fit import fit_body, mesh_of
-from tools.motion_capture.bodies import BodyMotion
 from tools.train_lifter.data import load_takes
-from tools.train_lifter.deeds import Manner
 from tools.train_lifter.fits import track_of
-from tools.train_lifter.takes import Scene, Stage, Take
+from tools.train_lifter.takes import Motion, Stage
 
 _BESIDE_M = 0.25
 _TRUNK = [LANDMARKS.index(f"{place}.{side}") for place in ("shoulder", "hip") for side in "LR"]
@@ -38,24 +37,29 @@ _GROUPS, _PLACEMENTS = 10, 2
 _SAME_M = 1e-3
 
 
-def make_pairs(
-    out: Path,
-    folder: Path,
-    seed: int,
-    *,
-    held_out: bool = False,
-    manner: Manner = "any",
-    motions: Sequence[BodyMotion] = (),
-    progress: Progress = silent,
-) -> int:
+class Pairs(Motion):
+    """Options of ``pairs``.
+
+    Parameters
+    ----------
+    data : DATA
+        folder of the takes
+    out : FILE
+        to write (.zarr)
+    """
+
+    data: Annotated[Path, ARGUMENT]
+    out: Path
+
+
+def make_pairs(options: Pairs, progress: Progress = silent) -> int:
     """Add a pair for every take in which the person is seen throughout; return their number.
 
-    ``folder`` holds takes that :func:`~tools.train_lifter.data.make_lifter_data` made with the same
-    arguments. Each is seen by two drawn radars, beside the camera and from anywhere around. Raises
-    Sd2Error if the takes were made with others.
+    Each take is seen by two drawn radars, beside the camera and from anywhere around. Raises
+    Sd2Error if the takes were not made with the same options.
     """
     writer = PairWriter(
-        out,
+        options.out,
         kind="simulated",
         axis=OPTIONS.axis,
         null_bins=OPTIONS.null_bins,
@@ -70,10 +74,16 @@ def make_pairs(
         parts=PARTS,
     )
     made = 0
-    takes = load_takes(folder)
-    for number, (take, scene) in enumerate(_with_scenes(takes, seed, held_out, manner, motions)):
+    takes, stage = load_takes(options.data), Stage(options.loaded())
+    for number, take in enumerate(takes):
         progress(number, len(takes))
-        subject = f"{folder.name}-{number % _GROUPS}"
+        scene = stage.drawn(options.generator(number), options, len(take.confidence))
+        if not np.allclose(scene.keypoints_m, take.keypoints_m, atol=_SAME_M):
+            raise Sd2Error(
+                f"Take {number} shows another person, or other motion",
+                "the seed, manner and motions that the takes were made with",
+            )
+        subject = f"{options.data.name}-{number % _GROUPS}"
         name = f"take-{number:05d}"
         if TakeKey(subject, name, 0) in writer.done:
             continue
@@ -81,11 +91,13 @@ def make_pairs(
         if not track.present.all():
             continue
         fitted = mesh_of(fit_body(track, take.camera, stature_m=take.stature_m), FITTED)
-        true = _true(scene, fitted)
+        body = stage.space.load(TRUE, scene.shape)
+        vertices = pose_vertices(body, scene.transforms)
+        true = MeshSequence(vertices, body.faces, fitted.timebase, source="simulated body")
         synthesizer = Synthesizer(fitted, OPTIONS, threads=1)
         chest_m = tuple(take.keypoints_m[:, _TRUNK].mean(axis=(0, 1)).tolist())
         for placement in range(_PLACEMENTS):
-            rng = np.random.default_rng([seed, int(held_out), number, placement])
+            rng = options.generator(number, placement)
             sensor = _sensor(rng, chest_m, placement)
             radar = radar_target(
                 true,
@@ -93,7 +105,7 @@ def make_pairs(
                 sensor,
                 OPTIONS.axis,
                 OPTIONS.null_bins,
-                seed=(seed, int(held_out), number, placement),
+                seed=(options.seed, int(options.held_out), number, placement),
                 options=TargetOptions().drawn(rng),
             )
             found = synthetic_map(synthesizer, sensor, limbs=True)
@@ -115,30 +127,6 @@ def make_pairs(
     return made
 
 
-def _with_scenes(
-    takes: Sequence[Take],
-    seed: int,
-    held_out: bool,
-    manner: Manner,
-    motions: Sequence[BodyMotion],
-) -> Iterator[tuple[Take, Scene]]:
-    """Takes with what they were drawn of, drawn anew."""
-    stage = Stage()
-    for number, take in enumerate(takes):
-        rng = np.random.default_rng((seed, int(held_out), number))
-        frames = len(take.confidence)
-        if motions:
-            scene = stage.captured(rng, motions, frames)
-        else:
-            scene = stage.scene(rng, held_out=held_out, manner=manner, frames=frames)
-        if not np.allclose(scene.keypoints_m, take.keypoints_m, atol=_SAME_M):
-            raise Sd2Error(
-                f"Take {number} shows another person, or other motion",
-                "the seed, manner and motions that the takes were made with",
-            )
-        yield take, scene
-
-
 def _sensor(rng: np.random.Generator, chest_m: Vector, placement: int) -> VirtualSensor:
     """One beside the camera, or anywhere around the person."""
     if placement:
@@ -152,9 +140,3 @@ def _sensor(rng: np.random.Generator, chest_m: Vector, placement: int) -> Virtua
         x_m, y_m = rng.uniform(-_BESIDE_M, _BESIDE_M, 2).tolist()
         place_m = (x_m, y_m, 0.0)
     return aimed_at(VirtualSensor(place_m), chest_m)
-
-
-def _true(scene: Scene, like: MeshSequence) -> MeshSequence:
-    body = Stage().space.load(TRUE, scene.shape)
-    vertices = pose_vertices(body, scene.transforms)
-    return MeshSequence(vertices, body.faces, like.timebase, source="simulated body")

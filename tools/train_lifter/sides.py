@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -38,7 +37,6 @@ def train_sides(
     known: TrainingArrays,
     recipe: SidesRecipe,
     progress: Progress = silent,
-    log: Callable[[str], None] | None = None,
 ) -> tuple[Network, dict[str, Any]]:
     """Train the network on takes into which mirrored stretches are put; also its provenance."""
     torch.manual_seed(recipe.seed)
@@ -51,7 +49,7 @@ def train_sides(
     )
     walks = (*known.captured, *known.walks)
 
-    def lost() -> tuple[torch.Tensor, dict[str, float]]:
+    def lost() -> torch.Tensor:
         frames = int(rng.integers(recipe.frames[0], recipe.frames[1] + 1))
         drawn = []
         for _ in range(recipe.batch):
@@ -63,14 +61,13 @@ def train_sides(
                 one = learnt[int(rng.integers(len(learnt)))]
             drawn.append(spoilt(rng, varied(rng, one, frames)))
         seen_as = np.stack([features(free_of_place(one.seen)) for one in drawn])
-        loss = torch.nn.functional.binary_cross_entropy_with_logits(
+        return torch.nn.functional.binary_cross_entropy_with_logits(
             network(torch.from_numpy(seen_as)),
             torch.from_numpy(np.stack([one.mirrored for one in drawn])),
             torch.from_numpy(np.stack([one.weight for one in drawn])),
         )
-        return loss, {"loss": float(loss.detach())}
 
-    exported = trained(network, recipe.steps, recipe.rate, lost, progress, log)
+    exported = trained(network, recipe.steps, recipe.rate, lost, progress)
     return exported, {
         "format": FORMAT,
         "version": VERSION,

@@ -23,10 +23,10 @@ from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.body.track import LANDMARKS
 from sd2core.files.atomic import atomic_write
+from sd2core.mocap.body_motion import RATE_HZ, BodyMotion, Role, load_motions
 from sd2core.mocap.driving import resample_pose
+from sd2core.options.records import OptionRecord
 from sd2core.simulate.people.motion import random_motion
-from tools.motion_capture.bodies import BodyMotion
-from tools.motion_capture.catalogue import RATE_HZ
 from tools.train_lifter.crops import (
     CropPainter,
     Furniture,
@@ -54,6 +54,37 @@ _ARMS = [
     for name in ("clavicle", "shoulder", "elbow", "pronation", "wrist")
     for side in "LR"
 ]
+
+
+class Motion(OptionRecord):
+    """How the people of takes move.
+
+    Parameters
+    ----------
+    seed : S
+        seed of all random numbers
+    held_out
+        with the kinds of motion kept for testing
+    manner
+        how people move: with elbows any way they can be, as people have them, or gesturing before
+        the camera, with arms or with forearms alone
+    motions : FOLDER
+        people move as those recorded there do (made by python -m tools.motion_capture)
+    """
+
+    seed: int = 0
+    held_out: bool = False
+    manner: Manner = "any"
+    motions: Path | None = None
+
+    def loaded(self) -> list[BodyMotion]:
+        """The recorded motions, of those who are kept for calibration if any are held out."""
+        role: Role = "calibrate" if self.held_out else "learn"
+        return [] if self.motions is None else load_motions(self.motions, role)
+
+    def generator(self, number: int, *more: int) -> np.random.Generator:
+        """Random numbers of a take, or of something of it."""
+        return np.random.default_rng((self.seed, int(self.held_out), number, *more))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,11 +156,18 @@ class Scene(NamedTuple):
 
 
 class Stage:
-    """Makes scenes."""
+    """Makes scenes, of bodies that move as real people did if there are motions."""
 
-    def __init__(self) -> None:
+    def __init__(self, motions: Sequence[BodyMotion] = ()) -> None:
+        self.motions = motions
         self.space = ShapeSpace()
         self._keypoints = KeypointSpace(self.space)
+
+    def drawn(self, rng: np.random.Generator, how: Motion, frames: int = FRAMES) -> Scene:
+        """A random scene with people who move as is said."""
+        if self.motions:
+            return self.captured(rng, frames)
+        return self.scene(rng, held_out=how.held_out, manner=how.manner, frames=frames)
 
     def scene(
         self,
@@ -157,14 +195,13 @@ class Stage:
                 continue
             return _scene(shape, keypoints, view, transforms)
 
-    def captured(
-        self, rng: np.random.Generator, motions: Sequence[BodyMotion], frames: int = FRAMES
-    ) -> Scene:
+    def captured(self, rng: np.random.Generator, frames: int = FRAMES) -> Scene:
         """A random body in a part of a real person's motion, seen from anywhere around.
 
         The motion may be reversed, and up to a quarter faster or slower than it was; a short one
         is drawn out. The arms may move as in another recording.
         """
+        motions = self.motions
         share = np.array([_weight(motion) for motion in motions])
         share /= share.sum()
         while True:
@@ -224,41 +261,19 @@ def _weight(motion: BodyMotion) -> float:
 
 
 class TakeMaker:
-    """Makes takes; each depends on its seed only."""
+    """Makes takes; each depends on how people move and on its number only."""
 
-    def __init__(self, landmarker: PoseLandmarker) -> None:
+    def __init__(self, landmarker: PoseLandmarker, how: Motion | None = None) -> None:
         self._landmarker = landmarker
-        self._stage = Stage()
+        self._how = how or Motion()
+        self._stage = Stage(self._how.loaded())
 
-    def make(
-        self,
-        seed: tuple[int, ...],
-        *,
-        held_out: bool = False,
-        manner: Manner = "any",
-        frames: int = FRAMES,
-    ) -> Take:
-        """One take of a random person.
-
-        Parameters
-        ----------
-        held_out : bool
-            With the motion that is kept for testing.
-        manner : {"any", "natural", "gestures", "forearms"}
-            How people move.
-        """
-        rng = np.random.default_rng(seed)
-        scene = self._stage.scene(rng, held_out=held_out, manner=manner, frames=frames)
-        return self._filmed(rng, scene, None)
-
-    def captured(
-        self, seed: tuple[int, ...], motions: Sequence[BodyMotion], frames: int = FRAMES
-    ) -> Take:
-        """One take of a random body in the motion of a real person, perhaps behind furniture."""
-        rng = np.random.default_rng(seed)
-        scene = self._stage.captured(rng, motions, frames)
+    def make(self, number: int, frames: int = FRAMES) -> Take:
+        """One take; people who move as real ones did are perhaps behind furniture."""
+        rng = self._how.generator(number)
+        scene = self._stage.drawn(rng, self._how, frames)
         furniture = None
-        if rng.random() < _FURNISHED:
+        if self._stage.motions and rng.random() < _FURNISHED:
             places_px = scene.camera.project(scene.keypoints_m)
             size = scene.camera.width, scene.camera.height
             furniture = random_furniture(rng, places_px, *size)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -27,8 +27,8 @@ from sd2core.body.lifter import (
 from sd2core.body.lifter_features import RATE_HZ
 from sd2core.body.network import Network
 from sd2core.body.track import LANDMARKS
+from sd2core.mocap.body_motion import BodyMotion
 from sd2core.progress import Progress, silent
-from tools.motion_capture.bodies import BodyMotion
 from tools.train_lifter.emulate import Emulator, Walk, captured_walks, random_walks
 from tools.train_lifter.examples import Batch, Example, batch, emulated, example, varied
 from tools.train_lifter.fits import repaired
@@ -119,15 +119,12 @@ def train(
     known: TrainingArrays,
     recipe: Recipe,
     progress: Progress = silent,
-    log: Callable[[str], None] | None = None,
     start: Lifter | None = None,
 ) -> Lifter:
     """Train a lifter; deterministic for the same material, recipe, machine and threads.
 
     Parameters
     ----------
-    log : callable, optional
-        Told the losses now and then.
     start : Lifter, optional
         What to go on from, whose width counts; otherwise random weights.
     """
@@ -143,11 +140,11 @@ def train(
             told.mean(axis=0), deviation, recipe.width, recipe.dilations, recipe.dropout, OUTPUTS
         )
 
-    def lost() -> tuple[torch.Tensor, dict[str, float]]:
+    def lost() -> torch.Tensor:
         drawn = _drawn(rng, learnt, known, recipe)
-        return losses(network(torch.from_numpy(drawn.told)), drawn, recipe)
+        return loss(network(torch.from_numpy(drawn.told)), drawn, recipe)
 
-    exported = trained(network, recipe.steps, recipe.rate, lost, progress, log)
+    exported = trained(network, recipe.steps, recipe.rate, lost, progress)
     return Lifter(
         exported,
         calibration(exported, [example(repaired(take)) for take in known.kept]),
@@ -179,10 +176,8 @@ def _drawn(
     return batch(chosen)
 
 
-def losses(
-    out: torch.Tensor, truth: Batch, recipe: Recipe
-) -> tuple[torch.Tensor, dict[str, float]]:
-    """The loss and its parts; spreads learn from errors, but errors not from spreads."""
+def loss(out: torch.Tensor, truth: Batch, recipe: Recipe) -> torch.Tensor:
+    """The loss; spreads learn from errors, but errors not from spreads."""
     weights = torch.from_numpy(landmark_weights())
     rest = out[..., 2 : STANDING.start].unflatten(-1, (KINDS, POINTS))
     root, depth, velocity, across, size, standing = (torch.from_numpy(part) for part in truth[1:])
@@ -196,25 +191,24 @@ def losses(
         (_huber((depth_error[:, k:] - depth_error[:, :-k]) * 30.0 / k, 1.0) * weights).mean()
         for k in (1, 2, 4)
     )
-    parts = {
-        "velocity": recipe.velocity * (_huber(velocity_error, 0.6) * weights).mean(),
-        "spread": recipe.spread * _huber(said - true, 0.3).mean(),
-        "depth": recipe.depth * (_huber(depth_error, 0.15) * weights).mean(),
-        "across": recipe.across * (_huber(across_error, 0.1) * weights[:, None]).mean(),
-        "root": recipe.root * _huber(root_error, 0.2).mean(),
-        "change": recipe.change * change,
-        "standing": _STANDING_WEIGHT
+    parts = (
+        recipe.velocity * (_huber(velocity_error, 0.6) * weights).mean(),
+        recipe.spread * _huber(said - true, 0.3).mean(),
+        recipe.depth * (_huber(depth_error, 0.15) * weights).mean(),
+        recipe.across * (_huber(across_error, 0.1) * weights[:, None]).mean(),
+        recipe.root * _huber(root_error, 0.2).mean(),
+        recipe.change * change,
+        _STANDING_WEIGHT
         * torch.nn.functional.binary_cross_entropy_with_logits(out[..., STANDING], standing),
-        "spreads": _SPREADS_WEIGHT
+        _SPREADS_WEIGHT
         * (
             _likelihood(root_error, out[..., 1]).mean()
             + _likelihood(depth_error, rest[..., 1, :]).mean()
             + _likelihood(velocity_error, rest[..., 3, :]).mean()
             + _likelihood(across_error, rest[..., 6, :, None]).mean()
         ),
-    }
-    total = torch.stack([torch.as_tensor(part) for part in parts.values()]).sum()
-    return total, {name: float(part.detach()) for name, part in parts.items()}
+    )
+    return torch.stack([torch.as_tensor(part) for part in parts]).sum()
 
 
 def landmark_weights() -> Singles:

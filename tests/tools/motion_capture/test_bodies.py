@@ -8,7 +8,8 @@ import pytest
 from sd2core.body.rig import JOINTS, KeypointSpace, Rig
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.track import LANDMARK
-from tools.motion_capture.bodies import BodyMotion, drive_bodies, load_motions
+from sd2core.mocap.body_motion import BodyMotion, load_motions
+from tools.motion_capture.bodies import drive_bodies
 from tools.motion_capture.catalogue import trials
 
 SPACE = ShapeSpace()

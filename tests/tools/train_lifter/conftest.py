@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sd2core.body.blazepose import CROP_PX, Pose, Roi
-from tools.train_lifter.takes import Take, TakeMaker
+from tools.train_lifter.takes import Motion, Take, TakeMaker
 
 
 class _PerfectLandmarker:
@@ -27,5 +27,5 @@ class _PerfectLandmarker:
 
 @pytest.fixture(scope="module")
 def takes() -> list[Take]:
-    maker = TakeMaker(_PerfectLandmarker())  # type: ignore[arg-type]
-    return [maker.make((7, 0, number), frames=24) for number in range(4)]
+    maker = TakeMaker(_PerfectLandmarker(), Motion(seed=7))  # type: ignore[arg-type]
+    return [maker.make(number, frames=24) for number in range(4)]

@@ -11,7 +11,7 @@ from sd2core.errors import Sd2Error
 from sd2core.mesh.vertex_parts import QUANTITIES
 from sd2core.pairs.store import read_pairs
 from tools.train_lifter.data import take_path
-from tools.train_lifter.pairs import make_pairs
+from tools.train_lifter.pairs import Pairs, make_pairs
 from tools.train_lifter.takes import Take
 
 
@@ -20,8 +20,9 @@ def test_a_take_gives_two_pairs_once(takes: list[Take], tmp_path: Path) -> None:
     folder.mkdir()
     for number, take in enumerate(takes[:2]):
         take.save(take_path(folder, number))
-    assert make_pairs(out, folder, 7) == 2
-    assert make_pairs(out, folder, 7) == 0
+    options = Pairs(data=folder, out=out, seed=7)
+    assert make_pairs(options) == 2
+    assert make_pairs(options) == 0
     pairs = read_pairs(out)
     assert pairs.kind == "simulated"
     assert [(take.subject, take.placement) for take in pairs.takes] == [
@@ -36,4 +37,4 @@ def test_a_take_gives_two_pairs_once(takes: list[Take], tmp_path: Path) -> None:
         assert (moves[:, QUANTITIES.index("sigma_mps")] > 0).all()
     assert np.abs(pairs.takes[0].sensor_position_m).max() <= 0.25
     with pytest.raises(Sd2Error, match="Take 0 shows another person"):
-        make_pairs(tmp_path / "other.zarr", folder, 8)
+        make_pairs(Pairs(data=folder, out=tmp_path / "other.zarr", seed=8))
