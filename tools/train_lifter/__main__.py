@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Annotated
 
 from sd2core.body.lifter import Lifter
-from sd2core.cli.output import print_json, progress_bar
+from sd2core.cli.output import progress_bar
+from sd2core.files.tables import numbers_table
 from sd2core.mocap.body_motion import load_motions
 from sd2core.options.kinds import Count
 from sd2core.options.records import ARGUMENT, ARGUMENTS, OptionRecord, Place
-from sd2core.options.shared import Json
 from tools.command_line import Commands, run_tool
 from tools.train_lifter.data import Data, load_takes, make_lifter_data
 from tools.train_lifter.fits import fit_law, repaired
@@ -62,7 +62,7 @@ class Train(Learning):
     start: Path | None = None
 
 
-class Score(Json):
+class Score(OptionRecord):
     """Options of ``score``.
 
     Parameters
@@ -138,31 +138,13 @@ def _score(options: Score) -> None:
     taken for right.
     """
     takes = load_takes(options.data)
-    found, sides = score(Lifter.load(options.lifter), takes), score_sides(takes)
-    if options.json:
-        joints = {joint: values._asdict() for joint, values in found.joints.items()}
-        likeness = [row._asdict() for row in found.likeness]
-        print_json(
-            {"joints": joints, "likeness": likeness, "still_mps": found.still_mps}
-            | {"sides": {part: values._asdict() for part, values in sides.items()}}
-        )
-        return
-    print("joint       error  of true  corr.  kept  within 1σ  edge  depth")
-    for joint, one in found.joints.items():
-        print(
-            f"{joint:10s}{one.rms_mps:7.3f}{one.truth_mps:9.3f}{one.correlation:7.2f}"
-            f"{one.kept:6.2f}{one.covered:10.2f}{one.edge:7.2f}{one.depth_cm:6.1f} cm"
-        )
-    print("frames up to    depth  landmark model's  velocity  landmark model's")
-    for row in found.likeness:
-        print(
-            f"{row.distance:12.2f}{row.depth_cm:6.1f} cm{row.own_depth_cm:15.1f} cm"
-            f"{row.velocity_mps:6.2f} m/s{row.own_velocity_mps:14.2f} m/s"
-        )
-    print("mirrored         found  undone   put in  undone")
-    for part, shares in sides.items():
-        print(f"{part:15s}" + "".join(f"{100.0 * share:6.1f} %" for share in shares))
-    print(f"Nothing moves: {found.still_mps:.3f} m/s over all landmarks")
+    joints, likeness, still_mps = score(Lifter.load(options.lifter), takes)
+    sides = [["mirrored", "found", "undone", "put in", "undone"]]
+    for part, shares in score_sides(takes).items():
+        sides.append([part, *(f"{100.0 * share:.1f} %" for share in shares)])
+    for rows in (joints, likeness, sides):
+        print("\n".join(numbers_table(rows)))
+    print(f"Nothing moves: {still_mps:.3f} m/s over all landmarks")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,75 +31,19 @@ GROUPS = {
 }
 
 
-class JointScore(NamedTuple):
-    """Errors of one joint, both sides, over all frames in which it is inside the picture.
+Table = list[list[str]]
 
-    Parameters
-    ----------
-    rms_mps : float
-        Error of the velocity along z.
-    truth_mps : float
-        Root mean square of the true velocity.
-    kept : float
-        Share of the true velocity that is found where it is above 0.5 m/s (slope of
-        the found on the true).
-    covered : float
-        Share of errors within one standard deviation as stated.
-    edge : float
-        Error in the first and last five frames over that in the middle.
-    depth_cm : float
-        Error of the depth behind the body's centre.
+
+def score(lifter: Lifter, takes: Sequence[Take]) -> tuple[Table, Table, float]:
+    """Compare what a lifter says of takes with their truth, in tables and one number.
+
+    The first table is of the velocity of joints inside the picture: its error, the share of fast
+    motion that is found (slope of the found on the true), the share of errors within the stated
+    deviation, the error in the first and last five frames over that in the middle, and the error of
+    the depth behind the body's centre. The second is of the half of the frames that is most like
+    those learnt from, the 40 % after it, and the rest. The number is the root mean square of all
+    velocities, m/s, in takes in which nothing moves; NaN where there is none.
     """
-
-    rms_mps: float
-    truth_mps: float
-    correlation: float
-    kept: float
-    covered: float
-    edge: float
-    depth_cm: float
-
-
-class LikenessScore(NamedTuple):
-    """Errors of all landmarks in frames that are about as like those learnt from.
-
-    Parameters
-    ----------
-    distance : float
-        Largest mean square of the features, in their standard deviations.
-    depth_cm, own_depth_cm : float
-        Error of the depth behind the body's centre: of the lifter, and of the landmark model.
-    velocity_mps, own_velocity_mps : float
-        Error of its rate; the lifter's with its error of the centre's.
-    """
-
-    distance: float
-    depth_cm: float
-    own_depth_cm: float
-    velocity_mps: float
-    own_velocity_mps: float
-
-
-class Score(NamedTuple):
-    """Errors of a lifter.
-
-    Parameters
-    ----------
-    likeness : list of LikenessScore
-        Of the half of the frames that is most like those learnt from, the 40 % after it, and the
-        tenth that is least like them.
-    still_mps : float
-        Root mean square of all velocities found in takes in which nothing moves;
-        NaN where there is no such take.
-    """
-
-    joints: dict[str, JointScore]
-    likeness: list[LikenessScore]
-    still_mps: float
-
-
-def score(lifter: Lifter, takes: Sequence[Take]) -> Score:
-    """Compare what a lifter says of takes with their truth."""
     errors, truths, depths, sigmas, inside, frames = [], [], [], [], [], []
     still, distances, squares = [], [], []
     for take in takes:
@@ -121,26 +64,22 @@ def score(lifter: Lifter, takes: Sequence[Take]) -> Score:
     error, truth, depth, sigma, seen, away = (
         np.concatenate(parts) for parts in (errors, truths, depths, sigmas, inside, frames)
     )
-    joints = {}
+    joints = [["joint", "error m/s", "of true", "corr.", "kept", "within 1σ", "edge", "depth cm"]]
     for joint, rows in GROUPS.items():
         chosen = seen[:, rows]
         e, v = error[:, rows][chosen], truth[:, rows][chosen]
         if not len(e):
             continue
         fast = np.abs(v) > _FAST_MPS
+        kept = 1.0 + float((e[fast] * v[fast]).sum() / max((v[fast] ** 2).sum(), 1e-12))
+        within = float((np.abs(e) <= sigma[:, rows][chosen]).mean())
         from_edge = np.broadcast_to(away[:, None], chosen.shape)[chosen]
-        joints[joint] = JointScore(
-            rms(e),
-            rms(v),
-            correlation(v, v + e),
-            1.0 + float((e[fast] * v[fast]).sum() / max((v[fast] ** 2).sum(), 1e-12)),
-            float((np.abs(e) <= sigma[:, rows][chosen]).mean()),
-            rms(e[from_edge < _EDGE]) / max(rms(e[from_edge >= _MIDDLE]), 1e-12),
-            100.0 * rms(depth[:, rows][chosen]),
-        )
+        edge = rms(e[from_edge < _EDGE]) / max(rms(e[from_edge >= _MIDDLE]), 1e-12)
+        shares = (f"{value:.2f}" for value in (correlation(v, v + e), kept, within, edge))
+        depth_cm = f"{100.0 * rms(depth[:, rows][chosen]):.1f}"
+        joints.append([joint, f"{rms(e):.3f}", f"{rms(v):.3f}", *shares, depth_cm])
     still_mps = rms(np.concatenate(still)) if still else float("nan")
-    likeness = _by_likeness(np.concatenate(distances), np.concatenate(squares))
-    return Score(joints, likeness, still_mps)
+    return joints, _by_likeness(np.concatenate(distances), np.concatenate(squares)), still_mps
 
 
 def _distance(lifter: Lifter, right: Batch) -> Floats:
@@ -151,7 +90,7 @@ def _distance(lifter: Lifter, right: Batch) -> Floats:
 
 
 def _squares(one: Example, right: Batch, said: Floats, stature_m: float) -> Floats:
-    """Mean squares of errors over the landmarks, (T, 4), in the order of LikenessScore.
+    """Mean squares of errors over the landmarks, (T, 4), in the order of :func:`_by_likeness`.
 
     Of the lifter's depth and of the landmark model's own, and of their rates, in statures.
     """
@@ -163,14 +102,15 @@ def _squares(one: Example, right: Batch, said: Floats, stature_m: float) -> Floa
     return np.stack([np.square(each).mean(axis=1) for each in off], axis=1)
 
 
-def _by_likeness(distance: Floats, squares: Floats) -> list[LikenessScore]:
+def _by_likeness(distance: Floats, squares: Floats) -> Table:
     """Whether the landmark model's own depth is better where the features are unusual."""
-    edges = np.quantile(distance, [0.0, *_LIKE, 1.0])
-    rows = []
-    for low, high in pairwise(edges):
+    headings = ["depth cm", "landmark model's", "velocity m/s", "landmark model's"]
+    rows = [["frames up to", *headings]]
+    for low, high in pairwise(np.quantile(distance, [0.0, *_LIKE, 1.0])):
         chosen = (distance >= low) & (distance <= high)
-        depth_m, own_m, mps, own_mps = np.sqrt(squares[chosen].mean(axis=0)).tolist()
-        rows.append(LikenessScore(float(high), 100 * depth_m, 100 * own_m, mps, own_mps))
+        depth_m, own_m, *mps = np.sqrt(squares[chosen].mean(axis=0)).tolist()
+        depths_cm = (f"{100.0 * value:.1f}" for value in (depth_m, own_m))
+        rows.append([f"{high:.2f}", *depths_cm, *(f"{value:.2f}" for value in mps)])
     return rows
 
 
