@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from collections.abc import Iterator
 
 from PySide6.QtCore import QPoint, QTimer
@@ -17,12 +16,11 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from sd2app.palette import palette_for
 from sd2app.session.layouts import LAYOUTS
-from sd2app.shell.app import wait_until_settled
 from sd2app.shell.window import MainWindow
 from sd2app.widgets.pages import InnerPages
 from sd2core.files.resources import resource_path
 from tools.documentation.places import REPOSITORY
-from tools.documentation.windows import LIMIT_S, opened, wait_for
+from tools.documentation.windows import opened, settle, wait_for
 
 FOLDER = REPOSITORY / "build" / "contact-sheet"
 DIALOGS = (
@@ -34,11 +32,11 @@ DIALOGS = (
 SHEET_PX, CAPTION_PX, GAP_PX = 2800, 24, 16
 
 
-def pictures(application: QApplication, window: MainWindow) -> Iterator[tuple[str, QPixmap]]:
+def pictures(window: MainWindow) -> Iterator[tuple[str, QPixmap]]:
     """The start page, the layouts, the panels page by page, the dialogs and the tour."""
 
     def grab(widget: QWidget) -> QPixmap:
-        wait_until_settled(application, window, LIMIT_S)
+        settle(window)
         return widget.grab()
 
     yield "start", grab(window)
@@ -54,18 +52,18 @@ def pictures(application: QApplication, window: MainWindow) -> Iterator[tuple[st
                 inner.turn_to(page)
             yield f"{panel} {page}".rstrip(), grab(window.side)
     window.fold_side(True)
-    yield from ((name, dialog(application, window, name)) for name in DIALOGS)
+    yield from ((name, dialog(window, name)) for name in DIALOGS)
     window.action("tour").trigger()
     yield "tour", grab(window)
 
 
-def dialog(application: QApplication, window: MainWindow, action: str) -> QPixmap:
+def dialog(window: MainWindow, action: str) -> QPixmap:
     """What an action shows, closed again."""
     taken: list[QPixmap] = []
 
     def take() -> None:
-        wait_until_settled(application, window, LIMIT_S)
-        shown = [one for one in application.topLevelWidgets() if one.isVisible() and one != window]
+        settle(window)
+        shown = [one for one in QApplication.topLevelWidgets() if one.isVisible() and one != window]
         for one in shown:
             taken.append(one.grab())
             one.close()
@@ -74,7 +72,7 @@ def dialog(application: QApplication, window: MainWindow, action: str) -> QPixma
 
     QTimer.singleShot(2000, take)  # which is as long as figures are drawn
     window.action(action).trigger()
-    wait_for(application, lambda: bool(taken), LIMIT_S)
+    wait_for(lambda: bool(taken))
     return taken[0]
 
 
@@ -107,21 +105,17 @@ def main() -> None:
     parser.add_argument("--theme", choices=("light", "dark"), action="append")
     arguments = parser.parse_args()
     os.environ["QT_SCALE_FACTOR"] = str(arguments.scale)
-    application = QApplication(sys.argv[:1])
     width, height = map(int, arguments.size.split("x"))
     for theme in arguments.theme or ("light", "dark"):
         folder = FOLDER / f"{arguments.size} x{arguments.scale:g} {theme}"
         folder.mkdir(parents=True, exist_ok=True)
-        window = opened(application, [])
-        window.resize(width, height)
-        window.features.program.set_dark(theme == "dark")
-        shown = list(pictures(application, window))
+        with opened([], size=(width, height)) as window:
+            window.features.program.set_dark(theme == "dark")
+            shown = list(pictures(window))
         for name, picture in shown:
             picture.save(str(folder / f"{name}.png"))
         sheet(shown, theme == "dark").save(f"{folder}.png")
         print(f"{folder}.png")
-        window.session.document.undo_stack.setClean()
-        window.close()
 
 
 if __name__ == "__main__":

@@ -7,17 +7,14 @@ writes ``docs/images/dragging.gif``.
 from __future__ import annotations
 
 import math
-import sys
-import time
 
 from PIL import Image
 from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QApplication
 
 from sd2app.shell.window import MainWindow
 from sd2core.files.resources import resource_path
 from tools.documentation.places import IMAGES, REPOSITORY
-from tools.documentation.windows import opened
+from tools.documentation.windows import opened, wait_for
 
 SIZE = (1280, 720)
 SHOWN_WIDTH = 880
@@ -34,20 +31,18 @@ LIMIT_BYTES = 3_000_000
 
 def main() -> None:
     """Drag, draw, write."""
-    application = QApplication(sys.argv[:1])
-    window = opened(application, [resource_path("swipes.sd2")])
-    window.resize(*SIZE)
-    window.session.playback.seek(1.9)
-    _run(application, 1.0)
-    edits = window.session.edits
-    pictures = [_picture(window)]
-    edits.begin_sensor_drag()
-    for step in range(1, STEPS + 1):
-        turned = math.sin(math.pi * step / STEPS) ** 2
-        edits.drag_sensor((2.2 * turned, -0.25 * turned, 1.3 * turned))
-        _run(application, FOLLOWS_S)
-        pictures.append(_picture(window))
-    edits.end_sensor_drag()
+    with opened([resource_path("swipes.sd2")], size=SIZE) as window:
+        window.session.playback.seek(1.9)
+        _run(1.0)
+        edits = window.session.edits
+        pictures = [_picture(window)]
+        edits.begin_sensor_drag()
+        for step in range(1, STEPS + 1):
+            turned = math.sin(math.pi * step / STEPS) ** 2
+            edits.drag_sensor((2.2 * turned, -0.25 * turned, 1.3 * turned))
+            _run(FOLLOWS_S)
+            pictures.append(_picture(window))
+        edits.end_sensor_drag()
     palette = pictures[STEPS // 2].quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE)
     frames = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures]
     path = IMAGES / "dragging.gif"
@@ -56,18 +51,13 @@ def main() -> None:
     )
     size = path.stat().st_size
     print(f"{path.relative_to(REPOSITORY)}: {size / 1e6:.1f} MB")
-    window.session.document.undo_stack.setClean()
-    window.close()
     if size > LIMIT_BYTES:
         raise SystemExit(f"It may have {LIMIT_BYTES / 1e6:.0f} MB: take fewer STEPS or COLOURS")
 
 
-def _run(application: QApplication, seconds: float) -> None:
+def _run(seconds: float) -> None:
     """Let the window work for a while."""
-    until = time.monotonic() + seconds
-    while time.monotonic() < until:
-        application.processEvents()
-        time.sleep(0.005)
+    wait_for(lambda: False, seconds)
 
 
 def _picture(window: MainWindow) -> Image.Image:

@@ -15,24 +15,29 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtWidgets import QApplication
-
 from sd2app.fit.request import FitRequest
 from sd2app.live.setup import ListenRequest
 from sd2app.mesh_comparison.window import ComparisonWindow
-from sd2app.shell.app import wait_until_settled
 from sd2app.shell.window import MainWindow
+from sd2core.figures.strip import plot_strip
+from sd2core.figures.strip_source import StripOptions, StripSource
+from sd2core.files.figure_files import save_figure
 from sd2core.files.resources import resource_path
 from sd2core.mesh.walls import Wall
 from sd2core.placements.placements import PlacementCloud
+from sd2core.recording.recording import open_recording
 from sd2core.sensor import Beam, VirtualSensor, aimed_at
 from sd2core.simulate.two_people import two_people
 from tools.documentation.learning_screenshots import learning
 from tools.documentation.places import IMAGES, REPOSITORY, SHARED
-from tools.documentation.windows import LIMIT_S, opened, save, wait_for
+from tools.documentation.windows import application, opened, save, settle, wait_for
 
 SIZES = (1280, 720), (1600, 1000), (2560, 1440)
 """Windows of small, usual and large screens."""
+
+SAMPLE = resource_path("swipes.sd2")
+TALL = (1280, 960)
+WALK = SHARED / "video" / "walk.mkv"
 
 
 def sample(window: MainWindow) -> None:
@@ -60,13 +65,13 @@ def far_in_the_dark(window: MainWindow) -> None:
 
 def accuracy(window: MainWindow) -> None:
     """The Accuracy panel on the sample, measured, for a tolerance of 2 %."""
-    window.resize(1280, 960)
-    window.session.playback.seek(1.9)
+    window.resize(*TALL)
+    sample(window)
     window.features.accuracy.model.set_tolerance(0.02)
     window.features.accuracy.measure()
 
 
-def room(application: QApplication) -> None:
+def room() -> None:
     """Two people, a table and a wall on the right, with a beam that follows Anna."""
     with tempfile.TemporaryDirectory() as folder:
         recording = two_people(Path(folder) / "two.sd2")
@@ -79,12 +84,12 @@ def room(application: QApplication) -> None:
             window.session.playback.seek(4.0)
             window.features.scene.view.set_view("overview")
 
-        take(application, "room.png", [recording.folder], arrange)
+        take("room.png", [recording.folder], arrange)
 
 
 def labels(window: MainWindow) -> None:
     """The spans of the sample as a table beside the maps, one of them selected."""
-    window.resize(1280, 960)
+    window.resize(*TALL)
     window.bring_up("Labels", "Spans")
     span = window.features.labels.model.labels.spans[2]
     window.features.labels.edits.go_to(span)
@@ -92,7 +97,7 @@ def labels(window: MainWindow) -> None:
 
 def placements(window: MainWindow) -> None:
     """A cloud of sensors planned around the sample's body."""
-    window.resize(1280, 960)
+    window.resize(*TALL)
     window.session.playback.seek(1.9)
     window.bring_up("Sensor", "Placements")
     window.session.edits.plan_placements(
@@ -100,19 +105,14 @@ def placements(window: MainWindow) -> None:
     )
 
 
-def real(application: QApplication) -> None:
+def real() -> None:
     """A real person with the body that `sd2 fit` makes of the video."""
     with tempfile.TemporaryDirectory() as folder:
-        video, mesh = SHARED / "video" / "walk.mkv", Path(folder) / "walk.zarr"
+        video, mesh = WALK, Path(folder) / "walk.zarr"
         if fitted(video, mesh):
-            take(application, "real-video.png", [video, mesh], walking)
+            take("real-video.png", [video, mesh], sample)
         else:
             print("real-video.png is left as it is: the fit failed", file=sys.stderr)
-
-
-def walking(window: MainWindow) -> None:
-    """A moment in which both arms are seen."""
-    window.session.playback.seek(1.9)
 
 
 def fitted(video: Path, mesh: Path) -> bool:
@@ -123,130 +123,108 @@ def fitted(video: Path, mesh: Path) -> bool:
 
 def strip() -> None:
     """Frames of a swipe of the sample above its mesh."""
-    from sd2core.figures.strip import plot_strip
-    from sd2core.figures.strip_source import StripOptions, StripSource
-    from sd2core.recording.recording import open_recording
-
-    recording = open_recording(resource_path("swipes.sd2"))
+    recording = open_recording(SAMPLE)
     with recording.open_video() as video:
         source = StripSource.of(recording, video, recording.load_mesh(), recording.title)
         figure = plot_strip(source, range(48, 84, 5), StripOptions(v_max_mps=1.5))
-    figure.savefig(IMAGES / "strip.png", dpi=110)
+    save_figure(figure, IMAGES / "strip.png", pixels_per_inch=110)
     print((IMAGES / "strip.png").relative_to(REPOSITORY))
 
 
-def fitting(application: QApplication) -> None:
+def fitting() -> None:
     """A body being fitted to a real video, with what has been found so far."""
     with tempfile.TemporaryDirectory() as folder:
-        video = Path(shutil.copy(SHARED / "video" / "walk.mkv", folder))
-        window = opened(application, [video])
-        fit = window.features.fit.model
-        fit.start(FitRequest(video, video.with_suffix(".sd2")))
+        video = Path(shutil.copy(WALK, folder))
+        with opened([video]) as window:
+            fit = window.features.fit.model
+            fit.start(FitRequest(video, video.with_suffix(".sd2")))
 
-        def far_enough() -> bool:
-            progress = fit.progress
-            second_pass = progress is not None and progress.stage == "refine"
-            return not fit.busy or (second_pass and progress.done > 0.55 * progress.total)
+            def far_enough() -> bool:
+                progress = fit.progress
+                second_pass = progress is not None and progress.stage == "refine"
+                return not fit.busy or (second_pass and progress.done > 0.55 * progress.total)
 
-        wait_for(application, far_enough)
-        if fit.busy:
-            save(window, "fitting.png")
-        else:
-            print(f"fitting.png is left as it is: {fit.text}", file=sys.stderr)
-        fit.cancel()
-        wait_for(application, lambda: not fit.busy)
-        window.close()
+            wait_for(far_enough)
+            if fit.busy:
+                save(window, "fitting.png")
+            else:
+                print(f"fitting.png is left as it is: {fit.text}", file=sys.stderr)
+            fit.cancel()
+            wait_for(lambda: not fit.busy)
 
 
-def comparison(application: QApplication) -> None:
+def comparison() -> None:
     """The sample's mesh, which is the truth, beside the body that is fitted to its video."""
-    sample_folder = resource_path("swipes.sd2")
     with tempfile.TemporaryDirectory() as folder:
         mesh = Path(folder) / "sd2 fit.zarr"
-        if not fitted(sample_folder / "video.mp4", mesh):
+        if not fitted(SAMPLE / "video.mp4", mesh):
             print("comparison.png is left as it is: the fit failed", file=sys.stderr)
             return
-        window = opened(application, [sample_folder])
-        window.session.playback.seek(2.1)
-        window.features.mesh_comparison.compare(mesh)
-        compared = window.findChild(ComparisonWindow)
-        wait_for(application, lambda: compared.model.comparison is not None)
-        wait_until_settled(application, window, LIMIT_S)
-        save(compared, "comparison.png")
-        window.close()
+        with opened([SAMPLE]) as window:
+            window.session.playback.seek(2.1)
+            window.features.mesh_comparison.compare(mesh)
+            compared = window.findChild(ComparisonWindow)
+            wait_for(lambda: compared.model.comparison is not None)
+            settle(window)
+            save(compared, "comparison.png")
 
 
-def listening(application: QApplication) -> None:
+def listening() -> None:
     """The sample's radar replayed, with more than ten seconds heard."""
-    with tempfile.TemporaryDirectory() as folder:
-        window = opened(application, [resource_path("swipes.sd2")])
+    with tempfile.TemporaryDirectory() as folder, opened([SAMPLE]) as window:
         live = window.features.live.model
-        request = ListenRequest(Path(folder) / "walk.sd2", replay=resource_path("swipes.sd2"))
-        live.start(request)
-        wait_for(application, lambda: live.counts.recorded >= 330)
+        live.start(ListenRequest(Path(folder) / "walk.sd2", replay=SAMPLE))
+        wait_for(lambda: live.counts.recorded >= 330)
         save(window, "listening.png")
         live.stop()
-        wait_for(application, lambda: not live.busy)
-        wait_until_settled(application, window, LIMIT_S)
-        window.close()
+        wait_for(lambda: not live.busy)
+        settle(window)
 
 
-def sizes(application: QApplication) -> None:
+def sizes() -> None:
     """The window as small, usual and large screens show it, light and dark."""
-    window = opened(application, [resource_path("swipes.sd2")])
-    sample(window)
-    for width, height in SIZES:
-        window.resize(width, height)
-        for theme in ("light", "dark"):
-            window.features.program.set_dark(theme == "dark")
-            if not wait_until_settled(application, window, LIMIT_S):
-                sys.exit(f"The window was still busy after {LIMIT_S:.0f} s")
-            save(window, f"window-{width}x{height}-{theme}.png")
-    window.session.document.undo_stack.setClean()
-    window.close()
+    with opened([SAMPLE]) as window:
+        sample(window)
+        for width, height in SIZES:
+            window.resize(width, height)
+            for theme in ("light", "dark"):
+                window.features.program.set_dark(theme == "dark")
+                settle(window)
+                save(window, f"window-{width}x{height}-{theme}.png")
 
 
-def take(
-    application: QApplication, name: str, paths: list[Path], arrange: Callable[[MainWindow], None]
-) -> None:
+def take(name: str, paths: list[Path], arrange: Callable[[MainWindow], None]) -> None:
     """Open, wait, arrange, wait, write."""
-    window = opened(application, paths)
-    arrange(window)
-    if not wait_until_settled(application, window, LIMIT_S):
-        sys.exit(f"{name}: the window was still busy after {LIMIT_S:.0f} s")
-    if window.messages.text:
-        print(f"{name}: {window.messages.text}", file=sys.stderr)
-        window.messages.dismiss()
-        application.processEvents()
-    save(window, name)
-    window.session.document.undo_stack.setClean()
-    window.close()
-    application.processEvents()
+    with opened(paths) as window:
+        arrange(window)
+        settle(window)
+        if window.messages.text:
+            print(f"{name}: {window.messages.text}", file=sys.stderr)
+            window.messages.dismiss()
+            application().processEvents()
+        save(window, name)
 
 
 def main() -> None:
     """Take them all."""
-    application = QApplication(sys.argv[:1])
     IMAGES.mkdir(exist_ok=True)
     strip()
-    swipes = [resource_path("swipes.sd2")]
-    take(application, "sample.png", swipes, sample)
-    take(application, "beside.png", swipes, beside)
-    take(application, "dark.png", swipes, far_in_the_dark)
-    take(application, "accuracy.png", swipes, accuracy)
-    room(application)
-    sizes(application)
-    take(application, "labels.png", swipes, labels)
-    take(application, "placements.png", swipes, placements)
-    comparison(application)
-    listening(application)
-    learning(application)
-    walk = SHARED / "video" / "walk.mkv"
-    if walk.exists():
-        real(application)
-        fitting(application)
+    take("sample.png", [SAMPLE], sample)
+    take("beside.png", [SAMPLE], beside)
+    take("dark.png", [SAMPLE], far_in_the_dark)
+    take("accuracy.png", [SAMPLE], accuracy)
+    room()
+    sizes()
+    take("labels.png", [SAMPLE], labels)
+    take("placements.png", [SAMPLE], placements)
+    comparison()
+    listening()
+    learning()
+    if WALK.exists():
+        real()
+        fitting()
     else:
-        print(f"real-video.png is left as it is: there is no {walk}", file=sys.stderr)
+        print(f"real-video.png is left as it is: there is no {WALK}", file=sys.stderr)
 
 
 if __name__ == "__main__":
