@@ -13,7 +13,7 @@ from sd2core.body.network import Network
 from sd2core.body.sides import FORMAT, SIDED_PARTS, VERSION, free_of_place
 from sd2core.progress import Progress, silent
 from tools.train_lifter.examples import emulated
-from tools.train_lifter.network import TemporalNetwork, trained
+from tools.train_lifter.network import TemporalNetwork, random_network, trained
 from tools.train_lifter.swaps import Known, known_of, spoilt, varied
 from tools.train_lifter.training import TrainingArrays
 
@@ -43,10 +43,8 @@ def train_sides(
     rng = np.random.default_rng(recipe.seed)
     learnt = [known_of(take) for take in known.takes]
     told = np.concatenate([features(free_of_place(one.seen)) for one in learnt[:200]])
-    spread = np.maximum(told.std(axis=0), 1e-3)
-    network = TemporalNetwork(
-        told.mean(axis=0), spread, recipe.width, recipe.dilations, recipe.dropout, len(SIDED_PARTS)
-    )
+    begun = random_network(told, recipe.width, recipe.dilations, len(SIDED_PARTS))
+    network = TemporalNetwork(begun, recipe.dropout)
     walks = (*known.captured, *known.walks)
 
     def lost() -> torch.Tensor:

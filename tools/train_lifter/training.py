@@ -32,7 +32,12 @@ from sd2core.progress import Progress, silent
 from tools.train_lifter.emulate import Emulator, Walk, captured_walks, random_walks
 from tools.train_lifter.examples import Batch, Example, batch, emulated, example, varied
 from tools.train_lifter.fits import repaired
-from tools.train_lifter.network import TemporalNetwork, save_network, trained
+from tools.train_lifter.network import (
+    TemporalNetwork,
+    random_network,
+    save_network,
+    trained,
+)
 from tools.train_lifter.takes import Take
 
 Singles = NDArray[np.float32]
@@ -132,13 +137,11 @@ def train(
     rng = np.random.default_rng(recipe.seed)
     learnt = [example(take) for take in known.takes]
     if start is not None:
-        network = TemporalNetwork.going_on(start.network, recipe.dropout)
+        begun = start.network
     else:
         told = np.concatenate([batch([one]).told[0] for one in learnt[:200]])
-        deviation = np.maximum(told.std(axis=0), 1e-3)
-        network = TemporalNetwork(
-            told.mean(axis=0), deviation, recipe.width, recipe.dilations, recipe.dropout, OUTPUTS
-        )
+        begun = random_network(told, recipe.width, recipe.dilations, OUTPUTS)
+    network = TemporalNetwork(begun, recipe.dropout)
 
     def lost() -> torch.Tensor:
         drawn = _drawn(rng, learnt, known, recipe)

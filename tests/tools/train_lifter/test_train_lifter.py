@@ -211,16 +211,13 @@ def _swaying() -> BodyMotion:
 
 def test_numpy_and_torch_agree() -> None:
     torch = pytest.importorskip("torch")
-    from tools.train_lifter.network import TemporalNetwork
+    from tools.train_lifter.network import TemporalNetwork, random_network
 
     torch.manual_seed(1)
     rng = np.random.default_rng(1)
-    spread = rng.uniform(0.5, 2.0, 9).astype(np.float32)
-    network = TemporalNetwork(
-        rng.standard_normal(9).astype(np.float32), spread, 16, (1, 3, 2), 0.5, 7
-    )
+    told = rng.normal(1.0, 2.0, (50, 9)).astype(np.float32)
+    network = TemporalNetwork(random_network(told, 16, (1, 3, 2), 7), 0.5)
     network.eval()
-    told = rng.standard_normal((50, 9)).astype(np.float32)
     with torch.no_grad():
         wanted = network(torch.from_numpy(told)[None])[0].numpy()
     np.testing.assert_allclose(network.exported().whole(told), wanted, atol=1e-5)
