@@ -48,110 +48,84 @@ class Journey:
     columns: tuple[str, ...]
     stations: tuple[Station, ...]
 
+    @classmethod
+    def read(cls, text: str) -> Journey:
+        """A journey from the names of its columns and a line per station."""
+        columns, *lines = text.strip().splitlines()
+        stations = []
+        for line in lines:
+            column, file, rest = line.removeprefix("- ").split(" ", 2)
+            function, words = rest.split(": ", 1)
+            stations.append(Station(int(column), file, function, words, line.startswith("- ")))
+        return cls(tuple(columns.split(", ")), tuple(stations))
 
+
+# A line per station: column, file, function, and what it does; a dash before those that are not
+# called by the one before, but when the user asks for it.
 JOURNEYS = {
-    "array": Journey(
-        ("video", "body", "mesh", "map"),
-        (
-            Station(0, "sd2core/io/video.py", "VideoReader.read", "a picture, (height, width, 3)"),
-            Station(
-                1, "sd2core/body/person_tracker.py", "PersonTracker.step", "where the person is"
-            ),
-            Station(1, "sd2core/body/refining.py", "Refiner.stretch", "landmarks, (T, 33, 2)"),
-            Station(
-                1,
-                "sd2core/body/landmark_repair.py",
-                "repair_landmarks",
-                "sides, spikes, gaps put right",
-            ),
-            Station(1, "sd2core/body/lifter.py", "LiftedInParts.part", "depth of each landmark"),
-            Station(1, "sd2core/body/solve.py", "solve", "angles of the joints, by Gauss–Newton"),
-            Station(2, "sd2core/body/fitted.py", "FittedMotion.mesh", "vertices, (T, V, 3)"),
-            Station(2, "sd2core/io/mesh.py", "save_mesh", "a file, which load_mesh reads"),
-            Station(
-                3,
-                "sd2core/doppler/prepared.py",
-                "PreparedMesh.counted",
-                "moving vertices of a block",
-            ),
-            Station(
-                3, "sd2core/doppler/masks.py", "VisibilityMasks.for_rows", "which the sensor sees"
-            ),
-            Station(
-                3,
-                "sd2core/doppler/frame_counts.py",
-                "FrameCounts.count",
-                "velocities counted in bins",
-            ),
-            Station(3, "sd2core/doppler/smoothing.py", "smooth", "DopplerMap.values, (bins, T)"),
-        ),
-    ),
-    "label": Journey(
-        ("window", "models", "library", "disk"),
-        (
-            Station(0, "sd2app/labels/actions.py", "LabelActions", "the action that has the key"),
-            Station(0, "sd2app/labels/feature.py", "LabelsFeature._use_label", "mark, or relabel?"),
-            Station(
-                1, "sd2app/labels/marking.py", "LabelMarking.mark", "begins; pressed again, ends"
-            ),
-            Station(1, "sd2app/labels/edits.py", "LabelEdits.apply", "refused where read-only"),
-            Station(2, "sd2core/labels/edits.py", "create", "old labels to new ones, pure"),
-            Station(1, "sd2app/labels/edits.py", "LabelEdits.make", "a step of the undo history"),
-            Station(1, "sd2app/labels/autosave.py", "LabelAutosave.keep", "before it is shown"),
-            Station(3, "sd2core/labels/journal.py", "Journal.write", "a record, flushed to disk"),
-            Station(
-                1, "sd2app/labels/model.py", "LabelsModel.set_labels", "changed: all views redraw"
-            ),
-            Station(0, "sd2app/shell/files.py", "FilesFeature.save", "Ctrl+S", later=True),
-            Station(
-                2, "sd2core/recording/recording.py", "Recording.save", "unless changed by others"
-            ),
-            Station(3, "sd2core/labels/files.py", "write_labels", "the file of labels, replaced"),
-        ),
-    ),
-    "drag": Journey(
-        ("views", "models", "background thread", "library"),
-        (
-            Station(0, "sd2app/scene/view.py", "SceneView.eventFilter", "the pointer moves"),
-            Station(0, "sd2app/scene/navigation.py", "Navigator.move", "pixels to metres"),
-            Station(1, "sd2app/session/undo.py", "Edits.drag_sensor", "one step in the end"),
-            Station(1, "sd2app/session/sensor.py", "SensorModel.set_sensor", "changed"),
-            Station(1, "sd2app/maps/model.py", "SynthesisModel._follow", "asks for a sweep"),
-            Station(1, "sd2app/maps/quality.py", "preview_quality", "as exact as time allows"),
-            Station(1, "sd2app/background/latest.py", "LatestRunner.submit", "the newest wins"),
-            Station(2, "sd2app/maps/quality.py", "compute_part", "frames of a map"),
-            Station(
-                3,
-                "sd2core/doppler/synthesizer.py",
-                "Synthesizer.stretch",
-                "as in the first picture",
-            ),
-            Station(
-                1, "sd2app/maps/partial_map.py", "PartialMap.take", "back in the window's thread"
-            ),
-            Station(1, "sd2app/session/maps.py", "MapModel.set_map", "changed"),
-            Station(0, "sd2app/maps/heatmap.py", "HeatmapView.paint", "pixels"),
-        ),
-    ),
-    "training": Journey(
-        ("command", "data", "network", "disk"),
-        (
-            Station(0, "sd2core/cli/train.py", "_train", "options to settings"),
-            Station(3, "sd2core/train/start.py", "begin", "a locked folder, config.toml"),
-            Station(0, "sd2core/train/run.py", "carry_out", "all that follows"),
-            Station(1, "sd2core/train/data.py", "prepare", "pairs to segments, people split"),
-            Station(1, "sd2core/denoise/scaling.py", "Scaling.fitted", "energies to levels"),
-            Station(2, "sd2core/denoise/registry.py", "build", "the network by its name"),
-            Station(
-                2, "sd2core/train/denoiser_loop.py", "DenoiserLoop.step", "a batch: loss, descent"
-            ),
-            Station(2, "sd2core/train/learner.py", "Learner.forward", "errors of the answers"),
-            Station(2, "sd2core/denoise/s4_layer.py", "S4Layer.forward", "(B, L, H) to (B, L, H)"),
-            Station(1, "sd2core/train/validate.py", "validate", "epoch's end: people kept out"),
-            Station(3, "sd2core/denoise/files.py", "save_model", "best.safetensors"),
-            Station(3, "sd2core/train/checkpoint.py", "write_checkpoint", "last.safetensors"),
-        ),
-    ),
+    name: Journey.read(text)
+    for name, text in {
+        "array": """
+video, body, mesh, map
+0 sd2core/io/video.py VideoReader.read: a picture, (height, width, 3)
+1 sd2core/body/person_tracker.py PersonTracker.step: where the person is
+1 sd2core/body/refining.py Refiner.stretch: landmarks, (T, 33, 2)
+1 sd2core/body/landmark_repair.py repair_landmarks: sides, spikes, gaps put right
+1 sd2core/body/lifter.py LiftedInParts.part: depth of each landmark
+1 sd2core/body/solve.py solve: angles of the joints, by Gauss–Newton
+2 sd2core/body/fitted.py FittedMotion.mesh: vertices, (T, V, 3)
+2 sd2core/io/mesh.py save_mesh: a file, which load_mesh reads
+3 sd2core/doppler/prepared.py PreparedMesh.counted: moving vertices of a block
+3 sd2core/doppler/masks.py VisibilityMasks.for_rows: which the sensor sees
+3 sd2core/doppler/frame_counts.py FrameCounts.count: velocities counted in bins
+3 sd2core/doppler/smoothing.py smooth: DopplerMap.values, (bins, T)
+""",
+        "label": """
+window, models, library, disk
+0 sd2app/labels/actions.py LabelActions: the action that has the key
+0 sd2app/labels/feature.py LabelsFeature._use_label: mark, or relabel?
+1 sd2app/labels/marking.py LabelMarking.mark: begins; pressed again, ends
+1 sd2app/labels/edits.py LabelEdits.apply: refused where read-only
+2 sd2core/labels/edits.py create: old labels to new ones, pure
+1 sd2app/labels/edits.py LabelEdits.make: a step of the undo history
+1 sd2app/labels/autosave.py LabelAutosave.keep: before it is shown
+3 sd2core/labels/journal.py Journal.write: a record, flushed to disk
+1 sd2app/labels/model.py LabelsModel.set_labels: changed: all views redraw
+- 0 sd2app/shell/files.py FilesFeature.save: Ctrl+S
+2 sd2core/recording/recording.py Recording.save: unless changed by others
+3 sd2core/labels/files.py write_labels: the file of labels, replaced
+""",
+        "drag": """
+views, models, background thread, library
+0 sd2app/scene/view.py SceneView.eventFilter: the pointer moves
+0 sd2app/scene/navigation.py Navigator.move: pixels to metres
+1 sd2app/session/undo.py Edits.drag_sensor: one step in the end
+1 sd2app/session/sensor.py SensorModel.set_sensor: changed
+1 sd2app/maps/model.py SynthesisModel._follow: asks for a sweep
+1 sd2app/maps/quality.py preview_quality: as exact as time allows
+1 sd2app/background/latest.py LatestRunner.submit: the newest wins
+2 sd2app/maps/quality.py compute_part: frames of a map
+3 sd2core/doppler/synthesizer.py Synthesizer.stretch: as in the first picture
+1 sd2app/maps/partial_map.py PartialMap.take: back in the window's thread
+1 sd2app/session/maps.py MapModel.set_map: changed
+0 sd2app/maps/heatmap.py HeatmapView.paint: pixels
+""",
+        "training": """
+command, data, network, disk
+0 sd2core/cli/train.py _train: options to settings
+3 sd2core/train/start.py begin: a locked folder, config.toml
+0 sd2core/train/run.py carry_out: all that follows
+1 sd2core/train/data.py prepare: pairs to segments, people split
+1 sd2core/denoise/scaling.py Scaling.fitted: energies to levels
+2 sd2core/denoise/registry.py build: the network by its name
+2 sd2core/train/denoiser_loop.py DenoiserLoop.step: a batch: loss, descent
+2 sd2core/train/learner.py Learner.forward: errors of the answers
+2 sd2core/denoise/s4_layer.py S4Layer.forward: (B, L, H) to (B, L, H)
+1 sd2core/train/validate.py validate: epoch's end: people kept out
+3 sd2core/denoise/files.py save_model: best.safetensors
+3 sd2core/train/checkpoint.py write_checkpoint: last.safetensors
+""",
+    }.items()
 }
 
 
