@@ -24,13 +24,14 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 import sd2core as sd2
+from sd2core.compare.measures import line_of_sight_velocity
 from sd2core.figures.colours import velocity_colours
 from sd2core.files.figure_files import save_figure
 from sd2core.files.resources import resource_path
 from sd2core.fmcw.options import SignalOptions
 from sd2core.fmcw.simulation import simulate_radar
-from sd2core.scattering.velocity import radial_velocity
 from tools.documentation.places import IMAGES, REPOSITORY
+from tools.fitting.measures import speed_mps
 
 CONCEPTS = IMAGES / "concepts"
 SAMPLE = resource_path("swipes.sd2")
@@ -48,7 +49,8 @@ def what_doppler_shows() -> Figure:
         "A, in front": sd2.VirtualSensor(),
         "B, to the side": sd2.VirtualSensor(position_m=(2.0, 0.0, 1.6)),
     }
-    frame = _fastest_frame(mesh)
+    speeds_mps = speed_mps(np.asarray(mesh.vertices[:], float), mesh.times_s)
+    frame = int(speeds_mps[1:-1].max(axis=1).argmax()) + 1
     before, now, after = mesh.vertices[frame - 1 : frame + 2].astype(float)
     velocity_mps = (after - before) / (mesh.times_s[frame + 1] - mesh.times_s[frame - 1])
     hand = np.argsort(np.linalg.norm(velocity_mps, axis=1))[-60:]
@@ -336,22 +338,8 @@ def _swipe() -> sd2.MeshSequence:
 
 
 def _towards_camera(mesh: sd2.MeshSequence) -> Array:
-    """Radial velocity of every vertex towards the camera, by central differences, (T, V)."""
-    vertices_m = np.asarray(mesh.vertices[:], float).transpose(0, 2, 1)
-    frames = np.arange(len(vertices_m))
-    before, after = np.maximum(frames - 1, 0), np.minimum(frames + 1, frames[-1])
-    duration_s = (mesh.times_s[after] - mesh.times_s[before])[:, None]
-    velocity_mps: Array = radial_velocity(
-        vertices_m[before], vertices_m[after], np.zeros(3), duration_s
-    )
-    return velocity_mps
-
-
-def _fastest_frame(mesh: sd2.MeshSequence) -> int:
-    """Frame with the largest speed of any vertex in space."""
-    vertices_m = np.asarray(mesh.vertices[:], float)
-    steps_m = np.linalg.norm(vertices_m[2:] - vertices_m[:-2], axis=2)
-    return int((steps_m.max(axis=1) / (mesh.times_s[2:] - mesh.times_s[:-2])).argmax()) + 1
+    """Velocity of every vertex towards the camera, (T, V)."""
+    return line_of_sight_velocity(np.asarray(mesh.vertices[:], float), mesh.times_s)
 
 
 def _swinging_plate(peak_mps: float) -> tuple[sd2.MeshSequence, Array]:

@@ -108,7 +108,7 @@ class People(OptionRecord):
 def _people(options: People) -> None:
     """Measure how well two people who meet are told apart, and what that costs their fits.
 
-    Prints the table of docs/fitting.md.
+    Prints a table; docs/how-to/correct-a-body-fit.md tells what it says.
     """
     chosen = [
         (meeting, clothes)

@@ -18,6 +18,7 @@ from sd2core.body.fit_people import fit_people
 from sd2core.body.fit_video import FitChoices, FitReport, fit_video
 from sd2core.body.landmark_models import landmark_models
 from sd2core.body.people import SeenPerson, find_people
+from sd2core.files.tables import markdown_table
 from sd2core.io.mesh import load_mesh
 from sd2core.io.video import open_video
 from sd2core.io.video_writing import write_video
@@ -191,19 +192,16 @@ def _film(path: Path, actors: Sequence[Actor]) -> Path:
 
 def as_table(outcomes: Sequence[Outcome]) -> str:
     """Markdown table of outcomes."""
-    lines = [
-        "| two people | apart | clothes | right | found | place off by, alone | velocity, alone |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    away = ["place off by, alone", "velocity, alone"]
+    rows = [["two people", "apart", "clothes", "right", "found", *away]]
     for each in outcomes:
-        place, rate = (
+        pairs = (
             "" if pair is None else f"{pair[0]:.3f}, {pair[1]:.3f} {unit}"
             for pair, unit in ((each.place_m, "m"), (each.velocity_mps, "m/s"))
         )
-        lines.append(
-            f"| {each.meeting.name} | {each.meeting.apart_m:g} m | {each.clothes} |"
-            f" {100.0 * each.right:.1f} % | {each.seen} of {each.looks} | {place} | {rate} |"
-        )
+        met = [each.meeting.name, f"{each.meeting.apart_m:g} m", each.clothes]
+        rows.append([*met, f"{100.0 * each.right:.1f} %", f"{each.seen} of {each.looks}", *pairs])
     seen, wrong = (sum(getattr(each, name) for each in outcomes) for name in ("seen", "wrong"))
-    lines.append(f"| all | | | {100.0 * (1.0 - wrong / max(seen, 1)):.2f} % | {seen} | | |")
-    return "\n".join(lines)
+    right = f"{100.0 * (1.0 - wrong / max(seen, 1)):.2f} %"
+    rows.append(["all", "", "", right, str(seen), "", ""])
+    return "\n".join(markdown_table(rows, len(rows[0])))

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from sd2core.body.parts import body_parts
 from sd2core.mesh.sequence import MeshSequence
@@ -17,9 +18,8 @@ def wandering(generator: np.random.Generator, frames: int, count: int) -> Floats
     """Noise (T, count, 3) of standard deviation 1 that is forgotten within half a second."""
     share = np.exp(-1.0 / 15.0)
     noise = generator.normal(size=(frames, count, 3))
-    for frame in range(1, frames):
-        noise[frame] = share * noise[frame - 1] + np.sqrt(1.0 - share**2) * noise[frame]
-    return noise
+    noise[1:] *= np.sqrt(1.0 - share**2)
+    return np.asarray(lfilter([1.0], [1.0, -share], noise, axis=0))
 
 
 def jittering(mesh: MeshSequence, white_m: float, lasting_m: float, seed: int) -> MeshSequence:
