@@ -13,12 +13,13 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates, uniform_filter
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.model import Body, vertex_normals
 from sd2core.figures.surface import Frame, find_visible_triangles
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.numerics.compiled import compiled, worker_count, workers
+from sd2core.numerics.compiled import worker_count, workers
 from sd2core.numerics.raster import rasterise
 from sd2core.progress import Progress, silent
 from tools.build_sample.clothing import Clothes, linear, srgb
@@ -28,6 +29,8 @@ Singles = NDArray[np.float32]
 _CAPTION_MARGIN_PX = 12
 _OVERSAMPLING = 2
 _LIGHT_PIXELS = 640
+_SHADOW_SLACK_M = 0.012
+"""So that a surface does not shade itself."""
 
 
 @dataclass(frozen=True)
@@ -133,9 +136,7 @@ class Renderer:
             _unit(direction).astype(np.float32)
             for direction in (studio.key, studio.fill, studio.rim)
         )
-        lit = np.empty(len(positions), np.float32)
-        points, nearness = self._seen_by_light(positions)
-        lit_share(points, nearness, shadow, self._offsets, 0.012, lit)
+        lit = lit_share(*self._seen_by_light(positions), shadow, self._offsets)
         # Wrapped diffuse light: softer than Lambert at the terminator, as skin and cloth are.
         key_light = np.clip((normals @ key + 0.15) / 1.15, 0.0, None) * lit
         fill_light = np.clip((normals @ fill + 0.3) / 1.3, 0.0, None)
@@ -185,16 +186,10 @@ class Renderer:
 
     def background(self, shadow: Singles) -> Singles:
         """The empty room with the person's soft shadow, linear (H, W, 3)."""
-        silhouette = (shadow > -1e8).astype(np.float32)
+        silhouette = (shadow > -1e8).astype(np.float64)
         for _ in range(3):
-            silhouette = _box_blurred(silhouette, 19)
-        r, c, fr, fc = self._room_in_light
-        shade = (
-            silhouette[r, c] * (1 - fr) * (1 - fc)
-            + silhouette[r + 1, c] * fr * (1 - fc)
-            + silhouette[r, c + 1] * (1 - fr) * fc
-            + silhouette[r + 1, c + 1] * fr * fc
-        )
+            silhouette = uniform_filter(silhouette, 19, mode="constant")
+        shade = map_coordinates(silhouette, self._room_in_light, order=1).astype(np.float32)
         picture: Singles = self._room * (1.0 - 0.42 * shade[..., None])
         return picture
 
@@ -239,12 +234,11 @@ class Renderer:
         return colours.astype(np.float32)
 
     @cached_property
-    def _room_in_light(self) -> tuple[NDArray[np.intp], NDArray[np.intp], Singles, Singles]:
-        """Coordinates of each pixel of the room in the light's image."""
+    def _room_in_light(self) -> Singles:
+        """Row and column of each pixel of the room in the light's image, (2, H, W)."""
         points, _ = self._seen_by_light(self._room_points)
         points = np.clip(points - 0.5, 0, _LIGHT_PIXELS - 1.001)
-        c, r = points[..., 0].astype(np.intp), points[..., 1].astype(np.intp)
-        return r, c, points[..., 1] - r, points[..., 0] - c
+        return np.asarray(points[..., ::-1].transpose(2, 0, 1))
 
     @cached_property
     def _dither(self) -> Singles:
@@ -285,18 +279,6 @@ def _shrunk(picture: Singles, factor: int) -> Singles:
     return total
 
 
-def _box_blurred(picture: Singles, size: int) -> Singles:
-    for axis in (0, 1):
-        padding = [(0, 0), (0, 0)]
-        padding[axis] = (size // 2 + 1, size // 2)
-        total = np.cumsum(np.pad(picture, padding), axis=axis, dtype=np.float64)
-        length = picture.shape[axis]
-        upper = np.take(total, np.arange(size, size + length), axis=axis)
-        lower = np.take(total, np.arange(length), axis=axis)
-        picture = ((upper - lower) / size).astype(np.float32)
-    return picture
-
-
 def _disc(count: int, radius: float) -> Singles:
     """Evenly spread points in a disc (a sunflower)."""
     k = np.arange(count) + 0.5
@@ -319,36 +301,23 @@ def stamp(picture: Singles, word: str) -> Singles:
     return np.asarray(stamped + 0.85 * share * (1.0 - stamped))
 
 
-@compiled
-def lit_share(
-    points: NDArray[np.float32],
-    nearness: NDArray[np.float32],
-    buffer: NDArray[np.float32],
-    offsets: NDArray[np.float32],
-    bias: float,
-    share: NDArray[np.float32],
-) -> None:
-    """Share of a light that reaches points, from the light's depth buffer.
+def lit_share(points: Singles, nearness: Singles, buffer: Singles, offsets: Singles) -> Singles:
+    """Share of a light that reaches points, (N,), from the light's depth buffer.
 
     Parameters
     ----------
     points : float32 array, shape (N, 2)
         In pixels of the light's image.
     nearness : float32 array, shape (N,)
+    buffer : float32 array, shape (P, P)
     offsets : float32 array, shape (S, 2)
         Where around each point to look, in pixels: the light's softness.
-    bias : float
-        Slack in nearness, so that a surface does not shade itself.
-    share : float32 array, shape (N,)
-        Filled.
     """
-    height, width = buffer.shape
-    for n in range(points.shape[0]):
-        lit = 0
-        for s in range(offsets.shape[0]):
-            c = int(points[n, 0] + offsets[s, 0])
-            r = int(points[n, 1] + offsets[s, 1])
-            outside = r < 0 or c < 0 or r >= height or c >= width
-            if outside or nearness[n] + bias >= buffer[r, c]:
-                lit += 1
-        share[n] = np.float32(lit) / np.float32(offsets.shape[0])
+    lit = np.zeros(len(points), np.float32)
+    nearer = nearness + np.float64(_SHADOW_SLACK_M)
+    for offset in offsets:
+        columns, rows = (points + offset).astype(np.intp).T
+        inside = (np.minimum(rows, columns) >= 0) & (np.maximum(rows, columns) < len(buffer))
+        lit[~inside] += 1.0
+        lit[inside] += nearer[inside] >= buffer[rows[inside], columns[inside]]
+    return lit / np.float32(len(offsets))

@@ -85,8 +85,7 @@ def test_light_is_kept_out_by_what_is_nearer_to_it() -> None:
     buffer[:, 5:] = 1.0
     points = np.array([[2.5, 5.5], [7.5, 5.5], [7.5, 5.5], [99.0, 5.0]], np.float32)
     nearness = np.array([0.0, 0.0, 1.0, 0.0], np.float32)
-    share = np.empty(4, np.float32)
-    lit_share(points, nearness, buffer, np.zeros((1, 2), np.float32), 0.01, share)
+    share = lit_share(points, nearness, buffer, np.zeros((1, 2), np.float32))
     assert share.tolist() == [1.0, 0.0, 1.0, 1.0]
 
 
