@@ -11,14 +11,9 @@ from tools.build_sample.render import Studio
 
 @dataclass(frozen=True)
 class Person:
-    """One simulated person.
+    """One simulated person."""
 
-    Parameters
-    ----------
-    gender, muscle, weight, proportions : float
-        From 0 to 1; see :data:`sd2core.body.shape.PHENOTYPES`.
-    """
-
+    # From 0 to 1; see PHENOTYPES of sd2core.body.shape.
     gender: float
     muscle: float
     weight: float

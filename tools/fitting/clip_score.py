@@ -85,91 +85,56 @@ def pooled(pairs: list[Pair]) -> Pair:
 
 @dataclass(frozen=True, eq=False)
 class StrokeScore:
-    """One gesture.
-
-    Parameters
-    ----------
-    velocity : dict of str to Pair
-        Of each of :data:`LIMBS`, along the line of sight.
-    tempo : dict of str to Pair
-        The same limbs' speed in space.
-    map_difference, map_total : float
-        Sums over the gesture's frames of the absolute difference of the smoothed
-        Doppler maps, and of the true one.
-    """
+    """One gesture."""
 
     stroke: GestureSpan
     speed: str
-    velocity: dict[str, Pair]
-    tempo: dict[str, Pair]
+    velocity: dict[str, Pair]  # of each of LIMBS, along the line of sight
+    tempo: dict[str, Pair]  # the same limbs' speed in space
+    # Sums over the gesture's frames of the absolute difference of the smoothed Doppler maps, and of
+    # the true one.
     map_difference: float
     map_total: float
 
 
 @dataclass(frozen=True, eq=False)
 class ClipScore:
-    """One clip.
-
-    Parameters
-    ----------
-    distance_m : float64 array, shape (J,)
-        Mean distance of each joint.
-    aligned_m : float64 array, shape (J,)
-        The same from the pelvis.
-    quiet : bool
-        True if no joint moves along the line of sight; then all joints count as moving.
-    velocity : Pair
-        Of all frames and the joints that move, along the line of sight, each (n,).
-    spread : float
-        Of these joints' velocities within a frame, fitted over true (root mean square over frames);
-        NaN of quiet clips.
-    vertex_velocity_mps : float
-        RMS over all vertices and frames of the velocity along the line of sight: for
-        who stands still, all of it is false.
-    map_l1, plain_l1 : float
-        Of the whole clip: of the fit's expected map, and of the plain one.
-    stated_l1 : float or None
-        What the fit's map states of it.
-    edge, middle : float64 array, shape (2,)
-        RMS error of the first and last frames, and of those between: velocity along
-        the line of sight (m/s), then place (m), of all joints.
-    overlap : float
-        Mean intersection over union of the fitted and the true silhouette.
-    sigma : Pair or None
-        ``fitted`` holds standard deviations that the fit gave for the velocities of
-        joints, ``truth`` their actual errors, each (n, J); NaN where a joint does not move.
-    seconds_per_frame, processor_s_per_frame : float or None
-        That the fit took by the clock, and on all cores together.
-    unseen : Pair
-        Of the joints of limbs while they are out of the picture, (n,): velocity along the
-        line of sight against the joint that they hang on.
-    unseen_sigma : Pair or None
-        Of the same joints, as ``sigma``.
-    residual_m : float or None
-        Mean distance of joints from the landmarks that were found, in the picture at
-        the joint's depth.
-    """
+    """One clip."""
 
     name: str
     kind: str
     strokes: tuple[StrokeScore, ...]
-    distance_m: Floats
-    aligned_m: Floats
-    quiet: bool
-    velocity: Pair
+    distance_m: Floats  # (J,), mean distance of each joint
+    aligned_m: Floats  # (J,), the same from the pelvis
+    quiet: bool  # true if no joint moves along the line of sight; then all joints count as moving
+    velocity: Pair  # of all frames and the joints that move, along the line of sight, each (n,)
+    # Of these joints' velocities within a frame, fitted over true (root mean square over frames);
+    # NaN of quiet clips.
     spread: float
+    # RMS over all vertices and frames of the velocity along the line of sight: for who stands
+    # still, all of it is false.
     vertex_velocity_mps: float
+    # Of the whole clip: of the fit's expected map, and of the plain one.
     map_l1: float
     plain_l1: float
-    stated_l1: float | None
+    stated_l1: float | None  # what the fit's map states of it
+    # (2,), RMS error of the first and last frames, and of those between: velocity along the line of
+    # sight (m/s), then place (m), of all joints.
     edge: Floats
     middle: Floats
-    overlap: float
+    overlap: float  # mean intersection over union of the fitted and the true silhouette
+    # Of the joints of limbs while they are out of the picture, (n,): velocity along the line of
+    # sight against the joint that they hang on.
     unseen: Pair
+    # ``fitted`` holds standard deviations that the fit gave for the velocities of joints, ``truth``
+    # their actual errors, each (n, J); NaN where a joint does not move.
     sigma: Pair | None = None
-    unseen_sigma: Pair | None = None
+    unseen_sigma: Pair | None = None  # of the same joints, as ``sigma``
+    # That the fit took by the clock, and on all cores together.
     seconds_per_frame: float | None = None
     processor_s_per_frame: float | None = None
+    # Mean distance of joints from the landmarks that were found, in the picture at the joint's
+    # depth.
     residual_m: float | None = None
 
 

@@ -53,27 +53,17 @@ _ALL = (*_HORIZONTAL, *_VERTICAL)
 
 @dataclass(frozen=True)
 class Clip:
-    """One clip: who does what, where, seen from where.
-
-    Parameters
-    ----------
-    person, room : str
-        Of :data:`tools.fitting.cast.PEOPLE` and ``ROOMS``.
-    distance_m, across_m : float
-        Where the person stands (at first), seen from the camera.
-    camera_m : float
-        Height of the camera over the floor; it looks level.
-    seed : int
-        Of the strokes and of the camera's noise.
-    """
+    """One clip: who does what, where, seen from where."""
 
     name: str
     action: Action
+    # Of PEOPLE and ROOMS of tools.fitting.cast.
     person: str
     room: str
+    # distance_m and across_m: where the person stands (at first), seen from the camera.
     distance_m: float
-    camera_m: float
-    seed: int
+    camera_m: float  # height of the camera over the floor; it looks level
+    seed: int  # of the strokes and of the camera's noise
     across_m: float = 0.0
 
 
@@ -234,18 +224,11 @@ def make_fit_truth(
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A clip before it is drawn.
-
-    Parameters
-    ----------
-    shape : BodyShape
-    times_s : float64 array, shape (T,)
-    transforms : float64 array, shape (T, B, 3, 4)
-        Of :meth:`sd2core.body.model.Skeleton.transforms`, in the camera frame.
-    """
+    """A clip before it is drawn."""
 
     shape: BodyShape
-    times_s: NDArray[np.float64]
+    times_s: NDArray[np.float64]  # (T,)
+    # (T, B, 3, 4), of the bones, in the camera frame.
     transforms: NDArray[np.float64]
     skeleton: Skeleton
     spans: tuple[GestureSpan, ...]

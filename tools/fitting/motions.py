@@ -48,42 +48,24 @@ _PRESENTED = ArmPose(-8.0, -14.0, 0.36, 0.6, 1.0, 0.1, 30.0, -20.0, 2.0)
 
 @dataclass(frozen=True)
 class Action:
-    """Action of one simulated person.
-
-    Parameters
-    ----------
-    kind : {"swipes", "still", "walk", "turn", "captured"}
-    swipes : tuple of {"left-to-right", "right-to-left", "up-to-down", "down-to-up"}
-        One after another, as the camera sees them.
-    speed : {"slow", "normal", "fast"}
-        See :data:`STROKE_S`.
-    hand : {"L", "R"}
-    raised : bool
-        For ``still``: the hand is held in front instead of hanging.
-    walk_m, walk_mps : float
-        For ``walk``: how far towards the camera, and how fast in between.
-    turn_deg : tuple of float
-        For ``turn``: where to, one after another; 0 faces the camera.
-    trial : str
-        For ``captured``: the recording of a real person's motion.
-    start_s, length_s : float
-        For ``captured``: the part of it that is shown.
-    heading_deg : float
-        For ``captured``: 0 shows the person's front at the start, 180 the back; positive turns
-        the person's left side to the camera.
-    """
+    """Action of one simulated person."""
 
     kind: Kind
-    swipes: tuple[Swipe, ...] = ()
-    speed: Speed = "normal"
+    swipes: tuple[Swipe, ...] = ()  # one after another, as the camera sees them
+    speed: Speed = "normal"  # see STROKE_S
     hand: Literal["L", "R"] = "R"
-    raised: bool = False
+    raised: bool = False  # for ``still``: the hand is held in front instead of hanging
+    # For ``walk``: how far towards the camera, and how fast in between.
     walk_m: float = 2.5
     walk_mps: float = 1.05
+    # For ``turn``: where to, one after another; 0 faces the camera.
     turn_deg: tuple[float, ...] = (75.0, -65.0)
-    trial: str = ""
+    trial: str = ""  # for ``captured``: the recording of a real person's motion
+    # For ``captured``: the part of it that is shown.
     start_s: float = 0.0
     length_s: float = 4.0
+    # For ``captured``: 0 shows the person's front at the start, 180 the back; positive turns the
+    # person's left side to the camera.
     heading_deg: float = 0.0
 
 

@@ -24,20 +24,14 @@ _BOTH = tuple(name for name in LANDMARKS if name in JOINTS)
 
 @dataclass(frozen=True)
 class RealScore:
-    """One video.
-
-    Parameters
-    ----------
-    overlap : float
-        Mean over frames of the intersection over union of the mesh's silhouette and
-        the landmark model's mask, within the picture.
-    reprojection_px, reprojection_m : float
-        Mean distance of joints from their landmarks in the picture, and the same at
-        the joint's depth. Landmarks that are hidden or outside the picture are left out.
-    """
+    """One video."""
 
     name: str
+    # Mean over frames of the intersection over union of the mesh's silhouette and the landmark
+    # model's mask, within the picture.
     overlap: float
+    # Mean distance of joints from their landmarks in the picture, and the same at the joint's
+    # depth. Landmarks that are hidden or outside the picture are left out.
     reprojection_px: float
     reprojection_m: float
 

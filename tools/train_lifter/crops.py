@@ -24,26 +24,15 @@ _GAMMA_STEPS = 1024
 
 @dataclass(frozen=True)
 class Look:
-    """Light, lens and noise of one take.
+    """Light, lens and noise of one take."""
 
-    Parameters
-    ----------
-    lights : tuple of (direction, strength)
-        Towards the lights, camera frame, unit vectors.
-    blur_px : float
-        Standard deviation in the picture's pixels.
-    noise : float
-        Standard deviation in grey levels.
-    quality : int
-        Of JPEG, for the blocks of a compressed video; 0 for none.
-    """
-
+    # Towards the lights, camera frame, unit vectors.
     lights: tuple[tuple[tuple[float, float, float], float], ...]
     ambient: float
     exposure: float
-    blur_px: float
-    noise: float
-    quality: int
+    blur_px: float  # standard deviation in the picture's pixels
+    noise: float  # standard deviation in grey levels
+    quality: int  # of JPEG, for the blocks of a compressed video; 0 for none
 
 
 def random_look(rng: np.random.Generator) -> Look:

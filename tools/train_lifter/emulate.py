@@ -69,18 +69,10 @@ def _across(take: Take) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """Motion before a camera, without pictures of it.
+    """Motion before a camera, without pictures of it."""
 
-    Parameters
-    ----------
-    places : float32 array, shape (T, 33, 3)
-        Of the keypoints in statures, camera frame.
-    apparent : float32 array, shape (T, 33, 3)
-        Of the landmarks.
-    """
-
-    places: Singles
-    apparent: Singles
+    places: Singles  # (T, 33, 3), of the keypoints in statures, camera frame
+    apparent: Singles  # (T, 33, 3), of the landmarks
 
 
 class Emulator:

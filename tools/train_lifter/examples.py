@@ -25,47 +25,24 @@ _OTHER_FEET = [FEET.index(MIRRORED[row]) for row in FEET]
 
 
 class Example(NamedTuple):
-    """One take as the lifter sees it, and its truth.
+    """One take as the lifter sees it, and its truth."""
 
-    Parameters
-    ----------
-    seen : Seen
-        (T, ...).
-    places : float32 array, shape (T, 33, 3)
-        Keypoints in statures, in the camera frame.
-    standing : float32 array, shape (T, 4)
-        1 where a foot stands still, otherwise 0.
-    """
-
-    seen: Seen
-    places: Singles
-    standing: Singles
+    seen: Seen  # (T, ...)
+    places: Singles  # (T, 33, 3), keypoints in statures, in the camera frame
+    standing: Singles  # (T, 4), 1 where a foot stands still, otherwise 0
 
 
 class Batch(NamedTuple):
-    """Input and wanted output of the network.
+    """Input and wanted output of the network."""
 
-    Parameters
-    ----------
-    told : float32 array, shape (N, T, C)
-    root : float32 array, shape (N, T)
-        Logarithm of the centre's depth times the typical size.
-    depth, velocity : float32 array, shape (N, T, 33)
-    across : float32 array, shape (N, T, 33, 2)
-        Keypoints beside the landmarks in the picture, in typical apparent sizes.
-    size : float32 array, shape (N,)
-        The typical apparent size.
-    standing : float32 array, shape (N, T, 4)
-        See :class:`Example`.
-    """
-
-    told: Singles
-    root: Singles
-    depth: Singles
-    velocity: Singles
+    told: Singles  # (N, T, C)
+    root: Singles  # (N, T), logarithm of the centre's depth times the typical size
+    depth: Singles  # (N, T, 33)
+    velocity: Singles  # (N, T, 33)
+    # (N, T, 33, 2), keypoints beside the landmarks in the picture, in typical apparent sizes.
     across: Singles
-    size: Singles
-    standing: Singles
+    size: Singles  # (N,), the typical apparent size
+    standing: Singles  # (N, T, 4), see Example
 
 
 def example(take: Take) -> Example:

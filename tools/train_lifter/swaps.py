@@ -38,19 +38,11 @@ _FOCAL_PX = 600.0
 
 
 class Known(NamedTuple):
-    """What the landmark model saw, and which parts it mirrored.
-
-    Parameters
-    ----------
-    mirrored : float32 array, shape (T, 3)
-        1 where a part is mirrored.
-    weight : float32 array, shape (T, 3)
-        From 0, where both sides are in one place, to 1.
-    """
+    """What the landmark model saw, and which parts it mirrored."""
 
     seen: Seen
-    mirrored: Singles
-    weight: Singles
+    mirrored: Singles  # (T, 3), 1 where a part is mirrored
+    weight: Singles  # (T, 3), from 0, where both sides are in one place, to 1
 
 
 def known_of(take: Take) -> Known:
@@ -136,18 +128,12 @@ def _put_in(rng: np.random.Generator, one: Known) -> Known:
 
 
 class SidesScore(NamedTuple):
-    """Share of the frames in which a part is on the wrong side, where that is clear.
+    """Share of the frames in which a part is on the wrong side, where that is clear."""
 
-    Parameters
-    ----------
-    before, after : float
-        As the landmark model gives it, and when swaps are undone.
-    before_put_in, after_put_in : float
-        The same, with more mirrored stretches put in.
-    """
-
+    # As the landmark model gives it, and when swaps are undone.
     before: float
     after: float
+    # The same, with more mirrored stretches put in.
     before_put_in: float
     after_put_in: float
 

@@ -89,31 +89,19 @@ class Motion(OptionRecord):
 
 @dataclass(frozen=True, eq=False)
 class Take:
-    """One take.
-
-    Parameters
-    ----------
-    keypoints_m : float32 array, shape (T, 33, 3)
-        Truth, camera frame.
-    bone_turns : float32 array, shape (T, 33, 3, 3)
-        Turn against rest of the bone that each keypoint is fixed to.
-    image_px : float32 array, shape (T, 33, 2)
-    depth_px : float32 array, shape (T, 33)
-    world_m : float32 array, shape (T, 33, 3)
-    visibility : float32 array, shape (T, 33)
-    confidence : float32 array, shape (T,)
-        What the network says; see :class:`~sd2core.body.track.LandmarkTrack`.
-    """
+    """One take."""
 
     camera: PinholeCamera
     stature_m: float
-    keypoints_m: NDArray[np.float32]
+    keypoints_m: NDArray[np.float32]  # (T, 33, 3), truth, camera frame
+    # (T, 33, 3, 3), turn against rest of the bone that each keypoint is fixed to.
     bone_turns: NDArray[np.float32]
-    image_px: NDArray[np.float32]
-    depth_px: NDArray[np.float32]
-    world_m: NDArray[np.float32]
-    visibility: NDArray[np.float32]
-    confidence: NDArray[np.float32]
+    # What the network says; see LandmarkTrack.
+    image_px: NDArray[np.float32]  # (T, 33, 2)
+    depth_px: NDArray[np.float32]  # (T, 33)
+    world_m: NDArray[np.float32]  # (T, 33, 3)
+    visibility: NDArray[np.float32]  # (T, 33)
+    confidence: NDArray[np.float32]  # (T,)
 
     def save(self, path: Path) -> None:
         """Write one ``.npz``, whole or not at all."""
@@ -136,23 +124,13 @@ class Take:
 
 
 class Scene(NamedTuple):
-    """A random person moving before a random camera.
-
-    Parameters
-    ----------
-    shape : BodyShape
-    transforms : float64 array, shape (T, B, 3, 4)
-        Of the bones, ending in the camera frame.
-    keypoints_m : float64 array, shape (T, 33, 3)
-        Camera frame.
-    bone_turns : float64 array, shape (T, 33, 3, 3)
-    """
+    """A random person moving before a random camera."""
 
     shape: BodyShape
     camera: PinholeCamera
-    transforms: Floats
-    keypoints_m: Floats
-    bone_turns: Floats
+    transforms: Floats  # (T, B, 3, 4), of the bones, ending in the camera frame
+    keypoints_m: Floats  # (T, 33, 3), camera frame
+    bone_turns: Floats  # (T, 33, 3, 3)
 
 
 class Stage:

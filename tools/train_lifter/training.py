@@ -53,41 +53,26 @@ _STANDING_WEIGHT = 0.05
 
 @dataclass(frozen=True)
 class Recipe:
-    """Settings of the training.
-
-    Parameters
-    ----------
-    steps : int
-        Of optimisation.
-    emulated_share, captured_share : float
-        Of every batch: simulated and real motion without pictures; the rest is drawn takes.
-    frames : int
-        Of each example.
-    rate : float
-        Of learning, at its highest.
-    velocity, spread, depth, across, root, change : float
-        Weights of the losses; ``change`` is that of the depths' differences over
-        1, 2 and 4 frames.
-    walks : int
-        Motions to emulate, of either kind.
-    """
+    """Settings of the training."""
 
     width: int = 192
     dilations: tuple[int, ...] = (1, 2, 4, 8, 16, 4, 1)
     dropout: float = 0.1
-    steps: int = 9000
+    steps: int = 9000  # of optimisation
+    # Of every batch: simulated and real motion without pictures; the rest is drawn takes.
     emulated_share: float = 0.15
     captured_share: float = 0.35
     batch: int = 24
-    frames: int = 80
-    rate: float = 1.0e-3
+    frames: int = 80  # of each example
+    rate: float = 1.0e-3  # of learning, at its highest
+    # Weights of the losses; ``change`` is that of the depths' differences over 1, 2 and 4 frames.
     velocity: float = 1.0
     spread: float = 1.5
     depth: float = 4.0
     across: float = 4.0
     root: float = 2.0
     change: float = 0.3
-    walks: int = 1500
+    walks: int = 1500  # motions to emulate, of either kind
     seed: int = 0
 
 

@@ -22,18 +22,11 @@ _UPPER_BODY = tuple(
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A camera, and how the world is moved into its frame.
-
-    Parameters
-    ----------
-    turn : float64 array, shape (3, 3)
-    shift_m : float64 array, shape (3,)
-        A point x of the world is at ``turn @ x + shift_m`` in the camera frame.
-    """
+    """A camera, and how the world is moved into its frame."""
 
     camera: PinholeCamera
-    turn: Floats
-    shift_m: Floats
+    turn: Floats  # (3, 3)
+    shift_m: Floats  # (3,), a point x of the world is at ``turn @ x + shift_m`` in the camera frame
 
     def points(self, points_m: Floats) -> Floats:
         """Points (..., 3) of the world in the camera frame."""

@@ -22,21 +22,11 @@ _HAIRS = ((0.10, 0.08, 0.07), (0.30, 0.20, 0.14), (0.62, 0.48, 0.30), (0.65, 0.6
 
 @dataclass(frozen=True, eq=False)
 class Wardrobe:
-    """Clothes of one surface.
+    """Clothes of one surface."""
 
-    Parameters
-    ----------
-    fields : float32 array, shape (V, 8)
-        Positive inside :data:`REGIONS` but the first.
-    palette : float32 array, shape (9, 3)
-        Linear colours of the regions.
-    texture : float32 array, shape (2, V)
-        How much lighter or darker shirt and trousers are at every vertex.
-    """
-
-    fields: Singles
-    palette: Singles
-    texture: Singles
+    fields: Singles  # (V, 8), positive inside REGIONS but the first
+    palette: Singles  # (9, 3), linear colours of the regions
+    texture: Singles  # (2, V), how much lighter or darker shirt and trousers are at every vertex
 
 
 def random_wardrobe(rng: np.random.Generator, body: Body) -> Wardrobe:
