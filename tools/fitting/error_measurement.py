@@ -39,24 +39,11 @@ class Sample(NamedTuple):
 
 
 def measure_errors(truths: Sequence[Truth], fits: Path, progress: Progress = silent) -> FitErrors:
-    """Measure from clips and the landmarks that were found in them.
+    """Measure from clips and the landmarks that were found in them, which are fitted again.
 
-    The landmarks are fitted again, because a kept mesh does not say its pose; the
-    result is the same.
-
-    Parameters
-    ----------
-    truths : sequence of Truth
-        Clips that ``python -m tools.fitting clips`` makes.
-    fits : Path
-        Folder with ``NAME.landmarks.npz``, as ``python -m tools.fitting score --keep`` leaves them.
-    progress : Progress
-        Counts clips.
-
-    Raises
-    ------
-    Sd2Error
-        When landmarks of a clip are missing, or a clip is none of ours.
+    A kept mesh does not say its pose; the result is the same. ``fits`` is a folder with
+    ``NAME.landmarks.npz``, as ``python -m tools.fitting score --keep`` leaves them; ``progress``
+    counts clips. Raises Sd2Error when landmarks of a clip are missing, or a clip is none of ours.
     """
     space = ShapeSpace()
     samples: dict[Group, list[Sample]] = {group: [] for group, _ in all_groups()}

@@ -44,14 +44,9 @@ def score_real(
     Parameters
     ----------
     mesh : MeshSequence
-        With a surface of ours, frame by frame of the track.
+        With a surface of ours, frame by frame of the track; otherwise Sd2Error.
     track : LandmarkTrack
         With silhouettes.
-
-    Raises
-    ------
-    Sd2Error
-        When the two have different frames, or the surface is none of ours.
     """
     resolution = own_resolution(mesh)
     if resolution is None or mesh.faces is None or mesh.frame_count != len(track):
@@ -79,18 +74,10 @@ def score_real(
 def reprojection(
     mesh: MeshSequence, track: LandmarkTrack, camera: PinholeCamera
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Distances of joints from their landmarks in the picture.
+    """Distances (n,) of joints from their landmarks in the picture: pixels, metres at their depth.
 
-    Parameters
-    ----------
-    mesh : MeshSequence
-        With a surface of ours, frame by frame of the track.
-
-    Returns
-    -------
-    float64 arrays, shape (n,)
-        In pixels, and in metres at the joint's depth: of shoulders, elbows, wrists,
-        hips, knees and ankles in all frames in which they are seen.
+    Of shoulders, elbows, wrists, hips, knees and ankles in all frames in which they are seen; the
+    mesh has a surface of ours, frame by frame of the track.
     """
     resolution = own_resolution(mesh)
     assert resolution is not None

@@ -141,12 +141,9 @@ class CropPainter:
         self._srgb = (255.0 * shade ** (1.0 / 2.2)).astype(np.uint8)
 
     def crop(self, vertices_m: Singles, roi: Roi) -> Pixels:
-        """Crop of one frame as the landmark network sees it, (256, 256, 3) RGB.
+        """Crop of a frame as the landmark network sees it, (256, 256, 3) RGB.
 
-        Parameters
-        ----------
-        vertices_m : float32 array, shape (V, 3)
-            Camera frame, all in front of the camera.
+        Vertices (V, 3) are in the camera frame, all in front of the camera.
         """
         import cv2
 

@@ -40,15 +40,8 @@ class View:
 def random_view(rng: np.random.Generator, keypoints_m: Floats) -> View | None:
     """A camera that sees the upper body of a person all the time.
 
-    Parameters
-    ----------
-    keypoints_m : array, shape (T, 33, 3)
-        On the floor of the world, y down, facing about -z.
-
-    Returns
-    -------
-    View or None
-        None where no camera of a hundred sees it: the person walks too far.
+    Keypoints (T, 33, 3) are on the floor of the world, y down, facing about -z. None where no
+    camera of a hundred sees it: the person walks too far.
     """
     upper = keypoints_m[:, _UPPER_BODY]
     hips = keypoints_m[:, [LANDMARKS.index("hip.L"), LANDMARKS.index("hip.R")]].mean(axis=1)
@@ -78,16 +71,8 @@ def random_view_around(rng: np.random.Generator, keypoints_m: Floats) -> View | 
 
     Headings are uniform over the circle, heights 0.4 to 2.5 m above the floor, distances 1 to 6 m.
     Three of five see the whole body most of the time; the others may cut off arms and legs.
-
-    Parameters
-    ----------
-    keypoints_m : array, shape (T, 33, 3)
-        In the world, y down, the floor at 0.
-
-    Returns
-    -------
-    View or None
-        None where no camera of a hundred sees it.
+    Keypoints (T, 33, 3) are in the world, y down, the floor at 0. None where no camera of a hundred
+    sees it.
     """
     middle = keypoints_m[:, TORSO_CORNERS].mean(axis=(0, 1))
     whole = rng.random() < 0.6
