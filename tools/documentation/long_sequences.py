@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from sd2core.denoise.files import load_model
-from sd2core.files.atomic import atomic_write_text
 from sd2core.files.figure_files import save_figure
 from sd2core.pairs.store import read_pairs
 from tools.documentation.pages import filled, table
 from tools.documentation.places import IMAGES
-from tools.documentation.runs import evaluated, sd2, settings
+from tools.documentation.runs import MEMORY, Job, evaluated, sd2, settings, train
 
 LENGTHS = (72, 288, 1152, 4608)
 SETTINGS = {"30 frames/s, 32 bins": (30, 32, 160, 48), "120 frames/s, 128 bins": (120, 128, 40, 12)}
@@ -28,13 +23,6 @@ SETTINGS = {"30 frames/s, 32 bins": (30, 32, 160, 48), "120 frames/s, 128 bins":
 MODELS = ("s4", "s4d", "gru", "unet", "swin")
 _WINDOWED = ("unet", "swin")
 _FRAMES = 4608
-
-
-class _Run(NamedTuple):
-    model: str
-    length: int
-    path: Path
-    data: Path
 
 
 def long_sequences(folder: Path, minutes: float) -> str:
@@ -48,24 +36,27 @@ def long_sequences(folder: Path, minutes: float) -> str:
             *("simulate", "campaign", "--out", data, "--people", 6, "--minutes", total_min),
             *("--take-seconds", take_s, "--rate", rate, "--bins", bins, "--seed", 4),
         )
-        runs = [
-            _Run(model, length, folder / f"{rate}-{model}-{length}", data)
+        kinds = [
+            (model, length)
             for model in MODELS
             for length in (LENGTHS[:1] if model in _WINDOWED else LENGTHS)
         ]
-        with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-            list(pool.map(lambda run: _train(run, minutes), runs))
-        told = evaluated([run.path / "best.safetensors" for run in runs], data)
+        jobs = [
+            Job(f"{rate}-{model}-{length}", data, _options(model, length, minutes))
+            for model, length in kinds
+        ]
+        runs = train(folder, jobs)
+        told = evaluated([run / "best.safetensors" for run in runs], data)
         none, *_ = told["groups"]
         reports = {one["name"]: one["all"] for group in told["groups"] for one in group["models"]}
         rows.append([f"**{title}**: none", "", *_errors(none["models"][0]["all"]), "", ""])
         found[title] = {}
-        for run in runs:
-            score = reports[run.path.name]
-            found[title][run.model, run.length] = score
-            memory = f"{int((run.path / 'memory.txt').read_text()) / 1e6:.0f} MB"
-            took = f"{1e6 * _frame_s(run):.0f} µs"
-            rows.append([run.model, f"{run.length:,}", *_errors(score), memory, took])
+        for (model, length), run in zip(kinds, runs, strict=True):
+            score = reports[run.name]
+            found[title][model, length] = score
+            memory = f"{int((run / MEMORY).read_text()) / 1e6:.0f} MB"
+            took = f"{1e6 * _frame_s(run, data):.0f} µs"
+            rows.append([model, f"{length:,}", *_errors(score), memory, took])
     _draw(found)
     return filled("long-sequences.md", first=_first(found), minutes=minutes, table=table(rows))
 
@@ -78,29 +69,21 @@ def _errors(score: dict[str, Any]) -> list[str]:
     ]
 
 
-def _train(run: _Run, minutes: float) -> None:
-    """Train one run, and note the most memory that its process had."""
-    if (run.path / "memory.txt").exists():
-        return
-    options = {"dropout": 0.3}
-    if run.model in ("s4", "s4d"):
-        options |= {"live": "false", "dt_min": round(0.02 * 72 / run.length, 6)}
-    command = [
-        *(sys.executable, "-m", "sd2core.cli", "train", str(run.data), "--out", str(run.path)),
-        *("--model", run.model, *settings(options), "--minutes", f"{minutes:g}", "--threads", "1"),
-        *("--segment-frames", str(run.length), "--batch-size", str(_FRAMES // run.length)),
+def _options(model: str, length: int, minutes: float) -> tuple[str, ...]:
+    """How a network learns from segments of some length, from as many frames at once."""
+    options: dict[str, object] = {"dropout": 0.3}
+    if model in ("s4", "s4d"):
+        options |= {"live": "false", "dt_min": round(0.02 * 72 / length, 6)}
+    return (
+        *("--model", model, *settings(options), "--minutes", f"{minutes:g}"),
+        *("--segment-frames", str(length), "--batch-size", str(_FRAMES // length)),
         *("--velocity-weight", "1"),
-    ]
-    process = subprocess.Popen(command)
-    _, code, usage = os.wait4(process.pid, 0)
-    if code:
-        sys.exit(f"{run.path.name} failed")
-    atomic_write_text(run.path / "memory.txt", f"{usage.ru_maxrss * 1024}\n")
+    )
 
 
-def _frame_s(run: _Run) -> float:
-    model = load_model(run.path / "best.safetensors")
-    values = np.concatenate([take.synthetic for take in read_pairs(run.data).takes])[:_FRAMES]
+def _frame_s(run: Path, data: Path) -> float:
+    model = load_model(run / "best.safetensors")
+    values = np.concatenate([take.synthetic for take in read_pairs(data).takes])[:_FRAMES]
     model.denoise_values(values)
     began = time.perf_counter()
     model.denoise_values(values)

@@ -13,11 +13,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from sd2core.files.atomic import atomic_write_text
 from sd2core.runs.progress import effective, read_events
 from sd2core.train.folder import TrainingFolder
 from tools.documentation.pages import spread
 
 PILOT_EPOCHS = 4
+MEMORY = "memory.txt"
 
 
 @dataclass(frozen=True)
@@ -116,10 +118,15 @@ def _finished(run: Path) -> bool:
 
 
 def _run(folder: Path, job: Job) -> int:
+    """Train one, and note the most memory that its process had."""
     path = folder / job.name
     how = (
         ["--resume", str(path)]
         if TrainingFolder(path).exists
         else [str(job.data), *job.options, "--out", str(path), "--threads", "1"]
     )
-    return subprocess.run([sys.executable, "-m", "sd2core.cli", "train", *how]).returncode
+    process = subprocess.Popen([sys.executable, "-m", "sd2core.cli", "train", *how])
+    _, code, usage = os.wait4(process.pid, 0)
+    if not code:
+        atomic_write_text(path / MEMORY, f"{usage.ru_maxrss * 1024}\n")
+    return code

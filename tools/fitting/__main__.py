@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Literal
+from typing import Annotated
 
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
@@ -19,7 +19,7 @@ from tools.fitting.clips import CLIPS, REAL_MOTION, TUNING, clip_named, make_fit
 from tools.fitting.error_measurement import measure_errors
 from tools.fitting.people import OTHERS, as_table, measure_people, meetings
 from tools.fitting.report import as_markdown, as_text
-from tools.fitting.scoring import MeshSource
+from tools.fitting.scoring import Fits
 from tools.fitting.truth import read_truth, truth_folders
 
 
@@ -52,26 +52,20 @@ class Score(OptionRecord):
         a folder of clips, or one clip
     clips : NAMES
         only these, separated by commas (default: all)
-    meshes : FOLDER
-        measure NAME.zarr, NAME.npz or NAME/mesh.zarr of this folder instead of fitting
     keep : FOLDER
         keep what is fitted as NAME.zarr in FOLDER, and its landmarks as NAME.landmarks.npz; what
         is there is not fitted again
     real : VIDEO
         also fit these videos, whose motion is not known, and measure whether the body lies on the
         person that the landmark model sees; their meshes are called real-NAME
-    stature
-        give the fit the person's height, or not
     markdown : FILE
         also write the tables as Markdown
     """
 
     truth: Annotated[Path, ARGUMENT]
     clips: Names = ()
-    meshes: Annotated[Path | None, Place(one_of="source")] = None
-    keep: Annotated[Path | None, Place(one_of="source")] = None
+    keep: Path | None = None
     real: Annotated[tuple[Path, ...], Place(many="together")] = ()
-    stature: Literal["known", "unknown"] = "known"
     markdown: Annotated[Path | None, Place(endings=(".md",))] = None
 
 
@@ -138,9 +132,8 @@ def _clips(options: Clips) -> None:
 def _score(options: Score) -> None:
     """Fit the clips, and measure how good that is.
 
-    Runs `sd2 fit` on every clip, or takes meshes that are fitted already, and prints the tables
-    of docs/fitting.md. The fit is given the camera's focal length, and the person's height
-    unless --stature unknown.
+    Runs `sd2 fit` on every clip and prints the tables of docs/fitting.md. The fit is given the
+    camera's focal length and the person's height.
     """
     truths = [read_truth(folder) for folder in truth_folders(options.truth)]
     if options.clips:
@@ -152,9 +145,9 @@ def _score(options: Score) -> None:
     if options.keep is not None:
         options.keep.mkdir(exist_ok=True)
     with TemporaryDirectory() if options.keep is None else nullcontext(options.keep) as folder:
-        source = MeshSource(options.meshes, Path(folder), options.stature == "known")
-        scores = [source.score(truth) for truth in truths]
-        real = [source.score_real(video) for video in options.real]
+        fits = Fits(Path(folder))
+        scores = [fits.score(truth) for truth in truths]
+        real = [fits.score_real(video) for video in options.real]
     if options.markdown is not None:
         atomic_write_text(options.markdown, as_markdown(scores, real))
     print(as_text(scores, real))

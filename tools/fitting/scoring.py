@@ -1,4 +1,4 @@
-"""Scores of fits of clips and of real videos: fitted as a user does it, or read from a folder."""
+"""Scores of fits of clips and of real videos, each fitted as a user does it."""
 
 from __future__ import annotations
 
@@ -21,21 +21,15 @@ from tools.fitting.clip_score import ClipScore, score_clip
 from tools.fitting.real_score import RealScore, score_real
 from tools.fitting.truth import Truth
 
-_SUFFIXES = (".zarr", ".npz")
 
+class Fits(NamedTuple):
+    """Fits into a folder; what is there is not fitted again."""
 
-class MeshSource(NamedTuple):
-    """Fitted meshes: those of a folder, or fits into another one."""
-
-    meshes: Path | None
     folder: Path
-    stature_known: bool
 
     def score(self, truth: Truth) -> ClipScore:
-        """Score the fit of one clip."""
-        known = ["--focal-px", f"{truth.camera.focal_px:g}"]
-        if self.stature_known:
-            known += ["--stature-m", f"{truth.stature_m:g}"]
+        """Score the fit of one clip, which is told the focal length and the person's height."""
+        known = ["--focal-px", f"{truth.camera.focal_px:g}", "--stature-m", f"{truth.stature_m:g}"]
         path, seconds = self._fitted(truth.name, truth.video, known)
         landmarks = landmarks_of(path)
         track = load_track(landmarks) if landmarks.exists() else None
@@ -60,8 +54,6 @@ class MeshSource(NamedTuple):
         self, name: str, video: Path, known: list[str]
     ) -> tuple[Path, tuple[float, float] | None]:
         """Path of the mesh, and the seconds its fit took if it was made now."""
-        if self.meshes is not None:
-            return _mesh_in(self.meshes, name), None
         path = self.folder / f"{name}.zarr"
         if path.exists():
             return path, None
@@ -71,18 +63,6 @@ class MeshSource(NamedTuple):
 def landmarks_of(mesh: Path) -> Path:
     """Path of the landmarks that a mesh was fitted to."""
     return mesh.with_name(f"{mesh.stem}.landmarks.npz")
-
-
-def _mesh_in(folder: Path, name: str) -> Path:
-    places = [folder / f"{name}{suffix}" for suffix in _SUFFIXES]
-    places += [folder / name / f"mesh{suffix}" for suffix in _SUFFIXES]
-    for path in places:
-        if path.exists():
-            return path
-    raise Sd2Error(
-        f"{folder} holds no mesh of the clip {name!r}",
-        f"{name}.zarr, {name}.npz or {name}/mesh.zarr",
-    )
 
 
 def _fit(name: str, video: Path, out: Path, known: list[str]) -> tuple[float, float]:

@@ -66,15 +66,16 @@ def truth(tmp_path: Path) -> Path:
 
 
 def test_fitted_meshes_are_measured(fitting: Tool, truth: Path, tmp_path: Path) -> None:
-    outcome = fitting("score", truth, "--meshes", truth, "--markdown", tmp_path / "table.md")
+    fits = tmp_path / "fits"
+    shutil.copytree(truth / "still" / "mesh.zarr", fits / "still.zarr")
+    outcome = fitting("score", truth, "--keep", fits, "--markdown", tmp_path / "table.md")
     assert outcome.code == 0
     assert re.search(r"who stands still: .* 0\.000 m/s +≤ 0\.015 +yes", outcome.out)
     assert "| still |" in (tmp_path / "table.md").read_text("utf-8")
 
 
-@pytest.mark.parametrize("stature", ["known", "unknown"])
 def test_clips_are_fitted_with_what_is_known(
-    fitting: Tool, truth: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stature: str
+    fitting: Tool, truth: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[list[str]] = []
 
@@ -89,14 +90,14 @@ def test_clips_are_fitted_with_what_is_known(
 
     monkeypatch.setattr(subprocess, "run", fit)
     kept = tmp_path / "kept"
-    outcome = fitting("score", truth, "--keep", kept, "--stature", stature)
+    outcome = fitting("score", truth, "--keep", kept)
     assert outcome.code == 0
     assert "who stands still" in outcome.out
     (command,) = asked
     assert command[:4] == [sys.executable, "-m", "sd2core.cli", "fit"]
     assert command[4] == str(truth / "still" / "video.mp4")
     assert command[command.index("--focal-px") + 1] == "600"
-    assert ("--stature-m" in command) == (stature == "known")
+    assert command[command.index("--stature-m") + 1] == "1.76"
     assert (kept / "still.zarr").is_dir()
     again = fitting("score", truth, "--keep", kept)
     assert re.search(r"time for a fit +– s/frame", again.out)
@@ -155,7 +156,7 @@ def test_real_videos_are_looked_at_too(
 
     monkeypatch.setattr("tools.fitting.scoring.landmark_models", lambda: None)
     monkeypatch.setattr("tools.fitting.scoring.find_landmarks", look)
-    outcome = fitting("score", truth, "--meshes", meshes, "--real", video)
+    outcome = fitting("score", truth, "--keep", meshes, "--real", video)
     assert outcome.code == 0
     assert outcome.out.splitlines()[-1].split() == ["real-walk", "1.000", "–"]
 
@@ -163,8 +164,7 @@ def test_real_videos_are_looked_at_too(
 @pytest.mark.parametrize(
     ("arguments", "found"),
     [
-        (("--clips", "dance", "--meshes", "."), "no clip 'dance'"),
-        (("--meshes", "elsewhere"), "holds no mesh of the clip 'still'"),
+        (("--clips", "dance"), "no clip 'dance'"),
         (("--markdown", "table.txt"), "ends in .md"),
     ],
 )
