@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +26,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 import sd2core as sd2
+from sd2core.compare.measures import correlation, rms
 from sd2core.files.hdf5_files import open_hdf5_file
 from sd2core.imu.mounting import mounted
 from sd2core.imu.signals import GRAVITY_MPS2, InertialSignals, RigidPath, imu_signals, low_pass
@@ -106,9 +106,9 @@ def beside(
         turn, _ = Rotation.align_vectors(acceleration, moved[:, :3])
         turned = turn.apply(moved[:, :3]), turn.apply(moved[:, 3:])
         return Beside(
-            float(np.sqrt(np.square(acceleration - turned[0]).mean())),
-            float(np.sqrt(np.square(turn_rate - turned[1]).mean())),
-            float(np.corrcoef(acceleration.ravel(), turned[0].ravel())[0, 1]),
+            rms(acceleration - turned[0]),
+            rms(turn_rate - turned[1]),
+            correlation(acceleration, turned[0]),
             float(shift_s),
             int(counted.sum()),
         )
@@ -121,6 +121,19 @@ def board_beside(path: Path, cutoff_hz: float = CUTOFF_HZ) -> Beside:
     mesh, real, moved = board(path)
     virtual = imu_signals(mounted(mesh, 0).path(mesh), mesh.times_s, cutoff_hz)
     return beside(virtual, real, moved & virtual.known, cutoff_hz)
+
+
+def board_rows(path: Path) -> list[list[str]]:
+    """Differences of the two sensors on a board below some frequencies."""
+    rows = [["below", "acceleration, m/s²", "correlation", "turn rate, rad/s", "shift", "samples"]]
+    for cutoff_hz in CUTOFFS_HZ:
+        one = board_beside(path, cutoff_hz)
+        numbers = one.acceleration_rms_mps2, one.acceleration_correlation, one.turn_rate_rms_radps
+        cells = (f"{number:.4f}" for number in numbers)
+        rows.append(
+            [f"{cutoff_hz:g} Hz", *cells, f"{1000 * one.shift_s:.1f} ms", f"{one.samples:,}"]
+        )
+    return rows
 
 
 # -- A foot ----------------------------------------------------------------------------------------
@@ -174,6 +187,17 @@ def foot_beside(folder: Path, side: str, vertex: int = INSTEP) -> tuple[float, f
     return max(map(alike, SHIFTS_S))
 
 
+def foot_rows(folder: Path) -> list[list[str]]:
+    """Likeness of the two sensors on each foot, with the virtual one at two places."""
+    rows = [["foot", "\\|a\\| correlates at", "\\|ω\\| correlates at", "shift"]]
+    for place, vertex in (("instep", INSTEP), ("forefoot", FOREFOOT)):
+        for side in ("left", "right"):
+            acceleration, turn_rate, shift_s = foot_beside(folder, side, vertex)
+            values = f"{acceleration:.3f}", f"{turn_rate:.3f}", f"{1000 * shift_s:.1f} ms"
+            rows.append([f"{side}, {place}", *values])
+    return rows
+
+
 def _both(signals: InertialSignals) -> tuple[Floats, Floats]:
     return signals.acceleration_mps2, signals.turn_rate_radps
 
@@ -193,8 +217,9 @@ def _columns(path: Path) -> dict[tuple[str, str], Floats]:
 # -- A fit -----------------------------------------------------------------------------------------
 
 
-def fit_rows(true: MeshSequence, fitted: MeshSequence) -> list[list[str]]:
+def fit_rows(true_mesh: Path, fitted_mesh: Path) -> list[list[str]]:
     """Errors of virtual sensors on a fitted body, of one on the true body at the same place."""
+    true, fitted = sd2.load_mesh(true_mesh), sd2.load_mesh(fitted_mesh)
     rows = [["place", "moves", "off", "across", "along", "turns", "off", "turned by"]]
     rows.append(["", "m/s²", "m/s²", "m/s²", "m/s²", "rad/s", "rad/s", "°"])
     times_s = true.times_s[true.times_s <= fitted.times_s[-1]]
@@ -214,14 +239,8 @@ def fit_rows(true: MeshSequence, fitted: MeshSequence) -> list[list[str]]:
             Rotation.from_matrix(path.rotation[numbers])
             for path, numbers in zip(paths, frames, strict=True)
         ]
-        values = (
-            _length_rms(moved),
-            _length_rms(felt_off),
-            _length_rms(off[:, :2]),
-            _length_rms(off[:, 2:]),
-            _length_rms(rates[0]),
-            _length_rms(rates[1] - rates[0]),
-        )
+        vectors = (moved, felt_off, off[:, :2], off[:, 2:], rates[0], rates[1] - rates[0])
+        values = [rms(np.linalg.norm(each, axis=1)) for each in vectors]
         turned_deg = np.degrees((turns[0].inv() * turns[1]).magnitude()).mean()
         rows.append([place, *(f"{value:.2f}" for value in values), f"{turned_deg:.0f}"])
     return rows
@@ -231,10 +250,6 @@ def _unturned(path: RigidPath) -> RigidPath:
     """The same places with the world's axes."""
     turns = np.broadcast_to(np.eye(3), path.rotation.shape)
     return RigidPath(path.timebase, path.position_m, turns, path.present)
-
-
-def _length_rms(vectors: Floats) -> float:
-    return float(np.sqrt(np.square(vectors).sum(axis=1).mean()))
 
 
 # -- Derivatives -----------------------------------------------------------------------------------
@@ -276,37 +291,15 @@ def _turn_rate(times_s: Floats, turns: Rotation, degree: int) -> Floats:
 
 def _error(found: Floats, truth: Floats) -> float:
     inner = slice(60, 240)  # the ends are another matter
-    return float(np.sqrt(np.square(found - truth)[inner].mean() / np.square(truth)[inner].mean()))
+    return rms((found - truth)[inner]) / rms(truth[inner])
 
 
-# -- Command ---------------------------------------------------------------------------------------
-
-
-def _print_board(path: Path) -> None:
-    rows = [["below", "acceleration, m/s²", "correlation", "turn rate, rad/s", "shift", "samples"]]
-    for cutoff_hz in CUTOFFS_HZ:
-        one = board_beside(path, cutoff_hz)
-        rows.append(
-            [
-                f"{cutoff_hz:g} Hz",
-                f"{one.acceleration_rms_mps2:.4f}",
-                f"{one.acceleration_correlation:.4f}",
-                f"{one.turn_rate_rms_radps:.4f}",
-                f"{1000 * one.shift_s:.1f} ms",
-                f"{one.samples:,}",
-            ]
-        )
-    print(table(rows))
-
-
-def _print_foot(folder: Path) -> None:
-    rows = [["foot", "\\|a\\| correlates at", "\\|ω\\| correlates at", "shift"]]
-    for place, vertex in (("instep", INSTEP), ("forefoot", FOREFOOT)):
-        for side in ("left", "right"):
-            acceleration, turn_rate, shift_s = foot_beside(folder, side, vertex)
-            values = f"{acceleration:.3f}", f"{turn_rate:.3f}", f"{1000 * shift_s:.1f} ms"
-            rows.append([f"{side}, {place}", *values])
-    print(table(rows))
+TABLES = {
+    "derivatives": derivative_rows,
+    "board": board_rows,
+    "foot": foot_rows,
+    "fit": fit_rows,
+}
 
 
 def main() -> None:
@@ -314,23 +307,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    commands = parser.add_subparsers(required=True)
-
-    def add(name: str, files: tuple[str, ...], work: Callable[..., object]) -> None:
-        command = commands.add_parser(name)
-        for file in files:
-            command.add_argument(file, type=Path)
-        command.set_defaults(work=lambda options: work(*(getattr(options, one) for one in files)))
-
-    def print_fit(true: Path, fitted: Path) -> None:
-        print(table(fit_rows(sd2.load_mesh(true), sd2.load_mesh(fitted))))
-
-    add("derivatives", (), lambda: print(table(derivative_rows())))
-    add("board", ("recording",), _print_board)
-    add("foot", ("folder",), _print_foot)
-    add("fit", ("true_mesh", "fitted_mesh"), print_fit)
+    parser.add_argument("table", choices=TABLES)
+    parser.add_argument("paths", nargs="*", type=Path, help="of what it is measured on")
     options = parser.parse_args()
-    options.work(options)
+    print(table(TABLES[options.table](*options.paths)))
 
 
 if __name__ == "__main__":
