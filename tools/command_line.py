@@ -15,10 +15,14 @@ Commands = Mapping[str, tuple[type[OptionRecord], Callable[[Any], None]]]
 """Names of commands, their options, and what does them; its docstring is the help."""
 
 
-def run_tool(name: str, commands: Commands, arguments: Sequence[str] | None = None) -> int:
-    """Run one command of ``python -m tools.NAME``, by default as typed; return its exit code."""
-    parser = argparse.ArgumentParser(prog=f"python -m tools.{name}")
-    places = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for command, (options, handler) in commands.items():
-        add_command(places, command, options=options, handler=handler)
-    return run(parser, sys.argv[1:] if arguments is None else arguments)
+def tool(name: str, commands: Commands) -> Callable[..., int]:
+    """Program of ``python -m tools.NAME``: it runs a command, by default as typed, for a code."""
+
+    def main(arguments: Sequence[str] | None = None) -> int:
+        parser = argparse.ArgumentParser(prog=f"python -m tools.{name}")
+        places = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+        for command, (options, handler) in commands.items():
+            add_command(places, command, options=options, handler=handler)
+        return run(parser, sys.argv[1:] if arguments is None else arguments)
+
+    return main

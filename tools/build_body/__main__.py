@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 from sd2core.cli.output import progress_bar
 from sd2core.options.records import OptionRecord, Place
 from tools.build_body.export_body import export_body
-from tools.command_line import run_tool
+from tools.command_line import tool
 
 
 class Export(OptionRecord):
@@ -35,9 +34,7 @@ def _export(options: Export) -> None:
     print(f"Wrote {options.out}")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Export the body; return the exit code."""
-    return run_tool("build_body", {"export": (Export, _export)}, arguments)
+main = tool("build_body", {"export": (Export, _export)})
 
 
 if __name__ == "__main__":

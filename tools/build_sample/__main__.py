@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 from sd2core.cli.output import progress_bar
 from sd2core.options.records import ARGUMENT, OptionRecord
 from tools.build_sample.sample import make_sample
-from tools.command_line import run_tool
+from tools.command_line import tool
 
 
 class Make(OptionRecord):
@@ -35,9 +34,7 @@ def _make(options: Make) -> None:
     print(f"Made {made}")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Make the sample; return the exit code."""
-    return run_tool("build_sample", {"make": (Make, _make)}, arguments)
+main = tool("build_sample", {"make": (Make, _make)})
 
 
 if __name__ == "__main__":

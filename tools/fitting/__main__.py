@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,7 +13,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.options.kinds import Names
 from sd2core.options.records import ARGUMENT, OptionRecord, Place
-from tools.command_line import Commands, run_tool
+from tools.command_line import tool
 from tools.fitting.clips import CLIPS, REAL_MOTION, TUNING, clip_named, make_fit_truth
 from tools.fitting.error_measurement import measure_errors
 from tools.fitting.people import OTHERS, as_table, measure_people, meetings
@@ -166,15 +165,15 @@ def _errors(options: Errors) -> None:
     print(f"Wrote {options.out}: {len(truths)} clips, {errors.provenance['frames']} frames")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one of the commands; return the exit code."""
-    commands: Commands = {
+main = tool(
+    "fitting",
+    {
         "clips": (Clips, _clips),
         "score": (Score, _score),
         "errors": (Errors, _errors),
         "people": (People, _people),
-    }
-    return run_tool("fitting", commands, arguments)
+    },
+)
 
 
 if __name__ == "__main__":

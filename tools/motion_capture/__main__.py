@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +11,7 @@ import numpy as np
 from sd2core.cli.output import progress_bar
 from sd2core.options.kinds import Count
 from sd2core.options.records import ARGUMENT, OptionRecord
-from tools.command_line import Commands, run_tool
+from tools.command_line import tool
 from tools.motion_capture.bodies import drive_bodies
 from tools.motion_capture.refining import measure_refining
 
@@ -72,10 +71,7 @@ def _refining(options: Refining) -> None:
     )
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one of the commands; return the exit code."""
-    commands: Commands = {"drive": (Drive, _drive), "refining": (Refining, _refining)}
-    return run_tool("motion_capture", commands, arguments)
+main = tool("motion_capture", {"drive": (Drive, _drive), "refining": (Refining, _refining)})
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +13,7 @@ from sd2core.files.tables import numbers_table
 from sd2core.mocap.body_motion import load_motions
 from sd2core.options.kinds import Count
 from sd2core.options.records import ARGUMENT, ARGUMENTS, OptionRecord, Place
-from tools.command_line import Commands, run_tool
+from tools.command_line import tool
 from tools.train_lifter.data import Data, load_takes, make_lifter_data
 from tools.train_lifter.fits import fit_law, repaired
 from tools.train_lifter.pairs import Pairs, make_pairs
@@ -147,16 +146,16 @@ def _score(options: Score) -> None:
     print(f"Nothing moves: {still_mps:.3f} m/s over all landmarks")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one of the commands; return the exit code."""
-    commands: Commands = {
+main = tool(
+    "train_lifter",
+    {
         "data": (Data, _data),
         "pairs": (Pairs, _pairs),
         "train": (Train, _train),
         "sides": (Learning, _sides),
         "score": (Score, _score),
-    }
-    return run_tool("train_lifter", commands, arguments)
+    },
+)
 
 
 if __name__ == "__main__":
