@@ -34,6 +34,8 @@ STROKE_S: dict[Speed, float] = {"slow": 1.25, "normal": 0.72, "fast": 0.42}
 
 _RAISE_S, _LOWER_S, _HOLD_S = 0.65, 0.7, 0.2
 _START_S = 0.25
+_RAMP_S = 0.7
+"""To reach the speed of a walk, and to stand again."""
 _GRID_HZ = 240.0
 """Rate at which the way of a walk is summed."""
 
@@ -120,13 +122,13 @@ def perform(
     return Performance(with_one_arm(skeleton, times, arm, action.hand, arm_scale, sway_s), spans)
 
 
-def _straight(start_s: float, distance_m: float, speed_mps: float, ramp_s: float = 0.7) -> Path:
+def _straight(start_s: float, distance_m: float, speed_mps: float) -> Path:
     """Stand, walk a distance towards the camera, stand."""
-    cruise_s = distance_m / speed_mps - ramp_s
+    cruise_s = distance_m / speed_mps - _RAMP_S
     if cruise_s <= 0:
         raise ValueError("too short a way to reach this speed")
-    fine = np.arange(0.0, cruise_s + 2 * ramp_s + 1.0 / _GRID_HZ, 1.0 / _GRID_HZ)
-    share = minimum_jerk(fine / ramp_s) - minimum_jerk((fine - ramp_s - cruise_s) / ramp_s)
+    fine = np.arange(0.0, cruise_s + 2 * _RAMP_S + 1.0 / _GRID_HZ, 1.0 / _GRID_HZ)
+    share = minimum_jerk(fine / _RAMP_S) - minimum_jerk((fine - _RAMP_S - cruise_s) / _RAMP_S)
     way = np.concatenate([[0.0], np.cumsum(0.5 * (share[1:] + share[:-1]))])
     way *= distance_m / way[-1]
     return Path(lambda t: np.interp(t, start_s + fine, way), np.zeros_like)

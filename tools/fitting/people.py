@@ -34,6 +34,7 @@ OTHERS = {
 _OFF = 0.1
 """Distance of the hips in squares from where they are, beyond which somebody else is shown."""
 _HIPS = (23, 24)
+_NEAR_M = 3.0
 _SILENT = FitReport(lambda stage: silent, lambda *_: None, lambda *_: None)
 
 
@@ -52,9 +53,9 @@ class Meeting:
     fitted: bool = False  # the errors of fits are measured, too
     sits: bool = False
 
-    def parts(self, clothes: str, near_m: float = 3.0) -> list[Part]:
+    def parts(self, clothes: str) -> list[Part]:
         """Parts of both people, the other one nearer."""
-        away = (near_m if self.sits else near_m + self.apart_m, near_m)
+        away = (_NEAR_M if self.sits else _NEAR_M + self.apart_m, _NEAR_M)
         return [
             Part(who, times, x, far, turns, self.sits)
             for who, (times, x, turns), far in zip(

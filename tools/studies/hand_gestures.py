@@ -1,4 +1,4 @@
-"""Simulated pairs of a K60168A's gestures: ``python -m tools.studies.hand_gestures OUT.zarr``.
+"""Simulated pairs of a K60168A's gestures, which ``tools.documentation.studies`` makes.
 
 Bodies of the program before a radar on a table make three movements of a hand as the sensor's
 recordings seem to show them: to one side past the sensor, to the other, and a fist that is pushed
@@ -10,7 +10,6 @@ taper.
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import astuple, dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -42,6 +41,8 @@ LABELS = ("background", "FirstGesture", "SecondGesture", "ThirdGesture")
 FRAMES = 70
 AXIS = VelocityAxis(31, 31 * BIN_WIDTH_MPS / 2)
 _CHIRPS = 16
+_PEOPLE, _TAKES, _SEED = 8, 8, 1
+"""Takes are of each person and label."""
 RADAR = replace(
     PAPER_RADAR,
     name="60 GHz, 16 chirps, as a K60168A's bins",
@@ -182,7 +183,7 @@ def with_still(
     return (energies + level[:, None] * lobes + noise).astype(np.float32)
 
 
-def make_pairs(out: Path, people: int = 8, takes: int = 8, seed: int = 1) -> None:
+def make_pairs(out: Path) -> None:
     """Simulate the takes of each person and label that are not there."""
     writer = PairWriter(
         out,
@@ -193,26 +194,15 @@ def make_pairs(out: Path, people: int = 8, takes: int = 8, seed: int = 1) -> Non
         labels=LABELS,
         provenance={
             "made_by": f"SD² Studio {__version__}, tools.studies.hand_gestures",
-            "seed": seed,
+            "seed": _SEED,
             "radar": RADAR.name,
         },
     )
     space = ShapeSpace()
-    wanted = list(product(range(takes), range(people), range(len(LABELS))))
+    wanted = list(product(range(_TAKES), range(_PEOPLE), range(len(LABELS))))
     with bar("Simulating", "take", total=len(wanted)) as shown:
         for index, person, number in wanted:
             key = TakeKey(f"simulated {person + 1}", f"{LABELS[number]}-{index:02d}", 0)
             if key not in writer.done:
-                writer.append(made_take(space, seed, person, number, index))
+                writer.append(made_take(space, _SEED, person, number, index))
             shown.update(1)
-
-
-def main() -> None:
-    """Make the pairs that are asked for."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", type=Path, metavar="OUT.zarr")
-    make_pairs(parser.parse_args().out)
-
-
-if __name__ == "__main__":
-    main()
