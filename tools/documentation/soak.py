@@ -19,7 +19,6 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -44,28 +43,8 @@ _LOOK_S = 0.02
 _NONE, _CONTROL = Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ControlModifier
 
 
-@dataclass(frozen=True)
-class Row:
-    """State of the process at a moment of rest, and what happened since the row before."""
-
-    minute: float
-    rounds: int
-    resident_mb: float
-    threads: int
-    most_threads: int  # Since the row before, also while something was computed.
-    descriptors: int
-    objects: int
-    top_level_widgets: int
-    median_gap_ms: float
-    gap_95_ms: float
-    gap_99_ms: float
-    largest_gap_ms: float
-
-
-HEADINGS = (
-    *("minute", "rounds", "RSS, MB", "threads", "most", "descriptors", "objects", "windows"),
-    *("gap, ms", "95 %", "99 %", "largest"),
-)
+Row = dict[str, float]
+"""State of the process at a moment of rest, and what happened since the row before."""
 
 
 class Pulse(QObject):
@@ -116,18 +95,19 @@ class Meter:
 
     def row(self, rounds: int) -> Row:
         """Measure a row."""
-        gaps_ms = self._pulse.gaps_ms or [0.0]
-        row = Row(
-            round(self.minute, 2),
-            rounds,
-            round(self.resident_mb(), 1),
-            self._process.num_threads(),
-            self._pulse.most_threads,
-            self._process.num_fds(),
-            len(gc.get_objects()),
-            len(QApplication.topLevelWidgets()),
-            *(round(float(one), 1) for one in np.percentile(gaps_ms, (50, 95, 99, 100))),
-        )
+        gaps_ms = np.percentile(self._pulse.gaps_ms or [0.0], (50, 95, 99, 100))
+        row = {
+            "minute": round(self.minute, 2),
+            "rounds": rounds,
+            "RSS, MB": round(self.resident_mb(), 1),
+            "threads": self._process.num_threads(),
+            "most": self._pulse.most_threads,  # also while something was computed
+            "descriptors": self._process.num_fds(),
+            "objects": len(gc.get_objects()),
+            "windows": len(QApplication.topLevelWidgets()),
+        }
+        names = ("gap, ms", "95 %", "99 %", "largest")
+        row |= {name: round(gap, 1) for name, gap in zip(names, gaps_ms.tolist(), strict=True)}
         self._pulse.restart()
         return row
 
@@ -300,11 +280,10 @@ def main() -> int:
     raised = Raised()
 
     def say(row: Row) -> None:
-        cells = [f"{value:g}" for value in asdict(row).values()]
-        *heading, line = markdown_table([HEADINGS, cells])
+        *heading, line = markdown_table([list(row), [f"{value:g}" for value in row.values()]])
         if options.json:
-            line = json.dumps(asdict(row))
-        elif row.rounds == 0:
+            line = json.dumps(row)
+        elif row["rounds"] == 0:
             print("\n".join(heading))
         print(line, flush=True)
 

@@ -22,7 +22,7 @@ def test_five_minutes_of_use() -> None:
     rows = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
     first, *later = [row for row in rows if row["minute"] >= 2]
     assert later
-    assert max(row["most_threads"] for row in rows) <= 40
-    for count in ("threads", "descriptors", "top_level_widgets"):
+    assert max(row["most"] for row in rows) <= 40
+    for count in ("threads", "descriptors", "windows"):
         assert max(row[count] for row in later) <= first[count]
-    assert max(row["resident_mb"] for row in later) <= 1.1 * first["resident_mb"]
+    assert max(row["RSS, MB"] for row in later) <= 1.1 * first["RSS, MB"]
