@@ -49,7 +49,7 @@ from tools.fitting.clips import REAL_MOTION
 
 FOLDER = BUILD / "denoiser"
 FITTING = BUILD / "fitting"
-SEEDS, MINUTES = 3, 2.0
+SEEDS, MINUTES = 3, 1.0
 """Trainings of each network, and minutes of each."""
 
 WALKS = ("walk-towards", "towards-2", "towards-3", "walk-away", "away-2", "away-3")
