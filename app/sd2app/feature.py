@@ -96,6 +96,13 @@ class Shell(Protocol):
     def fold_side(self, folded: bool) -> None:
         """Fold the panel at the side away, or bring it back."""
 
+    @property
+    def starts(self) -> bool:
+        """True while the start page is on screen."""
+
+    def show_start(self, shown: bool) -> None:
+        """Show the start page over what is open, or what is open again."""
+
     def save(self) -> bool:
         """Save the recording, asking where if need be; False where the user cancels."""
 

@@ -22,7 +22,7 @@ LAYOUT: Mapping[str, tuple[str, ...]] = {
         "new_from_video", "listen", "open", "@recent", "add", "read_mesh",
         "refine_mesh", "compare", "relink", "-", "save",
         "save_as", "export_map", "export_maps", "export_strip", "export_dataset", "-", "batch",
-        "any_command", "-", "recover_labels", "-", "quit",
+        "any_command", "-", "recover_labels", "-", "start_page", "quit",
     ),
     "Edit": (
         "undo", "redo", "-", "placements", "things", "bodies", "place_inertial", "align",

@@ -76,6 +76,7 @@ class MainWindow(QMainWindow):
         self._settings = settings
         self._parts = parts or Parts()
         self.ready = False  # true once the views stand and a recording can be shown
+        self._asks_start = False
         self._behind: set[Feature] = set()  # whose actions do not follow their models yet
         self._tabbed: QWidget | None = None  # control that Tab has reached last
         self.setWindowTitle("SD² Studio")
@@ -230,6 +231,7 @@ class MainWindow(QMainWindow):
             signal.connect(lambda *_: self._refresh())
         s.sensor.dragging_changed.connect(lambda _: self._refresh([]))
         s.document.opened.connect(self._show_document)
+        s.document.opened.connect(partial(self.show_start, False))
         for signal in (s.document.opened, s.jobs.changed):
             signal.connect(self._start_or_views.start)
         for signal in (s.document.changed, s.video.frame_changed):
@@ -258,14 +260,16 @@ class MainWindow(QMainWindow):
         self._refresh()
 
     def _choose_start(self) -> None:
-        """Show the start page while nothing is open, and none of what belongs to a recording."""
+        """Show the start page while nothing is open or it is asked for, and nothing else."""
         document = self.session.document
-        starts = document.content is None and document.reading is None
+        nothing = document.content is None and document.reading is None
+        starts = nothing or (self._asks_start and document.reading is None)
         if self.ready and starts == self.start.isHidden():
             for view in self._of_recording:
                 view.setVisible(not starts)
-            self.start.refresh()
+            self.start.refresh("" if nothing else document.title)
             self.start.setVisible(starts)
+            self._refresh([self.features.welcome])
             if not starts:  # Space plays, whatever had the keyboard on the page
                 self._panels["tracks"].setFocus()
 
@@ -381,6 +385,16 @@ class MainWindow(QMainWindow):
     def fold_side(self, folded: bool) -> None:
         """Fold the panel at the side away, or bring it back."""
         self.side.set_folded(folded)
+
+    @property
+    def starts(self) -> bool:
+        """True while the start page is on screen."""
+        return not self.start.isHidden()
+
+    def show_start(self, shown: bool) -> None:
+        """Show the start page over what is open, or what is open again."""
+        self._asks_start = shown
+        self._start_or_views.start()
 
     def save(self) -> bool:
         """Save the recording, asking where if need be; False where the user cancels."""

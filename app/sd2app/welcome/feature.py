@@ -1,8 +1,9 @@
-"""The start page while nothing is open, and the tour of the sample."""
+"""The start page, and the tour of the sample."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QObject
@@ -50,8 +51,15 @@ class WelcomeFeature(Feature):
         self.changing, self.closing = (self.tour.changed,), (self.pictures,)
 
     def actions(self) -> Sequence[Action]:
-        """The tour."""
+        """The start page and the tour."""
+        shell, document = self._shell, self._session.document
         return (
+            Action(
+                "start_page", "File", "Start page", (),
+                "Ways to begin, and what was open lately; what is open stays open",
+                lambda: shell.show_start(not shell.starts),
+                lambda: document.content is not None, checked=lambda: shell.starts,
+            ),
             Action(
                 "tour", "Help", "Tour of the sample", (),
                 "Small steps by your own hand, from the first look to a trained model; goes on"
@@ -61,9 +69,10 @@ class WelcomeFeature(Feature):
         )  # fmt: skip
 
     def start_page(self) -> StartPage:
-        """Page for the window that has nothing open."""
+        """Page to begin on."""
         settings, action = self._session.settings, self._shell.action
-        return StartPage(settings, self.pictures, self.tour, action, self._open_recent)
+        back = partial(self._shell.show_start, False)
+        return StartPage(settings, self.pictures, self.tour, action, self._open_recent, back)
 
     def callout(self, window: QMainWindow, label_key: Callable[[], str]) -> TourCallout:
         """The tour on a window."""

@@ -1,4 +1,4 @@
-"""What the window shows while nothing is open: ways to begin, and what was open lately."""
+"""What the window shows while nothing is open, or when asked: ways to begin, and recent files."""
 
 from __future__ import annotations
 
@@ -46,7 +46,8 @@ WAYS = (
 class StartPage(QScrollArea):
     """Cards of ways to begin, the tour, and recordings with pictures; files can be dropped on it.
 
-    ``action`` finds an action by its id; ``open_recent`` opens what was open together.
+    ``action`` finds an action by its id; ``open_recent`` opens what was open together; ``back``
+    goes back to what is open.
     """
 
     def __init__(
@@ -56,6 +57,7 @@ class StartPage(QScrollArea):
         tour: TourModel,
         action: Callable[[str], QAction],
         open_recent: Callable[[Sequence[Path]], object],
+        back: Callable[[], object],
     ) -> None:
         super().__init__()
         self._settings, self._pictures, self._tour = settings, pictures, tour
@@ -76,6 +78,7 @@ class StartPage(QScrollArea):
             card.clicked.connect(done.trigger)
             done.changed.connect(lambda card=card, done=done: card.setEnabled(done.isEnabled()))
             ways.addWidget(card, 1)
+        self.back = outlined("", "What is open is still there", back, self)
         self._begin = outlined("", "", tour.begin, self, look="primary")
         self._about_tour = sentence("")
         any_file = outlined("Open…", action("open").toolTip(), action("open").trigger, self)
@@ -91,7 +94,7 @@ class StartPage(QScrollArea):
         page.setObjectName("page")
         page.setMaximumWidth(_WIDTH_PX)
         parts = (
-            STRETCH, head, about, 20, ways, 12,
+            STRETCH, row_of(head, STRETCH, self.back), about, 20, ways, 12,
             row_of(self._begin, (self._about_tour, 1), spacing_px=12), 20,
             row_of(title("Recent"), STRETCH, any_file), 8, self._nothing, self._recent, 16,
             sentence("Or drop anything here: a recording, a video, a mesh, a radar capture."),
@@ -103,12 +106,18 @@ class StartPage(QScrollArea):
         middle.setLayout(row_of(STRETCH, (page, 100), STRETCH, spacing_px=0, margins_px=0))
         self.setWidget(middle)
         tour.changed.connect(self._say_tour)
-        pictures.changed.connect(self.refresh)
-        self.refresh()
+        pictures.changed.connect(lambda: self.refresh())
+        self.refresh("")
         self._say_tour()
 
-    def refresh(self) -> None:
-        """List what was open lately anew, with pictures as they are on disk."""
+    def refresh(self, opened: str | None = None) -> None:
+        """List what was open lately anew, with pictures as they are on disk.
+
+        ``opened`` is the title of what is open, empty if that is nothing; None: as before.
+        """
+        if opened is not None:
+            self.back.setText(f"Back to “{opened}”")
+            self.back.setVisible(opened != "")
         for card in self.recent:
             self._recent.removeWidget(card)
             card.deleteLater()

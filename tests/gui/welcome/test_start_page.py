@@ -49,6 +49,32 @@ def test_nothing_but_the_start_page_is_there_until_something_is_open(
     assert all(view.isVisible() for view in views(starting))
 
 
+def test_it_is_gone_back_to_and_what_is_open_stays_open(starting, qtbot, small_recording) -> None:
+    assert not starting.action("start_page").isEnabled()
+    assert starting.start.back.isHidden()
+    opened(starting, qtbot, small_recording)
+    document = models_of(starting).document
+    qtbot.waitUntil(starting.start.isHidden)
+
+    starting.action("start_page").trigger()
+
+    qtbot.waitUntil(starting.start.isVisible)
+    assert starting.action("start_page").isChecked()
+    assert not any(view.isVisible() for view in views(starting))
+    assert starting.start.back.text() == "Back to “ball”"
+    QTest.mouseClick(starting.start.back, LEFT)
+    qtbot.waitUntil(starting.start.isHidden)
+    assert all(view.isVisible() for view in views(starting))
+    assert not starting.action("start_page").isChecked()
+    assert document.recording.folder == small_recording
+
+    starting.action("start_page").trigger()
+    qtbot.waitUntil(starting.start.isVisible)
+    with qtbot.waitSignal(document.opened, timeout=20_000):
+        QTest.mouseClick(starting.start.recent[0], LEFT)
+    qtbot.waitUntil(starting.start.isHidden)
+
+
 def test_it_comes_back_where_opening_fails(starting, qtbot, tmp_path) -> None:
     (tmp_path / "broken.mp4").write_bytes(b"no video")
     with qtbot.waitSignal(models_of(starting).document.failed, timeout=20_000):
