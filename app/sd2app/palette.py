@@ -1,6 +1,7 @@
 """Colours of the two themes. Text on its background has a contrast of at least 4.5:1.
 
-Those of a sensor's axes have it on panels and wells, and differ to the colour-blind.
+What is disabled, and frames of what is typed or chosen, have 3:1. Those of a sensor's axes have
+4.5:1 on panels and wells, and differ to the colour-blind.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ class Palette:
     border: str
     text: str
     muted: str
+    disabled: str
     accent: str
     accent_text: str
     synthetic: str
@@ -41,6 +43,7 @@ LIGHT = Palette(
     border="#d3d7dd",
     text="#1d2127",
     muted="#5a6370",
+    disabled="#7b828c",
     accent="#1f66d1",
     accent_text="#ffffff",
     synthetic="#1f66d1",
@@ -63,6 +66,7 @@ DARK = Palette(
     border="#343941",
     text="#e7e9ec",
     muted="#a0a8b3",
+    disabled="#767e89",
     accent="#79b0ff",
     accent_text="#0e1116",
     synthetic="#79b0ff",

@@ -25,6 +25,16 @@ _ROLES = {
     QPalette.ColorRole.Accent: "accent",
 }
 
+_FRAMES = {
+    "QAbstractSpinBox": "disabled",
+    "QComboBox": "disabled",
+    "QLineEdit": "disabled",
+    "QCheckBox": "muted",
+}
+"""Colours of frames of what is typed, chosen or ticked; the last are drawn lighter."""
+_OF_A_FRAME = 140
+"""By which percentage Fusion divides the brightness of a window for frames on it."""
+
 
 def apply_theme(application: QApplication, dark: bool) -> None:
     """Give every widget the light or the dark theme, unless the application has it already."""
@@ -41,9 +51,14 @@ def apply_theme(application: QApplication, dark: bool) -> None:
         QPalette.ColorRole.Text,
         QPalette.ColorRole.ButtonText,
     ):
-        palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(colours.hatch))
+        palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(colours.disabled))
     application.setStyle("Fusion")
     application.setPalette(palette)
+    # Fusion frames these by a darker shade of their window, which is not seen on a dark one.
+    for kind, name in _FRAMES.items():
+        window = QColor(getattr(colours, name)).lighter(_OF_A_FRAME)
+        palette.setColor(QPalette.ColorRole.Window, window)
+        application.setPalette(palette, kind)  # type: ignore[arg-type]  # not bytes
     application.setStyleSheet(sheet)
 
 
@@ -63,12 +78,6 @@ def _style_sheet(c: Palette) -> str:
         background: {c.panel}; border: 1px solid {c.muted}; border-left: 3px solid {c.accent};
         border-radius: 6px;
     }}
-    /* Fusion's frame is darker than the window: on a dark one it is not seen. */
-    QCheckBox::indicator:unchecked {{
-        background: {c.panel}; border: 1px solid {c.muted}; border-radius: 2px;
-        width: 12px; height: 12px;
-    }}
-    QCheckBox::indicator:unchecked:disabled {{ border-color: {c.hatch}; }}
     QLabel#title {{ font-weight: 600; }}
     QLabel#muted, QLabel#unit {{ color: {c.muted}; }}
     QLabel#warning {{ color: {c.warning}; }}
@@ -92,7 +101,7 @@ def _style_sheet(c: Palette) -> str:
     QToolButton#primary:hover {{ background: {c.accent}; border-color: {c.text}; }}
     QToolButton#primary:focus {{ border-color: {c.text}; }}
     QToolButton#primary:disabled {{
-        background: {c.well}; color: {c.hatch}; border-color: {c.border};
+        background: {c.well}; color: {c.disabled}; border-color: {c.border};
     }}
     QToolButton#fold {{ padding: 2px 4px 2px 0; }}
     QToolButton#fold:checked {{ background: transparent; border-color: transparent; }}

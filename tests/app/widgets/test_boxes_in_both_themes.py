@@ -1,10 +1,10 @@
-"""Boxes to tick stand out from the window in the light and in the dark theme."""
+"""What is typed, chosen or ticked stands out from the window in the light and in the dark theme."""
 
 from __future__ import annotations
 
 import pytest
 from PySide6.QtGui import QColor, QImage
-from PySide6.QtWidgets import QApplication, QCheckBox
+from PySide6.QtWidgets import QApplication, QCheckBox, QComboBox, QDoubleSpinBox, QLineEdit
 
 from sd2app.palette import palette_for
 from sd2app.widgets.theme import apply_theme
@@ -24,18 +24,37 @@ def contrast(one: QColor, other: QColor) -> float:
     return (high + 0.05) / (low + 0.05)
 
 
-@pytest.mark.parametrize("dark", [False, True])
-def test_a_box_that_is_not_ticked_is_seen(qtbot, qapp: QApplication, dark: bool) -> None:
+@pytest.fixture(params=[False, True])
+def theme(request, qapp: QApplication):
+    """Colours of a theme that is in use."""
     before = qapp.styleSheet(), qapp.palette()
-    try:
-        apply_theme(qapp, dark)
-        box = QCheckBox()
-        qtbot.addWidget(box)
-        box.resize(box.sizeHint())
-        picture: QImage = box.grab().toImage()
-        row = [picture.pixelColor(x, picture.height() // 2) for x in range(picture.width())]
-        window = QColor(palette_for(dark).window)
-        assert max(contrast(one, window) for one in row) >= 3.0  # WCAG 2, 1.4.11
-    finally:
-        qapp.setStyleSheet(before[0])
-        qapp.setPalette(before[1])
+    apply_theme(qapp, request.param)
+    yield palette_for(request.param)
+    qapp.setStyleSheet(before[0])
+    qapp.setPalette(before[1])
+
+
+def ticked_box() -> QCheckBox:
+    box = QCheckBox()
+    box.setChecked(True)
+    return box
+
+
+@pytest.mark.parametrize("kind", [QCheckBox, ticked_box, QComboBox, QDoubleSpinBox, QLineEdit])
+def test_its_frame_is_seen(qtbot, theme, kind) -> None:
+    box = kind()
+    qtbot.addWidget(box)
+    box.resize(box.sizeHint())
+    picture: QImage = box.grab().toImage()
+    # Without what is in it: above the sign of a ticked box, and above text and arrows.
+    middle = picture.height() // 2
+    column = [
+        picture.pixelColor(6, y) for y in range(middle - 5 if isinstance(box, QCheckBox) else 3)
+    ]
+    window = QColor(theme.window)
+    assert max(contrast(one, window) for one in column) >= 3.0  # WCAG 2, 1.4.11
+
+
+def test_what_is_disabled_can_still_be_read(theme) -> None:
+    backgrounds = theme.window, theme.panel, theme.well
+    assert min(contrast(QColor(theme.disabled), QColor(one)) for one in backgrounds) >= 3.0
