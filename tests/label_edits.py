@@ -16,7 +16,10 @@ from sd2core.timebase import Timebase
 def label_edits(timebase: Timebase) -> LabelEdits:
     """Edits on a model and a clock of their own, which nobody refuses and nothing keeps."""
     document: Any = SimpleNamespace(
-        recording=SimpleNamespace(labels=None), mesh=None, undo_stack=QUndoStack()
+        recording=SimpleNamespace(labels=None),
+        mesh=None,
+        undo_stack=QUndoStack(),
+        renamed=SimpleNamespace(connect=lambda _: None),
     )
     session: Any = SimpleNamespace(refusal="", keep=lambda *_: None)
     playback = PlaybackModel()

@@ -8,6 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
+from sd2app.plain_imports import imports_of_qt
 from sd2app.scene.backend import (
     GL_MISSING,
     NoOpenGL,
@@ -32,7 +33,8 @@ class InteractorBackend:
         if library is not None:
             raise NoOpenGL(GL_MISSING.format(library=library))
         driver = opengl_renderer()
-        from pyvistaqt import QtInteractor
+        with imports_of_qt():  # it takes all of Qt's names at once
+            from pyvistaqt import QtInteractor
 
         self._interactor: Any = QtInteractor(parent, auto_update=False, multi_samples=0)
         # It would keep drops and the window's keys to itself.
