@@ -195,9 +195,7 @@ class _Look:
         faces = reading.pop("faces", None)
         parts = [self._digest(file) for file in files_at(path)]
         parts += [self._digest(Path(one.shape)) for one in recording.things if one.is_file]
-        for one in recording.bodies:
-            files = [*files_at(Path(one.path)), *([Path(one.faces)] if one.faces else [])]
-            parts += map(self._digest, files)
+        parts += [self._digest(file) for one in recording.bodies for file in one.files]
         identity = [parts, {key: str(value) for key, value in reading.items()}]
         if faces is not None:
             identity.append(self._digest(faces))

@@ -12,7 +12,6 @@ import numpy as np
 
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import signature
-from sd2core.files.paths import files_at
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.bodies import MAX_BODIES, Body
 from sd2core.mesh.made_vertices import ChangedVertices, shifted, unshifted
@@ -105,12 +104,11 @@ def _named(mesh: MeshSequence, body: Body) -> MeshSequence:
 
 def _placed(body: Body, first: MeshSequence) -> MeshSequence:
     """Body of a file, in its place and at the times of the first."""
-    path, reading, files = Path(body.path), dict(body.reading), files_at(Path(body.path))
+    path, reading = Path(body.path), dict(body.reading)
     if body.faces is not None:
         reading["faces"] = body.faces
-        files.append(Path(body.faces))
     try:
-        own = _read(path, tuple(reading.items()), str(signature(files)))
+        own = _read(path, tuple(reading.items()), str(signature(body.files)))
     except Sd2Error as error:
         if path.exists():
             raise

@@ -47,9 +47,10 @@ def set_field(labels: Labels, ids: Iterable[int], field: SpanField, value: Any) 
 
 def rename_persons(labels: Labels, names: Mapping[str, str]) -> Edit:
     """Give the spans of persons their new names, by the old ones."""
-    theirs = [span.id for span in labels.spans if span.person in names]
-    changed = [replace(span, person=names[span.person]) for span in labels.these(theirs)]
-    return Edit("Rename person", labels.with_spans(changed) if changed else labels)
+    changed = (
+        replace(span, person=names[span.person]) for span in labels.spans if span.person in names
+    )
+    return Edit("Rename person", labels.with_spans(changed))
 
 
 def _name(verb: str, count: int) -> str:

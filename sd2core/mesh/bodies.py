@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from sd2core.errors import Sd2Error
+from sd2core.files.paths import files_at
 from sd2core.mesh.things import FARTHEST_THING_M
 from sd2core.sensor import Vector
 
@@ -73,6 +75,11 @@ class Body:
     def name(self) -> str:
         """Name of the person, or of the file."""
         return self.person or self.file_name
+
+    @property
+    def files(self) -> list[Path]:
+        """Files that it is read from."""
+        return [*files_at(Path(self.path)), *([] if self.faces is None else [Path(self.faces)])]
 
     @property
     def file_name(self) -> str:

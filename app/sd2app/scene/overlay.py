@@ -144,8 +144,8 @@ class Overlay(Canvas):
             self._paint_hint(painter, HINT)
         elif (thing := self._navigator.thing) is not None and thing < len(self.thing_names):
             words = THING_HINT.format(self.thing_names[thing])
-            both = f"{words}  ·  {self.hint}" if self.hint else words
-            self._paint_hint(painter, both) or self._paint_hint(painter, words)
+            if not (self.hint and self._paint_hint(painter, f"{words}  ·  {self.hint}")):
+                self._paint_hint(painter, words)
         elif self.hint:
             self._paint_hint(painter, self.hint)
         elif marker is not None:

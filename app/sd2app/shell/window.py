@@ -231,7 +231,6 @@ class MainWindow(QMainWindow):
             signal.connect(lambda *_: self._refresh())
         s.sensor.dragging_changed.connect(lambda _: self._refresh([]))
         s.document.opened.connect(self._show_document)
-        s.document.opened.connect(partial(self.show_start, False))
         for signal in (s.document.opened, s.jobs.changed):
             signal.connect(self._start_or_views.start)
         for signal in (s.document.changed, s.video.frame_changed):
@@ -255,6 +254,7 @@ class MainWindow(QMainWindow):
     # --- following the models -------------------------------------------------------------
 
     def _show_document(self) -> None:
+        self._asks_start = False
         self.messages.dismiss()
         self.maps.refresh()
         self._refresh()
