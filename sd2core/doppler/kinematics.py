@@ -35,7 +35,7 @@ _BLOCK_FRAMES = 256
 class _Joints:
     """Joints of a mesh, whatever the sensor is; places are found where they are asked for."""
 
-    parts: VertexParts
+    numbers: NDArray[np.uint8]  # part of the body of every vertex
     rows: list[NDArray[np.intp]]  # vertices whose mean each joint is
     places_m: Floats  # (T, J, 3), in those blocks of frames that are known
     known: NDArray[np.bool_]
@@ -123,12 +123,12 @@ _JOINTS_OF: WeakKeyDictionary[MeshSequence, _Joints] = WeakKeyDictionary()
 def _joints_of(mesh: MeshSequence, parts: VertexParts) -> _Joints:
     """Joints of a mesh, found once."""
     joints = _JOINTS_OF.get(mesh)
-    if joints is None or joints.parts is not parts:
+    if joints is None or joints.numbers is not parts.numbers:
         first = mesh.frame(int(np.argmax(mesh.presence.there))).astype(np.float64)
         rows = joint_vertices(first, mesh.faces, parts)
         places_m = np.zeros((mesh.frame_count, len(rows), 3))
         blocks = -(-mesh.frame_count // _BLOCK_FRAMES)
-        joints = _Joints(parts, rows, places_m, np.zeros(blocks, bool))
+        joints = _Joints(parts.numbers, rows, places_m, np.zeros(blocks, bool))
         _JOINTS_OF[mesh] = joints
     return joints
 

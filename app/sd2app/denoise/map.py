@@ -15,7 +15,7 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import BackgroundModel, LatestRunner, delayed
 from sd2app.background.model_worker.client import RemoteDenoiser, RemoteLive
-from sd2app.maps.partial_map import View
+from sd2app.maps.partial_map import Part, View
 from sd2app.maps.quality import Postprocess
 from sd2app.session.content import reference_of
 from sd2app.session.maps import MapModel
@@ -24,7 +24,6 @@ from sd2app.session.tasks import Job
 from sd2core.denoise.known import KnownMovements
 from sd2core.denoise.resample_to_model import input_of, is_regular
 from sd2core.denoise.texture import Texture
-from sd2core.doppler.synthesizer import Stretch
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap, LimbMaps
 from sd2core.pairs.segments import LENGTH, OVERLAP
@@ -74,11 +73,11 @@ class _Answer(NamedTuple):
 class DenoisedMap(BackgroundModel):
     """Denoises what changed of the synthetic map, what is in view first.
 
-    While the sensor is dragged the model is asked in the same background task that
-    sweeps the map (:meth:`postprocess`), so that both are of the same place and are shown
-    together. At rest one piece after another is denoised behind the synthetic map. Pieces
-    of a long clip are a preview, where a model remembers more than is around them: when
-    the synthetic map stands, the clip is gone through in order (:meth:`finish`).
+    While the sensor is dragged the model is asked by the background task that sweeps the
+    map (:meth:`postprocess`), so that both are of the same place and are shown together. At
+    rest one piece after another is denoised behind the synthetic map. Pieces of a long clip
+    are a preview, where a model remembers more than is around them: when the synthetic map
+    stands, the clip is gone through in order (:meth:`finish`).
     """
 
     failed = Signal(str)
@@ -204,17 +203,17 @@ class DenoisedMap(BackgroundModel):
             self._go_on()
 
     def postprocess(self) -> Postprocess | None:
-        """Function that denoises a preview in the same background task; None without a model."""
+        """Function that denoises a preview in the background; None without a model."""
         denoiser, source = self.denoiser, self._synthetic.map
         if denoiser is None or source is None or self._held or not self.keeps_up:
             return None
         if self._lacks_limbs:
             return None
 
-        def denoised(start: int, stretch: Stretch) -> Swept | None:
+        def denoised(part: Part) -> Swept | None:
             began = time.perf_counter()
             try:
-                made = denoiser.denoise(cut_out(source, start, stretch.values, stretch.limbs))
+                made = denoiser.denoise(cut_out(source, part.start, part.values, part.limbs))
             except Sd2Error as error:
                 self._stumbled.emit(str(error))
                 return None

@@ -314,11 +314,11 @@ class DenoiseModel(ReportingModel):
     # --- following the synthetic map ------------------------------------------------------
 
     def _postprocess(self) -> Postprocess | None:
-        """Postprocessing of a sweep, which makes both maps in one task."""
+        """Postprocessing of a sweep, which makes both maps."""
         parts = [one.postprocess() for one in (self.map, self.before_map)]
         if not any(parts):
             return None
-        return lambda start, stretch: [part and part(start, stretch) for part in parts]
+        return lambda swept: [part and part(swept) for part in parts]
 
     def _take(self, part: Part) -> None:
         piece = (part.start, part.stop)

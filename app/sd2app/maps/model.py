@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import functools
+import threading
 from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -76,7 +78,8 @@ class SynthesisModel(QObject):
         self._prefetcher = MaskPrefetcher(self)
         self._prefetcher.failed.connect(lambda error: self.failed.emit(str(error)))
         # Asked for by the window and taken by the thread.
-        self._next_sweep: deque[Callable[[], Part]] = deque(maxlen=1)
+        self._next_sweep: deque[tuple[Callable[[], Part], Postprocess | None]] = deque(maxlen=1)
+        self._woken = threading.Event()  # by another sweep, or the end of what is made of one
         self._forget()
         self._runner = ListedRunner("synthesis", session.jobs, self, self._finish, self._fail)
         self._runner.partial.connect(self._receive)
@@ -228,7 +231,7 @@ class SynthesisModel(QObject):
         return lambda: synthesizers.of(plan), self._sensor
 
     def postprocess_with(self, postprocess: Callable[[], Postprocess | None]) -> None:
-        """Ask ``postprocess`` before each sweep what is to be made of it, in step with it."""
+        """Ask ``postprocess`` before each sweep what is to be made of it, and shown with it."""
         self._postprocess = postprocess
 
     def want_limbs(self, who: str, wanted: bool) -> None:
@@ -318,24 +321,41 @@ class SynthesisModel(QObject):
         shows the one before meanwhile.
         """
         level, (start, stop) = self._preview_quality(), self._swept()
-        postprocess = self._postprocess()
-        self._next_sweep.append(
-            functools.partial(
-                compute_part, level, self._sensor, start, stop, postprocess=postprocess
-            )
-        )
+        sweep = functools.partial(compute_part, level, self._sensor, start, stop)
+        self._next_sweep.append((sweep, self._postprocess()))
+        self._woken.set()
         if not (self._sweeping and self._runner.busy):
             self._sweeping = True
             self._runner.submit(self._sweep_on)
 
     def _sweep_on(self, emit: Emit) -> None:
-        """Make passes in the background for as long as another is asked for."""
-        while True:
-            try:
-                sweep = self._next_sweep.pop()
-            except IndexError:
-                return
-            emit(sweep())
+        """Make passes in the background for as long as another is asked for.
+
+        What is to be made of one is made beside the next, and comes with it.
+        """
+
+        def more_of(part: Part, postprocess: Postprocess | None) -> None:
+            emit(part if postprocess is None else replace(part, more=postprocess(part)))
+
+        with ThreadPoolExecutor(1, "postprocess") as beside:
+            before: Future[None] | None = None
+            while True:
+                self._woken.clear()
+                ended = before is None or before.done()
+                try:
+                    sweep, postprocess = self._next_sweep.pop()
+                except IndexError:
+                    if not ended:
+                        self._woken.wait()
+                        continue
+                    if before is not None:
+                        before.result()
+                    return
+                part = sweep()
+                if before is not None:
+                    before.result()
+                before = beside.submit(more_of, part, postprocess)
+                before.add_done_callback(lambda _: self._woken.set())
 
     def _settle(self) -> None:
         """Compute previews where nothing is known, then the final quality; time window first."""

@@ -190,8 +190,8 @@ def pieces(
 class Part:
     """Computed frames on their way to the window.
 
-    ``key`` is of all that final ones depend on; ``more`` is what was made of it in
-    the same task.
+    ``key`` is of all that final ones depend on; ``more`` is what was made of it
+    and is shown with it.
     """
 
     sensor: VirtualSensor

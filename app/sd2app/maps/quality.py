@@ -18,7 +18,7 @@ from sd2app.background.latest import Emit
 from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, Part, View, pieces
 from sd2core.body.parts import body_parts
 from sd2core.doppler.options import SynthesisOptions
-from sd2core.doppler.synthesizer import Stretch, Synthesizer, Visibility
+from sd2core.doppler.synthesizer import Synthesizer, Visibility
 from sd2core.mesh.made_vertices import same_bodies
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import VertexParts
@@ -42,8 +42,8 @@ _KEPT = 3
 
 _ROUGH_WORDS = "preview: vertices facing the sensor"
 _ALL_WORDS = "all vertices of the point cloud"
-Postprocess = Callable[[int, Stretch], Any]
-"""Makes something more of a stretch, given its first frame, in the same background task."""
+Postprocess = Callable[[Part], Any]
+"""Makes something more of a part, while the next is computed."""
 
 
 class SynthesizerCache:
@@ -209,7 +209,6 @@ def compute_part(
     start: int,
     stop: int,
     proceed: Callable[[], None] = lambda: None,
-    postprocess: Postprocess | None = None,
 ) -> Part:
     """Compute frames ``start`` to ``stop``; ``proceed`` is called in between and may raise."""
     synthesizer = level.synthesizer()
@@ -221,10 +220,9 @@ def compute_part(
     if level.visibility == "frozen" and stretch.quality == "facing":
         # No mask is kept.
         quality, words = ROUGH, _ROUGH_WORDS
-    more = postprocess(start, stretch) if postprocess is not None else None
     return Part(
         sensor, start, stretch.values, stretch.limbs, quality, words, synthesizer.unit,
-        level.key_of(sensor), more,
+        level.key_of(sensor),
     )  # fmt: skip
 
 

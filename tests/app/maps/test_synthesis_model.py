@@ -104,6 +104,36 @@ def test_every_sweep_of_a_fast_hand_is_for_one_placement(context, qtbot, ball):
     assert context.document.undo_stack.count() == 1
 
 
+def test_a_sweep_need_not_wait_for_what_is_made_of_the_one_before(
+    context, qtbot, ball, monkeypatch
+):
+    open_ball(context, qtbot, ball)
+    qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
+    shown, swept, answer = [], [], threading.Event()
+
+    def slowly(part):
+        assert answer.wait(10)
+        return None, None, part.sensor.position_m[0]  # the first are of the two denoisers
+
+    def counted(self, sensor, *args, _stretch=Synthesizer.stretch, **options):
+        swept.append(sensor.position_m[0])
+        return _stretch(self, sensor, *args, **options)
+
+    monkeypatch.setattr(Synthesizer, "stretch", counted)
+    context.synthesis.postprocess_with(lambda: slowly)
+    context.synthesis._rest.setInterval(60_000)  # the hand does not rest, however slow the machine
+    context.synthesis.painted.connect(lambda part: shown.append((part.sensor.position_m[0], part)))
+    context.edits.begin_sensor_drag()
+    for x_m in (0.1, 0.2):
+        context.edits.drag_sensor((x_m, 0.0, 0.0))
+        qtbot.waitUntil(lambda x_m=x_m: x_m in swept, timeout=10_000)
+    assert shown == []  # both maps of a place come together
+    answer.set()
+    qtbot.waitUntil(lambda: not context.synthesis.busy, timeout=10_000)
+    assert [(x_m, part.more[2]) for x_m, part in shown] == [(0.1, 0.1), (0.2, 0.2)]
+    context.edits.end_sensor_drag()
+
+
 def test_a_hand_that_holds_still_gets_the_exact_map(context, qtbot, ball):
     open_ball(context, qtbot, ball)
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)

@@ -177,3 +177,17 @@ def test_other_parts_have_none() -> None:
     thirds = np.arange(TURNING.vertex_count) % 3
     assert kinematics(TURNING, VertexParts(("a", "b", "c"), thirds), VirtualSensor()) is None
     assert kinematics(TURNING, VertexParts(PARTS, thirds), VirtualSensor()) is None
+
+
+def test_joints_of_a_scene_are_found_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They do not depend on the sensor: of the next place no frame is read again."""
+    scene = replace(TURNING, others=(replace(TURNING, person="anna"),))
+    maps = Synthesizer(scene, "paper")
+    maps.limb_maps(VirtualSensor(), body_parts(scene))
+    read: list[tuple[int, int]] = []
+    whole = MeshSequence.read
+    monkeypatch.setattr(
+        MeshSequence, "read", lambda mesh, *span: (read.append(span), whole(mesh, *span))[1]
+    )
+    maps.limb_maps(VirtualSensor((0.2, 0.0, 0.0)), body_parts(scene))
+    assert read == []

@@ -143,7 +143,8 @@ class RemoteDenoiser(_Remote):
 
     def denoise(self, doppler: DopplerMap) -> DopplerMap:
         """Denoised map: an estimate of a radar's map from a synthetic one."""
-        given = replace(doppler, uncertainty=None)  # no model uses it
+        # What the model does not take need not travel.
+        given = replace(doppler, uncertainty=None, limbs=doppler.limbs if self.parts else None)
         denoised: DopplerMap = self._process.ask("call", self._ready(), "denoise", given)
         return replace(denoised, timebase=doppler.timebase)
 
