@@ -161,17 +161,20 @@ def spread_over_bins(
     counting : Counting
         Axis, and what happens beyond it.
     """
-    known, bins, turns = sigma == 0, counting.bins, 0
+    known, bins = sigma == 0, counting.bins
     number, _ = place_in_bins(place[known], counting)
     shares = np.bincount(number, weight[known], bins + 1)[:bins].astype(np.float64)
-    place, weight, sigma = place[~known], weight[~known], sigma[~known]
-    if counting.beyond == WRAP:
-        farthest = np.abs(place - 0.5 * bins) + 2 * REACH * sigma
-        turns = math.ceil(farthest.max(initial=0.0) / bins)
-    edges = np.arange(-turns * bins, (turns + 1) * bins + 1)
-    below = ndtr((edges - place[:, None]) / sigma[:, None])
-    if counting.beyond == CLIP:
-        below[:, 0], below[:, -1] = 0.0, 1.0
-    # Of nearly equal sums the difference may be less than nothing by a rounding.
-    shares += np.maximum(np.diff(weight @ below), 0.0).reshape(-1, bins).sum(axis=0)
+    reach = np.ceil(2 * REACH * sigma).astype(np.intp)  # bins to each side; beyond it is 1e-15
+    for away in np.unique(reach[~known]).tolist():
+        rows = reach == away
+        first = np.floor(place[rows]) - away
+        edges = first[:, None] + np.arange(2 * away + 2)
+        below = ndtr((edges - place[rows, None]) / sigma[rows, None])
+        number, share = edges[:, :-1].astype(np.intp), weight[rows, None] * np.diff(below)
+        if counting.beyond == WRAP:
+            number %= bins
+        elif counting.beyond == CLIP:
+            number = np.clip(number, 0, bins - 1)
+        inside = (number >= 0) & (number < bins)
+        shares += np.bincount(number[inside], share[inside], bins)
     return shares
