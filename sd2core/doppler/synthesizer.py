@@ -66,6 +66,27 @@ class FrameScattering:
     quality: Quality  # visibility that was used
 
 
+@dataclass(frozen=True, eq=False)
+class _Counted:
+    """Counts of a body in frames ``start`` to ``stop`` (exclusive), and the jobs that fill them."""
+
+    start: int
+    stop: int
+    counts: Counts
+    totals: NDArray[np.float64]  # (n,), what the counts are shares of
+    visibility: Visibility
+    used: set[Quality]  # what the jobs found
+    jobs: list[Callable[[Ticket], None]]
+    light: bool  # done about as soon as other threads wake
+
+    @property
+    def quality(self) -> Quality:
+        """Visibility that was used."""
+        if self.visibility == "frozen":
+            return "frozen" if self.used == {"frozen"} else "facing"
+        return self.visibility
+
+
 def _body_notes(prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: int) -> list[str]:
     """Sentences about frames without a person, and about limits of single precision.
 
@@ -443,11 +464,15 @@ class Synthesizer:
         if not 0 <= start < stop <= self.mesh.frame_count:
             raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
         by_body = (None,) * len(self._bodies) if parts is None else (parts, *parts.others)
-        of, each = len(self._bodies), []
-        for number, (one, its) in enumerate(zip(self._bodies, by_body, strict=True)):
-            counting = _of_bodies(progress, number, of)
-            each.append(one._own_stretch(sensor, start, stop, visibility, counting, its, shares))
-        return each[0] if of == 1 else self._joined(each)
+        # Together, so that no thread waits for another between two bodies.
+        counted = [
+            one._to_count(sensor, (start, stop), one._choose(visibility), its, shares)
+            for one, its in zip(self._bodies, by_body, strict=True)
+        ]
+        processor_s = self._run(counted, progress)
+        bodies = zip(self._bodies, counted, by_body, strict=True)
+        each = [one._summed(its, sensor, (start, stop), part, shares) for one, its, part in bodies]
+        return replace(each[0] if len(each) == 1 else self._joined(each), processor_s=processor_s)
 
     def _joined(self, each: list[Stretch]) -> Stretch:
         """Sum of the stretches of all bodies."""
@@ -467,25 +492,19 @@ class Synthesizer:
             beyond,
             "facing" if "facing" in qualities else each[0].quality,
             LimbMaps.of_persons(limbs, self.mesh.persons) if limbs else None,
-            sum(one.processor_s for one in each),
         )
 
-    def _own_stretch(
+    def _summed(
         self,
+        counted: _Counted,
         sensor: VirtualSensor,
-        start: int,
-        stop: int,
-        visibility: Visibility | None,
-        progress: Progress,
+        frames: tuple[int, int],
         parts: VertexParts | None,
         shares: bool,
     ) -> Stretch:
-        """Stretch of this body alone, among the others."""
-        options, times_s = self.options, self.mesh.times_s
-        first, last = frames_within_reach(times_s, start, stop, options.time_sigma_s)
-        counts, totals, quality, processor_s = self._count(
-            sensor, first, last, self._choose(visibility), progress, parts, shares
-        )
+        """Stretch of this body alone, among the others, once it is counted."""
+        options, times_s, (start, stop) = self.options, self.mesh.times_s, frames
+        counts, totals, first, last = counted.counts, counted.totals, counted.start, counted.stop
 
         def smoothed(counted: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
             """Shares (..., bins, frames) of what was counted, before and after smoothing."""
@@ -497,7 +516,7 @@ class Synthesizer:
         limbs = None
         if parts is not None:
             split = smoothed(counts.histogram.transpose(1, 2, 0))[1].astype(np.float32)
-            moves = kinematics(self.mesh, parts, sensor, (start, stop))
+            moves = kinematics(self.mesh, parts, sensor, frames)
             limbs = LimbMaps(parts.names, split, moves)
         inside = slice(start - first, stop - first)
         nobody = ~self.mesh.presence.there[first:last]
@@ -508,9 +527,8 @@ class Synthesizer:
             raw[:, inside],
             (visible / self.mesh.represented_count).astype(np.float32) if shares else None,
             (beyond / np.maximum(visible, 1)).astype(np.float32) if shares else None,
-            quality,
+            counted.quality,
             limbs,
-            processor_s,
         )
 
     def frame(
@@ -585,7 +603,9 @@ class Synthesizer:
         for number, one in enumerate(self._bodies):
             counting = _of_bodies(progress, number, of)
             if known and one.mesh.uncertainty is None:  # what is not said is taken to be right
-                values = one._own_stretch(sensor, start, stop, chosen, counting, None, False).values
+                counted = one._to_count(sensor, (start, stop), chosen, None, False)
+                one._run([counted], counting)
+                values = one._summed(counted, sensor, (start, stop), None, False).values
                 each.append(CellUncertainty(values, np.zeros_like(values)))
                 continue
             frames_of, threads = one._frames, self._threads
@@ -604,17 +624,16 @@ class Synthesizer:
             raise _no_surface(self.mesh, f"Visibility {chosen}")
         return chosen
 
-    def _count(
+    def _to_count(
         self,
         sensor: VirtualSensor,
-        start: int,
-        stop: int,
+        frames: tuple[int, int],
         visibility: Visibility,
-        progress: Progress,
-        parts: VertexParts | None = None,
-        shares: bool = True,
-    ) -> tuple[Counts, NDArray[np.float64], Quality, float]:
-        """Counts per frame, their totals, the visibility used, and processor seconds."""
+        parts: VertexParts | None,
+        shares: bool,
+    ) -> _Counted:
+        """Empty counts of what some frames of this body need, and the jobs that fill them."""
+        start, stop = frames_within_reach(self.mesh.times_s, *frames, self.options.time_sigma_s)
         sensor = sensor if self._beam else replace(sensor, beam=None)
         if not kernels_ready():
             compile_in_background()
@@ -623,7 +642,7 @@ class Synthesizer:
         )
         numbers = None if parts is None else parts.numbers
         totals = np.empty(stop - start)
-        qualities: set[Quality] = set()
+        used: set[Quality] = set()
         quick = visibility not in ("depth", "exact") and kernels_ready()
         at_once = max(_EXACT_VERTICES // self.mesh.vertex_count, 1) if kernels_ready() else 1
 
@@ -639,7 +658,7 @@ class Synthesizer:
                     rows = slice(first - block.start, last - block.start)
                     target = slice(first - start, last - start)
                     into = counts.rows(target), totals[target]
-                    qualities.add(
+                    used.add(
                         self._frames.count(
                             block,
                             rows,
@@ -668,15 +687,19 @@ class Synthesizer:
             if light:
                 cuts = [low, *(cut for cut in shared if low < cut < high), high]
             jobs += [job(index, a, b) for a, b in pairwise(cuts)]
-        if light and self._threads is None:
-            processor_s = run_light_jobs(jobs, stop - start, progress)
-        else:
-            processor_s = run_jobs(jobs, stop - start, progress, self._threads)
-        if visibility == "frozen":
-            quality: Quality = "frozen" if qualities == {"frozen"} else "facing"
-        else:
-            quality = visibility
-        return counts, totals, quality, processor_s
+        return _Counted(start, stop, counts, totals, visibility, used, jobs, light)
+
+    def _run(self, counted: list[_Counted], progress: Progress) -> float:
+        """Count several bodies; returns processor seconds."""
+        jobs = [job for one in counted for job in one.jobs]
+        of, frames = len(counted), counted[0].stop - counted[0].start
+
+        def of_clip(done: int, _: int) -> None:
+            progress(done // of, frames)
+
+        if self._threads is None and all(one.light for one in counted):
+            return run_light_jobs(jobs, of * frames, of_clip)
+        return run_jobs(jobs, of * frames, of_clip, self._threads)
 
     def _block_of(self, frame: int) -> Block:
         if not 0 <= frame < self.mesh.frame_count:

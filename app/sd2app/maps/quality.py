@@ -36,7 +36,7 @@ AT_ONCE = 12_000_000
 _BUDGET_BYTES = 192 << 20
 """For prepared frames: more than a clip takes that is swept in one go; of a longer one, what is in
 view."""
-_EXACT_PARTS = 16
+_EXACT_PARTS = 8
 _KEPT = 3
 """Number of kept synthesizers: for the rest, for dragging, and the one before."""
 
