@@ -39,7 +39,10 @@ class MaskPrefetcher(LatestRunner):
 
         def work(emit: Emit) -> VirtualSensor:
             synthesizer = synthesizers.of(plan)
-            synthesizer.stretch(sensor, *frames, progress=lambda *_: emit(None), shares=False)
+            parts = synthesizers.parts_of(synthesizer)
+            synthesizer.stretch(
+                sensor, *frames, progress=lambda *_: emit(None), parts=parts, shares=False
+            )
             return sensor
 
         self.submit(work)
