@@ -78,7 +78,7 @@ class SynthesisModel(QObject):
         self._prefetcher = MaskPrefetcher(self)
         self._prefetcher.failed.connect(lambda error: self.failed.emit(str(error)))
         # Asked for by the window and taken by the thread.
-        self._next_sweep: deque[tuple[Callable[[], Part], Postprocess | None]] = deque(maxlen=1)
+        self._next_sweep: deque[tuple[Callable[..., Part], Postprocess | None]] = deque(maxlen=1)
         self._woken = threading.Event()  # by another sweep, or the end of what is made of one
         self._forget()
         self._runner = ListedRunner("synthesis", session.jobs, self, self._finish, self._fail)
@@ -351,7 +351,7 @@ class SynthesisModel(QObject):
                     if before is not None:
                         before.result()
                     return
-                part = sweep()
+                part = sweep(proceed=lambda: emit(None))
                 if before is not None:
                     before.result()
                 before = beside.submit(more_of, part, postprocess)
