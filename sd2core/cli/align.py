@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import print_facts, print_json
 from sd2core.errors import Sd2Error
 from sd2core.options.bounds import RADAR_SEARCH_S
@@ -49,11 +48,7 @@ class Align(Json):
             raise OptionError("--camera-delay-ms is given without --by-arrival", "both")
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``align``."""
-    add_command(commands, "align", options=Align, handler=_align)
-
-
+@command("align", Align)
 def _align(options: Align) -> int:
     """Find the time offset of video and radar from what both saw.
 

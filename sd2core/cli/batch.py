@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from collections.abc import Iterator
@@ -10,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import (
     counted,
     duration,
@@ -71,11 +70,7 @@ class Batch(JsonAndProgress):
             raise OptionError("No plan is given", "PLAN.toml, or --status FOLDER")
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``batch``."""
-    add_command(commands, "batch", options=Batch, handler=_batch)
-
-
+@command("batch", Batch)
 def _batch(options: Batch) -> int:
     """Fit, synthesise, denoise and export many recordings from many places.
 

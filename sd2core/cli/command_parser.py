@@ -7,7 +7,8 @@ import inspect
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import MISSING, dataclass
-from typing import Any, NamedTuple, NoReturn, TypeVar
+from importlib import import_module
+from typing import Any, NamedTuple, NoReturn, TypeAlias, TypeVar
 
 from sd2core.errors import Sd2Error
 from sd2core.files.tables import capitalised
@@ -15,6 +16,12 @@ from sd2core.options.records import Group, Option, OptionRecord, typed_options
 from sd2core.options.shared import ReplacesMaps
 
 Record = TypeVar("Record", bound=OptionRecord)
+Handler = TypeVar("Handler", bound=Callable[[Any], int | None])
+Subcommands: TypeAlias = "argparse._SubParsersAction[Any]"
+"""Where commands are added to a parser."""
+
+_DECLARED: dict[str, list[Callable[[Subcommands], object]]] = {}
+"""What adds the commands of each module."""
 
 
 class UsageError(Sd2Error):
@@ -163,8 +170,44 @@ def record_of(typed: argparse.Namespace) -> Any:
     return kind(**values)
 
 
+def command(
+    name: str, options: type[OptionRecord], description: str = ""
+) -> Callable[[Handler], Handler]:
+    """Declare the command that a function runs, as :func:`add_command` adds it."""
+
+    def declare(handler: Handler) -> Handler:
+        def add(commands: Subcommands) -> None:
+            add_command(commands, name, options=options, handler=handler, description=description)
+
+        _DECLARED.setdefault(handler.__module__, []).append(add)
+        return handler
+
+    return declare
+
+
+def command_group(name: str) -> Callable[[Handler], Handler]:
+    """Declare a group of commands, which a function adds; its docstring is the help."""
+
+    def declare(add_commands: Handler) -> Handler:
+        def add(commands: Subcommands) -> None:
+            parser = add_command(commands, name, about=add_commands)
+            add_commands(parser.add_subparsers(title="commands", metavar="COMMAND", required=True))
+
+        _DECLARED.setdefault(add_commands.__module__, []).append(add)
+        return add_commands
+
+    return declare
+
+
+def add_declared(commands: Subcommands, *modules: str) -> None:
+    """Add the commands that modules of ``sd2core.cli`` declare, in their order."""
+    for module in modules:
+        for add in _DECLARED[import_module(f"sd2core.cli.{module}").__name__]:
+            add(commands)
+
+
 def add_command(
-    commands: argparse._SubParsersAction,
+    commands: Subcommands,
     name: str,
     summary: str = "",
     *,
@@ -178,7 +221,7 @@ def add_command(
 
     Parameters
     ----------
-    commands : argparse._SubParsersAction
+    commands : Subcommands
         Where it is added.
     name : str
         As it is typed.

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import print_json, print_rows, progress_bar
 from sd2core.options.kinds import Words
 from sd2core.options.records import ARGUMENTS, OptionError
@@ -72,11 +71,7 @@ class CompareMeshes(Sensor, MeshReading, Figure, Json):
         ]
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``compare-meshes``."""
-    add_command(commands, "compare-meshes", options=CompareMeshes, handler=_compare)
-
-
+@command("compare-meshes", CompareMeshes)
 def _compare(options: CompareMeshes) -> None:
     """Compare meshes of one video: joints, velocities along the line of sight, Doppler maps.
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import Annotated
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.records import ARGUMENT
@@ -25,11 +24,7 @@ class Denoise(MapOutput, Denoising, Json):
     map: Annotated[Path, ARGUMENT]
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``denoise``."""
-    add_command(commands, "denoise", options=Denoise, handler=_denoise)
-
-
+@command("denoise", Denoise)
 def _denoise(options: Denoise) -> None:
     """Turn a synthetic Doppler map into what a radar would show.
 

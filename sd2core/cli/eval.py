@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import print_json, progress_bar, tell_lost
 from sd2core.errors import Sd2Error
 from sd2core.options.records import ARGUMENTS, Place
@@ -54,16 +53,12 @@ class Evaluate(Judging):
     markdown: Annotated[Path | None, Place(endings=(".md",))] = None
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``eval``."""
-    add_command(commands, "eval", options=Evaluate, handler=_eval)
-
-
 def named_subjects(text: str, everybody: tuple[str, ...]) -> tuple[str, ...]:
     """Parse ``--subjects``."""
     return everybody if text == "all" else tuple(name for name in text.split(",") if name)
 
 
+@command("eval", Evaluate)
 def _eval(options: Evaluate) -> None:
     """Measure denoisers on people that they have not learnt from.
 

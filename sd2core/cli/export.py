@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import shlex
 import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import (
     counted,
     duration,
@@ -112,11 +111,7 @@ class Export(Exporting, _Spans, _People, _Maps, JsonAndProgress):
     dry_run: bool = False
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``export``."""
-    add_command(commands, "export", options=Export, handler=_export)
-
-
+@command("export", Export)
 def _export(options: Export) -> int:
     """Write a data set to learn from: segments with labels, sensors and provenance.
 

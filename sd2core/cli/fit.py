@@ -10,7 +10,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import (
     picked,
     print_event,
@@ -122,11 +122,7 @@ class Fit(Overwrite, Fitting, JsonAndProgress):
             raise OptionError("--out is not given", "the mesh to write")
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``fit``."""
-    add_command(commands, "fit", options=Fit, handler=_fit)
-
-
+@command("fit", Fit)
 def _fit(options: Fit) -> None:
     """Make a moving mesh from a video of a person.
 

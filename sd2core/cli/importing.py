@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import sys
 from contextlib import ExitStack
@@ -10,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.bounds import AZIMUTH_DEG, ELEVATION_DEG, RANGE_M
@@ -185,13 +184,6 @@ class Relink(Json):
     folder: Annotated[Path, ARGUMENT]
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``import``, ``set`` and ``relink``."""
-    add_command(commands, "import", options=Import, handler=_import)
-    add_command(commands, "set", options=Set, handler=_set)
-    add_command(commands, "relink", options=Relink, handler=_relink)
-
-
 def copy_sample(out: Path, scene: DemoScene = "one") -> None:
     """Write a copy of the bundled sample recording, with the true body of its person, or two."""
     from sd2core.files.resources import resource_path
@@ -208,6 +200,7 @@ def copy_sample(out: Path, scene: DemoScene = "one") -> None:
     print(f"Wrote {copy.folder}")
 
 
+@command("import", Import)
 def _import(options: Import) -> None:
     """Make a recording from a video, a mesh and a radar capture.
 
@@ -292,6 +285,7 @@ def _refuse_unused_channel(recording: Recording, options: Content) -> None:
             raise Sd2Error(f"{name} is given without raw samples", f"{name} with --radar CAPTURE")
 
 
+@command("set", Set)
 def _set(options: Set) -> None:
     """Change what a recording is made of: its files, its clocks, where its radar is.
 
@@ -457,6 +451,7 @@ def _placed(recording: Recording, options: Set) -> VirtualSensor:
     return looking(sensor, options, recording.load_mesh)
 
 
+@command("relink", Relink)
 def _relink(options: Relink) -> int:
     """Find the missing files of a recording in another folder.
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import print_facts, print_json, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.kinds import NotNegative, Positive, Vector
@@ -85,11 +84,7 @@ class Imu(MeshInput, Overwrite, Errors, Json):
     up: Vector = (0.0, -1.0, 0.0)
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``imu``."""
-    add_command(commands, "imu", options=Imu, handler=_imu)
-
-
+@command("imu", Imu)
 def _imu(options: Imu) -> None:
     """What an inertial sensor on the body would measure (simulated).
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import print_json, progress_bar
 from sd2core.options.kinds import Count
 from sd2core.options.records import OptionError, given
@@ -70,11 +69,7 @@ class Ladder(MeshAndSensor, UsualRequest, Method, Counting, Figure, Json):
                     )
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``ladder``."""
-    add_command(commands, "ladder", options=Ladder, handler=_ladder)
-
-
+@command("ladder", Ladder)
 def _ladder(options: Ladder) -> int:
     """Measure what accuracy costs on a scene, and say what the scene requires.
 

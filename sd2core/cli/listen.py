@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import math
 import re
 import shutil
@@ -13,7 +12,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import counted, print_event, print_facts
 from sd2core.options.kinds import Positive
 from sd2core.options.records import OptionError, Place
@@ -84,11 +83,7 @@ class Listen(Json):
             )
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``listen``."""
-    add_command(commands, "listen", options=Listen, handler=_listen)
-
-
+@command("listen", Listen)
 def _listen(options: Listen) -> None:
     """Record a radar while it runs, and follow its Doppler map.
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import Subcommands, add_command, command_group
 from sd2core.cli.output import print_facts, print_json, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.bounds import SEED
@@ -142,10 +141,9 @@ class Vary(MadePairs, Subjects, RadarChoice):
     seed: Annotated[int, SEED] = 0
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
+@command_group("pairs")
+def _commands(kinds: Subcommands) -> None:
     """Make pairs of synthetic and radar Doppler to learn from."""
-    parser = add_command(commands, "pairs", about=add_commands)
-    kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     add_command(kinds, "mars", options=Mars, handler=_mars)
     add_command(kinds, "recordings", options=Recordings, handler=_recordings)
     add_command(kinds, "label", options=Label, handler=_label)

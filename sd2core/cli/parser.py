@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from importlib import import_module
 
-from sd2core.cli.command_parser import AddedCommand, CommandParser, add_command
+from sd2core.cli.command_parser import AddedCommand, CommandParser, add_command, add_declared
 from sd2core.errors import Sd2Error
 from sd2core.options.records import OptionRecord
 from sd2core.plug_ins import Group, PlugIn
@@ -123,8 +122,7 @@ def build_parser(
         return parser, commands
     wanted = [name] if name in COMMANDS else COMMANDS
     modules = (_MODULE_OF.get(one, one.replace("-", "_")) for one in wanted)
-    for module in dict.fromkeys(modules):
-        import_module(f"sd2core.cli.{module}").add_commands(commands)
+    add_declared(commands, *dict.fromkeys(modules))
     if name not in COMMANDS and not name.startswith("-"):
         _add_usable(commands)
     return parser, commands

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.ladder import UsualRequest
 from sd2core.cli.output import (
     counted,
@@ -80,11 +79,7 @@ class Placing(MeshInput, UsualRequest, Overwrite, Json):
             raise OptionError("--seed is given without --cloud", "it for random places only")
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``placements``."""
-    add_command(commands, "placements", options=Placing, handler=_placements)
-
-
+@command("placements", Placing)
 def _placements(options: Placing) -> int:
     """Plan sensors around a body, and say what a map from each would cost.
 

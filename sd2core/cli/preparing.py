@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 from typing import Annotated
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.records import OptionError, OptionRecord, Place
@@ -107,12 +106,7 @@ class FetchModels(OptionRecord):
     if_missing: bool = False
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``warm-up`` and ``fetch-models``, which `sd2 doctor` has taken over."""
-    add_command(commands, "warm-up", options=OptionRecord, handler=_warm_up)
-    add_command(commands, "fetch-models", options=FetchModels, handler=_fetch_models)
-
-
+@command("warm-up", OptionRecord)
 def _warm_up(options: OptionRecord) -> None:
     """Compile the numerical kernels: part of `sd2 doctor` now.
 
@@ -122,6 +116,7 @@ def _warm_up(options: OptionRecord) -> None:
     _compile()
 
 
+@command("fetch-models", FetchModels)
 def _fetch_models(options: FetchModels) -> None:
     """Fetch the landmark models that `sd2 fit` needs: part of `sd2 doctor` now.
 

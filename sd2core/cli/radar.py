@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import progress_bar
 from sd2core.cli.radar_description import DESCRIPTION, Description, describe
 from sd2core.options.kinds import SpanM
@@ -69,11 +68,7 @@ class Radar(ReplacesMaps, Axis, Channel, Json, Description):
             raise OptionError(f"{name} is given{comma} {why}", f"{name} {where}")
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``radar``."""
-    add_command(commands, "radar", options=Radar, handler=_radar)
-
-
+@command("radar", Radar)
 def _radar(options: Radar) -> None:
     """Turn a raw radar capture into a Doppler map, or say what limits it has.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import math
 import re
@@ -11,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.keys import pressed_keys
 from sd2core.cli.output import counted, print_event, print_facts, print_json
 from sd2core.options.kinds import Around, Positive
@@ -108,11 +107,7 @@ class Record(Json):
             raise OptionError(f"--size is {self.size!r}", "WIDTHxHEIGHT, as in 1280x720")
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``record``."""
-    add_command(commands, "record", options=Record, handler=_record)
-
-
+@command("record", Record)
 def _record(options: Record) -> int:
     """Record a camera and a radar together, on one clock.
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import print_facts, print_json, progress_bar
 from sd2core.options.shared import Json, MeshInput, Overwrite
 
@@ -26,11 +25,7 @@ class Refine(MeshInput, Overwrite, Json):
     video: Path | None = None
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``refine``."""
-    add_command(commands, "refine", options=Refine, handler=_refine)
-
-
+@command("refine", Refine)
 def _refine(options: Refine) -> None:
     """Make a mesh of another tool smooth in time, and say how well its velocities are known.
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import duration, print_facts, print_json, print_rows
 from sd2core.errors import Sd2Error
 from sd2core.options.records import ARGUMENT, Place
@@ -45,11 +44,7 @@ class Runs(Json):
     cancel: Annotated[bool, Place(one_of="word")] = False
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``runs``."""
-    add_command(commands, "runs", options=Runs, handler=_runs)
-
-
+@command("runs", Runs)
 def _runs(options: Runs) -> None:
     """List training runs, and pause, stop or cancel one.
 

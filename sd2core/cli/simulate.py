@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import Subcommands, add_command, command_group
 from sd2core.cli.output import picked, print_json, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.bounds import ANY, COUNT
@@ -190,14 +190,13 @@ class SimulateCampaign(Simulating, Limbs, Json):
             )
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
+@command_group("simulate")
+def _commands(kinds: Subcommands) -> None:
     """Make radar samples of any mesh, or pairs of simulated people to train on.
 
     sd2 simulate radar walk.npz --out walk-radar
     sd2 simulate campaign --out campaign.zarr
     """
-    parser = add_command(commands, "simulate", about=add_commands)
-    kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     add_command(kinds, "radar", options=SimulateRadar, handler=_radar)
     add_command(kinds, "campaign", options=SimulateCampaign, handler=_campaign)
 

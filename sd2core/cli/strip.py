@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import picked, progress_bar
 from sd2core.files.figure_files import SUFFIXES as FIGURES
 from sd2core.options.bounds import STRIP_FRAMES
@@ -62,11 +61,7 @@ class Strip(Sensor, MeshReading, Overwrite):
     columns: Count = 10
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``strip``."""
-    add_command(commands, "strip", options=Strip, handler=_strip)
-
-
+@command("strip", Strip)
 def _strip(options: Strip) -> None:
     """Draw frames side by side: the video above its mesh.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import time
 from collections.abc import Iterator
@@ -10,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import print_event, print_json, progress_bar, tell_lost
 from sd2core.options.kinds import Count
 from sd2core.options.records import ARGUMENT, Place
@@ -48,11 +47,7 @@ class Study(Running):
     plan: Annotated[Path, ARGUMENT]
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``study``."""
-    add_command(commands, "study", options=Study, handler=_study)
-
-
+@command("study", Study)
 def _study(options: Study) -> None:
     """Find out whether synthetic data help a classifier on a real radar.
 

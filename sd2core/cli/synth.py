@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.records import OptionError, changed_flags, options_of
@@ -57,11 +56,7 @@ class Synth(MeshAndSensor, MapOutput, Method, RadarChoice, Request, Synthesis, J
             )
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``synth``."""
-    add_command(commands, "synth", options=Synth, handler=_synth)
-
-
+@command("synth", Synth)
 def _synth(options: Synth) -> None:
     """Compute the Doppler that a radar would have measured of a moving mesh.
 

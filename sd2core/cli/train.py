@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import shlex
 import sys
 from collections.abc import Iterator
@@ -10,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import picked, print_facts, print_json, tell_lost
 from sd2core.errors import Sd2Error
 from sd2core.options.training import DataConfig, Train, TrainConfig
@@ -21,11 +20,7 @@ if TYPE_CHECKING:
 _BACKGROUND_NICE = 10
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``train``."""
-    add_command(commands, "train", options=Train, handler=_train)
-
-
+@command("train", Train)
 def _train(options: Train) -> int:
     """Train a denoiser that turns synthetic Doppler into what a radar would show.
 

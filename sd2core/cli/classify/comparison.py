@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from sd2core.cli.classify.data import DATA_HELP, Sources
 from sd2core.cli.classify.train import Network
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.study import Running, make_study
 from sd2core.options.bounds import STEPS
 from sd2core.options.kinds import Count, Typed, joined, share
@@ -48,11 +47,7 @@ class Table(Sources, Network, Running):
     steps: Annotated[int, STEPS] | None = None
 
 
-def add_table(kinds: argparse._SubParsersAction) -> None:
-    """Add ``table``."""
-    add_command(kinds, "table", options=Table, handler=_table, description=DATA_HELP)
-
-
+@command("table", Table, DATA_HELP)
 def _table(options: Table) -> None:
     """Compare networks, and trainings with and without synthetic data.
 

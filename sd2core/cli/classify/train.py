@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import shlex
 import sys
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from sd2core.classify.defaults import DELAY_S, DELAYS_S, WIDTH, WIDTHS, FeatureKind, model_name
 from sd2core.cli.classify.data import DATA_HELP, SourcesAndMaps, clips_of, split_of
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.output import finite, print_event, print_facts, print_json
 from sd2core.cli.recording_maps import parsed_maps
 from sd2core.options.bounds import LEARNING_RATE, SEED, STEPS
@@ -79,11 +78,7 @@ class Train(SourcesAndMaps, Overwrite, Network, KeptOut, JsonAndProgress):
     seed: Annotated[int, SEED] = 0
 
 
-def add_train(kinds: argparse._SubParsersAction) -> None:
-    """Add ``train``."""
-    add_command(kinds, "train", options=Train, handler=_train, description=DATA_HELP)
-
-
+@command("train", Train, DATA_HELP)
 def _train(options: Train) -> int:
     """Train a classifier on labelled maps.
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from sd2core.cli.classify.data import DATA_HELP, SourcesAndMaps, clips_of
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.eval import Judging, named_subjects
 from sd2core.cli.labels.reading import check_label_output, print_lost
 from sd2core.cli.labels.suggest import (
@@ -83,11 +82,7 @@ class Apply(SearchedMap, TrainedModel, Json):
     merge_gap_s: NotNegative = 0.1
 
 
-def add_eval(kinds: argparse._SubParsersAction) -> None:
-    """Add ``eval``."""
-    add_command(kinds, "eval", options=Evaluate, handler=_eval, description=DATA_HELP)
-
-
+@command("eval", Evaluate, DATA_HELP)
 def _eval(options: Evaluate) -> None:
     """Evaluate a classifier on people it was not trained on.
 
@@ -170,11 +165,7 @@ def _say(found: Score, known: ClipSet, subjects: list[str], learnt: list[str]) -
         )
 
 
-def add_apply(kinds: argparse._SubParsersAction) -> None:
-    """Add ``apply``."""
-    add_command(kinds, "apply", options=Apply, handler=_apply)
-
-
+@command("apply", Apply)
 def _apply(options: Apply) -> None:
     """Find gestures in a recording or a map.
 

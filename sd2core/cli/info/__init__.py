@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import Annotated
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.info.description import (
     Description,
     describe_imu,
@@ -37,11 +36,7 @@ class Info(MeshReading, Json):
     verify: bool = False
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
-    """Add ``info``."""
-    add_command(commands, "info", options=Info, handler=_info)
-
-
+@command("info", Info)
 def _info(options: Info) -> None:
     """What is in a recording, video, mesh, radar or IMU file, map, pairs, data set or model.
 

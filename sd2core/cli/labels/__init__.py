@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from sd2core.cli.command_parser import add_command
-from sd2core.cli.labels.agree import add_agree
-from sd2core.cli.labels.label_set import add_set
+from sd2core.cli.command_parser import Subcommands, add_command, add_declared, command_group
 from sd2core.cli.labels.reading import (
     LabelFile,
     check_label_output,
@@ -17,9 +14,6 @@ from sd2core.cli.labels.reading import (
     read_named,
     write,
 )
-from sd2core.cli.labels.recording import add_cut, add_figure
-from sd2core.cli.labels.recover import add_recover
-from sd2core.cli.labels.suggest import add_suggest
 from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.options.records import Place
 from sd2core.options.shared import Json, Overwrite
@@ -62,7 +56,8 @@ class Statistics(LabelFile, Json):
     json: Annotated[bool, Place(one_of="form")] = False
 
 
-def add_commands(commands: argparse._SubParsersAction) -> None:
+@command_group("labels")
+def _commands(kinds: Subcommands) -> None:
     """Show, count, convert, suggest, compare, draw and cut out labelled spans.
 
     sd2 labels show walk.sd2
@@ -73,17 +68,11 @@ def add_commands(commands: argparse._SubParsersAction) -> None:
     sd2 labels figure walk.sd2 --out walk.pdf
     sd2 labels cut walk.sd2 --out cuts
     """
-    parser = add_command(commands, "labels", about=add_commands)
-    kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     add_command(kinds, "show", options=Show, handler=_show)
     add_command(kinds, "convert", options=Convert, handler=_convert)
     add_command(kinds, "statistics", options=Statistics, handler=_statistics)
-    add_set(kinds)
-    add_suggest(kinds)
-    add_figure(kinds)
-    add_cut(kinds)
-    add_agree(kinds)
-    add_recover(kinds)
+    others = ("label_set", "suggest", "recording", "agree", "recover")
+    add_declared(kinds, *(f"labels.{module}" for module in others))
 
 
 def _show(options: Show) -> None:

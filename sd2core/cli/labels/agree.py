@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.labels.reading import FrameTimes, clock_of, labels_at, needed, with_rate
 from sd2core.cli.labels.suggest import spans_data
 from sd2core.cli.output import counted, picked, print_json, print_rows
@@ -39,11 +38,7 @@ class Agree(FrameTimes, Json):
     track: str | None = None
 
 
-def add_agree(kinds: argparse._SubParsersAction) -> None:
-    """Add ``agree``."""
-    add_command(kinds, "agree", options=Agree, handler=_agree)
-
-
+@command("agree", Agree)
 def _agree(options: Agree) -> None:
     """Compare the labels of two people.
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.labels.reading import (
     LabelFile,
     check_label_output,
@@ -47,11 +46,7 @@ class Set(LabelFile, Overwrite, Json):
             raise OptionError("One of --use and --out is given", "both of them, or none")
 
 
-def add_set(kinds: argparse._SubParsersAction) -> None:
-    """Add ``set``."""
-    add_command(kinds, "set", options=Set, handler=_set)
-
-
+@command("set", Set)
 def _set(options: Set) -> None:
     """Show, share or exchange a label set.
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.labels.reading import labels_at, recording_clock
 from sd2core.cli.output import counted, print_json, progress_bar
 from sd2core.cli.recording_maps import MapName, maps_of, parsed_maps, usual_maps
@@ -84,11 +83,7 @@ class Cut(LabelledRecording, Json):
     replace_others: Annotated[bool, Place(("--overwrite", "--replace"))] = False
 
 
-def add_figure(kinds: argparse._SubParsersAction) -> None:
-    """Add ``figure``."""
-    add_command(kinds, "figure", options=DrawnLabels, handler=_figure)
-
-
+@command("figure", DrawnLabels)
 def _figure(options: DrawnLabels) -> None:
     """Draw the Doppler maps of a recording with its labels.
 
@@ -146,11 +141,6 @@ def _strongest(doppler: DopplerMap) -> float:
     return float(told.max(initial=0.0)) or 1.0
 
 
-def add_cut(kinds: argparse._SubParsersAction) -> None:
-    """Add ``cut``."""
-    add_command(kinds, "cut", options=Cut, handler=_cut)
-
-
 def _nothing_to_cut(path: Path, labels: Labels, wanted: tuple[str, ...]) -> Sd2Error:
     there = sorted({span.label for span in labels.spans if span.origin != "suggestion"})
     if wanted and there:
@@ -167,6 +157,7 @@ def _nothing_to_cut(path: Path, labels: Labels, wanted: tuple[str, ...]) -> Sd2E
     )
 
 
+@command("cut", Cut)
 def _cut(options: Cut) -> None:
     """Cut labelled spans out: video, mesh and maps of each.
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.labels.reading import check_label_output
 from sd2core.cli.output import counted, picked, print_json, print_rows
 from sd2core.errors import Sd2Error
@@ -47,11 +46,7 @@ class Recover(Overwrite, Json):
             )
 
 
-def add_recover(kinds: argparse._SubParsersAction) -> None:
-    """Add ``recover``."""
-    add_command(kinds, "recover", options=Recover, handler=_recover)
-
-
+@command("recover", Recover)
 def _recover(options: Recover) -> None:
     """List labels that were not saved when a window ended, or write them to a file.
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import command
 from sd2core.cli.labels.reading import (
     check_label_output,
     print_lost,
@@ -60,11 +59,7 @@ class Suggest(SearchedMap, SuggestOptions, Json):
     label: str = "gesture"
 
 
-def add_suggest(kinds: argparse._SubParsersAction) -> None:
-    """Add ``suggest``."""
-    add_command(kinds, "suggest", options=Suggest, handler=_suggest)
-
-
+@command("suggest", Suggest)
 def _suggest(options: Suggest) -> None:
     """Find spans in which something moves.
 
