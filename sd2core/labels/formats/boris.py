@@ -21,9 +21,10 @@ from typing import Any
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import plain_path, stored_path
+from sd2core.files.tables import counted
 from sd2core.files.texts import read_json
 from sd2core.labels.formats.lanes import Lane, edges_s, lanes_of, track_of
-from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, counted
+from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss
 from sd2core.labels.formats.rows import LabelRows, Row, clean_name
 from sd2core.labels.label_set import GESTURES, Label, LabelSet, with_own_keys
 from sd2core.labels.spans import Labels, Span

@@ -298,7 +298,12 @@ class _Numbers:
     def of(self, line: int, column: str, text: str) -> float:
         """The number in a cell, of a time also in hours, minutes and seconds."""
         if ":" in text and column.endswith("_s"):
-            return self._clock(line, column, text)
+            if (seconds := seconds_of(text)) is None:
+                raise Sd2Error(
+                    f"{self._path}, line {line}: {column} is {text[:50]!r}",
+                    "seconds, or hours:minutes:seconds",
+                )
+            return seconds
         plain = _NUMBER.fullmatch(text.strip())
         value = finite_number(plain[0].replace(",", ".")) if plain else None
         if value is None:
@@ -307,28 +312,17 @@ class _Numbers:
             )
         return value * self._units_s.get(column, 1.0)
 
-    def _clock(self, line: int, column: str, text: str) -> float:
-        value = seconds_of(text)
-        if value is None:
-            raise Sd2Error(
-                f"{self._path}, line {line}: {column} is {text[:50]!r}",
-                "seconds, or hours:minutes:seconds",
-            )
-        return value
-
 
 def _times(
     path: Path, line: int, numbers: _Numbers, cell: dict[str, str]
 ) -> tuple[float, float, tuple[int, int] | None]:
     """Start and end in seconds, or the frames that stand for them."""
-    if "start_s" in cell and "end_s" in cell:
+    if "start_s" in cell and ({"end_s", "duration_s"} & cell.keys() or "start_frame" not in cell):
         start_s = numbers.of(line, "start_s", cell["start_s"])
-        return start_s, numbers.of(line, "end_s", cell["end_s"]), None
-    if "start_s" in cell and "duration_s" in cell:
-        start_s = numbers.of(line, "start_s", cell["start_s"])
-        return start_s, start_s + numbers.of(line, "duration_s", cell["duration_s"]), None
-    if "start_s" in cell and "start_frame" not in cell:
-        start_s = numbers.of(line, "start_s", cell["start_s"])
+        if "end_s" in cell:
+            return start_s, numbers.of(line, "end_s", cell["end_s"]), None
+        if "duration_s" in cell:
+            return start_s, start_s + numbers.of(line, "duration_s", cell["duration_s"]), None
         return start_s, start_s, None  # a mark
     first = _frame(path, line, "start_frame", cell["start_frame"])
     end = (

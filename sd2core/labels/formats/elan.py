@@ -22,21 +22,21 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.files.paths import plain_path, stored_path
+from sd2core.files.tables import counted
 from sd2core.labels.formats.elan_reading import (
     DETAILS,
     LABELS,
     PROPERTY,
     VOCABULARY_LANGUAGE,
-    vocabulary_id,
 )
 from sd2core.labels.formats.lanes import Lane, edges_s, lanes_of
 from sd2core.labels.formats.losses import (
     ASPECTS,
     LabelFormat,
     Loss,
-    counted,
     hold_texts,
 )
+from sd2core.labels.formats.rows import clean_name
 from sd2core.labels.label_set import LabelSet
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
@@ -243,8 +243,9 @@ def _annotation(tier: Element, kind: str, value: str, name: str, **attributes: s
 
 def _types(document: Element, label_set: LabelSet) -> None:
     """Types of tiers, and the labels as vocabulary, in the order of the schema."""
+    vocabulary_id = clean_name(label_set.name)  # one line, not empty
     kind = {"GRAPHIC_REFERENCES": "false"}
-    labelled = {"CONTROLLED_VOCABULARY_REF": vocabulary_id(label_set.name), **kind}
+    labelled = {"CONTROLLED_VOCABULARY_REF": vocabulary_id, **kind}
     SubElement(
         document, "LINGUISTIC_TYPE", labelled, LINGUISTIC_TYPE_ID=LABELS, TIME_ALIGNABLE="true"
     )
@@ -258,8 +259,7 @@ def _types(document: Element, label_set: LabelSet) -> None:
     SubElement(document, "LANGUAGE", defined, LANG_LABEL=f"undetermined ({language})")
     for stereotype, description in _CONSTRAINTS.items():
         SubElement(document, "CONSTRAINT", DESCRIPTION=description, STEREOTYPE=stereotype)
-    name = vocabulary_id(label_set.name)
-    vocabulary = SubElement(document, "CONTROLLED_VOCABULARY", CV_ID=name)
+    vocabulary = SubElement(document, "CONTROLLED_VOCABULARY", CV_ID=vocabulary_id)
     SubElement(vocabulary, "DESCRIPTION", LANG_REF=language)
     for number, label in enumerate(label_set.labels):
         entry = SubElement(vocabulary, "CV_ENTRY_ML", CVE_ID=f"cve{number}")

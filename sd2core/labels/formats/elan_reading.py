@@ -12,10 +12,10 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
 from sd2core.errors import Sd2Error
+from sd2core.files.tables import counted
 from sd2core.files.texts import read_content
 from sd2core.labels.formats.elan_times import ElanTimes
 from sd2core.labels.formats.lanes import track_of
-from sd2core.labels.formats.losses import counted
 from sd2core.labels.formats.numbers import whole_number
 from sd2core.labels.formats.rows import LabelRows, Row, clean_name
 from sd2core.labels.label_set import GESTURES, Label, LabelSet, with_own_keys
@@ -30,12 +30,6 @@ DETAILS = {
 }
 PROPERTY = "sd2-label-set"
 VOCABULARY_LANGUAGE = "und"
-
-
-def vocabulary_id(name: str) -> str:
-    """Return the id of a label set as a vocabulary: one line, not empty."""
-    return clean_name(name)
-
 
 # For labels of a vocabulary without colours: Okabe and Ito's, as in the default set.
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#f0e442")
@@ -200,7 +194,7 @@ def _label_set(document: Element) -> LabelSet:
             labels[name] = Label(name, colour, key, value.get("DESCRIPTION", ""))
         except Sd2Error:  # somebody edited the property
             labels[name] = Label(name, default[0], "", value.get("DESCRIPTION", ""))
-    exact = set_name is not None and vocabulary_id(set_name) == wanted
+    exact = set_name is not None and clean_name(set_name) == wanted
     own_keys = tuple(with_own_keys(labels.values()))
     return LabelSet(set_name if exact and set_name else wanted, own_keys)
 

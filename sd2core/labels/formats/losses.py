@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
+from sd2core.files.tables import counted
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.spans import Labels, LabelTrack, Span
 
@@ -112,19 +113,11 @@ def hold_texts(labels: Labels, banned: re.Pattern[str], title: str) -> tuple[Lab
     count = sum(a != b for a, b in zip(spans, labels.spans, strict=True))
     if not count:
         return labels, []
-    words = (
-        f"{title} cannot hold control characters: replaced in {counted(count, 'note or author')}"
-    )
+    where = counted(count, "note or author", "notes or authors")
+    words = f"{title} cannot hold control characters: replaced in {where}"
     return replace(labels, spans=spans), [Loss("characters", count, words)]
 
 
 def sentences(losses: Iterable[Loss]) -> str:
     """Join losses, each with its full stop."""
     return " ".join(f"{loss.sentence}." for loss in losses)
-
-
-def counted(count: int, what: str) -> str:
-    """Such as "3 spans", or "2 notes or authors" of "note or author"."""
-    if count == 1:
-        return f"1 {what}"
-    return f"{count} " + " or ".join(f"{word}s" for word in what.split(" or "))

@@ -16,8 +16,9 @@ from urllib.parse import quote, unquote
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
+from sd2core.files.tables import counted
 from sd2core.files.texts import read_text
-from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, counted
+from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss
 from sd2core.labels.formats.numbers import finite_number, positional
 from sd2core.labels.formats.rows import LabelRows, Row
 from sd2core.labels.spans import Labels, Span

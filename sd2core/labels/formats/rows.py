@@ -14,8 +14,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from sd2core.errors import Sd2Error
+from sd2core.files.tables import counted
 from sd2core.files.texts import errors_in
-from sd2core.labels.formats.losses import DEFAULT_TRACK, counted
+from sd2core.labels.formats.losses import DEFAULT_TRACK
 from sd2core.labels.formats.numbers import whole_number
 from sd2core.labels.label_set import GESTURES, LONGEST_NAME, LabelSet
 from sd2core.labels.spans import (
@@ -247,37 +248,6 @@ def assembled(path: Path, found: LabelRows, clock: LabelClock) -> LabelReading:
     )
     left_out = tuple(error.found.removeprefix(f"{path}, ") for error in found.odd)
     return LabelReading(Labels(made, spans, found.label_set), left_out, tuple(found.remarks))
-
-
-def assemble(
-    path: Path,
-    rows: Sequence[Row],
-    *,
-    tracks: Iterable[tuple[str, Overlap | None]] = (),
-    label_set: LabelSet = GESTURES,
-    timebase: Timebase | None = None,
-) -> Labels:
-    """Make labels of rows that must all be spans, for readers of plug-ins.
-
-    Parameters
-    ----------
-    path : Path
-        The file, for messages.
-    rows, tracks, label_set
-        As in :class:`LabelRows`.
-    timebase : Timebase, optional
-        Needed for a row without extent, which becomes the frame that is shown at that instant.
-
-    Raises
-    ------
-    Sd2Error
-        Naming the file and the place, when a row is not a span.
-    """
-    found = LabelRows(list(rows), list(tracks), label_set)
-    made = assembled(path, found, LabelClock(timebase))
-    if found.odd:
-        raise found.odd[0]
-    return made.labels
 
 
 def clean_name(name: str) -> str:

@@ -85,7 +85,8 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
     tokens.number("xmin")
     tokens.number("xmax")
     found = LabelRows()
-    for _ in range(tokens.count("tiers") if tokens.has_tiers() else 0):
+    has_tiers = tokens.next("flag", "flag <exists>") == "<exists>"
+    for _ in range(tokens.count("tiers") if has_tiers else 0):
         kind, name = tokens.text("class of a tier"), tokens.text("name of a tier")
         if kind not in ("IntervalTier", "TextTier"):
             raise Sd2Error(f"{path} has a tier of class {kind[:50]!r}", "IntervalTier or TextTier")
@@ -164,27 +165,24 @@ class _Tokens:
                 f"{self._path} holds a {found[:50]!r}", _EXPECTED, "Save the TextGrid in Praat"
             )
 
-    def has_tiers(self) -> bool:
-        return self._next("flag", "flag <exists>") == "<exists>"
-
     def text(self, what: str) -> str:
-        return self._next("text", what).replace('""', '"')
+        return self.next("text", what).replace('""', '"')
 
     def number(self, what: str) -> float:
-        found = self._next("number", what)
+        found = self.next("number", what)
         value = finite_number(found)
         if value is None:
             raise Sd2Error(f"{self._path} has {found[:50]!r} for the {what}", "a finite number")
         return value
 
     def count(self, what: str) -> int:
-        found = self._next("number", f"number of {what}")
+        found = self.next("number", f"number of {what}")
         value = whole_number(found)
         if value is None:
             raise Sd2Error(f"{self._path} has {found[:50]!r} {what}", "a whole number from 0 on")
         return value
 
-    def _next(self, kind: str, what: str) -> str:
+    def next(self, kind: str, what: str) -> str:
         match = next(self._tokens, None)
         if match is None:
             raise Sd2Error(
