@@ -147,18 +147,14 @@ def _facts(entry: dict[str, Any]) -> dict[str, str]:
     if "jitter_s" in entry:
         facts = {"arrivals": f"± {1e3 * entry['jitter_s']:.1f} ms"}
     else:
-        facts = _confidence(entry)
+        facts = {
+            "confidence": f"{entry['confidence']:.3f}",
+            "correlation": f"{entry['correlation']:.2f}",
+        }
     if entry["problem"]:
         return {"not aligned": entry["problem"]} | facts
     return {
         "radar offset": f"{entry['offset_s'] + 0.0:g} s (was {entry['before_s']:g} s)",
         **facts,
         "saved": "yes" if entry["saved"] else "no (--save)",
-    }
-
-
-def _confidence(entry: dict[str, Any]) -> dict[str, str]:
-    return {
-        "confidence": f"{entry['confidence']:.3f}",
-        "correlation": f"{entry['correlation']:.2f}",
     }

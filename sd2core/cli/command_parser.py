@@ -209,15 +209,16 @@ def add_declared(commands: Subcommands, *modules: str) -> None:
 def add_command(
     commands: Subcommands,
     name: str,
-    summary: str = "",
     *,
     options: type[Record] | None = None,
     handler: Callable[[Any], int | None] | None = None,
     about: Callable[..., Any] | None = None,
     description: str = "",
-    examples: str = "",
 ) -> CommandParser:
     """Add a subcommand with its help, and the options of a record, which the handler gets.
+
+    The docstring of the handler, or of ``about``, is the help: a summary, a description, and
+    examples from the first line on that begins with ``sd2``.
 
     Parameters
     ----------
@@ -225,10 +226,6 @@ def add_command(
         Where it is added.
     name : str
         As it is typed.
-    summary : str
-        First line of the help, small at the beginning and without a full stop. Without it the
-        docstring of the handler, or of ``about``, is the help: a summary, a description, and
-        examples from the first line on that begins with ``sd2``.
     options : type of OptionRecord, optional
         Fields become options.
     handler : callable, optional
@@ -236,16 +233,13 @@ def add_command(
     about : callable, optional
         Its docstring is the help in place of the handler's.
     description : str
-        Text below the summary; that of a docstring follows it.
-    examples : str
-        Lines at the end; a docstring has its own.
+        Text below the summary; that of the docstring follows it.
     """
-    if not summary:
-        text, *lines = re.split(r"\n+ *(?=sd2 )", inspect.getdoc(about or handler) or f"{name}.")
-        examples = "\n".join(f"  {line}" for line in lines)
-        summary, _, own = text.partition("\n\n")
-        summary = f"{summary[0].lower()}{summary[1:].removesuffix('.')}"
-        description = "\n\n".join(filter(None, (description, own)))
+    text, *lines = re.split(r"\n+ *(?=sd2 )", inspect.getdoc(about or handler) or f"{name}.")
+    examples = "\n".join(f"  {line}" for line in lines)
+    summary, _, own = text.partition("\n\n")
+    summary = f"{summary[0].lower()}{summary[1:].removesuffix('.')}"
+    description = "\n\n".join(filter(None, (description, own)))
     text = f"{capitalised(summary)}."
     parser: CommandParser = commands.add_parser(
         name,

@@ -28,7 +28,6 @@ from sd2core.options.shared import Axis, Denoising, JsonAndProgress
 from sd2core.options.synthesis import Counting, Synthesis, Tolerance
 
 if TYPE_CHECKING:
-    from sd2core.datasets.forecast import Forecast
     from sd2core.datasets.options import DatasetOptions
     from sd2core.datasets.recording_sources import Making
     from sd2core.datasets.source import LazySource
@@ -128,10 +127,15 @@ def _export(options: Export) -> int:
       sd2 export recordings/ --out set.zarr --dry-run
     """
     from sd2core.datasets.layout import format_of
+    from sd2core.datasets.options import dataset_options
     from sd2core.datasets.sources import gather
 
     format_of(options.out)
-    wanted = _dataset_options(options)
+    spans = None
+    if options.segments == "spans":
+        spans = SpanOptions(**picked(options, "margin_s", "shortest_s", "length"))
+    provenance = {"command": shlex.join(["sd2", *sys.argv[1:]])}
+    wanted = dataset_options(options, spans, provenance)
     making = _making(options, wanted.kinds)
     sources = gather(options.inputs, making, subjects=options.subjects, label_files=options.labels)
     for remark in (said for one in sources for said in one.remarks):
@@ -161,16 +165,6 @@ def _export(options: Export) -> int:
     else:
         _print(written, sheet)
     return 1 if written.failed else 0
-
-
-def _dataset_options(options: Export) -> DatasetOptions:
-    from sd2core.datasets.options import dataset_options
-
-    spans = SpanOptions(
-        margin_s=options.margin_s, shortest_s=options.shortest_s, length=options.length
-    )
-    provenance = {"command": shlex.join(["sd2", *sys.argv[1:]])}
-    return dataset_options(options, spans if options.segments == "spans" else None, provenance)
 
 
 def _making(options: Export, kinds: tuple[MapKind, ...]) -> Making:
@@ -221,26 +215,20 @@ def _dry_run(
             }
         )
     else:
-        facts = _forecast_facts(forecast)
-        facts["time"] = (
-            "not known before the first source is written"
+        facts = {
+            "segments": f"{forecast.segments:,} of {counted(forecast.sources, 'source')}",
+            "size": f"{forecast.total_bytes / 1e6:,.1f} MB before compression",
+            "kinds": listed(forecast.of_kind),
+            "labels": listed(forecast.of_label),
+            "splits": listed(forecast.of_split()),
+            "frame rate": f"{forecast.frame_rate_hz:g} frames/s",
+            "time": "not known before the first source is written"
             if seconds is None
-            else f"about {duration(seconds)}, as such maps took here before"
-        )
+            else f"about {duration(seconds)}, as such maps took here before",
+        }
         print_facts(f"{options.out} would hold", facts)
     _complain(forecast.frames_damaged, forecast.failed)
     return 1 if forecast.failed else 0
-
-
-def _forecast_facts(forecast: Forecast) -> dict[str, str]:
-    return {
-        "segments": f"{forecast.segments:,} of {counted(forecast.sources, 'source')}",
-        "size": f"{forecast.total_bytes / 1e6:,.1f} MB before compression",
-        "kinds": listed(forecast.of_kind),
-        "labels": listed(forecast.of_label),
-        "splits": listed(forecast.of_split()),
-        "frame rate": f"{forecast.frame_rate_hz:g} frames/s",
-    }
 
 
 def _content(written: Written, sheet: Path) -> dict[str, Any]:

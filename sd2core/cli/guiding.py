@@ -65,39 +65,31 @@ def guide(
         raise Sd2Error(
             f"A session goes on in {folder} already", "one at a time in a folder", "End that first"
         )
-    try:
-        _guide(protocol, folder, open_take, as_json=as_json)
-    finally:
-        lock.release(delete=True)
-
-
-def _guide(
-    protocol: Protocol,
-    folder: Path,
-    open_take: Callable[[Path], JointRecording],
-    *,
-    as_json: bool,
-) -> None:
-    """Record what is missing in a folder that is this process's alone."""
-    there = [path.stem for path in folder.glob(f"*{SUFFIX}") if is_recording(path)]
-    consent = Consent(folder, protocol.consent_text)
-    session = Session(protocol, there, consent.agreements)
-    telling = _Telling(session, consent, as_json=as_json)
-    telling.begin(folder)
-    if protocol.video != "keep":
-        takes = [folder / f"{take.name}{SUFFIX}" for take in session.takes if take.name in there]
-        telling.hidden(protocol.video, [one.stem for one in takes if _hides(one, protocol.video)])
-    with (
-        stop_signals() as told,
-        pressed_keys() as key,
-        contextlib.closing(_Takes(session, folder, open_take, telling)) as recorder,
-    ):
-        while session.phase != "over" and not told.is_set() and _press(session, consent, key()):
-            recorder.leave()
-            session.advance(time.monotonic())
-            telling.step()
-            recorder.follow()
-    telling.end()
+    with contextlib.ExitStack() as stack:
+        stack.callback(lock.release, delete=True)
+        there = [path.stem for path in folder.glob(f"*{SUFFIX}") if is_recording(path)]
+        consent = Consent(folder, protocol.consent_text)
+        session = Session(protocol, there, consent.agreements)
+        telling = _Telling(session, consent, as_json=as_json)
+        telling.begin(folder)
+        if protocol.video != "keep":
+            takes = [
+                folder / f"{take.name}{SUFFIX}" for take in session.takes if take.name in there
+            ]
+            telling.hidden(
+                protocol.video, [one.stem for one in takes if _hides(one, protocol.video)]
+            )
+        with (
+            stop_signals() as told,
+            pressed_keys() as key,
+            contextlib.closing(_Takes(session, folder, open_take, telling)) as recorder,
+        ):
+            while session.phase != "over" and not told.is_set() and _press(session, consent, key()):
+                recorder.leave()
+                session.advance(time.monotonic())
+                telling.step()
+                recorder.follow()
+        telling.end()
 
 
 def _hides(take: Path, how: Literal["blur", "drop"]) -> bool:

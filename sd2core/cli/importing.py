@@ -346,8 +346,13 @@ def _set(options: Set) -> None:
         parts = describe_parts(recording)
         recording.save()
     else:
+        from sd2core.live.videos import hide_person
+
         recording.save()
-        _anonymise(recording.folder, options.anonymise)
+        with progress_bar("Covering the head", unit="frame") as progress:
+            done = hide_person(recording.folder, options.anonymise, progress)
+        if not done:
+            print("note: that was done before, or there is no video", file=sys.stderr)
         recording = open_recording(recording.folder)
         parts = describe_parts(recording)
     show(describe_recording(recording, parts), as_json=options.json)
@@ -418,15 +423,6 @@ def _wall(text: str) -> Wall:
         )
     loss_db = numbers[1] if len(numbers) == 2 else Wall.loss_db
     return Wall(numbers[0], azimuth_deg, elevation_deg, loss_db)
-
-
-def _anonymise(folder: Path, how: Literal["blur", "drop"]) -> None:
-    from sd2core.live.videos import hide_person
-
-    with progress_bar("Covering the head", unit="frame") as progress:
-        done = hide_person(folder, how, progress)
-    if not done:
-        print("note: that was done before, or there is no video", file=sys.stderr)
 
 
 def _placed(recording: Recording, options: Set) -> VirtualSensor:

@@ -6,7 +6,6 @@ import math
 import re
 import shutil
 import sys
-import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -119,13 +118,7 @@ def _listen(options: Listen) -> None:
         raise
     status = Status(listening, source, as_json=options.json, columns=options.columns)
     status.begin(recording.folder, recording.is_continued)
-    # To be told to end is to be told to stop: what waits to be stored is stored.
-    with stop_signals() as told:
-        listening.start()
-        try:
-            follow(listening, status, options.seconds, told)
-        finally:
-            listening.stop()
+    follow(listening, status, options.seconds, listening.stop)
     status.end(recording.folder)
 
 
@@ -143,17 +136,24 @@ def _source(options: Listen) -> Source:
 
 
 def follow(
-    listening: Listening, status: Status, seconds: float | None, told: threading.Event
+    listening: Listening, status: Status, seconds: float | None, stop: Callable[[], object]
 ) -> None:
-    """Show columns until the source ends, the time is over, q is pressed, or it is told to end."""
+    """Listen until the source ends, the time is over, q is pressed, or it is told to end.
+
+    That stops it as well: what waits to be stored is stored.
+    """
     from sd2core.cli.keys import pressed_keys
 
-    end_s = time.monotonic() + seconds if seconds is not None else math.inf
-    with pressed_keys() as key:
-        while not (
-            listening.is_over or time.monotonic() >= end_s or told.is_set() or key() in ("q", "Q")
-        ):
-            status.show(listening.next_column(_WAIT_S))
+    with stop_signals() as told, pressed_keys() as key:
+        listening.start()
+        end_s = math.inf if seconds is None else time.monotonic() + seconds
+        try:
+            while not (listening.is_over or told.is_set() or key() in ("q", "Q")):
+                if time.monotonic() >= end_s:
+                    break
+                status.show(listening.next_column(_WAIT_S))
+        finally:
+            stop()
 
 
 class Status:

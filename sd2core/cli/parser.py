@@ -124,15 +124,11 @@ def build_parser(
     modules = (_MODULE_OF.get(one, one.replace("-", "_")) for one in wanted)
     add_declared(commands, *dict.fromkeys(modules))
     if name not in COMMANDS and not name.startswith("-"):
-        _add_usable(commands)
+        # Those that can be used; `sd2 doctor` names the others.
+        for usable, added in COMMAND_PLUG_INS.loaded():
+            if isinstance(added, AddedCommand):
+                _add(commands, usable, added)
     return parser, commands
-
-
-def _add_usable(commands: argparse._SubParsersAction) -> None:
-    """Add the commands of all plug-ins that can be used; `sd2 doctor` names the others."""
-    for plug_in, command in COMMAND_PLUG_INS.loaded():
-        if isinstance(command, AddedCommand):
-            _add(commands, plug_in, command)
 
 
 def _add_named(commands: argparse._SubParsersAction, plug_in: PlugIn[AddedCommand]) -> None:

@@ -222,13 +222,7 @@ def _take(options: Record, choice: CameraChoice) -> None:
         status.more, status.each_time = take.progress, partial(_follow, take)
         status.nothing = "No frame of the radar came: the recording holds the video alone."
         status.begin(take.folder, False, take.about)
-        # To be told to end is to be told to stop: what waits to be stored is stored.
-        with stop_signals() as told:
-            listening.start()
-            try:
-                follow(listening, status, options.seconds, told)
-            finally:
-                take.stop()
+        follow(listening, status, options.seconds, take.stop)
         status.end(take.folder)
         if (line := take.correct_clocks()) is not None:
             _print_clocks(take, line, as_json=options.json)

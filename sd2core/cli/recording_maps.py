@@ -61,7 +61,13 @@ def maps_of(
         if "synthetic" in names:
             made["synthetic"] = synthetic
         if model is not None:
-            made["denoised"] = _denoised(model, synthetic)
+            from sd2core.denoise.files import load_model
+            from sd2core.denoise.resample_to_model import check_map
+
+            assert model.path is not None
+            check_map(synthetic, model)
+            with progress_bar("Denoising") as progress:
+                made["denoised"] = load_model(model.path).denoise(synthetic, progress)
     if "radar" in names:
         made["radar"] = _radar(recording, axis)
     return made
@@ -91,16 +97,6 @@ def _model_of(recording: Recording, mesh: MeshSequence) -> ModelCard:
         name = recording.bundled_denoiser or default_name(limbs=splits_everybody(mesh))
         path = find_model(name)
     return describe_model(path)
-
-
-def _denoised(model: ModelCard, synthetic: DopplerMap) -> DopplerMap:
-    from sd2core.denoise.files import load_model
-    from sd2core.denoise.resample_to_model import check_map
-
-    assert model.path is not None
-    check_map(synthetic, model)
-    with progress_bar("Denoising") as progress:
-        return load_model(model.path).denoise(synthetic, progress)
 
 
 def _radar(recording: Recording, axis: VelocityAxis | None) -> DopplerMap:

@@ -75,6 +75,7 @@ def _table(options: Table) -> None:
 
 def _plan(options: Table) -> StudyPlan:
     from sd2core.denoise.files import MAP_MODEL
+    from sd2core.study.data import study_data_of
     from sd2core.study.plan import Denoiser, StudyPlan
 
     quick = options.quick
@@ -90,7 +91,12 @@ def _plan(options: Table) -> StudyPlan:
         classifiers=_learners(options),
         denoiser=Denoiser(file=options.denoiser or MAP_MODEL),
     )
-    return _fitting(plan, options.same_people)
+    # What the data do not hold is left out; with too few people movements are kept apart.
+    data = study_data_of(plan)
+    added = plan.added if data.filmed else ()
+    least = 3 if added else 2
+    folds = "files" if options.same_people or len(data.people) < least else "people"
+    return plan.model_copy(update={"added": added, "folds": folds})
 
 
 def _shares(text: str) -> tuple[float, ...]:
@@ -116,14 +122,3 @@ def _learners(options: Table) -> tuple[Learner, ...]:
         Learner(),
     )
     return (chosen, *(one for one in others if one != chosen))
-
-
-def _fitting(plan: StudyPlan, same_people: bool) -> StudyPlan:
-    """Leave out what the data do not hold; keep movements apart where there are too few people."""
-    from sd2core.study.data import study_data_of
-
-    data = study_data_of(plan)
-    added = plan.added if data.filmed else ()
-    least = 3 if added else 2
-    folds = "files" if same_people or len(data.people) < least else "people"
-    return plan.model_copy(update={"added": added, "folds": folds})

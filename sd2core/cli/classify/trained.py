@@ -24,9 +24,6 @@ from sd2core.options.records import OptionRecord, Place
 from sd2core.options.shared import Json
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from sd2core.classify.card import ClassifierCard
     from sd2core.classify.data import Clip, ClipSet
     from sd2core.classify.metrics import Score
@@ -178,9 +175,12 @@ def _apply(options: Apply) -> None:
       sd2 classify apply walk.sd2 --of radar --model g.safetensors --out found.json
       sd2 classify apply map.npz --model g.safetensors --probabilities p.npz
     """
+    import numpy as np
+
     from sd2core.classify.files import describe_classifier, load_classifier
     from sd2core.classify.spans import SpanOptions, predicted_spans
     from sd2core.denoise.resample_to_model import check_bins
+    from sd2core.files.atomic import atomic_write
 
     if options.out is not None:
         check_label_output(options.out)
@@ -196,7 +196,13 @@ def _apply(options: Apply) -> None:
     )
     lost = write_found(options, spans, clock)
     if options.probabilities is not None:
-        _write_probabilities(options.probabilities, probabilities, doppler.times_s, card.classes)
+        with atomic_write(options.probabilities) as stream:
+            np.savez_compressed(
+                stream,
+                probabilities=probabilities,
+                times_s=doppler.times_s,
+                classes=np.array(card.classes),
+            )
     if options.json:
         print_json(
             {
@@ -221,19 +227,3 @@ def _apply(options: Apply) -> None:
         if path is not None:
             print(f"Wrote {path}")
     print_lost(lost)
-
-
-def _write_probabilities(
-    path: Path,
-    probabilities: NDArray[np.float32],
-    times_s: NDArray[np.float64],
-    classes: tuple[str, ...],
-) -> None:
-    import numpy as np
-
-    from sd2core.files.atomic import atomic_write
-
-    with atomic_write(path) as stream:
-        np.savez_compressed(
-            stream, probabilities=probabilities, times_s=times_s, classes=np.array(classes)
-        )

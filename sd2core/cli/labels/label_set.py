@@ -19,7 +19,6 @@ from sd2core.options.records import OptionError
 from sd2core.options.shared import Json, Overwrite
 
 if TYPE_CHECKING:
-    from sd2core.labels.label_set import LabelSet
     from sd2core.labels.spans import Labels
 
 
@@ -60,6 +59,7 @@ def _set(options: Set) -> None:
     """
     from sd2core.labels import files
     from sd2core.labels.field_edits import set_label_set
+    from sd2core.labels.label_set import GESTURES
 
     there = {
         path: check_label_output(path) for path in (options.export, options.out) if path is not None
@@ -67,7 +67,9 @@ def _set(options: Set) -> None:
     labels, clock = read_named(options)
     written, lost = [], []
     if options.use is not None and options.out is not None:
-        labels = set_label_set(labels, _other(options.use)).labels
+        usual = options.use == "usual"
+        other = GESTURES if usual else files.read_label_set(Path(options.use))
+        labels = set_label_set(labels, other).labels
         lost = write(options.out, labels, clock, over=there[options.out])
         written.append(options.out)
     if options.export is not None:
@@ -81,13 +83,6 @@ def _set(options: Set) -> None:
     print_lost(lost)
     if not written:
         _print(labels)
-
-
-def _other(name: str) -> LabelSet:
-    from sd2core.labels.files import read_label_set
-    from sd2core.labels.label_set import GESTURES
-
-    return GESTURES if name == "usual" else read_label_set(Path(name))
 
 
 def _print(labels: Labels) -> None:

@@ -23,7 +23,6 @@ from sd2core.options.suggesting import SuggestOptions
 if TYPE_CHECKING:
     from sd2core.labels.spans import Span
     from sd2core.maps import DopplerMap
-    from sd2core.recording.recording import Recording
     from sd2core.sensor import VelocityAxis
     from sd2core.timebase import Timebase
 
@@ -146,7 +145,8 @@ def map_and_clock(
     kind = kind_of(path)
     if kind == "recording":
         recording = open_recording(path)
-        return _map_of(recording, options.of, axis), recording_clock(recording)
+        name = options.of or ("radar" if recording.mesh is None else "synthetic")
+        return maps_of(recording, (name,), axis=axis)[name], recording_clock(recording)
     if options.of is not None:
         raise Sd2Error(f"--of is given, and {path} is no recording", "--of for a recording only")
     if kind == "map":
@@ -160,9 +160,3 @@ def map_and_clock(
             "Make a map of it first with `sd2 synth` or `sd2 radar`",
         )
     return doppler, doppler.timebase
-
-
-def _map_of(recording: Recording, which: MapName | None, axis: VelocityAxis | None) -> DopplerMap:
-    """Map asked for; otherwise the synthetic one where there is a mesh, else the radar's."""
-    name = which or ("radar" if recording.mesh is None else "synthetic")
-    return maps_of(recording, (name,), axis=axis)[name]
