@@ -55,6 +55,10 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
     of_subject = np.bincount(column["subject"], minlength=len(header.subjects))
     available = column["available"].sum(axis=0)
     by_label = _named(header.labels, segments.sum(axis=1))
+    by_class: Counter[str] = Counter()
+    for label, count in by_label.items():
+        if name := header.classes.get(label):
+            by_class[name] += count
     return {
         "format": CARD_FORMAT,
         "version": 1,
@@ -65,7 +69,7 @@ def describe_dataset(dataset: Dataset) -> dict[str, Any]:
         "segments_of_split": _named(SPLITS, segments.sum(axis=0)),
         "segments_of_label": by_label,
         "frames_of_label": _named(header.labels, frames),
-        "segments_of_class": _of_class(by_label, header.classes),
+        "segments_of_class": dict(by_class),
         "segments_of_label_and_split": {
             label: _named(SPLITS, segments[number])
             for number, label in enumerate(header.labels)
@@ -181,15 +185,6 @@ def made_text(kind: str, made: dict[str, Any], provenance: dict[str, Any]) -> st
 
 def _named(names: tuple[str, ...], counts: np.ndarray) -> dict[str, int]:
     return dict(zip(names, counts.tolist(), strict=True))
-
-
-def _of_class(by_label: dict[str, int], classes: dict[str, str]) -> dict[str, int]:
-    found: dict[str, int] = {}
-    for label, count in by_label.items():
-        name = classes.get(label)
-        if name:
-            found[name] = found.get(name, 0) + count
-    return found
 
 
 # -- In words ------------------------------------------------------------------------------------

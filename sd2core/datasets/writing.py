@@ -172,14 +172,11 @@ class _Writer:
                 failed.append(Failed(one.key, str(error)))
                 first_error = first_error or error
                 continue
-            self._refuse_large()
+            if self._form == "npz" and self._store is not None:
+                kinds = tuple(kind for kind in KINDS if kind in self._names.kinds)
+                header = replace(self._store.header, kinds=kinds)
+                refuse_large_npz(self._out, self._store.rows, header)
         return added, failed, first_error
-
-    def _refuse_large(self) -> None:
-        if self._form == "npz" and self._store is not None:
-            kinds = tuple(kind for kind in KINDS if kind in self._names.kinds)
-            header = replace(self._store.header, kinds=kinds)
-            refuse_large_npz(self._out, self._store.rows, header)
 
     def _is_there(self, one: Source | LazySource) -> bool:
         known = self._there.get(one.key)
@@ -201,7 +198,13 @@ class _Writer:
             source = one.load(part_of(progress, 0.0, 0.9))
             if source.key != one.key:
                 raise Sd2Error(f"{one.key.title} turned out to be {source.key.title}")
-        store = self._open_store(source)
+        if self._store is None:
+            if self._out.exists() and self._form != "zarr":
+                with open_dataset(self._out) as there:
+                    self._store = self._unpacked(there)
+            else:
+                self._store = SegmentStore.begin(self._work, header_of(source, self._options))
+        store = self._store
         header = store.header
         check_fits(source, header)
         self._names.check(source)
@@ -237,15 +240,6 @@ class _Writer:
         store.append(counted(), entry)
         self._know(entry)
         progress(1, 1)
-
-    def _open_store(self, source: Source) -> SegmentStore:
-        if self._store is None:
-            if self._out.exists() and self._form != "zarr":
-                with open_dataset(self._out) as there:
-                    self._store = self._unpacked(there)
-            else:
-                self._store = SegmentStore.begin(self._work, header_of(source, self._options))
-        return self._store
 
     def _unpacked(self, there: Dataset) -> SegmentStore:
         return SegmentStore.unpack(self._work, there.header, there.arrays, there.sources())

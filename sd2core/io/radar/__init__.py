@@ -187,10 +187,6 @@ def _refuse_map(path: Path) -> RadarCapture:
     )
 
 
-def _holds_infineon(path: Path) -> bool:
-    return find_recording(path) is not None
-
-
 def _load_infineon(path: Path) -> RadarCapture:
     folder = find_recording(path)
     assert folder is not None
@@ -199,10 +195,6 @@ def _load_infineon(path: Path) -> RadarCapture:
 
 def _holds_dca1000(path: Path) -> bool:
     return path.is_dir() and any(one.suffix.lower() == dca1000.SUFFIX for one in path.iterdir())
-
-
-def _lacks_description(path: Path) -> bool:
-    return path.is_file() and is_describable(path)
 
 
 def _ask_description(path: Path) -> RadarCapture:
@@ -232,9 +224,9 @@ _READERS: tuple[FileReader[RadarCapture], ...] = (
     FileReader(refuse_a111, looks=lambda path: _maker_of(path) == "a111"),
     FileReader(_refuse_map, looks=holds_map),
     FileReader(dca1000.load_dca1000, (dca1000.SUFFIX,)),
-    FileReader(_load_infineon, looks=_holds_infineon),
+    FileReader(_load_infineon, looks=lambda path: find_recording(path) is not None),
     FileReader(dca1000.load_dca1000, looks=_holds_dca1000),
-    FileReader(_ask_description, looks=_lacks_description),
+    FileReader(_ask_description, looks=lambda path: path.is_file() and is_describable(path)),
     FileReader(_ask_columns, TEXT_SUFFIXES),
 )
 """Readers of captures; the first that fits is taken, and those of plug-ins after all of them."""

@@ -105,7 +105,9 @@ def load_infineon(folder: Path) -> RadarCapture:
     """
     meta = _read_meta(folder / _META)
     config = _read_config(folder / _CONFIG, meta)
-    counts = _open_samples(folder / _DATA)
+    _check_there(folder / _DATA)
+    expected = "the whole radar.npy as recorded, uint16 (frames, receivers, chirps, samples)"
+    counts = open_npy_file(folder / _DATA, expected, "It may be cut off: copy it again")
     samples, config, about_turns = _in_turns(counts, config, folder)
     check_cube(samples, config, str(folder / _DATA))
     timebase, start_unix_s, notes = _read_times(folder / _TIMES, len(counts), config)
@@ -217,15 +219,11 @@ def _check_there(path: Path) -> None:
         )
 
 
-def _read_json(path: Path) -> Any:
-    _check_there(path)
-    return read_json(path, "a JSON text")
-
-
 def _validated(model: type[Model], path: Path) -> Model:
+    _check_there(path)
     expected = "the configuration that Infineon's recorder writes (device_config.fmcw_single_shape)"
     with faults_in(path, expected, "Use the file that was recorded with this radar.npy"):
-        return model.model_validate(_read_json(path))
+        return model.model_validate(read_json(path, "a JSON text"))
 
 
 def _read_meta(path: Path) -> _Meta:
@@ -288,12 +286,6 @@ def _in_turns(
         return by_transmitter(counts, turns), config, (assumed,)
     order = "Channels are assumed to be the receivers of one transmitter, then those of the next."
     return counts, config, (assumed, order)
-
-
-def _open_samples(path: Path) -> NDArray[np.uint16]:
-    _check_there(path)
-    expected = "the whole radar.npy as recorded, uint16 (frames, receivers, chirps, samples)"
-    return open_npy_file(path, expected, "It may be cut off: copy it again")
 
 
 def _read_times(

@@ -42,7 +42,6 @@ TRACK = "Radar file"
 """Name of the track that the file's labels stand on."""
 
 _RANGES = _DOPPLERS = 32
-_STILL = _DOPPLERS // 2
 _MAX_FRAMES = 100_000
 _COUNTER = 2**16
 _GROUP, _NAME = "DATA_CONFIG", "Gesture_name"
