@@ -35,8 +35,9 @@ class CommandForm(QWidget):
         self._forms, self._shell = forms, shell
         self._shown = ""
         self._refreshers: list[Callable[[], None]] = []
+        self._left = set[str]()  # fields that the keyboard was in, and is not any more
         texts = {one.name: one.name for one in forms.commands.values()}
-        self._choice = Choice("Command", self, texts, self._choose)
+        self._choice = Choice("Command", self, texts, forms.choose)
         self._choice.setMaxVisibleItems(20)
         self._about = sentence("")
         self._area = QScrollArea()
@@ -63,14 +64,19 @@ class CommandForm(QWidget):
         self._choice.show_value(forms.chosen.name)
         for refresh in self._refreshers:
             refresh()
-        problem = forms.problem
-        show_words(self._problem, problem)
+        problem, missing = forms.problem, forms.missing
+        # Nobody is told of a field before having come to it.
+        ahead = missing is not None and missing.dest not in self._left
+        show_words(self._problem, forms.wrong if ahead else problem)
         show_words(self._line, "" if problem else forms.line)
-        self._start.setEnabled(not problem and not forms.busy)
-        self._copy.setEnabled(not problem)
+        reasons = (self._start, problem or forms.busy), (self._copy, problem)
+        for button, why_not in reasons:
+            button.setEnabled(not why_not)
+            button.setToolTip(why_not or button.accessibleDescription())
 
-    def _choose(self, name: str) -> None:
-        self._forms.choose(name)
+    def _leave(self, field: str) -> None:
+        self._left.add(field)
+        self.refresh()
 
     # --- building -----------------------------------------------------------------------------
 
@@ -92,6 +98,7 @@ class CommandForm(QWidget):
         inside = QWidget()
         inside.setLayout(column_of(*parts, STRETCH, spacing_px=8, margins_px=8))
         self._area.setWidget(inside)
+        self._left = set()  # after the one before is gone, whose field may have had the keyboard
 
     def _rows(self, options: list[Option]) -> QWidget:
         return pane(form_of(*((name_of(one), self._field(one)) for one in options)))
@@ -113,6 +120,7 @@ class CommandForm(QWidget):
         line = TypedLine(name, tip, self)
         line.setPlaceholderText(option.words)
         line.typed.connect(partial(forms.set_text, option))
+        line.ended.connect(partial(self._leave, option.dest))
         self._refreshers.append(lambda: line.show_text(forms.text(option)))
         if option.kind is not Path:
             return line

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from argparse import ArgumentTypeError
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import MISSING
 from functools import cached_property
 from pathlib import Path
@@ -108,26 +108,36 @@ class CommandForms(Runs[AnyCommandRun]):
         return self._typed.get(option.dest, "")
 
     @property
+    def missing(self) -> Option | None:
+        """The first option that has to be typed and is not yet."""
+        needed = (one for one in self.options if one.default is MISSING and not one.section)
+        return next((one for one in needed if not self.text(one)), None)
+
+    @property
+    def wrong(self) -> str:
+        """What is wrong with what is typed, whatever is missing; empty where nothing is."""
+        return _refusal(self._values)
+
+    @property
     def problem(self) -> str:
         """Why the command cannot be started as it stands; empty where it can."""
-        try:
-            self.record  # noqa: B018
-        except Sd2Error as error:
-            return str(error)
-        return ""
+        return _refusal(lambda: self.record)
 
     @property
     def record(self) -> OptionRecord:
         """The command as it is typed; Sd2Error where that is wrong, or something is missing."""
+        values = self._values()
+        if (missing := self.missing) is not None:
+            raise Sd2Error(f"{name_of(missing)} is missing", missing.words)
+        return self.chosen.record(**values)
+
+    def _values(self) -> dict[str, Any]:
         values: dict[str, Any] = {}
         for option in self.options:
-            text = self.text(option)
-            if text:
+            if text := self.text(option):
                 place = values.setdefault(option.section, {}) if option.section else values
                 place[option.name] = _read(option, text)
-            elif option.default is MISSING and not option.section:
-                raise Sd2Error(f"{name_of(option)} is missing", option.words)
-        return self.chosen.record(**values)
+        return values
 
     @property
     def words(self) -> list[str]:
@@ -201,6 +211,14 @@ class CommandForms(Runs[AnyCommandRun]):
 def name_of(option: Option) -> str:
     """Name of an option in a form."""
     return capitalised(option.name.replace("_", " "))
+
+
+def _refusal(attempt: Callable[[], object]) -> str:
+    try:
+        attempt()
+    except Sd2Error as error:
+        return str(error)
+    return ""
 
 
 def _read(option: Option, text: str) -> Any:

@@ -9,7 +9,15 @@ from typing import Any
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QCheckBox, QComboBox, QLineEdit, QToolButton, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QCheckBox,
+    QComboBox,
+    QLabel,
+    QLineEdit,
+    QToolButton,
+    QWidget,
+)
 
 from sd2app.commands.model import CommandForms
 from sd2app.commands.refining import MeshRefining
@@ -71,6 +79,27 @@ def test_a_form_is_filled_in_and_its_command_copied(qtbot, window) -> None:
     QTest.mouseClick(button(dialog, "Copy command"), Qt.MouseButton.LeftButton)
     copied = QApplication.clipboard().text()
     assert copied == "sd2 synth walk.npz --out map.npz --bins 64 --limbs"
+
+
+def test_what_is_missing_is_said_once_its_field_was_left(window) -> None:
+    _, dialog = window
+
+    def warned() -> list[str]:
+        labels = dialog.findChildren(QLabel, "warning")
+        return [one.text() for one in labels if one.isVisible() and one.text()]
+
+    assert warned() == []
+    assert "Mesh is missing" in button(dialog, "Start").toolTip()
+    mesh, out = (named(dialog, QLineEdit, name) for name in ("Mesh", "Out"))
+    mesh.setFocus()
+    assert warned() == []
+    QTest.keyClicks(out, "map.npz")
+    out.setFocus()
+    (said,) = warned()
+    assert "Mesh is missing" in said
+    QTest.keyClicks(mesh, "walk.npz")
+    assert warned() == []
+    assert "missing" not in button(dialog, "Start").toolTip()
 
 
 def test_what_is_wrong_is_said_and_nothing_starts(window) -> None:
