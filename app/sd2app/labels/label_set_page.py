@@ -18,6 +18,7 @@ from PySide6.QtGui import QColor, QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QColorDialog,
+    QHeaderView,
     QLineEdit,
     QMenu,
     QStyleOptionViewItem,
@@ -35,7 +36,7 @@ from sd2app.widgets.table import CellTable, Choosable, FramedCells, ListedEditor
 from sd2core.labels.files import read_label_set, write_label_set
 from sd2core.labels.label_set import GESTURES
 
-_WIDE = ("■ a longer name", "Key", "■ vermilion (alike)", "background", "Spans")
+_WIDE = ("a name", "Key", "■ vermilion", "background", "Spans")
 _PADDING_PX = 14
 _OTHER = "other"
 _FILES = "Label set (*.json);;All files (*)"
@@ -157,6 +158,8 @@ class LabelSetTable(CellTable):
         metrics = self.fontMetrics()
         for place, text in enumerate(_WIDE):
             self.setColumnWidth(place, metrics.horizontalAdvance(text) + _PADDING_PX)
+        self.horizontalHeader().setStretchLastSection(False)
+        self.horizontalHeader().setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Remove labels, not spans, with Delete."""

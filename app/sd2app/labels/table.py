@@ -8,7 +8,14 @@ from itertools import pairwise
 from typing import cast
 
 from PySide6.QtCore import QItemSelection, QItemSelectionModel, QItemSelectionRange, QModelIndex, Qt
-from PySide6.QtGui import QContextMenuEvent, QFocusEvent, QPainter, QPaintEvent, QShowEvent
+from PySide6.QtGui import (
+    QContextMenuEvent,
+    QFocusEvent,
+    QPainter,
+    QPaintEvent,
+    QResizeEvent,
+    QShowEvent,
+)
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QStyleOptionViewItem, QWidget
 
 from sd2app.feature import Shell
@@ -51,6 +58,8 @@ _PADDING_PX = 8
 _HIDDEN = "span_table/hidden"
 _MENU = ("span_starts_here", "span_ends_here", "split_span", "merge_spans", "delete_spans")
 """Actions of the window that the context menu has too."""
+_GIVE_WAY = "frames", "track", "duration"
+"""Columns that a narrow table does without, first what others say as well."""
 
 
 class SpanTable(CellTable):
@@ -94,10 +103,10 @@ class SpanTable(CellTable):
         metrics = self.fontMetrics()
         usual = " ".join(column.id for column in COLUMNS if column.hidden)
         hidden = self._session.settings.stored(_HIDDEN, usual).split()
-        for place, column in enumerate(COLUMNS):
-            widest_px = max(map(metrics.horizontalAdvance, (column.wide, column.heading)))
-            self.setColumnWidth(place, widest_px + _PADDING_PX)
-            self.setColumnHidden(place, column.id in hidden)
+        texts = ((column.wide, column.heading) for column in COLUMNS)
+        self._usual_px = [max(map(metrics.horizontalAdvance, one)) + _PADDING_PX for one in texts]
+        for place, wide_px in enumerate(self._usual_px):
+            self.setColumnWidth(place, wide_px)
         self.columns_menu = self._made_columns_menu(hidden)
         """Menu of the columns that are shown."""
         header.customContextMenuRequested.connect(
@@ -109,27 +118,42 @@ class SpanTable(CellTable):
     def _made_columns_menu(self, hidden: list[str]) -> QMenu:
         menu = QMenu("Columns", self)
         menu.setToolTipsVisible(True)
-        for place, column in enumerate(COLUMNS):
+        for column in COLUMNS:
             action = menu.addAction(column.heading)
             action.setToolTip(column.tip)
             action.setCheckable(True)
             action.setChecked(column.id not in hidden)
             action.setEnabled(column.id != "start")  # one is always there
-            action.toggled.connect(lambda shown, place=place: self._show_column(place, shown))
+            action.toggled.connect(self._choose_columns)
         return menu
 
-    def _show_column(self, place: int, shown: bool) -> None:
-        self.setColumnHidden(place, not shown)
+    def _choose_columns(self) -> None:
         chosen = zip(COLUMNS, self.columns_menu.actions(), strict=True)
         hidden = [column.id for column, action in chosen if not action.isChecked()]
         self._session.settings.set_value(_HIDDEN, " ".join(hidden))
+        self._fit_columns()
 
     def _follow_persons(self) -> None:
         """Offer the column of persons where there are some to choose from."""
         place = next(place for place, one in enumerate(COLUMNS) if one.id == "person")
-        action, several = self.columns_menu.actions()[place], bool(self._model.choices("person"))
-        action.setVisible(several)
-        self.setColumnHidden(place, not (several and action.isChecked()))
+        self.columns_menu.actions()[place].setVisible(bool(self._model.choices("person")))
+        self._fit_columns()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Show as many of the chosen columns as there is room for."""
+        super().resizeEvent(event)
+        self._fit_columns()
+
+    def _fit_columns(self) -> None:
+        actions = self.columns_menu.actions()
+        shown = [at for at, one in enumerate(actions) if one.isVisible() and one.isChecked()]
+        for name in _GIVE_WAY:
+            if sum(self._usual_px[at] for at in shown) > self.viewport().width():
+                shown = [at for at in shown if COLUMNS[at].id != name]
+        for at, action in enumerate(actions):
+            cut = action.isVisible() and action.isChecked() and at not in shown
+            action.setText(COLUMNS[at].heading + (" (no room here)" if cut else ""))
+            self.setColumnHidden(at, at not in shown)
 
     # --- one selection --------------------------------------------------------------------
 

@@ -318,10 +318,6 @@ class SpanTableModel(RecordTableModel[Span]):
         coloured = COLUMNS[column].id == "label"
         return swatch_icon(self._labels.colour_of(record.label)) if coloured else None
 
-    def _tip(self, record: Span, column: int) -> str | None:
-        wide = COLUMNS[column].id in ("label", "track", "note")
-        return self._text(record, column) if wide else None
-
     # --- typing ---------------------------------------------------------------------------
 
     def setData(self, index: Index, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:

@@ -61,7 +61,8 @@ class RecordTableModel(QAbstractTableModel, Generic[Record]):
         return None
 
     def _tip(self, record: Record, column: int) -> str | None:
-        return None
+        # A narrow column cuts words; numbers have their room.
+        return None if self.headings[column].number else self._text(record, column)
 
     # --- Qt's interface -------------------------------------------------------------------
 

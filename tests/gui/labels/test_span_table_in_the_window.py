@@ -12,6 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QToolButton
 from window_models import models_of
 
+from sd2app.labels.label_set_page import LabelSetTable
 from sd2app.labels.panel import LabelsPanel
 from sd2app.labels.table import SpanTable
 from sd2app.labels.table_model import COLUMNS
@@ -284,7 +285,7 @@ def test_the_panel_is_as_wide_as_its_table_needs_and_others_are_as_before(labell
     assert labelled.side.width() == chosen
 
 
-@pytest.mark.parametrize("size", [(1280, 720), (1600, 1000), (2560, 1440)])
+@pytest.mark.parametrize("size", [(1000, 640), (1280, 720), (1600, 1000), (2560, 1440)])
 def test_the_usual_columns_need_no_scrolling(labelled, size) -> None:
     labelled.resize(*size)
     labelled.side.bring_up("Sensor")
@@ -297,6 +298,30 @@ def test_the_usual_columns_need_no_scrolling(labelled, size) -> None:
         text = spans.model().headerData(place, Qt.Orientation.Horizontal)
         if not header.isSectionHidden(place):
             assert header.sectionSize(place) >= metrics.horizontalAdvance(text) + 4
+    labelled.resize(1280, 800)
+
+
+def test_a_narrow_table_does_without_some_columns_and_says_which(labelled) -> None:
+    menu = table(labelled).columns_menu
+    frames = next(one for one in menu.actions() if one.text() == "Frames")
+    labelled.resize(1000, 640)
+    QApplication.processEvents()
+    assert table(labelled).isColumnHidden(AT["frames"])
+    assert frames.text() == "Frames (no room here)"
+    menu.actions()[AT["note"]].trigger()
+    menu.actions()[AT["duration"]].trigger()
+    assert not table(labelled).isColumnHidden(AT["frames"])
+    labelled.resize(1280, 800)
+
+
+def test_columns_of_the_label_set_need_no_scrolling_either(labelled) -> None:
+    labelled.resize(1000, 640)
+    labelled.side.bring_up("Labels", "Label set")
+    QApplication.processEvents()
+    labels = labelled.findChild(LabelSetTable)
+    assert labels.horizontalScrollBar().maximum() == 0
+    assert labels.sizeHintForColumn(0) <= labels.columnWidth(0)
+    assert labels.model().index(0, 2).data(Qt.ItemDataRole.ToolTipRole) == "blue"
     labelled.resize(1280, 800)
 
 
