@@ -1,7 +1,7 @@
 """Colours of the two themes. Text on its background has a contrast of at least 4.5:1.
 
-What is disabled, and frames of what is typed or chosen, have 3:1. Those of a sensor's axes have
-4.5:1 on panels and wells, and differ to the colour-blind.
+That holds for what is disabled as well; frames of what is typed, chosen or pressed have 3:1.
+Colours of a sensor's axes have 4.5:1 on panels and wells, and differ to the colour-blind.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ class Palette:
     panel: str
     well: str
     border: str
+    frame: str
     text: str
     muted: str
     disabled: str
@@ -41,9 +42,10 @@ LIGHT = Palette(
     panel="#ffffff",
     well="#e9ebee",
     border="#d3d7dd",
+    frame="#7b828c",
     text="#1d2127",
     muted="#5a6370",
-    disabled="#7b828c",
+    disabled="#626974",
     accent="#1f66d1",
     accent_text="#ffffff",
     synthetic="#1f66d1",
@@ -64,9 +66,10 @@ DARK = Palette(
     panel="#1e2126",
     well="#121417",
     border="#343941",
+    frame="#6b727d",
     text="#e7e9ec",
     muted="#a0a8b3",
-    disabled="#767e89",
+    disabled="#868e99",
     accent="#79b0ff",
     accent_text="#0e1116",
     synthetic="#79b0ff",

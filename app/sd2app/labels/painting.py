@@ -24,7 +24,7 @@ ROW_PX = 24.0
 """Height of a track whose spans do not overlap."""
 _LANE_PX, _HIGHEST_PX = 17.0, 72.0
 _GAP_PX = 1.0
-_TINT, _SELECTED_TINT = 64, 136
+_TINT, _SELECTED_TINT = 64, 96
 _NARROW_TINTS = 90, 255
 """Opacities of columns that narrow spans cover hardly and wholly."""
 _REGION_TINT, _SELECTED_REGION_TINT = 140, 255

@@ -21,14 +21,17 @@ _ROLES = {
     QPalette.ColorRole.PlaceholderText: "muted",
     QPalette.ColorRole.Highlight: "accent",
     QPalette.ColorRole.HighlightedText: "accent_text",
+    QPalette.ColorRole.BrightText: "text",
     QPalette.ColorRole.Link: "accent",
+    QPalette.ColorRole.LinkVisited: "accent",
     QPalette.ColorRole.Accent: "accent",
 }
 
 _FRAMES = {
-    "QAbstractSpinBox": "disabled",
-    "QComboBox": "disabled",
-    "QLineEdit": "disabled",
+    "QAbstractSpinBox": "frame",
+    "QComboBox": "frame",
+    "QLineEdit": "frame",
+    "QPushButton": "frame",
     "QCheckBox": "muted",
 }
 """Colours of frames of what is typed, chosen or ticked; the last are drawn lighter."""
@@ -91,21 +94,21 @@ def _style_sheet(c: Palette) -> str:
         subcontrol-origin: padding; subcontrol-position: center right; right: 5px;
     }}
     QToolButton:hover {{ background: {c.well}; }}
-    QToolButton:checked {{ background: {c.well}; border-color: {c.border}; }}
-    QToolButton#outlined {{ border-color: {c.border}; padding: 2px 8px; }}
+    QToolButton:checked {{ background: {c.well}; border-color: {c.frame}; }}
+    QToolButton#outlined {{ border-color: {c.frame}; padding: 2px 8px; }}
     QToolButton#outlined[popupMode="2"] {{ padding-right: 18px; }}
-    QToolButton#model {{ border-color: {c.border}; padding: 1px 18px 1px 6px; }}
+    QToolButton#model {{ border-color: {c.frame}; padding: 1px 18px 1px 6px; }}
     QToolButton#primary {{
         background: {c.accent}; color: {c.accent_text}; border-color: {c.accent}; padding: 2px 10px;
     }}
     QToolButton#primary:hover {{ background: {c.accent}; border-color: {c.text}; }}
     QToolButton#primary:focus {{ border-color: {c.text}; }}
     QToolButton#primary:disabled {{
-        background: {c.well}; color: {c.disabled}; border-color: {c.border};
+        background: {c.well}; color: {c.disabled}; border-color: {c.frame};
     }}
     QToolButton#fold {{ padding: 2px 4px 2px 0; }}
     QToolButton#fold:checked {{ background: transparent; border-color: transparent; }}
-    QToolButton#preset {{ border-color: {c.border}; padding: 3px 0; }}
+    QToolButton#preset {{ border-color: {c.frame}; padding: 3px 0; }}
     QToolButton#preset:checked {{ border-color: {c.accent}; background: {c.well}; }}
     QFrame#opened {{ border: none; border-right: 1px solid {c.border}; border-radius: 0; }}
     QToolButton#rail {{ border-radius: 6px; }}
@@ -116,7 +119,7 @@ def _style_sheet(c: Palette) -> str:
     QTabBar#layouts::tab:selected {{ color: {c.text}; border-bottom-color: {c.accent}; }}
     QTabBar#layouts::tab:hover {{ background: {c.well}; }}
     QTabBar#layouts:focus {{ border: 1px solid {c.accent}; border-radius: 4px; }}
-    QTableView {{ border: 1px solid {c.border}; border-radius: 4px; }}
+    QTableView {{ border: 1px solid {c.frame}; border-radius: 4px; }}
     QTableView:focus {{ border-color: {c.accent}; }}
     QHeaderView::section {{
         background: {c.panel}; color: {c.muted}; border: none; border-bottom: 1px solid {c.border};
@@ -128,7 +131,7 @@ def _style_sheet(c: Palette) -> str:
     QScrollBar {{ background: transparent; margin: 0; }}
     QScrollBar:vertical {{ width: 8px; }}
     QScrollBar:horizontal {{ height: 8px; }}
-    QScrollBar::handle {{ background: {c.hatch}; border-radius: 3px; margin: 1px; }}
+    QScrollBar::handle {{ background: {c.frame}; border-radius: 3px; margin: 1px; }}
     QScrollBar::handle:vertical {{ min-height: 24px; }}
     QScrollBar::handle:horizontal {{ min-width: 24px; }}
     QScrollBar::handle:hover {{ background: {c.muted}; }}
