@@ -21,6 +21,8 @@ from sd2app.suggestions.finders import Found, Threshold
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.files import GESTURES
 from sd2core.classify.spans import SpanOptions, predicted_spans
+from sd2core.cli.classify.trained import Apply
+from sd2core.options.records import words_of
 
 _PATIENCE_MS = 1500
 """Delay after the first map before the last session's classifier is loaded."""
@@ -192,6 +194,17 @@ class ClassifyModel(ReportingModel):
             return Found(named, "" if named else "Nothing: no gesture is that sure")
 
         return look
+
+    def words(self, recording: Path, threshold: float) -> list[str]:
+        """Words of ``sd2 classify apply``."""
+        command = Apply(
+            map=recording,
+            of=None if self.source is None else self.source.name,
+            model=self.path,
+            min_confidence=threshold / 100.0 or None,
+            out=Path("found.json"),
+        )
+        return words_of("classify apply", command)
 
     # --- requests -------------------------------------------------------------------------
 

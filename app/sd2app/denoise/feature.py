@@ -14,10 +14,11 @@ from sd2app.denoise.live import LiveDenoiseModel
 from sd2app.denoise.model import DenoiseModel
 from sd2app.denoise.text import denoiser_page, kind_words, origin_words
 from sd2app.feature import Action, Drop, Feature, Shell, report
+from sd2app.maps.export_dialog import export_map
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.stack import MapStack
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import ask_file, ask_map
+from sd2app.widgets.dialogs import ask_file
 from sd2app.widgets.model_card_dialog import ModelCardDialog
 from sd2app.widgets.model_menu import ModelButton, ModelMenu, Words
 
@@ -131,6 +132,5 @@ class DenoiseFeature(Feature):
             ModelCardDialog(denoiser_page(self.model.card), self._shell.dialog_parent).exec()
 
     def _export(self) -> None:
-        name = self._session.document.file_name("-denoised.npz")
-        if path := ask_map(self._shell.dialog_parent, "Export denoised map", name):
-            self._shell.attempt(lambda: self.model.export(path))
+        name, model = self._session.document.file_name("-denoised.npz"), self.model
+        export_map("Export denoised map", name, model.line, model.export, self._shell)

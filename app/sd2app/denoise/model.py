@@ -12,6 +12,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.background.latest import LatestRunner, ReportingModel, delayed
 from sd2app.background.model_worker.client import RemoteDenoiser
 from sd2app.background.model_worker.library import DenoiserLibrary
+from sd2app.background.quoting import quoted
 from sd2app.denoise.map import TEXTURE_SEED, DenoisedMap
 from sd2app.denoise.text import origin_words, track_words
 from sd2app.maps.model import SynthesisModel
@@ -19,8 +20,10 @@ from sd2app.maps.partial_map import Part
 from sd2app.maps.quality import Postprocess
 from sd2app.session.denoiser_choice import NO_MODEL, UNSAID, DenoiserChoice
 from sd2app.session.session import Session
+from sd2core.cli.denoise import Denoise
 from sd2core.denoise.files import default_name
 from sd2core.errors import Sd2Error
+from sd2core.options.records import words_of
 
 if TYPE_CHECKING:
     from sd2core.denoise.card import ModelCard
@@ -163,6 +166,16 @@ class DenoiseModel(ReportingModel):
         if self.textured and texture is not None:
             made = texture.on(made, TEXTURE_SEED)
         made.save(path)
+
+    def line(self, name: str) -> str:
+        """Commands for a terminal: the synthetic map, and what this model makes of it."""
+        assert self.card is not None
+        synthetic = Path(name.replace("-denoised", "-synthetic"))
+        model = next(named for named, card in self.by_name().items() if card.path == self.card.path)
+        textured = self.textured and self.card.texture is not None
+        seed = TEXTURE_SEED if textured else None
+        denoise = Denoise(map=synthetic, out=Path(name), model=model, texture=seed)
+        return f"{self._synthesis.line(synthetic.name)} && {quoted(words_of('denoise', denoise))}"
 
     def close(self) -> None:
         """Stop computing and let go of the models."""

@@ -17,7 +17,6 @@ from sd2app.maps.difference import DifferenceModel
 from sd2app.session.content import UNTITLED, Content
 from sd2app.session.session import Session
 from sd2core.cli.labels.recording import DrawnLabels
-from sd2core.cli.recording_maps import MapName
 from sd2core.cli.strip import Strip
 from sd2core.errors import Sd2Error
 from sd2core.figures.maps import Levels, MapRow, draw_maps, save_maps
@@ -154,11 +153,7 @@ class MapFigure(DrawnFigure):
         s, levels, clock = session, session.display.levels, session.playback.timebase
         notes = {s.maps.denoised: denoiser, s.maps.before: s.maps.before.status}
         self._folder = Path() if (it := s.document.recording) is None else it.folder
-        self._named: dict[str, MapName] = {
-            s.maps.synthetic.title: "synthetic",
-            s.maps.denoised.title: "denoised",
-            s.maps.real.title: "radar",
-        }
+        self._named = {one.title: one.name for one in s.maps.all if one.name}
         # By titles; those without a map are left out.
         self._rows = {
             track.title: MapRow(

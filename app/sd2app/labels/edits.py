@@ -20,6 +20,7 @@ from sd2core.labels.free_time import NoRoom
 from sd2core.labels.spans import Labels, Span
 from sd2core.recording.divergence import State
 from sd2core.recording.edited import decoded_fields
+from sd2core.recording.recording import Recording
 
 
 class _Step(QUndoCommand):
@@ -85,6 +86,11 @@ class LabelEdits(QObject):
     def refusal(self) -> str:
         """Reason why labels cannot be edited; empty where they can."""
         return self._session.refusal
+
+    @property
+    def recording(self) -> Recording | None:
+        """The recording that is labelled."""
+        return self._document.recording
 
     @property
     def persons(self) -> tuple[str, ...]:

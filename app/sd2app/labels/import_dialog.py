@@ -5,18 +5,22 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtWidgets import QDialog, QLabel, QWidget
 
 from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.quoting import quoted
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
 from sd2app.manual.help import with_help
+from sd2app.session.content import UNTITLED
 from sd2app.widgets.dialogs import accepted, accepting, ask_file
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import column_of, form_of
-from sd2app.widgets.panel import FactRows, rule, say, sentence, title
+from sd2app.widgets.panel import FactRows, copy_button, rule, say, sentence, title
 from sd2app.widgets.text import counted
+from sd2core.cli.labels import Convert
 from sd2core.io.imu_columns import holds_inertial_signals
 from sd2core.labels.formats import (
     FORMATS,
@@ -28,6 +32,8 @@ from sd2core.labels.formats import (
 )
 from sd2core.labels.import_labels import Incoming, Way, set_after, take_in
 from sd2core.labels.spans import Labels
+from sd2core.options.records import words_of
+from sd2core.recording.recording import Recording
 from sd2core.timebase import Timebase
 
 _WAYS: dict[Way, str] = {
@@ -66,11 +72,20 @@ def import_labels(shell: Shell, edits: LabelEdits, path: Path | None = None) -> 
         path = ask_file(parent, "Import labels", label_files())
         if path is None:
             return
-    dialog = LabelImportDialog(path, edits.labels.labels, edits.playback.timebase, parent)
+    labels, base = edits.labels.labels, edits.playback.timebase
+    dialog = LabelImportDialog(path, labels, base, parent, edits.recording)
     taken, incoming, way, name = accepted(dialog), dialog.incoming, dialog.way, path.stem
     dialog.finish()
     if taken and incoming is not None:
         edits.apply(lambda labels, _: take_in(labels, incoming, way, name))
+
+
+def _frame_source(recording: Recording) -> dict[str, Any]:
+    """Where commands find times of frames, by their option: in the saved recording, or a file."""
+    sources = {"video": recording.video, "mesh": recording.mesh}
+    if recording.folder != UNTITLED:
+        sources = {"recording": recording.folder}
+    return dict([(name, path) for name, path in sources.items() if path is not None][:1])
 
 
 def _spans(found: Incoming) -> str:
@@ -91,9 +106,15 @@ class LabelImportDialog(QDialog):
     """Content of a label file above, choices below; read again when its format is chosen."""
 
     def __init__(
-        self, path: Path, labels: Labels, timebase: Timebase, parent: QWidget | None = None
+        self,
+        path: Path,
+        labels: Labels,
+        timebase: Timebase,
+        parent: QWidget | None = None,
+        recording: Recording | None = None,
     ) -> None:
         super().__init__(parent)
+        self._recording = recording
         self._path, self._labels, self._timebase = path, labels, timebase
         self.reading: LabelReading | None = None  # what the file has; None while reading
         self.incoming: Incoming | None = None  # the same, fitted to the recording
@@ -132,8 +153,9 @@ class LabelImportDialog(QDialog):
             ("Marks become", self._mark),
         )
         take = form_of(("Take them", self._way))
+        foot = with_help("Import labels", buttons, copy_button(lambda: self.line, self))
         content = form, rule(), self._said, self._facts, rule(), take, self._consequence
-        parts = title(path.name), *content, 8, with_help("Import labels", buttons)
+        parts = title(path.name), *content, 8, foot
         self.setLayout(column_of(*parts, spacing_px=8, margins_px=16))
         self._read()
         self.setMinimumWidth(560)
@@ -142,6 +164,21 @@ class LabelImportDialog(QDialog):
     def way(self) -> Way:
         """Replace the present labels, or add to them."""
         return self._way.currentData()
+
+    @property
+    def line(self) -> str:
+        """Command for a terminal that reads the file likewise, to a file of our own."""
+        recording, name = self._recording, f"{self._path.stem}-imported.json"
+        clock = {} if recording is None else _frame_source(recording)
+        convert = Convert(
+            file=self._path,
+            out=Path(name),
+            format=self._format.currentData(),
+            observation=self._observed,
+            mark_s=self._mark.value() or None,
+            **clock,
+        )
+        return quoted(words_of("labels convert", convert))
 
     def facts(self) -> list[tuple[str, str]]:
         """Return names and values on the content and what importing changes."""

@@ -32,6 +32,7 @@ HELP = {
     "Import labels": "tutorials/label-fast.md#4-take-the-labels-over",
     "Export labels": "tutorials/label-fast.md#5-hand-them-on",
     "Export cut-outs": "tutorials/label-fast.md#5-hand-them-on",
+    "Export map": "formats.md#doppler-map-files",
     "Export figure": "how-to/figures-for-a-paper.md",
     "Export data set": "tutorials/video-to-data-set.md#6-export-the-data-set",
     "Batch": "how-to/many-recordings.md",

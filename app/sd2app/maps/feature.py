@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QMenu, QWidget
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.feature import Action, Feature, Shell
 from sd2app.maps.difference import DifferenceModel
+from sd2app.maps.export_dialog import export_map
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.level_bar import LevelBar, MapEdge
 from sd2app.maps.limb_menu import LimbMenu
@@ -24,7 +25,6 @@ from sd2app.maps.stack import MapStack
 from sd2app.maps.uncertainty import UncertaintyModel
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import Overlay
-from sd2app.widgets.dialogs import ask_map
 from sd2app.widgets.layouts import pane
 
 
@@ -92,9 +92,8 @@ class MapsFeature(Feature):
         return LimbMenu(self.limbs, self._shell.dialog_parent)
 
     def _export(self) -> None:
-        name = self._session.document.file_name("-synthetic.npz")
-        if path := ask_map(self._shell.dialog_parent, "Export synthetic map", name):
-            self._shell.attempt(lambda: self.synthesis.export(path))
+        name, synthesis = self._session.document.file_name("-synthetic.npz"), self.synthesis
+        export_map("Export synthetic map", name, synthesis.line, synthesis.export, self._shell)
 
     def stack(self, over_maps: Sequence[Overlay], over_all: Sequence[Overlay]) -> MapStack:
         """Maps one above the other, with what other features draw over them and the overview."""

@@ -15,6 +15,7 @@ from PySide6.QtCore import QObject, Signal, SignalInstance
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.background.latest import Emit, delayed
+from sd2app.background.quoting import quoted
 from sd2app.maps.partial_map import FINAL, Part, PartialMap, View
 from sd2app.maps.quality import (
     Postprocess,
@@ -33,11 +34,14 @@ from sd2app.maps.warm_up import CompilerModel, MaskPrefetcher
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
 from sd2core.body.parts import synthetic_map
+from sd2core.cli.synth import Synth
 from sd2core.doppler.options import PRESETS
 from sd2core.doppler.synthesizer import FrameScattering, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import runs
+from sd2core.options.records import words_of
+from sd2core.options.synthesis import CHOSEN
 from sd2core.sensor import Vector, VirtualSensor
 
 if TYPE_CHECKING:
@@ -248,6 +252,31 @@ class SynthesisModel(QObject):
     def export(self, path: Path) -> None:
         """Write the map that is shown with its provenance."""
         self.whole_map().save(path)
+
+    def command(self, out: Path) -> Synth:
+        """Options of ``sd2 synth`` that make the map on screen of the saved recording."""
+        content, synthesizers, plan = self._session.document.content, self._synthesizers, self._plan
+        assert content is not None
+        assert synthesizers is not None
+        recording, used, usual = content.recording, synthesizers.options, PRESETS["paper"]
+        assert recording.mesh is not None
+        chosen: dict[str, Any] = {}
+        if plan is not None:
+            used, chosen["vertices_kept"] = plan.options(used), plan.vertices_kept
+        for name in (*CHOSEN, "count"):
+            if getattr(used, name, None) != getattr(usual, name, None):
+                chosen[name] = getattr(used, name)
+        return Synth(
+            mesh=recording.folder if content.saved else recording.mesh,
+            out=out,
+            sensor=self._sensor.position_m,
+            limbs=synthesizers.limbs and self.split,
+            **chosen,
+        )
+
+    def line(self, name: str) -> str:
+        """Command for a terminal that writes the map to a file of this name."""
+        return quoted(words_of("synth", self.command(Path(name))))
 
     def whole_map(self) -> DopplerMap:
         """Recompute the map on screen with its provenance, the plan included.

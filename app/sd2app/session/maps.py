@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.session.display import HeatmapLevels
+from sd2core.cli.recording_maps import MapName
 from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.mesh.presence import runs
 
@@ -55,17 +56,19 @@ class MapModel(QObject):
 
     ``reference`` is the value shown as 0 dB. It is set when a recording is
     opened and stays, so that a placement farther away looks weaker. ``revision`` counts
-    how often the map was set, also to one whose values changed in place. Others read the
-    attributes; the methods change them.
+    how often the map was set, also to one whose values changed in place. ``name`` is what commands
+    call it. Others read the attributes; the methods change them.
     """
 
     changed = Signal()
     came_or_went = Signal()  # there is a map where there was none, or the reverse
     status_changed = Signal()
 
-    def __init__(self, title: str, parent: QObject | None = None) -> None:
+    def __init__(
+        self, title: str, parent: QObject | None = None, name: MapName | None = None
+    ) -> None:
         super().__init__(parent)
-        self.title = title
+        self.title, self.name = title, name
         self.revision = 0
         self.map: DopplerMap | None = None  # on its own clock, without the offset
         self.covered: NDArray[np.bool_] | None = None  # (frames,): is computed; None: all are

@@ -142,10 +142,10 @@ def build_session(parent: QObject, settings: Settings) -> Session:
         span=span,
         pointer=PointerModel(parent),
         maps=Maps(
-            MapModel("Synthetic", parent),
-            MapModel("Denoised", parent),
+            MapModel("Synthetic", parent, "synthetic"),
+            MapModel("Denoised", parent, "denoised"),
             MapModel("Denoised before", parent),
-            MapModel("Real", parent),
+            MapModel("Real", parent, "radar"),
         ),
         placing=Mode(parent),
         aligning=Mode(parent),

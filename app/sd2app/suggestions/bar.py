@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QBoxLayout, QWidget
 from sd2app.suggestions.model import SuggestionsModel
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
 from sd2app.widgets.layouts import STRETCH, row_of
-from sd2app.widgets.panel import ElidedLabel, outlined
+from sd2app.widgets.panel import ElidedLabel, copy_button, outlined
 
 _BUTTONS = (
     ("accept_suggestion", "Accept"),
@@ -26,7 +26,7 @@ class SuggestionBar(QWidget):
     """View of :class:`SuggestionsModel`; hidden until suggestions are asked for.
 
     Where one row would cut its words short, what decides stands above what finds; where that is
-    not enough, the words stand above the buttons.
+    not enough, each of them stands in two rows itself.
     """
 
     def __init__(self, model: SuggestionsModel, action: Callable[[str], QAction]) -> None:
@@ -41,21 +41,27 @@ class SuggestionBar(QWidget):
         self._by.activated.connect(lambda at: model.set_finder(model.finders[at]))
         self._threshold = NumberBox(0.0, 100.0, "", "")
         self._threshold.valueChanged.connect(model.set_threshold)
+        self._copy = copy_button(lambda: model.line, self)
         buttons = [action_button(action(name), text, outlined=True) for name, text in _BUTTONS]
+        ends = row_of(STRETCH, self._copy, spacing_px=6)
         self._rows = (
             row_of(
                 (row_of((self._text, 1), self._as, spacing_px=6), 1),
                 row_of(*buttons, STRETCH, spacing_px=6),
                 spacing_px=6,
             ),
-            row_of(STRETCH, self._by, self._source, self._threshold, spacing_px=6),
+            row_of(
+                row_of(STRETCH, self._by, self._source, self._threshold, spacing_px=6),
+                ends,
+                spacing_px=6,
+            ),
         )
         self._layout = row_of((self._rows[0], 1), self._rows[1], spacing_px=6)
         self._layout.setContentsMargins(*_MARGINS_PX)
         self.setLayout(self._layout)
         # The last one for the keyboard too.
         tip, name = "Close; the suggestions stay", "Close the suggestions"
-        self._rows[1].addWidget(outlined("✕", tip, model.stop, self, name=name, look=""))
+        ends.addWidget(outlined("✕", tip, model.stop, self, name=name, look=""))
         model.changed.connect(self._refresh)
         self._refresh()
 
@@ -73,8 +79,8 @@ class SuggestionBar(QWidget):
     def _fold(self) -> None:
         left_px, _, right_px, _ = _MARGINS_PX
         room_px, ways = self.width() - left_px - right_px, QBoxLayout.Direction
-        # The inner one first: the outer one asks how wide it is.
-        for layout in (self._rows[0], self._layout):
+        # The inner ones first: the outer one asks how wide they are.
+        for layout in (*self._rows, self._layout):
             parts = (layout.itemAt(place) for place in range(layout.count()))
             needed_px = layout.spacing() + sum(one.sizeHint().width() for one in parts if one)
             fits = needed_px <= room_px
@@ -94,6 +100,7 @@ class SuggestionBar(QWidget):
         place = sources.index(source) if source in sources else -1
         self._source.offer([track.title for track in sources], place)
         self._source.setVisible(len(sources) > 1)
+        self._copy.setEnabled(source is not None and not model.finder.why_not)
         finders = [f"by {finder.title}" for finder in model.finders]
         self._by.offer(finders, model.finders.index(model.finder))
         box, limits = self._threshold, model.finder.threshold

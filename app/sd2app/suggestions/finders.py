@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from PySide6.QtCore import SignalInstance
 
 from sd2app.session.maps import MapModel
+from sd2core.cli.labels.suggest import Suggest
 from sd2core.labels.spans import Span
 from sd2core.labels.suggest import motion_energy_db, suggest_spans
+from sd2core.options.records import words_of
 from sd2core.options.suggesting import SuggestOptions
 
 
@@ -68,6 +71,9 @@ class SpanFinder(Protocol):
     def look(self, threshold: float) -> Callable[[], Found]:
         """Make the search, to be run in the background."""
 
+    def words(self, recording: Path, threshold: float) -> list[str]:
+        """Words of the command that searches a saved recording likewise."""
+
 
 class MotionFinder:
     """Finder of motion, of any kind."""
@@ -119,11 +125,11 @@ class MotionFinder:
 
     def look(self, threshold: float) -> Callable[[], Found]:
         """Make the search, to be run in the background."""
-        source, usual = self.source, SuggestOptions()
+        source = self.source
         assert source is not None
         assert source.map is not None
         doppler = source.map.shifted(source.offset_s)
-        options = SuggestOptions(high_db=threshold, low_db=min(usual.low_db, threshold))
+        options = SuggestOptions(**_levels(threshold))
 
         def look() -> Found:
             spans = suggest_spans(doppler, options)
@@ -133,3 +139,15 @@ class MotionFinder:
             return Found(spans)
 
         return look
+
+    def words(self, recording: Path, threshold: float) -> list[str]:
+        """Words of ``sd2 labels suggest``."""
+        name = None if self.source is None else self.source.name
+        out = Path("suggested.json")
+        command = Suggest(map=recording, of=name, out=out, **_levels(threshold))
+        return words_of("labels suggest", command)
+
+
+def _levels(threshold_db: float) -> dict[str, Any]:
+    low_db = min(SuggestOptions().low_db, threshold_db)
+    return {"high_db": threshold_db, "low_db": low_db}

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import BackgroundModel, LatestRunner
+from sd2app.background.quoting import quoted
 from sd2app.labels.edits import LabelEdits
 from sd2app.session.maps import MapModel
 from sd2app.suggestions.finders import Found, SpanFinder
@@ -87,6 +88,13 @@ class SuggestionsModel(BackgroundModel):
         if self.pending:
             return to_decide
         return self._if_none or "No suggestions left to decide on"
+
+    @property
+    def line(self) -> str:
+        """Command for a terminal that searches the saved recording likewise."""
+        recording = self._edits.recording
+        assert recording is not None
+        return quoted(self.finder.words(recording.folder, self.threshold))
 
     # --- asking ---------------------------------------------------------------------------
 

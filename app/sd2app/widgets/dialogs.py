@@ -116,8 +116,3 @@ def ask_new(
 def with_suffix(path: Path, suffix: str) -> Path:
     """Path with a suffix after its name, unless it has it."""
     return path if path.suffix.lower() == suffix else path.with_name(path.name + suffix)
-
-
-def ask_map(parent: QWidget, title: str, name: str) -> Path | None:
-    """Let the user choose the file of a Doppler map."""
-    return ask_new(parent, title, name, "Doppler map (*.npz)")

@@ -19,7 +19,7 @@ from sd2core.cli.labels.suggest import (
 from sd2core.cli.output import counted, print_json, print_rows, progress_bar
 from sd2core.cli.recording_maps import parsed_maps
 from sd2core.errors import Sd2Error
-from sd2core.options.kinds import NotNegative
+from sd2core.options.kinds import NotNegative, Share
 from sd2core.options.records import OptionRecord, Place
 from sd2core.options.shared import Json
 
@@ -72,11 +72,14 @@ class Apply(SearchedMap, TrainedModel, Json):
         shorter spans are left out
     merge_gap_s : S
         merge spans of a class with a shorter gap between them
+    min_confidence : SHARE
+        spans whose class is less probable on average are left out, as 50% or 0.5 (default: none)
     """
 
     probabilities: Annotated[Path | None, Place(endings=(".npz",))] = None
     min_duration_s: NotNegative = 0.2
     merge_gap_s: NotNegative = 0.1
+    min_confidence: Share | None = None
 
 
 @command("eval", Evaluate, DATA_HELP)
@@ -184,7 +187,7 @@ def _apply(options: Apply) -> None:
 
     if options.out is not None:
         check_label_output(options.out)
-    chosen = SpanOptions(options.min_duration_s, options.merge_gap_s)
+    chosen = SpanOptions(options.min_duration_s, options.merge_gap_s, options.min_confidence or 0.0)
     card = describe_classifier(options.classifier)
     doppler, clock = map_and_clock(options, card.axis)
     # Before torch is loaded, which takes seconds.

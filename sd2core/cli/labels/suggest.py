@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import command
 from sd2core.cli.labels.reading import (
@@ -54,7 +54,6 @@ class Suggest(SearchedMap, SuggestOptions, Json):
         label of the spans (default: gesture)
     """
 
-    of: Literal["synthetic", "radar"] | None = None
     label: str = "gesture"
 
 

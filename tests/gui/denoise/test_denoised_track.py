@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from answering import once_asked
+from copied import copied_record
 from dropping import drop
 from fake_denoisers import fading
 from finding import button_of
@@ -16,6 +17,7 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QPushButton
 from window_models import models_of
 
 from sd2app.figures.dialogs import MapFigureDialog
+from sd2app.maps.export_dialog import MapExportDialog
 from sd2app.maps.readout import reading_lines
 from sd2app.maps.spectrum import SpectrumView
 from sd2app.widgets.model_card_dialog import ModelCardDialog
@@ -277,12 +279,26 @@ def test_map_and_figure_are_exported(denoised, qtbot, tmp_path, monkeypatch):
     c = models_of(denoised)
     name = tmp_path / "out.npz"
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(name), ""))
+
+    def write(dialog: MapExportDialog) -> None:
+        qtbot.mouseClick(button_of(dialog, "Copy command"), Qt.MouseButton.LeftButton)
+        button = next(one for one in dialog.findChildren(QPushButton) if one.text() == "Export…")
+        qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+
+    once_asked(MapExportDialog, write)
     denoised.action("export_denoised").trigger()
+    first, second = QGuiApplication.clipboard().text().split(" && ")
+    assert first.startswith("sd2 synth ")
+    QGuiApplication.clipboard().setText(second)
+    assert (copied_record().map, copied_record().out.name) == (
+        Path("ball-synthetic.npz"),
+        "ball-denoised.npz",
+    )
     made = DopplerMap.load(name)
     assert made.kind == "denoised"
     np.testing.assert_allclose(made.values, c.denoised.map.values, rtol=1e-5, atol=1e-9)
     name = tmp_path / "maps.svg"
-    qtbot.keyClick(denoised, Qt.Key.Key_X)
+    denoised.action("difference").trigger()
 
     def export(dialog: MapFigureDialog) -> None:
         qtbot.mouseClick(button_of(dialog, "Copy command"), Qt.MouseButton.LeftButton)

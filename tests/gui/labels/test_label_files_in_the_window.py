@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 from answering import once_asked
+from copied import copied_record
 from dropping import drop, hover
-from finding import named
+from finding import button_of, named
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QComboBox, QFileDialog, QPushButton
 from window_models import models_of
@@ -15,6 +16,7 @@ from window_models import models_of
 from sd2app.labels.export_dialog import LabelExportDialog
 from sd2app.labels.import_dialog import LabelImportDialog, import_labels
 from sd2app.widgets.inputs import Choice
+from sd2core.cli.labels import Convert
 from sd2core.labels.formats import FORMATS, read_labels, write_labels
 from sd2core.labels.spans import Labels, LabelTrack, Span
 
@@ -75,6 +77,21 @@ def test_an_import_is_one_step(window, theirs, qtbot, monkeypatch) -> None:
     key(window, qtbot, "Z", CONTROL)
     assert c.labels.labels == before
     assert not c.document.modified
+
+
+def test_an_import_is_copied_as_a_command(window, theirs, qtbot, monkeypatch) -> None:
+    choose(monkeypatch, "getOpenFileName", theirs)
+
+    def copy(dialog: LabelImportDialog) -> None:
+        qtbot.mouseClick(button_of(dialog, "Copy command"), LEFT)
+        qtbot.mouseClick(button(dialog, "Cancel"), LEFT)
+
+    once_asked(LabelImportDialog, copy)
+    key(window, qtbot, "I", CONTROL)
+    command = copied_record()
+    assert isinstance(command, Convert)
+    assert (command.file, command.out) == (theirs, Path("ben-imported.json"))
+    assert command.recording == models_of(window).document.recording.folder
 
 
 def test_a_dropped_file_is_imported(window, theirs, qtbot) -> None:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
-from answering import menu_at, pick
+from answering import menu_at, once_asked, pick
+from copied import copied_record
 from finding import button_of
-from PySide6.QtWidgets import QFileDialog
+from PySide6.QtWidgets import QDialog, QFileDialog, QPushButton
 from window_models import models_of
 
+from sd2app.maps.export_dialog import MapExportDialog
 from sd2app.sensor.placements_page import PlacementsPage
+from sd2core.cli.synth import Synth
 from sd2core.placements.placements import PlacementGrid
 
 
@@ -22,10 +27,32 @@ def proposed(monkeypatch) -> list[str]:
     return names
 
 
+def press(dialog: QDialog, text: str) -> None:
+    """Press a button of the last row; a dialog that is not accepted is given up."""
+    button = next(one for one in dialog.findChildren(QPushButton) if one.text() == text)
+    button.click()
+    dialog.reject()
+
+
 def test_exports_and_save_as_are_named_as_the_recording(window, proposed):
     window.action("save_as").trigger()
+    once_asked(MapExportDialog, lambda dialog: press(dialog, "Export…"))
     window.action("export_map").trigger()
     assert proposed == ["ball.sd2", "ball-synthetic.npz"]
+
+
+def test_the_command_for_a_map_is_copied_from_where_it_is_exported(window):
+    def copy(dialog: MapExportDialog) -> None:
+        button_of(dialog, "Copy command").click()
+        press(dialog, "Cancel")
+
+    once_asked(MapExportDialog, copy)
+    window.action("export_map").trigger()
+    command, c = copied_record(), models_of(window)
+    assert isinstance(command, Synth)
+    assert (command.mesh, command.out) == (c.document.recording.folder, Path("ball-synthetic.npz"))
+    assert command.sensor == c.sensor.sensor.position_m
+    assert (command.visibility or "exact") == c.synthesis._plan.visibility
 
 
 def test_pictures_are_named_as_the_recording(window, proposed):

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import combinations
+from pathlib import Path
 
 import label_hands as hands
 import numpy as np
 import pytest
 from answering import once_asked
+from copied import copied_record
+from finding import button_of
 from kept_window import opened
 from PySide6.QtCore import QPoint, QRect, QRectF, Qt
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QInputDialog, QToolButton, QWidget
 from window_models import models_of
 
+from sd2app.background.quoting import quoted
 from sd2app.labels.painting import lane_box, text_on
 from sd2app.labels.timeline import TargetLine
 from sd2app.suggestions.bar import SuggestionBar
+from sd2core.cli.classify.trained import Apply
+from sd2core.cli.labels.suggest import Suggest
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 
@@ -76,6 +83,29 @@ def test_found_by_a_key_and_decided_on_by_one_key_each(moving, qtbot) -> None:
     key(moving, qtbot, "Y", Qt.KeyboardModifier.ShiftModifier)
     assert offered == ["down-to-up"], "the one used last comes first"
     assert decided(moving) == [("right-to-left", "person")] * 2
+
+
+def test_the_search_is_copied_as_a_command(moving, qtbot) -> None:
+    asked(moving, qtbot)
+    bar, c = moving.findChild(SuggestionBar), models_of(moving)
+    bar._threshold.setValue(9.0)
+    qtbot.mouseClick(button_of(bar, "Copy command"), Qt.MouseButton.LeftButton)
+    command = copied_record()
+    assert isinstance(command, Suggest)
+    assert command.map == c.document.recording.folder
+    assert (command.of, command.high_db, command.low_db) == ("synthetic", 9.0, 5.0)
+
+
+def test_the_search_of_a_classifier_is_copied_as_its_command(window) -> None:
+    c = models_of(window)
+    c.classify.path = Path("g.safetensors")
+    line = quoted(c.classify.words(Path("walk.sd2"), 60.0))
+    QGuiApplication.clipboard().setText(line)
+    command = copied_record()
+    assert isinstance(command, Apply)
+    assert (command.map, command.model) == (Path("walk.sd2"), Path("g.safetensors"))
+    assert command.min_confidence == pytest.approx(0.6)
+    c.classify.path = None
 
 
 def test_nobody_says_that_a_suggestion_without_a_name_is_sure(moving, qtbot) -> None:
