@@ -10,7 +10,7 @@ from PySide6.QtCore import QByteArray, QSettings
 
 T = TypeVar("T")
 
-_RECENT = 10
+MAX_RECENT = 10
 DEFAULT_TOLERANCE = 0.05
 
 
@@ -41,7 +41,7 @@ class Settings:
     def add_recent(self, *paths: Path) -> None:
         """Remember paths that are opened together as the newest."""
         groups = [paths, *(known for known in self.recent if known != paths)]
-        self.set_paths("recent", [Path("\n".join(map(str, one))) for one in groups[:_RECENT]])
+        self.set_paths("recent", [Path("\n".join(map(str, one))) for one in groups[:MAX_RECENT]])
 
     def flag(self, name: str, default: bool) -> bool:
         """Boolean, which may have been stored as text."""

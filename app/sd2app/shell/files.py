@@ -39,6 +39,7 @@ _SAID = (
     " here; undo brings it back. Keep mine writes over theirs."
 )
 _PARTS: tuple[Role, ...] = ("video", "mesh", "radar", "imu")
+_MOST_IN_MENU = 3
 
 
 class FilesFeature(Feature):
@@ -112,7 +113,7 @@ class FilesFeature(Feature):
         return (MeshOffer(self._document, self._session.edits),)
 
     def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
-        """Recordings that were open lately."""
+        """The latest recordings that were open; the start page lists more."""
         return {"recent": self._add_recent}
 
     def _add_recent(self, menu: QMenu) -> None:
@@ -122,7 +123,7 @@ class FilesFeature(Feature):
 
     def _list_recent(self, menu: QMenu) -> None:
         menu.clear()
-        for paths in self._session.settings.recent:
+        for paths in self._session.settings.recent[:_MOST_IN_MENU]:
             others = "".join(f" + {path.name}" for path in paths[1:])
             action = menu.addAction(f"{paths[0]}{others}".replace("&", "&&"))
             action.triggered.connect(lambda _=False, paths=paths: self.reopen(paths))

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QPixmap, QResizeEvent
+from PySide6.QtGui import QAction, QPixmap
 from PySide6.QtWidgets import QGridLayout, QScrollArea, QWidget
 
-from sd2app.settings import Settings
+from sd2app.settings import MAX_RECENT, Settings
 from sd2app.welcome.cards import RecentCard, WayCard
 from sd2app.welcome.pictures import RecordingPictures
 from sd2app.welcome.tour import TourModel
@@ -18,9 +18,7 @@ from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import outlined, sentence, title
 from sd2core.files.resources import is_bundled
 
-_COLUMNS, _MAX_RECENT, _WIDTH_PX, _GAP_PX = 4, 8, 1040, 16
-_ROOMY_PX = 800
-"""Height from which a second row of recordings is shown."""
+_COLUMNS, _WIDTH_PX, _GAP_PX = 4, 1040, 16
 
 
 class Way(NamedTuple):
@@ -88,7 +86,7 @@ class StartPage(QScrollArea):
         for column in range(_COLUMNS):
             self._recent.setColumnStretch(column, 1)
             # A column without anything would have no gap beside it.
-            self._recent.addWidget(QWidget(self), _MAX_RECENT, column)
+            self._recent.addWidget(QWidget(self), MAX_RECENT, column)
         self._nothing = sentence("What you open is listed here, with a picture of it.")
         page = QWidget(self)
         page.setObjectName("page")
@@ -122,7 +120,7 @@ class StartPage(QScrollArea):
             self._recent.removeWidget(card)
             card.deleteLater()
         self.recent = []
-        groups = self._settings.recent[:_MAX_RECENT]
+        groups = self._settings.recent
         self._nothing.setVisible(not groups)
         for at, paths in enumerate(groups):
             picture = QPixmap(str(self._pictures.path_of(paths)))
@@ -132,17 +130,6 @@ class StartPage(QScrollArea):
             card.clicked.connect(lambda _=False, paths=paths: self._open_recent(paths))
             self.recent.append(card)
             self._recent.addWidget(card, at // _COLUMNS, at % _COLUMNS)
-        self._fit()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Show one row of recordings, or two where there is room."""
-        super().resizeEvent(event)
-        self._fit()
-
-    def _fit(self) -> None:
-        roomy = self.height() >= _ROOMY_PX
-        for at, card in enumerate(self.recent):
-            card.setVisible(at < _COLUMNS or roomy)
 
     def _say_tour(self) -> None:
         tour = self._tour

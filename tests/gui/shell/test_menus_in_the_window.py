@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QKeySequence
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from window_models import menu_of, models_of
 
+from sd2app.settings import MAX_RECENT
 from sd2app.shell.menus import menus_in
 from sd2app.widgets.inputs import Choice, NumberBox
 
@@ -48,6 +51,8 @@ def test_letters_stay_when_the_menu_follows_the_window(labelled) -> None:
 
 
 def test_menus_have_at_most_80_entries_and_none_is_long(labelled) -> None:
+    for number in range(MAX_RECENT):
+        labelled.session.settings.add_recent(Path(f"/recording-{number}.sd2"))
     menus = list(menus_in(labelled.menuBar()))
     inner = {menu.menuAction() for menu in menus}
     leaves = 0
@@ -56,6 +61,9 @@ def test_menus_have_at_most_80_entries_and_none_is_long(labelled) -> None:
         assert len(entries) <= 20, menu.title()
         leaves += len(entries) - len(inner.intersection(menu.actions()))
     assert leaves <= 80
+    labelled.start.refresh()
+    assert len(labelled.start.recent) == MAX_RECENT
+    assert not any(one.isHidden() for one in labelled.start.recent)
 
 
 def test_the_context_menu_of_the_labels_has_what_is_done_with_spans(labelled) -> None:
