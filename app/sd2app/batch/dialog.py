@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.background.latest import delayed
 from sd2app.batch.model import BatchModel
@@ -11,7 +11,7 @@ from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.run_view import BatchRunView
 from sd2app.batch.setup_view import BatchSetupView
 from sd2app.manual.help import help_button
-from sd2app.widgets.dialogs import take_room
+from sd2app.widgets.dialogs import Dialog, take_room
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.panel import sentence, show_words
 from sd2app.widgets.run_panel import RunPanel
@@ -19,7 +19,7 @@ from sd2app.widgets.run_panel import RunPanel
 _ESTIMATE_MS = 600
 
 
-class BatchWindow(QDialog):
+class BatchWindow(Dialog):
     """A new batch, or the one in view; the rest of the program can be used meanwhile."""
 
     def __init__(self, batch: BatchModel, asks: BatchQuestions, parent: QWidget) -> None:

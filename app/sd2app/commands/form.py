@@ -8,6 +8,7 @@ from dataclasses import MISSING
 from functools import partial
 from pathlib import Path
 
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QScrollArea, QWidget
 
 from sd2app.commands.model import CommandForms, name_of
@@ -42,6 +43,7 @@ class CommandForm(QWidget):
         self._about = sentence("")
         self._area = QScrollArea()
         self._area.setWidgetResizable(True)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._problem, self._line = sentence("", "warning"), sentence("", "plain")
         attempt = shell.attempt
         tip = "In the background; the window can be used meanwhile"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from PySide6.QtGui import QFontDatabase
-from PySide6.QtWidgets import QDialog, QPlainTextEdit, QWidget
+from PySide6.QtWidgets import QPlainTextEdit, QWidget
 
 from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.commands.form import CommandForm
@@ -13,7 +13,7 @@ from sd2app.commands.model import AnyCommandRun, CommandForms
 from sd2app.commands.refining import MeshRefining
 from sd2app.feature import Shell
 from sd2app.manual.help import help_button
-from sd2app.widgets.dialogs import take_room
+from sd2app.widgets.dialogs import Dialog, take_room
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.run_panel import Button, RunPanel, RunView, RunWords
 from sd2app.widgets.run_text import PHASES
@@ -53,7 +53,7 @@ class CommandRunView(RunView[AnyCommandRun]):
             self._printed.setPlainText(run.facts or "")
 
 
-class CommandWindow(QDialog):
+class CommandWindow(Dialog):
     """A form, or the run in view; the rest of the program can be used meanwhile."""
 
     def __init__(

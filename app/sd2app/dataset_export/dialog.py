@@ -7,7 +7,6 @@ from pathlib import Path
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QPixmap
 from PySide6.QtWidgets import (
-    QDialog,
     QFileDialog,
     QLabel,
     QLineEdit,
@@ -19,7 +18,7 @@ from PySide6.QtWidgets import (
 from sd2app.dataset_export.model import MAPS, ExportModel
 from sd2app.dataset_export.text import inertial_words, label_words, size_words, split_words
 from sd2app.manual.help import help_button
-from sd2app.widgets.dialogs import ask_folder, take_room, with_suffix
+from sd2app.widgets.dialogs import Dialog, ask_folder, take_room, with_suffix
 from sd2app.widgets.inputs import CheckBox, Choice, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import (
@@ -45,7 +44,7 @@ _SHEET_PX = 940
 """Width of the preview sheet."""
 
 
-class ExportDialog(QDialog):
+class ExportDialog(Dialog):
     """A view of :class:`ExportModel`; the writing goes on when it, or the window, is closed."""
 
     def __init__(self, model: ExportModel, opened: Path | None, parent: QWidget | None) -> None:

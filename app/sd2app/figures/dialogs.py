@@ -8,13 +8,13 @@ from typing import Any, ClassVar
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPainter
-from PySide6.QtWidgets import QDialog, QLabel, QLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import QLabel, QLayout, QLineEdit, QWidget
 
 from sd2app.figures.model import DrawnFigure
 from sd2app.manual.help import with_help
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import Canvas
-from sd2app.widgets.dialogs import ExportButtons, ask_figure, take_room
+from sd2app.widgets.dialogs import Dialog, ExportButtons, ask_figure, take_room
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox, option_box
 from sd2app.widgets.layouts import column_of, form_of, row_of
 from sd2app.widgets.mesh_painting import paint_picture
@@ -50,7 +50,7 @@ class FigurePreview(Canvas):
         painter.drawText(self.rect().adjusted(16, 16, -16, -16), flags, text)
 
 
-class FigureDialog(QDialog):
+class FigureDialog(Dialog):
     """Preview, choices and a button to export; ``name`` is proposed for the file."""
 
     TITLE: ClassVar[str]

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, QSize, Qt
 from PySide6.QtGui import QColor, QIcon, QImage, QMouseEvent, QPainter, QPainterPath, QPen, QPixmap
-from PySide6.QtWidgets import QDialog, QLabel, QListWidget, QListWidgetItem, QSizePolicy, QWidget
+from PySide6.QtWidgets import QLabel, QListWidget, QListWidgetItem, QSizePolicy, QWidget
 
 from sd2app.fit.portraits import PICTURE_PX, Portrait
 from sd2app.fit.setup import DEFAULT_STATURE_M, FitSetupModel
 from sd2app.manual.help import with_help
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import Canvas
-from sd2app.widgets.dialogs import accepting, ask_file, ask_new
+from sd2app.widgets.dialogs import Dialog, accepting, ask_file, ask_new
 from sd2app.widgets.frame_slider import FrameSlider
 from sd2app.widgets.inputs import CheckBox, Choice, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
@@ -186,7 +186,7 @@ class PeopleList(QListWidget):
             self._setup.show_frame(self._shown[row].frame)
 
 
-class NewFromVideoDialog(QDialog):
+class NewFromVideoDialog(Dialog):
     """A view of :class:`FitSetupModel`; what is asked for is in the model."""
 
     def __init__(self, setup: FitSetupModel, palette: Palette, parent: QWidget) -> None:

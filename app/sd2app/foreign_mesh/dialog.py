@@ -8,13 +8,13 @@ from typing import get_args
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPainter
-from PySide6.QtWidgets import QDialog, QLayout, QScrollArea, QWidget
+from PySide6.QtWidgets import QLayout, QScrollArea, QWidget
 
 from sd2app.foreign_mesh.model import MeshPreview
 from sd2app.manual.help import with_help
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import Canvas
-from sd2app.widgets.dialogs import accepting, ask_file
+from sd2app.widgets.dialogs import Dialog, accepting, ask_file
 from sd2app.widgets.frame_slider import FrameSlider
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox, option_box
 from sd2app.widgets.layouts import column_of, form_of, row_of
@@ -68,7 +68,7 @@ class MeshOverPicture(Canvas):
         paint_mesh_over(painter, self.rect(), picture, mesh, time_s, camera, colour, opacity)
 
 
-class MeshDialog(QDialog):
+class MeshDialog(Dialog):
     """A view of :class:`MeshPreview`."""
 
     def __init__(self, preview: MeshPreview, palette: Palette, parent: QWidget) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QDialog, QMessageBox, QWidget
+from PySide6.QtWidgets import QMessageBox, QWidget
 
 from sd2app.background.latest import Emit, ReportingModel
 from sd2app.feature import Shell
@@ -15,7 +15,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.manual.help import with_help
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
-from sd2app.widgets.dialogs import accepted, accepting, ask_folder
+from sd2app.widgets.dialogs import Dialog, accepted, accepting, ask_folder
 from sd2app.widgets.inputs import CheckBox, Choice
 from sd2app.widgets.layouts import STRETCH, column_of, form_of
 from sd2app.widgets.panel import sentence, side_by_side
@@ -171,7 +171,7 @@ def _groups(labels: Labels, selected: Sequence[Span]) -> list[tuple[str, tuple[S
     return [*found, ("all", decided), *((name, tuple(spans)) for name, spans in by_label.items())]
 
 
-class CutOutDialog(QDialog):
+class CutOutDialog(Dialog):
     """Accepted to choose a folder for :attr:`spans` and :attr:`parts`."""
 
     def __init__(

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.background.quoting import quoted
@@ -14,7 +14,7 @@ from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.manual.help import with_help
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import ExportButtons, accepted, ask_new
+from sd2app.widgets.dialogs import Dialog, ExportButtons, accepted, ask_new
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, form_of
 from sd2app.widgets.panel import copy_button, rule, say, sentence
@@ -50,7 +50,7 @@ class _Written(NamedTuple):
     losses: tuple[Loss, ...]
 
 
-class LabelExportDialog(QDialog):
+class LabelExportDialog(Dialog):
     """Choice of a format; accepted once the file is written.
 
     The losses are computed by writing to a temporary folder. ``name`` is proposed for the file.

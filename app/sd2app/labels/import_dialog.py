@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtWidgets import QDialog, QLabel, QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.background.quoting import quoted
@@ -15,7 +15,7 @@ from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
 from sd2app.manual.help import with_help
 from sd2app.session.content import UNTITLED
-from sd2app.widgets.dialogs import accepted, accepting, ask_file
+from sd2app.widgets.dialogs import Dialog, accepted, accepting, ask_file
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import column_of, form_of
 from sd2app.widgets.panel import FactRows, copy_button, rule, say, sentence, title
@@ -102,7 +102,7 @@ def _names(names: Sequence[str]) -> str:
     return f"{shown} and {more} more" if more > 0 else shown
 
 
-class LabelImportDialog(QDialog):
+class LabelImportDialog(Dialog):
     """Content of a label file above, choices below; read again when its format is chosen."""
 
     def __init__(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import (
-    QDialog,
     QDialogButtonBox,
     QHeaderView,
     QMessageBox,
@@ -18,7 +17,7 @@ from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.edits import LabelEdits
 from sd2app.manual.help import with_help
 from sd2app.session.document import DocumentModel
-from sd2app.widgets.dialogs import accepted, ask_new, closing, may_delete
+from sd2app.widgets.dialogs import Dialog, accepted, ask_new, closing, may_delete
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.notices import Notice
 from sd2app.widgets.panel import sentence, show_words
@@ -120,7 +119,7 @@ def recover(autosave: LabelAutosave, document: DocumentModel, shell: Shell) -> N
         document.open([offer.recording])
 
 
-class RecoverLabelsDialog(QDialog):
+class RecoverLabelsDialog(Dialog):
     """A row for each session with unsaved edits: open, write to a file, discard."""
 
     def __init__(self, autosave: LabelAutosave, parent: QWidget) -> None:

@@ -7,7 +7,6 @@ from typing import Literal
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import (
     QCheckBox,
-    QDialog,
     QFormLayout,
     QInputDialog,
     QLineEdit,
@@ -18,7 +17,7 @@ from PySide6.QtWidgets import (
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
-from sd2app.widgets.dialogs import accepted, accepting
+from sd2app.widgets.dialogs import Dialog, accepted, accepting
 from sd2app.widgets.text import counted
 from sd2core.labels import field_edits
 from sd2core.labels.spans import LabelTrack, Overlap
@@ -106,7 +105,7 @@ class LabelTracks:
         return [track.name for track in self._labels.labels.tracks]
 
 
-class TrackDialog(QDialog):
+class TrackDialog(Dialog):
     """Name of a new track, and a choice if its spans may overlap."""
 
     def __init__(self, name: str, parent: QWidget) -> None:

@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QImage, QPixmap, QResizeEvent
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QLabel, QWidget
+from PySide6.QtWidgets import QDialogButtonBox, QLabel, QWidget
 
 from sd2app.live.place_check import PlaceCheck
 from sd2app.manual.help import with_help
-from sd2app.widgets.dialogs import closing
+from sd2app.widgets.dialogs import Dialog, closing
 from sd2app.widgets.layouts import STRETCH, column_of, grid_of, row_of
 from sd2app.widgets.panel import outlined, say, sentence, title
 from sd2core.placements.placements import Place
@@ -22,7 +22,7 @@ _LINES = 3
 _WAITS = "Walk towards both and away again, a few times."
 
 
-class CheckDialog(QDialog):
+class CheckDialog(Dialog):
     """A view of :class:`PlaceCheck`.
 
     Parameters

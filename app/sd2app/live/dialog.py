@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QSignalBlocker
-from PySide6.QtWidgets import QDialog, QLabel, QLineEdit, QMessageBox, QToolButton, QWidget
+from PySide6.QtWidgets import QLabel, QLineEdit, QMessageBox, QToolButton, QWidget
 
 from sd2app.live.check_dialog import CheckDialog
 from sd2app.live.place_check import PlaceCheck
@@ -15,7 +15,7 @@ from sd2app.live.protocol_dialog import TOML, ProtocolDialog
 from sd2app.live.protocol_draft import ProtocolDraft
 from sd2app.live.setup import DCA1000, REPLAY, ListenSetup, ways
 from sd2app.manual.help import with_help
-from sd2app.widgets.dialogs import accepted, accepting, ask_file, ask_new
+from sd2app.widgets.dialogs import Dialog, accepted, accepting, ask_file, ask_new
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import ElidedLabel, copy_button, outlined, say, sentence
@@ -56,7 +56,7 @@ def _captures() -> str:
     return _CAPTURES.format(" ".join(f"*{one}" for one in suffixes))
 
 
-class ListenDialog(QDialog):
+class ListenDialog(Dialog):
     """A view of :class:`ListenSetup`."""
 
     def __init__(self, setup: ListenSetup, parent: QWidget) -> None:

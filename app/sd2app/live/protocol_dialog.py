@@ -11,7 +11,6 @@ from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QDialog,
     QDialogButtonBox,
     QHeaderView,
     QLabel,
@@ -23,7 +22,7 @@ from PySide6.QtWidgets import (
 
 from sd2app.live.protocol_draft import CLASS, INSTRUCTION, NAME, GestureRows, ProtocolDraft
 from sd2app.manual.help import with_help
-from sd2app.widgets.dialogs import Answer, accepting, ask_file, ask_new, confirmed
+from sd2app.widgets.dialogs import Answer, Dialog, accepting, ask_file, ask_new, confirmed
 from sd2app.widgets.inputs import Choice, NumberBox, TypedLine, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import outlined, say, sentence
@@ -44,7 +43,7 @@ _CHOICES = {
 _ROWS_SHOWN, _LINES_SHOWN = 5, 5
 
 
-class ProtocolDialog(QDialog):
+class ProtocolDialog(Dialog):
     """A view of :class:`ProtocolDraft`; accepted once it was saved."""
 
     def __init__(self, draft: ProtocolDraft, parent: QWidget) -> None:

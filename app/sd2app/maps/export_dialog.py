@@ -6,11 +6,11 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtWidgets import QDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.feature import Shell
 from sd2app.manual.help import with_help
-from sd2app.widgets.dialogs import ExportButtons, accepted, ask_new
+from sd2app.widgets.dialogs import Dialog, ExportButtons, accepted, ask_new
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.panel import copy_button, sentence
 
@@ -42,7 +42,7 @@ def export_map(
         shell.attempt(lambda: write(path))
 
 
-class MapExportDialog(QDialog):
+class MapExportDialog(Dialog):
     """What is written, a copy of the command, and a button that asks for the file."""
 
     def __init__(self, title: str, name: str, line: Callable[[], str], parent: QWidget) -> None:

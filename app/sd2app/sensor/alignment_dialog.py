@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.manual.help import with_help
 from sd2app.sensor.alignment import AlignmentModel, result_text
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
-from sd2app.widgets.dialogs import accepting
+from sd2app.widgets.dialogs import Dialog, accepting
 from sd2app.widgets.inputs import option_box
 from sd2app.widgets.layouts import column_of, form_of
 from sd2app.widgets.panel import copy_button, sentence, show_words, side_by_side
@@ -20,7 +20,7 @@ _ABOUT = (
 )
 
 
-class AlignmentDialog(QDialog):
+class AlignmentDialog(Dialog):
     """A view of :class:`AlignmentModel`; the search begins with it."""
 
     def __init__(self, model: AlignmentModel, display: Themed, parent: QWidget) -> None:

@@ -9,7 +9,6 @@ from itertools import chain
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeyEvent, QKeySequence, QPalette
 from PySide6.QtWidgets import (
-    QDialog,
     QHeaderView,
     QMainWindow,
     QMenu,
@@ -18,6 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from sd2app.widgets.dialogs import Dialog
 from sd2app.widgets.inputs import SearchLine
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.panel import say, sentence
@@ -85,7 +85,7 @@ def found(entries: Iterable[MenuEntry], text: str) -> list[MenuEntry]:
     return [one for _, one in order]
 
 
-class ActionSearch(QDialog):
+class ActionSearch(Dialog):
     """A line to type in, and what is found; an entry that is disabled says why."""
 
     def __init__(self, window: QMainWindow) -> None:

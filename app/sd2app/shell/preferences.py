@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtWidgets import QDialog, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.labels.marking import LONGEST_MS, Reaction
 from sd2app.manual.help import with_help
 from sd2app.settings import Settings
-from sd2app.widgets.dialogs import closing
+from sd2app.widgets.dialogs import Dialog, closing
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import column_of, form_of
 from sd2app.widgets.panel import outlined, side_by_side
@@ -17,7 +17,7 @@ from sd2app.widgets.panel import outlined, side_by_side
 _THEMES = {None: "as the system", False: "light", True: "dark"}
 
 
-class PreferencesDialog(QDialog):
+class PreferencesDialog(Dialog):
     """Each preference in a row; what is changed holds at once.
 
     Parameters

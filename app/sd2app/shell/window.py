@@ -31,13 +31,13 @@ from sd2app.shell.messages.views import MessageNotice, MessagesDialog
 from sd2app.shell.parts import Parts
 from sd2app.shell.side_dock import SideDock
 from sd2app.shell.side_panel import SidePanel
-from sd2app.shell.tab_order import controls_of
 from sd2app.shell.window_size import place_on_screen
 from sd2app.widgets.dialogs import accepted
 from sd2app.widgets.inputs import claims
 from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.notices import Notice, NoticeStack
 from sd2app.widgets.panel import fill, panel, replace_content, sentence, splitter
+from sd2app.widgets.tab_order import tab_to
 from sd2app.widgets.theme import apply_theme, is_dark
 from sd2core.processes import return_free_memory
 
@@ -412,15 +412,9 @@ class MainWindow(QMainWindow):
 
     def focusNextPrevChild(self, forward: bool) -> bool:
         """Go through all controls with Tab, from top left to bottom right."""
-        controls = controls_of(self._regions) if self.ready else []
-        if not controls:
-            return False
-        focus, step = self.focusWidget(), 1 if forward else -1
-        at = controls.index(focus) + step if focus in controls else min(step, 0)
-        self._tabbed = controls[at % len(controls)]
-        reason = Qt.FocusReason
-        self._tabbed.setFocus(reason.TabFocusReason if forward else reason.BacktabFocusReason)
-        return True
+        regions = self._regions if self.ready else []
+        self._tabbed = tab_to(regions, self.focusWidget(), forward)
+        return self._tabbed is not None
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Show all maps again with Escape, wherever the keyboard is."""

@@ -18,6 +18,7 @@ from sd2app.widgets.panel import (
     copy_button,
     outlined,
     rule,
+    say,
     sentence,
     show_words,
     side_by_side,
@@ -83,7 +84,8 @@ class StudySetupView(QWidget):
             f"Of the Classifier page's {counted(count, 'source')} of labelled data, with its"
             " network." if count else "Of the labelled data of the Classifier page."
         )  # fmt: skip
-        show_words(self._problem, runs.why_not)
+        say(self._problem, runs.why_not, "warning" if count else "muted")
+        self._problem.setVisible(bool(runs.why_not))
         for name in SWITCHES:
             self._switches[name].show_checked(runs.is_on(name))
         self._start.setEnabled(not runs.why_not)

@@ -8,14 +8,14 @@ from itertools import cycle
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
-from PySide6.QtWidgets import QDialog, QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
 from sd2app.manual.help import help_button
 from sd2app.session.display import DisplayModel
 from sd2app.study.result import ClassResult, Matrix
 from sd2app.widgets.canvas import AT_RIGHT, Canvas
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
-from sd2app.widgets.dialogs import closing
+from sd2app.widgets.dialogs import Dialog, closing
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import sentence, title
@@ -113,7 +113,7 @@ class ConfusionView(Canvas):
         painter.setFont(font)
 
 
-class ClassResultDialog(QDialog):
+class ClassResultDialog(Dialog):
     """Reference matrix on the left, a chosen matrix on the right, learning curves below."""
 
     def __init__(self, result: ClassResult, display: DisplayModel, parent: QWidget) -> None:

@@ -39,6 +39,8 @@ class SuggestionBar(QWidget):
         self._source.activated.connect(lambda at: model.set_source(model.finder.sources[at]))
         self._by = Choice("What suggests spans: motion in a map, or the classifier", self)
         self._by.activated.connect(lambda at: model.set_finder(model.finders[at]))
+        for one in (self._by, self._source):  # filled once the bar is shown
+            one.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToContents)
         self._threshold = NumberBox(0.0, 100.0, "", "")
         self._threshold.valueChanged.connect(model.set_threshold)
         self._copy = copy_button(lambda: model.line, self)

@@ -16,11 +16,20 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from sd2app.widgets.tab_order import tab_to
 from sd2core.files.figure_files import SUFFIXES
 
 _TITLE_PX = 40
 Answer = QMessageBox.StandardButton
 FIGURES = ";;".join(f"{suffix[1:].upper()} (*{suffix})" for suffix in SUFFIXES)
+
+
+class Dialog(QDialog):
+    """A dialog through which Tab goes as one reads, whatever was made first."""
+
+    def focusNextPrevChild(self, forward: bool) -> bool:
+        """Go to the next control, or to the one before."""
+        return tab_to([self], self.focusWidget(), forward) is not None
 
 
 def may_delete(parent: QWidget, title: str, what: str) -> bool:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDialog, QFormLayout, QLabel, QScrollArea, QWidget
+from PySide6.QtWidgets import QFormLayout, QLabel, QScrollArea, QWidget
 
-from sd2app.widgets.dialogs import closing
+from sd2app.widgets.dialogs import Dialog, closing
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.model_page import ModelPage
 from sd2app.widgets.panel import sentence, side_by_side, title
 
 
-class ModelCardDialog(QDialog):
+class ModelCardDialog(Dialog):
     """Dialog of facts from the header of a model file, which is not loaded for it."""
 
     def __init__(self, page: ModelPage, parent: QWidget) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QButtonGroup, QSizePolicy, QStackedWidget, QWidget
 
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
@@ -78,6 +78,9 @@ class InnerPages(QWidget):
             page = self._pages.widget(place)
             assert page is not None
             page.setSizePolicy(policy.Preferred, kept)
+            # The arrows lead to the others.
+            focus = Qt.FocusPolicy.TabFocus if place == shown else Qt.FocusPolicy.NoFocus
+            self._buttons.button(place).setFocusPolicy(focus)
 
 
 def paged_panel(*pages: InnerPage) -> InnerPages:

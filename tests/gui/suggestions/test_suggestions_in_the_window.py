@@ -15,7 +15,7 @@ from finding import button_of
 from kept_window import opened
 from PySide6.QtCore import QPoint, QRect, QRectF, Qt
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QInputDialog, QToolButton, QWidget
+from PySide6.QtWidgets import QComboBox, QInputDialog, QToolButton, QWidget
 from window_models import models_of
 
 from sd2app.background.quoting import quoted
@@ -27,6 +27,7 @@ from sd2core.cli.labels.suggest import Suggest
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 
+ARROW_PX = 24  # and the frame
 NONE = Qt.KeyboardModifier.NoModifier
 
 
@@ -143,6 +144,9 @@ def test_no_word_of_the_bar_is_cut_short(moving, qtbot, size) -> None:
         assert shown
         for one in shown:
             assert one.width() >= one.sizeHint().width()
+            if isinstance(one, QComboBox):
+                text_px = one.fontMetrics().horizontalAdvance(one.currentText())
+                assert one.width() >= text_px + ARROW_PX
             assert bar.rect().contains(one.geometry())
         assert not any(
             one.geometry().intersects(other.geometry()) for one, other in combinations(shown, 2)

@@ -9,7 +9,6 @@ from PySide6.QtCore import QEvent, QKeyCombination, QModelIndex, QObject, Qt, Si
 from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QDialog,
     QDialogButtonBox,
     QHeaderView,
     QLineEdit,
@@ -22,7 +21,7 @@ from PySide6.QtWidgets import (
 from sd2app.manual.help import help_button
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.model import KEYS, KeyListModel
-from sd2app.widgets.dialogs import closing, take_room
+from sd2app.widgets.dialogs import Dialog, closing, take_room
 from sd2app.widgets.inputs import SearchLine
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import sentence
@@ -41,7 +40,7 @@ _MODIFIERS = (
 _KEYPAD = Qt.KeyboardModifier.KeypadModifier
 
 
-class KeysDialog(QDialog):
+class KeysDialog(Dialog):
     """A list of what keys and mouse do; Return or a double click waits for another key."""
 
     def __init__(self, model: KeyListModel, bindings: KeyBindings, parent: QWidget) -> None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QPlainTextEdit, QWidget
+from PySide6.QtWidgets import QDialogButtonBox, QPlainTextEdit, QWidget
 
 from sd2app.background.latest import delayed
 from sd2app.shell.messages.model import Message, MessagesModel
-from sd2app.widgets.dialogs import closing
+from sd2app.widgets.dialogs import Dialog, closing
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.notices import Notice
 from sd2app.widgets.text import clock_text
@@ -50,7 +50,7 @@ class MessageNotice(Notice):
             self._messages.dismiss()
 
 
-class MessagesDialog(QDialog):
+class MessagesDialog(Dialog):
     """All messages since the window was opened, the newest first, to be read and copied."""
 
     def __init__(self, messages: MessagesModel, parent: QWidget) -> None:

@@ -13,6 +13,17 @@ def controls_of(regions: Sequence[QWidget]) -> list[QWidget]:
     return [control for region in regions for control in _rows_of(region)]
 
 
+def tab_to(regions: Sequence[QWidget], focus: QWidget | None, forward: bool) -> QWidget | None:
+    """Give the keyboard to the control after the one that has it, or before; None without any."""
+    controls, step = controls_of(regions), 1 if forward else -1
+    if not controls:
+        return None
+    at = controls.index(focus) + step if focus in controls else min(step, 0)
+    control, reason = controls[at % len(controls)], Qt.FocusReason
+    control.setFocus(reason.TabFocusReason if forward else reason.BacktabFocusReason)
+    return control
+
+
 def _rows_of(region: QWidget) -> list[QWidget]:
     found = {one: one.mapTo(region, QPoint(0, 0)) for one in _controls(region)}
     rows: list[list[QWidget]] = []
