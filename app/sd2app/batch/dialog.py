@@ -23,8 +23,7 @@ class BatchWindow(Dialog):
     """A new batch, or the one in view; the rest of the program can be used meanwhile."""
 
     def __init__(self, batch: BatchModel, asks: BatchQuestions, parent: QWidget) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Batch")
+        super().__init__("Batch", parent)
         self._batch = batch
         self._setup, self._run = BatchSetupView(batch, asks, self), BatchRunView(batch, asks)
         self._warning = sentence("", "warning")

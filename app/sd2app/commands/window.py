@@ -59,8 +59,7 @@ class CommandWindow(Dialog):
     def __init__(
         self, forms: CommandForms, refining: MeshRefining, shell: Shell, parent: QWidget
     ) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Any command")
+        super().__init__("Any command", parent)
         form, run = CommandForm(forms, shell, self), CommandRunView(forms, refining, shell)
         tip, guide = "Commands that were started here", help_button("Any command", self)
         runs = RunPanel(forms, form, run, tip, new="New command", guide=guide)

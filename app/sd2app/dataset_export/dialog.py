@@ -48,9 +48,8 @@ class ExportDialog(Dialog):
     """A view of :class:`ExportModel`; the writing goes on when it, or the window, is closed."""
 
     def __init__(self, model: ExportModel, opened: Path | None, parent: QWidget | None) -> None:
-        super().__init__(parent)
+        super().__init__("Export data set", parent)
         self._model, self._opened = model, opened
-        self.setWindowTitle("Export data set")
         self._build_form()
         self._build_foot()
         words = (self._size, self._labels, self._splits, self._message)

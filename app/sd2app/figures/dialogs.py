@@ -58,9 +58,8 @@ class FigureDialog(Dialog):
     """Width and height at first."""
 
     def __init__(self, model: Any, palette: Palette, name: str, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__(self.TITLE, parent)
         self._model, self._name = model, name
-        self.setWindowTitle(self.TITLE)
         self._buttons = ExportButtons(self, self._ask)
         foot = with_help("Export figure", self._buttons, *self._more())
         parts = ((FigurePreview(model, palette, self), 1), self._choices(), foot)

@@ -190,9 +190,8 @@ class NewFromVideoDialog(Dialog):
     """A view of :class:`FitSetupModel`; what is asked for is in the model."""
 
     def __init__(self, setup: FitSetupModel, palette: Palette, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__("New from video", parent)
         self.setup = setup
-        self.setWindowTitle("New from video")
         self._build_picture(palette)
         self._build_form()
         self._buttons, self._begin = accepting(self, "Fit")

@@ -72,9 +72,8 @@ class MeshDialog(Dialog):
     """A view of :class:`MeshPreview`."""
 
     def __init__(self, preview: MeshPreview, palette: Palette, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__("Mesh over the video", parent)
         self.preview = preview
-        self.setWindowTitle("Mesh over the video")
         self.picture = MeshOverPicture(preview, palette, self)
         self._slider = FrameSlider(preview.show_frame, self)
         self._refreshers: list[Callable[[], None]] = []

@@ -177,8 +177,7 @@ class CutOutDialog(Dialog):
     def __init__(
         self, groups: Sequence[tuple[str, tuple[Span, ...]]], source: CutSource, parent: QWidget
     ) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Export cut-outs")
+        super().__init__("Export cut-outs", parent)
         self._groups, self._source = groups, source
         self._which = Choice("Which spans", self)
         self._which.addItems([f"{name} ({len(spans)})" for name, spans in groups])

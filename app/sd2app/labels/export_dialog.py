@@ -66,14 +66,13 @@ class LabelExportDialog(Dialog):
         name: str,
         parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__("Export labels", parent)
         self._labels, self._timebase, self._name = labels, timebase, name
         self._recording, self._media = recording, recording.video
         self.losses: tuple[Loss, ...] | None = None  # of the format; None while unknown
         self.problem = ""  # why the file cannot be written
         self.exporting = False
         self._runner = LatestRunner("labels", self, self._receive, self._refuse)
-        self.setWindowTitle("Export labels")
         self._format = Choice("The program that is to read the file", self)
         self._formats = all_formats()
         self._format.addItems([one.title for one in self._formats])

@@ -113,7 +113,7 @@ class LabelImportDialog(Dialog):
         parent: QWidget | None = None,
         recording: Recording | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__("Import labels", parent)
         self._recording = recording
         self._path, self._labels, self._timebase = path, labels, timebase
         self.reading: LabelReading | None = None  # what the file has; None while reading
@@ -123,7 +123,6 @@ class LabelImportDialog(Dialog):
         self._observed: str | None = None
         self._runner = LatestRunner("labels", self, self._receive, self._refuse)
         self._runner.partial.connect(self._learn)
-        self.setWindowTitle("Import labels")
         self._format = Choice(
             "The program that the file is of",
             self,

@@ -123,9 +123,8 @@ class RecoverLabelsDialog(Dialog):
     """A row for each session with unsaved edits: open, write to a file, discard."""
 
     def __init__(self, autosave: LabelAutosave, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__("Recover labels", parent)
         self._autosave = autosave
-        self.setWindowTitle("Recover labels")
         self._said, self._notes = sentence(""), sentence("", "warning")
         self._said.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._list = QTreeWidget(self)

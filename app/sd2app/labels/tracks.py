@@ -109,8 +109,7 @@ class TrackDialog(Dialog):
     """Name of a new track, and a choice if its spans may overlap."""
 
     def __init__(self, name: str, parent: QWidget) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Add track")
+        super().__init__("Add track", parent)
         self._name = QLineEdit(name, self)
         self._name.setAccessibleName("Name of the track")
         self._name.selectAll()

@@ -42,9 +42,8 @@ class CheckDialog(Dialog):
         take_over: Callable[[Place], object],
         parent: QWidget,
     ) -> None:
-        super().__init__(parent)
+        super().__init__("Check the place", parent)
         self._check, self._take_over = check, take_over
-        self.setWindowTitle("Check the place")
         self._picture = _LivePicture(self)
         self._head = sentence("", "title")
         self._rows = {

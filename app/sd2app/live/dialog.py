@@ -60,9 +60,8 @@ class ListenDialog(Dialog):
     """A view of :class:`ListenSetup`."""
 
     def __init__(self, setup: ListenSetup, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__("Record", parent)
         self._setup = setup
-        self.setWindowTitle("Record")
         known = {way: _WAYS.get(way, f"{way} (plug-in)") for way in ways()}
         self._way = Choice(
             "Where frames come from", self, known, lambda way: setup.choose("way", way)

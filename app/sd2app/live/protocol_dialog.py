@@ -47,7 +47,7 @@ class ProtocolDialog(Dialog):
     """A view of :class:`ProtocolDraft`; accepted once it was saved."""
 
     def __init__(self, draft: ProtocolDraft, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__("Protocol", parent)
         self._draft = draft
         self._refreshers: list[Callable[[], None]] = []
         self._rows = GestureRows(draft, self)

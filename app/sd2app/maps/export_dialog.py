@@ -46,10 +46,9 @@ class MapExportDialog(Dialog):
     """What is written, a copy of the command, and a button that asks for the file."""
 
     def __init__(self, title: str, name: str, line: Callable[[], str], parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__(title, parent)
         self.path: Path | None = None  # that was chosen
         self._name = name
-        self.setWindowTitle(title)
         buttons = ExportButtons(self, self._ask)
         foot = with_help("Export map", buttons, copy_button(line, self))
         self.setLayout(column_of(sentence(_ABOUT), foot, spacing_px=16, margins_px=16))

@@ -24,9 +24,8 @@ class AlignmentDialog(Dialog):
     """A view of :class:`AlignmentModel`; the search begins with it."""
 
     def __init__(self, model: AlignmentModel, display: Themed, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__("Align automatically", parent)
         self._model = model
-        self.setWindowTitle("Align automatically")
         self._chart = ChartView(display, "Correlation over offsets", offset_chart(model))
         self._result, self._problem = sentence("", "plain"), sentence("", "warning")
         self._within = option_box(Align, "within", " s", decimals=1)

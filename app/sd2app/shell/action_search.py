@@ -89,8 +89,7 @@ class ActionSearch(Dialog):
     """A line to type in, and what is found; an entry that is disabled says why."""
 
     def __init__(self, window: QMainWindow) -> None:
-        super().__init__(window)
-        self.setWindowTitle("Find an action")
+        super().__init__("Find an action", window)
         self._entries = entries_of(window)
         self.chosen: QAction | None = None
         self._line = SearchLine("What do you want to do?", self)

@@ -40,8 +40,7 @@ class PreferencesDialog(Dialog):
         open_labels: Callable[[], object],
         parent: QWidget,
     ) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Preferences")
+        super().__init__("Preferences", parent)
         theme = Choice("Dark or light", self, _THEMES, use_theme)
         theme.show_value(settings.dark)
         reaction_ms = NumberBox(

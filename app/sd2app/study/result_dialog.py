@@ -117,9 +117,8 @@ class ClassResultDialog(Dialog):
     """Reference matrix on the left, a chosen matrix on the right, learning curves below."""
 
     def __init__(self, result: ClassResult, display: DisplayModel, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__(f"Classifiers: {result.path.parent.name or result.path.name}", parent)
         self._result = result
-        self.setWindowTitle(f"Classifiers: {result.path.parent.name or result.path.name}")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         first, *others = result.matrices
         columns = [_MatrixColumn(display, QLabel(first.title))]

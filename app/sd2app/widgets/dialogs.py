@@ -27,6 +27,10 @@ FIGURES = ";;".join(f"{suffix[1:].upper()} (*{suffix})" for suffix in SUFFIXES)
 class Dialog(QDialog):
     """A dialog through which Tab goes as one reads, whatever was made first."""
 
+    def __init__(self, title: str, parent: QWidget | None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle(title)
+
     def focusNextPrevChild(self, forward: bool) -> bool:
         """Go to the next control, or to the one before."""
         return tab_to([self], self.focusWidget(), forward) is not None

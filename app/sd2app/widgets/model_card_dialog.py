@@ -15,8 +15,7 @@ class ModelCardDialog(Dialog):
     """Dialog of facts from the header of a model file, which is not loaded for it."""
 
     def __init__(self, page: ModelPage, parent: QWidget) -> None:
-        super().__init__(parent)
-        self.setWindowTitle(f"Model: {page.title}")
+        super().__init__(f"Model: {page.title}", parent)
         inside = QWidget(self)
         form = QFormLayout(inside)
         form.setContentsMargins(16, 8, 16, 16)

@@ -44,8 +44,7 @@ class KeysDialog(Dialog):
     """A list of what keys and mouse do; Return or a double click waits for another key."""
 
     def __init__(self, model: KeyListModel, bindings: KeyBindings, parent: QWidget) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Keys")
+        super().__init__("Keys", parent)
         self._model = model
         model.setParent(self)
         self._search = SearchLine("Search actions and keys", self)

@@ -54,8 +54,7 @@ class MessagesDialog(Dialog):
     """All messages since the window was opened, the newest first, to be read and copied."""
 
     def __init__(self, messages: MessagesModel, parent: QWidget) -> None:
-        super().__init__(parent)
-        self.setWindowTitle("Messages")
+        super().__init__("Messages", parent)
         self.resize(640, 420)
         self._messages = messages
         self.list = QPlainTextEdit(self)
