@@ -11,6 +11,12 @@ export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 # Without kept bytecode every worker and every process that a test starts compiles every module,
 # and pytest rewrites the assertions of every test file.
 unset PYTHONDONTWRITEBYTECODE
+# Tests write and delete thousands of files, and wait for them to be on disk: in memory where
+# there is room for them.
+ROOM_KB=3000000
+if [ -w /dev/shm ] && [ "$(df --output=avail /dev/shm | tail -n 1)" -gt $ROOM_KB ]; then
+    export TMPDIR=/dev/shm
+fi
 pytest=".venv/bin/python -m pytest"
 # Neighbours stay together, so that what a file shares is made once; a worker that has nothing
 # left takes half of what another has still to do.
