@@ -24,7 +24,7 @@ help:
 	@echo "make lint         ruff, mypy and the rules between modules"
 	@echo "make docs         the manual, as a site: build/docs/index.html"
 	@echo "make format       let ruff format the code"
-	@echo "make test-slow    the slow tests"
+	@echo "make test-slow    the slow tests, and all examples of those that draw them"
 	@echo "make bench        the benchmarks"
 	@echo "make fuzz         10,000 damaged files of all kinds, each read or refused (half an hour)"
 	@echo "make wheel        dist/*.whl: the program with its manual, and the library alone"
@@ -78,7 +78,7 @@ test: $(TESTS)
 	@scripts/test.sh "not slow"
 
 test-slow: $(TESTS) .venv/.with-dev
-	@scripts/test.sh "slow"
+	@SD2_EXAMPLES=thorough scripts/test.sh "slow or hypothesis"
 
 lint: .venv/.with-dev
 	$(BIN)/ruff check .

@@ -170,6 +170,7 @@ def test_what_is_linked_to_the_gpl_and_what_it_forbids_is_refused(licence: str) 
         licences.keep_apart(parts, ["/one", "/both"], imports)
 
 
+@pytest.mark.slow
 @on_linux
 def test_only_opencv_uses_the_old_openssl_and_only_pyav_x264() -> None:
     pytest.importorskip("PyInstaller")
@@ -199,6 +200,7 @@ def test_a_text_that_is_nowhere_is_refused_and_a_notice_named(tmp_path: Path) ->
     assert "- thing (" in added
 
 
+@pytest.mark.slow
 @on_linux
 def test_the_file_names_parts_and_addresses(tmp_path: Path, capsys) -> None:
     pytest.importorskip("PyInstaller")

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import pytest
 from hypothesis import given
-from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from PySide6.QtTest import QAbstractItemModelTester
 from window_models import all_actions
@@ -141,7 +140,6 @@ def test_a_label_has_its_key_for_as_long_as_its_recording_is_open(bindings, labe
     assert bindings.keys_of("next") == ("N",)
 
 
-@hypothesis_settings(max_examples=40)
 @given(seed=st.integers(0, 2**32))
 def test_no_key_ever_does_two_things(seed: int) -> None:
     rng, labels = random.Random(seed), LabelsModel()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2app.background.run_monitor import Phase, _Found
@@ -120,7 +120,6 @@ keys = st.sampled_from(
 kinds = st.sampled_from(["start", "step", "epoch", "paused", "resumed", "end", "unheard of"])
 
 
-@settings(max_examples=60)
 @given(st.lists(st.tuples(kinds, st.dictionaries(keys, json_values)), max_size=8))
 def test_nothing_that_is_told_breaks_it(events) -> None:
     history = TrainingHistory()

@@ -41,7 +41,7 @@ def survey(scene: MeshSequence) -> Survey:
     return survey_scene(scene, CAMERA, PAPER)
 
 
-@pytest.mark.parametrize("tolerance", [0.1, 0.02])
+@pytest.mark.parametrize("tolerance", [0.1, pytest.param(0.02, marks=pytest.mark.slow)])
 def test_opened_several_times_on_a_machine_of_any_speed(
     scene: MeshSequence, monkeypatch: pytest.MonkeyPatch, tolerance: float
 ) -> None:

@@ -123,7 +123,6 @@ def short_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(track, "_MARGIN_FRAMES", 30)
 
 
-@settings(max_examples=200)
 @given(st.integers(1, 100_000))
 def test_parts_follow_one_another(frames: int) -> None:
     found = list(track.parts(frames))

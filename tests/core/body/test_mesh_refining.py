@@ -94,7 +94,14 @@ def test_backwards_it_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("white_m", "lasting_m"), [(0.006, 0.010), (0.004, 0.005), (0.010, 0.015), (0.003, 0.010)]
+    ("white_m", "lasting_m"),
+    [
+        (0.006, 0.010),
+        *(
+            pytest.param(*one, marks=pytest.mark.slow)
+            for one in ((0.004, 0.005), (0.010, 0.015), (0.003, 0.010))
+        ),
+    ],
 )
 def test_velocities_of_a_jittering_body_are_twice_as_good_at_least(
     white_m: float, lasting_m: float

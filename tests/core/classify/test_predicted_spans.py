@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.classify.spans import SpanOptions, predicted_spans
@@ -76,7 +76,6 @@ def test_unsure_spans_can_be_left_out() -> None:
     assert len(found([1] * 5, SpanOptions(min_confidence=0.8))) == 1
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     labels=st.lists(st.integers(0, 2), min_size=1, max_size=60),
     gap_s=st.sampled_from([0.0, 0.1, 0.2, 0.5]),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 from denoisers import CAUSAL, SMALL, WINDOWED, trained
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.denoise.model import Denoiser, parameter_count
@@ -60,7 +60,6 @@ def test_windowed_models_look_both_ways_and_far(name: str) -> None:
     assert (moved[41:] > 1e-6).any()
 
 
-@settings(max_examples=40)
 @given(st.sampled_from(CAUSAL), st.lists(st.integers(1, 20), min_size=1, max_size=6))
 def test_chunks_and_steps_equal_the_whole(name: str, lengths: list[int]) -> None:
     model = network(name)

@@ -84,7 +84,6 @@ def test_each_vertex_comes_as_its_segments_say(
     aside=some.floats(0.3, 5.0),
     loss_db=some.floats(0.0, 30.0),
 )
-@settings(max_examples=40, deadline=None)
 def test_a_point_has_its_closed_form(
     speed: float, away: float, aside: float, loss_db: float
 ) -> None:

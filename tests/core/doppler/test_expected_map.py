@@ -56,7 +56,6 @@ def raw_of(mesh: MeshSequence, options: SynthesisOptions, **how: Any) -> NDArray
     return Synthesizer(mesh, options).stretch(ASIDE, 0, mesh.frame_count, **how).raw
 
 
-@settings(max_examples=40, deadline=None)
 @given(
     speed_mps=st.floats(-3.0, 3.0),
     sigma_mps=st.floats(0.02, 2.0),

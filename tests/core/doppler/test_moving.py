@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.doppler import PRESETS, Synthesizer
@@ -78,7 +78,6 @@ def everything(mesh: MeshSequence, options: SynthesisOptions) -> Synthesizer:
     return made
 
 
-@settings(max_examples=60)
 @given(
     seed=st.integers(0, 10**6),
     share=st.sampled_from((0.0, 0.05, 0.2, 0.9)),
@@ -152,7 +151,6 @@ def test_maps_of_what_moves_keep_a_quarter_of_the_mesh() -> None:
     assert found.meta["visible_share"] == wanted.meta["visible_share"]
 
 
-@settings(max_examples=200)
 @given(data=st.data(), precision=st.sampled_from((np.float32, np.float64)))
 def test_what_is_left_out_is_in_an_emptied_bin_from_any_place(data: Any, precision: Any) -> None:
     """Vertices that move straight to or from the sensor at just about the limit."""

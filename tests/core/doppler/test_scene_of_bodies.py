@@ -227,7 +227,6 @@ def test_a_scene_is_cut_and_decimated_as_a_whole() -> None:
         replace(scene, others=(replace(scene.others[0], faces=None),))
 
 
-@settings(max_examples=40, deadline=None)
 @given(key=some.sampled_from([3, -1, slice(1, 4), slice(None), slice(4, 1), [0, 5, 2]]))
 def test_made_vertices_are_picked_like_an_array(key: Any) -> None:
     values = np.random.default_rng(1).normal(size=(6, 4, 3)).astype(np.float32)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from doppler_scenes import CAMERA, RAW, moving, options, plate, sensor_at, wobbling
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as some
 from numpy.typing import NDArray
 
@@ -93,7 +93,6 @@ def test_a_thing_behind_or_beside_changes_no_number(visibility: Any) -> None:
     depth=some.floats(0.005, 0.4),
     visibility=some.sampled_from(["depth", "exact"]),
 )
-@settings(max_examples=60, deadline=None)
 def test_those_vertices_whose_segment_it_crosses(
     x: float, z: float, turn: float, width: float, high: float, depth: float, visibility: Any
 ) -> None:

@@ -17,7 +17,7 @@ _numbers = count()
 texts = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=300)
 
 
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(written=st.lists(texts, min_size=1, max_size=30), long=st.integers(0, 9000))
 def test_texts_come_back_as_they_were_written(
     tmp_path: Path, written: list[str], long: int

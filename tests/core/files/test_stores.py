@@ -135,7 +135,7 @@ def test_every_changed_bit_is_found_and_the_rest_is_read(tmp_path: Path, kind: s
     file = chunk(path, 2)
     whole = file.read_bytes()
     rng = np.random.default_rng(5)
-    for _ in range(60):
+    for _ in range(20):
         changed = bytearray(whole)
         changed[rng.integers(len(whole))] ^= 1 << rng.integers(8)
         file.write_bytes(changed)

@@ -8,7 +8,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from velocity_response import velocity_response
@@ -67,7 +67,6 @@ configs = st.builds(
 )
 
 
-@settings(max_examples=40)
 @given(config=configs, gate=st.floats(0.2, 0.8), speed=st.floats(-0.9, 0.9))
 def test_a_target_is_at_its_range_and_velocity(
     config: RadarConfig, gate: float, speed: float
@@ -89,7 +88,6 @@ def test_approaching_is_positive(velocity_mps: float) -> None:
     assert columns.mean_velocity_mps()[0] == pytest.approx(velocity_mps, abs=0.02)
 
 
-@settings(max_examples=40)
 @given(
     chirps=st.integers(2, 40),
     samples=st.integers(2, 20).map(lambda half: 2 * half + 1),
@@ -112,7 +110,6 @@ def test_power_is_conserved_on_every_axis_that_covers_the_radar(
     np.testing.assert_allclose(found, expected, rtol=1e-5)
 
 
-@settings(max_examples=60)
 @given(
     chirps=st.integers(2, 70),
     padding=st.integers(1, 5),

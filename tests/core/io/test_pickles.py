@@ -109,7 +109,6 @@ def test_pickles_of_python_2_are_read(tmp_path: Path) -> None:
     protocol=st.sampled_from(list(PROTOCOLS)),
     fortran=st.booleans(),
 )
-@settings(max_examples=80)
 def test_arrays_of_any_shape_survive(
     tmp_path_factory: pytest.TempPathFactory,
     array: tuple[str, list[int]],
@@ -314,7 +313,6 @@ def test_a_file_cut_short_is_named(tmp_path: Path, compression: Any) -> None:
 
 
 @given(st.binary(max_size=200), st.integers(0, 400))
-@settings(max_examples=150)
 def test_damage_gives_a_sentence_or_data(
     tmp_path_factory: pytest.TempPathFactory, noise: bytes, place: int
 ) -> None:

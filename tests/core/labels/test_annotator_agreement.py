@@ -102,7 +102,6 @@ def test_labels_at_the_same_time_are_one_answer() -> None:
 
 
 @given(any_labels())
-@settings(max_examples=50)
 def test_who_agrees_with_himself_agrees_wholly(a: Labels) -> None:
     found = agreement(a, a, CLOCK, min_iou=1.0)
     assert found.frames.overall.observed == 1.0
@@ -132,7 +131,6 @@ def test_it_does_not_matter_who_is_first(a: Labels, b: Labels, min_iou: float) -
 
 
 @given(any_labels(), any_labels(), st.permutations(["x", "y", "z"]))
-@settings(max_examples=60)
 def test_names_and_their_order_do_not_matter(a: Labels, b: Labels, names: list[str]) -> None:
     new = dict(zip("xyz", names, strict=True))
 
@@ -148,7 +146,6 @@ def test_names_and_their_order_do_not_matter(a: Labels, b: Labels, names: list[s
 
 
 @given(any_labels(), any_labels(), st.sampled_from([0.05, 0.3, 0.6]))
-@settings(max_examples=60)
 def test_matches_are_the_best_there_are(a: Labels, b: Labels, min_iou: float) -> None:
     """Against every way to match: number of matches, then of labels, then the sum of IoU."""
 

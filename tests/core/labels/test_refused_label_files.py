@@ -87,7 +87,7 @@ def test_cut_short_anywhere(tmp_path: Path, name: str) -> None:
     other=st.binary(max_size=4)
     | st.sampled_from((b"-1", b"9" * 30, b'"', b"null", b"<a>", b"1e9")),
 )
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_damaged_file_is_labels_or_a_sentence(
     tmp_path: Path, name: str, place: float, length: int, other: bytes
 ) -> None:

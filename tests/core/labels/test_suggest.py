@@ -96,7 +96,6 @@ sidelobes = hnp.arrays(np.float64, 32, elements=st.floats(1e-4, 0.047))
 
 
 @given(echo=echoes, shares=sidelobes)
-@settings(max_examples=60)
 def test_what_stands_still_is_quiet_however_its_echo_changes(echo, shares) -> None:
     """It leaks into every bin in proportion; of the 32, two at zero velocity change."""
     values = shares[:, None] * echo
@@ -174,7 +173,6 @@ def test_margins_end_at_the_ends_and_leave_a_third_of_the_quiet_between_neighbou
     ),
     data=st.data(),
 )
-@settings(max_examples=60)
 def test_any_map_gives_spans_that_a_track_can_hold(values, data) -> None:
     frames = values.shape[1]
     steps = data.draw(st.lists(st.floats(0.005, 2.0), min_size=frames, max_size=frames))
@@ -215,7 +213,6 @@ def test_neither_scale_nor_order_of_bins_nor_clock_matters(gain, seed, offset_s)
     frames=st.integers(1, 600),
     kind=st.sampled_from(["power", "magnitude", "uniform"]),
 )
-@settings(max_examples=60)
 def test_white_noise_gives_no_span(seed, bins, frames, kind) -> None:
     """From 8 bins on; the 3,000 clips of docs/decisions/0032 gave none and 4.5 dB at most."""
     rng = np.random.default_rng(seed)

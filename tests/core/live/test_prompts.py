@@ -241,7 +241,7 @@ def second(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("kept", ["keep", "drop", "blur"])
+@pytest.mark.parametrize("kept", ["keep", "drop", pytest.param("blur", marks=pytest.mark.slow)])
 def test_a_person_is_hidden_only_where_wanted_and_a_body_is_there(
     tmp_path: Path, second: Path, kept: str
 ) -> None:

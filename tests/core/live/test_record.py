@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.cli import build_parser, run
@@ -56,7 +56,6 @@ def _events_s(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     return _centres_s(pictures_s, flashes), _centres_s(radar_s, bursts / bursts.max())
 
 
-@settings(max_examples=40)
 @given(st.floats(-1e5, 1e5), st.floats(-4e-4, 4e-4), st.floats(30.0, 3000.0), st.integers(0, 2**32))
 def test_a_clock_is_found_whatever_is_held_up(
     start_s: float, drift: float, length_s: float, seed: int
@@ -76,9 +75,9 @@ def test_clocks_that_run_alike_are_not_made_to_differ() -> None:
     times_s = np.arange(0.0, 60.0, 0.05)
     rates = [
         fit_line(times_s, times_s + np.random.default_rng(seed).normal(0.0, 2e-3, 1200)).rate
-        for seed in range(40)
+        for seed in range(20)
     ]
-    assert rates.count(1.0) > 30  # in 5 % of the cases an interval of 95 % is wrong
+    assert rates.count(1.0) > 15  # in 5 % of the cases an interval of 95 % is wrong
 
 
 def test_too_little_is_no_drift_and_another_rate_is_no_clock() -> None:
@@ -103,12 +102,22 @@ def test_a_frame_has_the_share_of_an_event_that_it_sees() -> None:
     assert sum(shares) * 0.01 == pytest.approx(2 * FLASH_S)
 
 
-@pytest.mark.parametrize("rate_hz", [30, pytest.param(20, marks=pytest.mark.slow)])
-def test_events_that_both_see_are_at_one_time(tmp_path: Path, rate_hz: int) -> None:
+@pytest.mark.parametrize(
+    ("rate_hz", "seconds", "events"),
+    [
+        (30, 4, 1),
+        pytest.param(30, 9, 3, marks=pytest.mark.slow),
+        pytest.param(20, 9, 3, marks=pytest.mark.slow),
+    ],
+)
+def test_events_that_both_see_are_at_one_time_as_seen_from_a_place_that_was_found(
+    tmp_path: Path, rate_hz: int, seconds: int, events: int
+) -> None:
     out = tmp_path / "take.sd2"
     radar = "test" if rate_hz == 30 else f"test:{rate_hz}"
-    words = ["--camera", "test", "--radar", radar, "--out", str(out), "--seconds", "9", "--json"]
-    done = subprocess.run([*RECORD, *words], capture_output=True, text=True, check=True)
+    words = ["--camera", "test", "--radar", radar, "--out", str(out), "--placement", "2.2,-15"]
+    command = [*RECORD, *words, "--seconds", str(seconds), "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
     told = [json.loads(line) for line in done.stdout.splitlines()]
     end = next(one for one in told if one["event"] == "end")
     clocks = next(one for one in told if one["event"] == "clocks")
@@ -119,12 +128,13 @@ def test_events_that_both_see_are_at_one_time(tmp_path: Path, rate_hz: int) -> N
     assert len(recording.load_capture().timebase) == end["recorded"]
     assert (end["dropped"], end["lost"]) == (0, 0)
     assert recording.simulated
+    assert recording.placements == PlacementGrid((2.2,), (-15.0,), (0.0,))
     flashes_s, bursts_s = _events_s(recording)
-    assert len(flashes_s) >= 3
+    assert len(flashes_s) >= events
     apart_s = flashes_s[:, None] - bursts_s
     nearest_s = apart_s[np.arange(len(flashes_s)), np.abs(apart_s).argmin(axis=1)]
     # The radar looks half of the time: one event alone is known to some 10 ms.
-    assert abs(nearest_s.mean()) < 0.010 + clocks["jitter_s"]
+    assert abs(nearest_s.mean()) < 0.03 / events + clocks["jitter_s"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signal kills there")
@@ -209,11 +219,3 @@ def test_a_radar_that_is_silent_leaves_the_video(tmp_path: Path) -> None:
     assert recording.radar is None
     with open_video(recording.video) as video:
         assert len(video) > 10
-
-
-def test_a_place_that_was_found_is_the_recordings_plan(tmp_path: Path) -> None:
-    folder = tmp_path / "take.sd2"
-    words = ["--camera", "test", "--radar", "test", "--seconds", "1", "--placement", "2.2,-15"]
-    command = [sys.executable, "-m", "sd2core.cli", "record", *words, "--out", str(folder)]
-    subprocess.run(command, check=True, capture_output=True)
-    assert open_recording(folder).placements == PlacementGrid((2.2,), (-15.0,), (0.0,))

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 from hypothesis import given
-from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
@@ -50,7 +49,6 @@ def configs(draw: st.DrawFn) -> TrainConfig:
 
 
 @given(configs())
-@hypothesis_settings(max_examples=40)
 def test_toml_and_back(config: TrainConfig) -> None:
     folder = Path("/somewhere/run")
     again = config_from(config_text(config, folder), folder)

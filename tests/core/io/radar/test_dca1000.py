@@ -49,7 +49,7 @@ recordings = st.builds(
 )
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(recording=recordings, parts=st.integers(1, 3), studio=st.booleans())
 def test_a_target_is_where_it_is_and_moves_as_it_does(
     tmp_path: Path, recording: TiRecording, parts: int, studio: bool

@@ -56,7 +56,7 @@ def beat(range_m: float, velocity_mps: float, falling: bool = False) -> np.ndarr
     return np.exp(2j * np.pi * (phase + 0.2 * receiver + 0.4 * turn))
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     order=st.permutations(NAMES),
     stored=st.sampled_from(["complex64", "complex128", "int16", "float32", "iq"]),
@@ -173,7 +173,7 @@ places = st.just({}) | st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     told=st.tuples(extreme, sweeps, places).map(lambda parts: parts[0] | parts[1] | parts[2]),
     stored=st.sampled_from(["<f4", "<c8", "<i2", ">f8", "<u2"]),
