@@ -42,7 +42,8 @@ _PASSING = (
     *("edits._before", "edits._dragged", "_last_px", "_pressed_px", "_drops", "_name._before"),
     *("_tabbed", "_behind"),  # where Tab went last; actions that are followed soon
     *("_notices._at", "limb_menu._offered"),  # found anew when a notice or the menu appears
-    *("start.recent", "_pictures._wanted", "_pictures._writer.busy"),  # of the start page, hidden
+    # Of the start page, hidden.
+    *("start.recent", "_pictures._wanted", "_pictures._writer.busy", "_pictures._writer._pending"),
     *("_tour._before", "]._target"),  # of a tour that is over
     *("edges_s", "limb_hand._model._found"),  # worked out once, when first asked for
     # Of places and a search that are no more.

@@ -291,6 +291,7 @@ def test_what_is_filmed_is_shown_as_it_comes_and_then_with_its_video(session, tm
     )
 
 
+@pytest.mark.slow
 def test_edits_made_while_filming_are_not_lost(session, tmp_path, qtbot):
     request = ListenRequest(tmp_path / "take.sd2", radar="test", camera="test")
     model = heard(session, request, qtbot, 20)

@@ -404,6 +404,7 @@ class TestFiles:
             load_track(tmp_path / "track.npz")
 
 
+@pytest.mark.slow
 def test_a_real_person(shared_data: Path, models: LandmarkModels, tmp_path: Path) -> None:
     """Found in every frame; the face above the shoulders, they above the hips."""
     with open_video(shared_data / "video" / "help.mkv") as video:

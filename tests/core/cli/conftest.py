@@ -28,6 +28,12 @@ def sd2(capsys: pytest.CaptureFixture[str]) -> Sd2:
 
 
 @pytest.fixture
+def without_sheet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have data sets written without their sheet of pictures, which takes longer than the rest."""
+    monkeypatch.setattr("sd2core.datasets.preview.write_preview", lambda path: path)
+
+
+@pytest.fixture
 def plate(tmp_path: Path) -> Path:
     """A square plate of 2 m at z = 3 m that approaches the camera at 1.3 m/s, as plate.npz."""
     path = tmp_path / "plate.npz"

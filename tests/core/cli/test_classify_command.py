@@ -172,6 +172,7 @@ def test_gestures_of_a_map_become_labels(
     assert "--overwrite" in again.err
 
 
+@pytest.mark.slow
 def test_a_classifier_is_judged_on_a_labelled_recording(sd2: Sd2, model: Path) -> None:
     judged = sd2(
         *("classify", "eval", f"anna={SAMPLE}", "--maps", "synthetic", "--model", model, "--json")

@@ -64,6 +64,7 @@ def test_a_folder_of_recordings_becomes_a_data_set_with_card_and_sheet(
     assert json.loads(sd2("info", out, "--json").out)["segments"] == 15
 
 
+@pytest.mark.usefixtures("without_sheet")
 def test_limb_maps_are_exported_on_request(sd2: Sd2, tmp_path: Path) -> None:
     octahedron = recording(tmp_path / "anna.sd2", radar=False).folder
     mesh = load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(30, 50)
@@ -154,6 +155,7 @@ def test_programs_are_told_line_by_line(sd2: Sd2, people: Path, tmp_path: Path) 
     assert "ending in .zarr" in json.loads(refused.out)["text"]
 
 
+@pytest.mark.usefixtures("without_sheet")
 def test_one_damaged_recording_is_reported_and_the_rest_is_written(
     sd2: Sd2, people: Path, tmp_path: Path
 ) -> None:
@@ -166,6 +168,7 @@ def test_one_damaged_recording_is_reported_and_the_rest_is_written(
         assert dataset.header.subjects == ("anna", "carla")
 
 
+@pytest.mark.usefixtures("without_sheet")
 @pytest.mark.parametrize("more", [(), ("--dry-run",)])
 def test_what_of_a_label_file_is_taken_is_told(
     sd2: Sd2, tmp_path: Path, more: tuple[str, ...]
@@ -200,6 +203,7 @@ def test_what_cannot_be_is_explained(
     assert message in told.err
 
 
+@pytest.mark.usefixtures("without_sheet")
 def test_inertial_sensors_are_exported_on_request(sd2: Sd2, tmp_path: Path) -> None:
     octahedron = recording(tmp_path / "anna.sd2", radar=False).folder
     mesh = load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(30, 70)

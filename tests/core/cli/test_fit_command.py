@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import random
 import signal
 import subprocess
 import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from filmed_people import empty_room, film, swiping
 
 from sd2core.body.landmark_files import load_track
 from sd2core.body.landmark_models import LandmarkModels
+from sd2core.cli import build_parser, run
 from sd2core.io.mesh import load_mesh
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -74,10 +77,13 @@ def stages(lines: list[dict[str, Any]]) -> list[str]:
 def lines(
     clip: Path, models: LandmarkModels, tmp_path_factory: pytest.TempPathFactory
 ) -> list[dict[str, Any]]:
-    process = Process(clip, tmp_path_factory.mktemp("out") / "mesh.zarr")
-    lines = process.run()
-    assert process.code == 0
-    return lines
+    out = tmp_path_factory.mktemp("out") / "mesh.zarr"
+    landmarks = out.with_name("landmarks.npz")
+    words = arguments(clip, out, "--progress-json", "--landmarks", str(landmarks))
+    printed = io.StringIO()
+    with redirect_stdout(printed):
+        assert run(build_parser(typed=words)[0], words) == 0
+    return [json.loads(text) for text in printed.getvalue().splitlines()]
 
 
 class TestLines:
@@ -114,6 +120,7 @@ class TestLines:
         assert done["frames"] == done["present"] == FRAMES
         mesh = load_mesh(done["out"])
         assert mesh.frame_count == FRAMES
+        assert len(load_track(Path(done["out"]).with_name("landmarks.npz"))) == FRAMES
         about = zarr.open_group(done["out"], mode="r").attrs["fit"]
         assert about["camera"]["focal_px"] == pytest.approx(300.0)
         assert about["camera"]["source"] == "default"
@@ -190,6 +197,7 @@ class TestKilled:
 
 
 class TestOutput:
+    @pytest.mark.slow
     def test_facts_and_landmarks(
         self, sd2: Sd2, clip: Path, models: LandmarkModels, tmp_path: Path
     ) -> None:

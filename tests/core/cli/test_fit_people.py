@@ -67,6 +67,7 @@ def test_nobody_is_fitted_where_one_is_missing(video: Path, sd2: Sd2, tmp_path: 
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_who_is_alone_is_fitted_as_without_a_list(sd2: Sd2, tmp_path: Path) -> None:
     video = film(tmp_path / "one.mp4", swiping()[0][:6])
     fits = []
@@ -83,6 +84,7 @@ def test_who_is_alone_is_fitted_as_without_a_list(sd2: Sd2, tmp_path: Path) -> N
         np.testing.assert_array_equal(fit.read(0, 6), fits[0].read(0, 6))
 
 
+@pytest.mark.slow
 def test_a_stopped_run_makes_what_is_left(video: Path, sd2: Sd2, tmp_path: Path) -> None:
     words = ["fit", video, "--people", "all", "--resolution", "low"]
     words += ["--landmark-model", "full", "--out", tmp_path / "two.npz"]

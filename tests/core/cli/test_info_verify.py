@@ -41,7 +41,10 @@ def old_mesh(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("damage", [cut, change, lose])
+@pytest.mark.parametrize(
+    "damage",
+    [change, *(pytest.param(one, marks=pytest.mark.slow) for one in (cut, lose))],
+)
 def test_a_broken_copy_of_the_sample_is_told_and_the_rest_of_it_used(
     sd2: Sd2, recording: Path, damage: Callable[[Path], None]
 ) -> None:
@@ -107,7 +110,8 @@ def test_damaged_pairs_say_which_frames(
     assert "cannot be read: frames 0 to 599 of radar" in sd2("info", path).err
 
 
-@pytest.mark.parametrize("ending", [".zarr", ".h5"])
+@pytest.mark.usefixtures("without_sheet")
+@pytest.mark.parametrize("ending", [".zarr", pytest.param(".h5", marks=pytest.mark.slow)])
 def test_a_damaged_data_set_says_which_segments(sd2: Sd2, tmp_path: Path, ending: str) -> None:
     pairs = write_pairs(tmp_path / "p.zarr", ("s1", "s2"))
     out = tmp_path / f"set{ending}"

@@ -237,6 +237,7 @@ def _stopped(process: subprocess.Popen, out: Path) -> None:
     assert re.search(rf"recorded +{_frames(out)} frames", text)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGTERM")
 def test_a_request_to_end_stores_what_was_received(tmp_path: Path) -> None:
     out = tmp_path / "walk.sd2"

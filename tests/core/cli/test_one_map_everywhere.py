@@ -30,7 +30,7 @@ files = ["anna.sd2"]
 
 
 @pytest.fixture(autouse=True)
-def batches_here(monkeypatch: pytest.MonkeyPatch) -> None:
+def batches_here(monkeypatch: pytest.MonkeyPatch, without_sheet: None) -> None:
     """Have batches work in this process; ``test_batch_command.py`` has them start their own."""
     monkeypatch.setattr(
         batch_run, "local_pool", lambda folder, processes: in_this_process(folder.path)
@@ -74,7 +74,7 @@ def test_everywhere_the_same_things_stand_before_it(sd2: Sd2, fitted: Path, tmp_
     assert sd2("synth", fitted, "--out", tmp_path / "narrow.npz").code == 0
     narrow = DopplerMap.load(tmp_path / "narrow.npz")
     np.testing.assert_array_equal(narrow.values, free.values)
-    _made_elsewhere(sd2, fitted, tmp_path, narrow)
+    _made_by_a_batch(sd2, tmp_path, narrow)
 
 
 def test_everywhere_the_same_people_are_in_it(sd2: Sd2, fitted: Path, tmp_path: Path) -> None:
@@ -90,7 +90,7 @@ def test_everywhere_the_same_people_are_in_it(sd2: Sd2, fitted: Path, tmp_path: 
     # What a batch keeps is of the file as it was.
     mesh_file.unlink()
     assert sd2("set", fitted, "--without", "bodies").code == 0
-    _made_elsewhere(sd2, fitted, tmp_path, alone)
+    _made_by_a_batch(sd2, tmp_path, alone)
 
 
 def _made_elsewhere(
@@ -98,8 +98,6 @@ def _made_elsewhere(
 ) -> None:
     """Pairs, data set and batch hold a map that ``sd2 synth`` made."""
     wish = () if count is None else ("--count", count)
-    for name in ("pairs.zarr", "set.zarr"):
-        shutil.rmtree(tmp_path / name, ignore_errors=True)
     said = sd2("pairs", "recordings", fitted, "--out", tmp_path / "pairs.zarr", *wish)
     assert said.code == 0, said.err
     pairs = read_pairs(tmp_path / "pairs.zarr")
@@ -115,6 +113,10 @@ def _made_elsewhere(
     assert f"counted from a mesh: {made.meta['count']}, visibility exact" in card
     assert f"off the truth by {made.accuracy} (relative L1)" in card
 
+    _made_by_a_batch(sd2, tmp_path, made, count)
+
+
+def _made_by_a_batch(sd2: Sd2, tmp_path: Path, made: DopplerMap, count: str | None = None) -> None:
     words = "" if count is None else f'count = "{count}"\n'
     (tmp_path / "plan.toml").write_text(PLAN + words)
     said = sd2("batch", tmp_path / "plan.toml", "--workers", 1)

@@ -180,7 +180,9 @@ def figure(mesh: MeshSequence) -> Figure:
     return draw_comparison(compare_meshes([mesh, mesh], ["a", "b"]))
 
 
-@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+@pytest.mark.parametrize(
+    "suffix", [".png", *(pytest.param(one, marks=pytest.mark.slow) for one in (".svg", ".pdf"))]
+)
 def test_a_figure_is_whole_or_not_there(figure: Figure, tmp_path: Path, suffix: str) -> None:
     with full_disk(), pytest.raises(OSError, match="figure"):
         save_figure(figure, tmp_path / f"figure{suffix}")

@@ -31,6 +31,10 @@ from sd2core.progress import Cancelled, Progress
 
 OPTIONS = DatasetOptions(length=24, overlap=4)
 ENDINGS = (".zarr", ".h5", ".npz")
+ONE_OF_ENDINGS = [
+    ".zarr",
+    *(pytest.param(one, marks=pytest.mark.slow) for one in (".h5", ".npz")),
+]
 
 
 def several() -> list[Source]:
@@ -303,7 +307,7 @@ def split_sources() -> list[Source]:
     ]
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", ONE_OF_ENDINGS)
 def test_limb_maps_add_up_to_the_synthetic_map(tmp_path: Path, ending: str) -> None:
     out = tmp_path / f"set{ending}"
     sources = split_sources()
@@ -398,7 +402,7 @@ def without_parts(path: Path) -> None:
         np.savez(path, **arrays | {"meta": np.array(json.dumps(described))})
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", ONE_OF_ENDINGS)
 def test_data_sets_from_before_limb_maps_open_and_grow(
     tmp_path: Path, whole: Callable[[str], Path], ending: str
 ) -> None:

@@ -91,6 +91,7 @@ def test_describing_needs_no_torch(model: Path) -> None:
     assert done.stdout.split() == ["gru", "False"]
 
 
+@pytest.mark.slow
 def test_loading_needs_no_compiler() -> None:
     """Torch's own, with some hundred modules and a computer algebra."""
     code = """

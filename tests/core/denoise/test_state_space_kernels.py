@@ -32,7 +32,7 @@ GRID = [
     (64, 1),
     (64, 72),
     (64, 2304),
-    (64, 16384),
+    pytest.param(64, 16384, marks=pytest.mark.slow),
     (256, 2),
     pytest.param(256, 72, marks=pytest.mark.slow),
     pytest.param(256, 2304, marks=pytest.mark.slow),

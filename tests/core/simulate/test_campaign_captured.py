@@ -108,6 +108,7 @@ def test_takes_repeat_are_turned_and_keep_away(motions: Path) -> None:
     assert max(towards) > 0.3
 
 
+@pytest.mark.slow
 def test_nobody_comes_too_near(motions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     nearest: list[float] = []
 
@@ -123,6 +124,7 @@ def test_nobody_comes_too_near(motions: Path, monkeypatch: pytest.MonkeyPatch) -
     assert min(nearest) > RANGES_M[0] - 0.2
 
 
+@pytest.mark.slow
 def test_both_in_turn_and_radars_drawn(motions: Path) -> None:
     both = replace(VARIED, movements="both")
     maker = TakeMaker(campaign(motions, protocol=both))

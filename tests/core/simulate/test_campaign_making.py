@@ -92,6 +92,7 @@ def test_errors_of_fits_of_another_size(whole: Path) -> None:
         replace(SHORT, error_sizes=(1.0, 0.5))
 
 
+@pytest.mark.slow
 def test_bodies_state_about_how_wrong_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
     """σ of the joints: none without errors, and with them their size, on average."""
     monkeypatch.setattr(takes, "radar_target", lambda *_, **__: np.zeros((60, 32), np.float32))

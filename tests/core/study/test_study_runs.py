@@ -84,7 +84,7 @@ def test_a_study_that_cannot_be_is_no_study_that_was_stopped(
         run_study(chosen.model_copy(update={"classes": {"nothing such": "x"}}))
     folder = study_run.StudyFolder(Path(chosen.out))
     assert folder.state() == "failed"
-    run_study(chosen)
+    run_study(chosen.model_copy(update={"shares": (1.0,), "added": ()}))
     assert folder.state() == "finished"
 
 
@@ -116,7 +116,9 @@ def test_a_denoiser_that_cannot_learn_is_said(
         (place / "done").write_text(json.dumps({"reason": "too few frames"}))
 
     monkeypatch.setattr(study_run, "learn_denoiser", failed)
-    chosen = read_study(plan).model_copy(update={"added": ("denoised", "synthetic+texture")})
+    chosen = read_study(plan).model_copy(
+        update={"added": ("denoised", "synthetic+texture"), "shares": (1.0,)}
+    )
     results = run_study(chosen)
     assert all(set(one.takes) == {REAL} for one in results.runs)
     assert all("too few frames" in reason for one in results.runs
@@ -125,6 +127,7 @@ def test_a_denoiser_that_cannot_learn_is_said(
     assert "Nothing was added" in write_report(results, Path(chosen.out))
 
 
+@pytest.mark.slow
 def test_movements_of_one_person_are_kept_apart_and_classifiers_compared(
     plan: Path, in_this_process: list[int]
 ) -> None:
@@ -143,6 +146,7 @@ def test_movements_of_one_person_are_kept_apart_and_classifiers_compared(
     assert kernel.title in (Path(chosen.out) / "study.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_bodies_that_no_radar_saw_are_added_in_every_fold(
     plan: Path, in_this_process: list[int], tmp_path: Path
 ) -> None:

@@ -220,7 +220,7 @@ class TestLearning:
             lift.get_buffer("mean"), torch.from_numpy(np.concatenate(taken)[:, 8:]).mean(dim=0)
         )
 
-    @pytest.mark.parametrize("model", ["gru", "s4"])
+    @pytest.mark.parametrize("model", ["gru", pytest.param("s4", marks=pytest.mark.slow)])
     def test_mixed_precision(self, pairs: Path, tmp_path: Path, model: str) -> None:
         config = settings(pairs, model, epochs=4)
         for precision in ("32", "bf16"):
@@ -276,7 +276,10 @@ class TestLearning:
 
 
 class TestSteering:
-    @pytest.mark.parametrize(("model", "balanced"), [("gru", True), ("s4", False)])
+    @pytest.mark.parametrize(
+        ("model", "balanced"),
+        [("gru", True), pytest.param("s4", False, marks=pytest.mark.slow)],
+    )
     def test_stopped_and_gone_on_with(
         self, pairs: Path, tmp_path: Path, model: str, balanced: bool
     ) -> None:

@@ -250,7 +250,7 @@ def test_placements_of_the_recording_or_of_a_file_are_taken(opened, qtbot, tmp_p
     assert read_plan(tmp_path / "plan.toml") == setup.plan()
 
 
-@pytest.mark.parametrize("part", ["trunk", KINEMATICS])
+@pytest.mark.parametrize("part", ["trunk", pytest.param(KINEMATICS, marks=pytest.mark.slow)])
 def test_a_batch_begins_with_planned_places_and_the_model_in_use(
     opened, qtbot, fake_models, tmp_path, part
 ):

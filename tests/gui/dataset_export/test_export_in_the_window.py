@@ -135,6 +135,7 @@ def test_it_goes_on_when_the_dialog_is_closed_and_can_be_stopped(
     again.close()
 
 
+@pytest.mark.slow
 def test_one_segment_of_each_labelled_span(window, dialog, qtbot) -> None:
     model = models_of(window).export
     cut = next(one for one in dialog.findChildren(QComboBox) if "segment is" in one.toolTip())

@@ -63,6 +63,7 @@ def _request(protocol: Path, folder: Path) -> ListenRequest:
     return ListenRequest(folder, radar="test", camera="test", protocol=str(protocol))
 
 
+@pytest.mark.slow
 def test_keys_steer_a_session_that_ends_in_labelled_recordings(
     model, parent, qtbot, protocol, tmp_path
 ) -> None:

@@ -122,6 +122,7 @@ def test_a_window_that_closes_asks_and_stores(empty_window, qtbot, monkeypatch, 
     assert open_recording(folder).load_capture().frame_count >= shown
 
 
+@pytest.mark.slow
 def test_a_radar_alone_has_no_empty_pane_and_its_message_leaves_with_it(
     empty_window, qtbot, monkeypatch, capture, tmp_path, small_recording
 ):
@@ -141,6 +142,7 @@ def test_a_radar_alone_has_no_empty_pane_and_its_message_leaves_with_it(
     assert window.maps.width() < alone_px - 200
 
 
+@pytest.mark.slow
 def test_a_camera_that_is_filmed_has_its_pane(empty_window, qtbot, tmp_path):
     window, folder = empty_window, tmp_path / "walk.sd2"
     live, video = window.features.live.model, window.findChild(VideoView)

@@ -96,6 +96,7 @@ def test_the_place_that_is_found_goes_with_what_is_recorded(parent, qtbot) -> No
     assert "--placement" not in setup.request().words()
 
 
+@pytest.mark.slow
 def test_it_ends_when_told_and_begins_again(check, parent, qtbot) -> None:
     request = ListenRequest(Path("none.sd2"), radar="test", camera="test")
     dialog = CheckDialog(check, lambda: check.start(request), lambda _: None, parent)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
-from PySide6.QtCore import QPoint, Qt, QUrl
+from PySide6.QtCore import QCoreApplication, QEvent, QPoint, Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QTextCursor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolButton
@@ -21,13 +23,16 @@ MANUAL = Manual(manual_folder(), full_parser)
 
 
 @pytest.fixture
-def manual(qtbot) -> ManualWindow:
+def manual(qtbot) -> Iterator[ManualWindow]:
     """The window on its first page."""
     window = ManualWindow(MANUAL, Settings.forgetful())
-    qtbot.addWidget(window)
     window.show_address(address("index.md"))
     qtbot.waitExposed(window)
-    return window
+    yield window
+    window.close()
+    # What is still there would be styled anew with all others.
+    window.deleteLater()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
 def show(manual: ManualWindow, place: str) -> None:

@@ -157,7 +157,11 @@ def test_recent_files_are_kept_between_sessions(tmp_path):
     assert again[:2] == [(Path("/5.mp4"), Path("/5.npz")), (Path("/11.mp4"), Path("/11.npz"))]
 
 
-@pytest.mark.parametrize("way", ["dialog", "drop", "recent", "command line"])
+@pytest.mark.parametrize(
+    "way",
+    ["command line"]
+    + [pytest.param(one, marks=pytest.mark.slow) for one in ("dialog", "drop", "recent")],
+)
 def test_every_way_of_opening_takes_up_a_stopped_fit(empty_window, qtbot, begun_fit, way):
     c = models_of(empty_window)
     if way == "recent":

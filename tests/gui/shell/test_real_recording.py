@@ -36,6 +36,7 @@ def test_the_mesh_lies_on_the_person(walk, qtbot):
         assert body.sum() < 4 * pullover.sum()
 
 
+@pytest.mark.slow
 def test_the_sensor_drag_is_followed(walk, qtbot):
     c = models_of(walk)
     before = c.synthetic.map.values.copy()

@@ -40,6 +40,20 @@ def around_all(window: MainWindow) -> QSplitter:
 
 
 @pytest.fixture
+def sized(window):
+    """Makes the window as large as wanted."""
+
+    def make(width_px: int = 1280, height_px: int = 720) -> MainWindow:
+        window.resize(width_px, height_px)
+        QApplication.processEvents()
+        return window
+
+    yield make
+    window.side.set_mark("Train", "")
+    make(1280, 800)
+
+
+@pytest.fixture
 def windows(qtbot, compiled_kernels, fake, fake_models, fake_classes, small_recording):
     """Makes windows one after the other on the same settings."""
     settings = Settings.forgetful()
@@ -70,8 +84,8 @@ def windows(qtbot, compiled_kernels, fake, fake_models, fake_classes, small_reco
 
 
 @pytest.mark.parametrize("size", [(960, 640), (1280, 720), (2560, 1440)])
-def test_it_stands_beside_scene_and_maps_and_shows_every_icon(windows, size) -> None:
-    window = windows(*size)
+def test_it_stands_beside_scene_and_maps_and_shows_every_icon(sized, size) -> None:
+    window = sized(*size)
     side, line = place_of(window.side), place_of(window.findChild(StatusLine))
     assert (
         side.top() <= window.menuBar().mapToGlobal(QPoint(0, 0)).y() + window.menuBar().height() + 8
@@ -110,8 +124,8 @@ def test_it_lies_over_the_maps_by_choice_and_takes_no_room_of_theirs(windows) ->
     assert panel_of(again, "tracks").width() == pytest.approx(wide_px, abs=2)
 
 
-def test_icons_have_names_tips_and_a_ring_for_what_is_under_way(windows) -> None:
-    side = windows().side
+def test_icons_have_names_tips_and_a_ring_for_what_is_under_way(sized) -> None:
+    side = sized().side
     for name in NAMES:
         assert (side.button(name).accessibleName(), side.button(name).toolTip()) == (name, name)
     icon = side.button("Train")
@@ -126,8 +140,8 @@ def test_icons_have_names_tips_and_a_ring_for_what_is_under_way(windows) -> None
     assert icon.grab().toImage() == before
 
 
-def test_icons_have_their_words_where_the_window_is_wide(windows) -> None:
-    window = windows(1280, 720)
+def test_icons_have_their_words_where_the_window_is_wide(sized) -> None:
+    window = sized(1280, 720)
     icon = window.side.button("Agreement")
     worded = icon.size()
     assert worded.width() >= icon.fontMetrics().horizontalAdvance("Agree")
@@ -139,8 +153,8 @@ def test_icons_have_their_words_where_the_window_is_wide(windows) -> None:
     assert icon.size() == worded
 
 
-def test_arrows_go_from_panel_to_panel(windows) -> None:
-    window = windows()
+def test_arrows_go_from_panel_to_panel(sized) -> None:
+    window = sized()
     side = window.side
     side.button("Sensor").setFocus(Qt.FocusReason.TabFocusReason)
     for name in (*NAMES[1:], NAMES[-1]):
@@ -152,8 +166,8 @@ def test_arrows_go_from_panel_to_panel(windows) -> None:
     assert side.shown == NAMES[-2]
 
 
-def test_its_own_icon_or_a_key_folds_it_and_another_opens_it(windows) -> None:
-    window = windows()
+def test_its_own_icon_or_a_key_folds_it_and_another_opens_it(sized) -> None:
+    window = sized()
     side, tracks = window.side, panel_of(window, "tracks")
     wide_px, tracks_px = side.width(), tracks.width()
     QTest.mouseClick(side.button("Sensor"), LEFT)
@@ -170,6 +184,7 @@ def test_its_own_icon_or_a_key_folds_it_and_another_opens_it(windows) -> None:
     assert (side.folded, side.shown, side.width()) == (False, "Sensor", wide_px)
 
 
+@pytest.mark.slow
 def test_the_next_window_has_the_width_that_was_chosen(windows) -> None:
     window = windows()
     before_px = window.side.width()

@@ -98,7 +98,7 @@ def saved_by_another(path, span=THEIRS, without=(), **settings) -> None:
 
 class TestTheLockBesideTheRecording:
     def test_one_with_another_home_sees_who_edits_and_only_looks(
-        self, on, other_window, qtbot, recording_copy
+        self, on, other_window, qtbot, recording_copy, small_recording
     ) -> None:
         first = on(recording_copy)
         second = on(recording_copy, other_window)
@@ -111,8 +111,7 @@ class TestTheLockBesideTheRecording:
         assert shown(second) == [THERE, BACK]
         mark(first, qtbot, MINE)
         save(first, qtbot)
-        first.action("sample").trigger()
-        qtbot.waitUntil(lambda: models_of(first).document.recording.folder != recording_copy)
+        on(small_recording, first)
         qtbot.waitUntil(lambda: not list(recording_copy.glob(".edited*")), timeout=20_000)
         second.action("edit_labels_here").trigger()
         assert models_of(second).label_session.refusal == ""
@@ -131,6 +130,7 @@ class TestTheLockBesideTheRecording:
         mark(window, qtbot, MINE)
         assert len(list(recovery_folder().rglob("*.journal"))) == 1
 
+    @pytest.mark.slow
     def test_the_sample_recording_gets_no_lock(self, on, empty_window, qtbot) -> None:
         empty_window.action("sample").trigger()
         document = models_of(empty_window).document
@@ -141,9 +141,9 @@ class TestTheLockBesideTheRecording:
 
 class TestSavedMeanwhile:
     def test_merged_both_are_there_and_one_undo_takes_theirs_away(
-        self, on, qtbot, recording_copy
+        self, labelled, qtbot, recording_copy
     ) -> None:
-        window, asked = on(recording_copy), []
+        window, asked = labelled, []
         mark(window, qtbot, MINE)
         saved_by_another(recording_copy)
         save(window, qtbot, "Merge", asked)
@@ -157,16 +157,18 @@ class TestSavedMeanwhile:
         save(window, qtbot)
         assert on_disk(recording_copy) == [THERE, MINE, BACK]
 
-    def test_mine_is_written_over_theirs(self, on, qtbot, recording_copy) -> None:
-        window = on(recording_copy)
+    def test_mine_is_written_over_theirs(self, labelled, qtbot, recording_copy) -> None:
+        window = labelled
         mark(window, qtbot, MINE)
         saved_by_another(recording_copy)
         save(window, qtbot, "Keep mine")
         assert shown(window) == on_disk(recording_copy) == [THERE, MINE, BACK]
         assert not models_of(window).document.modified
 
-    def test_theirs_is_taken_and_mine_comes_back_by_undo(self, on, qtbot, recording_copy) -> None:
-        window = on(recording_copy)
+    def test_theirs_is_taken_and_mine_comes_back_by_undo(
+        self, labelled, qtbot, recording_copy
+    ) -> None:
+        window = labelled
         mark(window, qtbot, MINE)
         saved_by_another(recording_copy)
         save(window, qtbot, "Take theirs")
@@ -175,8 +177,8 @@ class TestSavedMeanwhile:
         undo(window, qtbot)
         assert shown(window) == [THERE, MINE, BACK]
 
-    def test_cancelled_nothing_changes(self, on, qtbot, recording_copy) -> None:
-        window = on(recording_copy)
+    def test_cancelled_nothing_changes(self, labelled, qtbot, recording_copy) -> None:
+        window = labelled
         mark(window, qtbot, MINE)
         saved_by_another(recording_copy)
         save(window, qtbot, "Cancel")
@@ -184,8 +186,10 @@ class TestSavedMeanwhile:
         assert on_disk(recording_copy) == [THEIRS, THERE, BACK]
         assert models_of(window).document.modified
 
-    def test_what_both_changed_is_there_twice_and_is_said(self, on, qtbot, recording_copy) -> None:
-        window = on(recording_copy)
+    def test_what_both_changed_is_there_twice_and_is_said(
+        self, labelled, qtbot, recording_copy
+    ) -> None:
+        window = labelled
         models_of(window).label_edits.step(1)
         qtbot.keyClick(window, Qt.Key.Key_1)
         theirs = open_recording(recording_copy)
@@ -199,8 +203,8 @@ class TestSavedMeanwhile:
         ]  # fmt: skip
         assert "Of 1 span that both had changed, both are there." in window.messages.text
 
-    def test_the_sensor_of_the_other_is_not_lost(self, on, qtbot, recording_copy) -> None:
-        window, asked = on(recording_copy), []
+    def test_the_sensor_of_the_other_is_not_lost(self, labelled, qtbot, recording_copy) -> None:
+        window, asked = labelled, []
         c = models_of(window)
         mark(window, qtbot, MINE)
         moved = replace(c.sensor.sensor, position_m=(0.0, 0.0, -1.0))
@@ -219,9 +223,9 @@ class TestSavedMeanwhile:
         assert shown(window) == [THERE, MINE, BACK]
 
     def test_of_an_offset_that_both_changed_mine_is_kept_and_said(
-        self, on, qtbot, recording_copy
+        self, labelled, qtbot, recording_copy
     ) -> None:
-        window = on(recording_copy)
+        window = labelled
         models_of(window).edits.set_radar_offset(0.5)
         theirs = open_recording(recording_copy)
         theirs.radar_offset_s = 0.25
@@ -243,17 +247,17 @@ class TestSavedMeanwhile:
         assert on_disk(recording_copy) == [THEIRS, THERE, BACK]
 
     def test_a_file_written_again_with_the_same_content_is_no_question(
-        self, on, qtbot, recording_copy
+        self, labelled, qtbot, recording_copy
     ) -> None:
-        window = on(recording_copy)
+        window = labelled
         mark(window, qtbot, MINE)
         path = recording_copy / "recording.json"
         path.write_text(json.dumps(json.loads(path.read_text("utf-8"))), "utf-8")
         save(window, qtbot)
         assert on_disk(recording_copy) == [THERE, MINE, BACK]
 
-    def test_asked_before_closing_too(self, on, qtbot, recording_copy, monkeypatch) -> None:
-        window = on(recording_copy)
+    def test_asked_before_closing_too(self, labelled, qtbot, recording_copy, monkeypatch) -> None:
+        window = labelled
         mark(window, qtbot, MINE)
         saved_by_another(recording_copy)
         answer(qtbot, "Save")
@@ -264,9 +268,9 @@ class TestSavedMeanwhile:
 
     @pytest.mark.slow
     def test_another_process_with_another_home(
-        self, on, qtbot, recording_copy, tmp_path, monkeypatch
+        self, labelled, qtbot, recording_copy, tmp_path, monkeypatch
     ) -> None:
-        window = on(recording_copy)
+        window = labelled
         mark(window, qtbot, MINE)
         code = (
             "import sys; from pathlib import Path;"
@@ -287,9 +291,9 @@ class TestSavedMeanwhile:
 
 class TestTheFolderIsGone:
     def test_it_is_said_and_everything_is_saved_elsewhere(
-        self, on, qtbot, recording_copy, monkeypatch, tmp_path
+        self, labelled, qtbot, recording_copy, monkeypatch, tmp_path
     ) -> None:
-        window, asked = on(recording_copy), []
+        window, asked = labelled, []
         mark(window, qtbot, MINE)
         moved = recording_copy.rename(tmp_path / "renamed.sd2")
         monkeypatch.setattr(files, "ask_new", lambda *_: tmp_path / "again.sd2")
@@ -315,8 +319,8 @@ class TestTheFolderIsGone:
         (offer,) = offers_in(recovery_folder()).offers
         assert spans_of(offer.labels) == [THERE, MINE, BACK]
 
-    def test_brought_back_it_is_saved(self, on, qtbot, recording_copy, tmp_path) -> None:
-        window = on(recording_copy)
+    def test_brought_back_it_is_saved(self, labelled, qtbot, recording_copy, tmp_path) -> None:
+        window = labelled
         mark(window, qtbot, MINE)
         moved = recording_copy.rename(tmp_path / "renamed.sd2")
         save(window, qtbot, "Cancel")

@@ -54,7 +54,7 @@ def faults(root: QWidget) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("size", [(1000, 640), (1280, 720)])
+@pytest.mark.parametrize("size", [(1000, 640), pytest.param((1280, 720), marks=pytest.mark.slow)])
 def test_words_of_all_panels_have_room(empty_window, qtbot, small_recording, size) -> None:
     window = empty_window
     window.resize(*size)

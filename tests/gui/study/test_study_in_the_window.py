@@ -44,6 +44,7 @@ def said(page) -> str:
     return "\n".join(one.text() for one in page.findChildren(QLabel) if one.isVisible())
 
 
+@pytest.mark.slow
 def test_begun_by_clicks_and_its_conclusion_read(window, page, qtbot):
     runs = window.features.study.runs
     (same,) = [one for one in page.findChildren(CheckBox) if one.text() == "The same people"]

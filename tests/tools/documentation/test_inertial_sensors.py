@@ -24,6 +24,7 @@ def recording(shared_data: Path) -> Path:
     return shared_data / "imu" / "broad" / "10_undisturbed_slow_translation_A.hdf5"
 
 
+@pytest.mark.slow
 def test_a_board_feels_what_the_sensor_on_it_measured(recording: Path) -> None:
     found = board_beside(recording)
     assert found.samples > 34_000

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from sd2core.body.fit import speed_mps
 from sd2core.body.lifter import Lifter, fit_law_terms
@@ -29,6 +30,7 @@ def test_frames_without_the_person_are_bridged_and_not_trusted(takes: list[Take]
     assert np.isfinite(found.image_px).all()
 
 
+@pytest.mark.slow
 def test_the_law_of_fits_covers_the_errors_it_was_learnt_from(takes: list[Take]) -> None:
     lifter = Lifter.load()
     law = fit_law(takes, lifter)

@@ -18,16 +18,17 @@ from tools.train_lifter.takes import Take
 def test_a_take_gives_two_pairs_once(takes: list[Take], tmp_path: Path) -> None:
     folder, out = tmp_path / "people", tmp_path / "fits.zarr"
     folder.mkdir()
-    for number, take in enumerate(takes[:2]):
+    for number, take in enumerate(takes[:1]):
         take.save(take_path(folder, number))
     options = Pairs(data=folder, out=out, seed=7)
-    assert make_pairs(options) == 2
+    assert make_pairs(options) == 1
     assert make_pairs(options) == 0
     pairs = read_pairs(out)
     assert pairs.kind == "simulated"
     assert [(take.subject, take.placement) for take in pairs.takes] == [
-        ("people-0", 0), ("people-0", 1), ("people-1", 0), ("people-1", 1),
-    ]  # fmt: skip
+        ("people-0", 0),
+        ("people-0", 1),
+    ]
     for take in pairs.takes:
         assert take.radar.any()
         assert take.limbs is not None
