@@ -7,6 +7,7 @@ there (``SD2_SHARED_DATA``).
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,7 +22,7 @@ from sd2core.io.mesh import load_mesh
 from sd2core.io.video import open_video
 from sd2core.numerics.compiled import warm_up
 from tools.documentation.pages import write_filled
-from tools.documentation.places import BUILD, IMAGES, SHARED
+from tools.documentation.places import BUILD, DOCS, IMAGES, SHARED
 from tools.fitting.__main__ import main as run_fitting
 from tools.fitting.truth import read_truth
 from tools.motion_capture.__main__ import main as run_motion_capture
@@ -61,6 +62,7 @@ def main() -> None:
     pair = [truth.mesh(), load_mesh(fits / f"{COMPARED}.zarr")]
     compared = compare_meshes(pair, ["true", "fitted"])
     save_figure(draw_comparison(compared), IMAGES / "fit-compared.png")
+    shutil.copyfile(tables.with_suffix(".csv"), DOCS / "fitting-clips.csv")
     write_filled("fitting.md", tables=tables.read_text("utf-8"), compared=COMPARED)
 
 

@@ -17,7 +17,7 @@ from tools.command_line import tool
 from tools.fitting.clips import CLIPS, REAL_MOTION, TUNING, clip_named, make_fit_truth
 from tools.fitting.error_measurement import measure_errors
 from tools.fitting.people import OTHERS, as_table, measure_people, meetings
-from tools.fitting.report import as_markdown, as_text
+from tools.fitting.report import as_csv, as_markdown, as_text
 from tools.fitting.scoring import Fits
 from tools.fitting.truth import read_truth, truth_folders
 
@@ -58,7 +58,7 @@ class Score(OptionRecord):
         also fit these videos, whose motion is not known, and measure whether the body lies on the
         person that the landmark model sees; their meshes are called real-NAME
     markdown : FILE
-        also write the tables as Markdown
+        also write the tables as Markdown, and every clip beside it, as NAME.csv
     """
 
     truth: Annotated[Path, ARGUMENT]
@@ -149,6 +149,7 @@ def _score(options: Score) -> None:
         real = [fits.score_real(video) for video in options.real]
     if options.markdown is not None:
         atomic_write_text(options.markdown, as_markdown(scores, real))
+        atomic_write_text(options.markdown.with_suffix(".csv"), as_csv(scores))
     print(as_text(scores, real))
 
 

@@ -1,4 +1,4 @@
-"""The tables of a scored fit, as text and as Markdown; each figure beside what is wanted."""
+"""The tables of a scored fit, as text, Markdown and CSV; each figure beside what is wanted."""
 
 from __future__ import annotations
 
@@ -16,6 +16,9 @@ from tools.fitting.measures import coverage
 from tools.fitting.real_score import RealScore
 
 Table = list[list[str]]
+
+_FIGURES = ["joints (m)", "velocity error RMS (m/s)", "correlation", "spread", "peak kept"]
+_FIGURES += ["map L1", "plain", "stated"]
 
 _KINDS = {
     "gestures": ("swipes",),
@@ -71,13 +74,17 @@ def as_text(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> str:
 
 
 def as_markdown(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> str:
-    """Tables for docs/fitting.md: what is wanted, in bold where missed, gestures at all speeds."""
+    """Tables for docs/fitting.md: what is wanted, in bold where missed, gestures at all speeds.
+
+    Of the clips it has medians; :func:`as_csv` has each of them.
+    """
     reach = [["what", "measured", "wanted"]]
     for row in reach_rows(scores, real):
         if row.wanted:
             mark = "**" if row.met is False else ""
             reach.append([row.what, f"{mark}{row.measured}{mark}", row.wanted])
-    tables = _tables(reach, scores, real, ("all",))
+    tables = _tables(reach, scores, real, ("all",)) | {"Clips, medians": _kind_table(scores)}
+    del tables["Clips"]
     return (
         "\n\n".join(
             "\n".join([f"**{heading}**", "", *markdown_table(rows)])
@@ -87,14 +94,22 @@ def as_markdown(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> 
     )
 
 
+def as_csv(scores: Sequence[ClipScore]) -> str:
+    """Every clip, for docs/fitting-clips.csv."""
+    rows = [[one.name, one.kind, *map(str, _clip_figures(one))] for one in scores]
+    return "".join(f"{','.join(row)}\n" for row in (["clip", "kind", *_FIGURES], *rows))
+
+
 def _tables(
     reach: Table, scores: Sequence[ClipScore], real: Sequence[RealScore], speeds: Sequence[str]
 ) -> dict[str, Table]:
-    clips = ["clip", "joints (m)", "velocity error RMS (m/s)", "correlation", "spread"]
     videos = ["video", "silhouette", "landmarks (m)"]
     tables = {
         "Gestures": list(_gesture_rows(scores, speeds)),
-        "Clips": [[*clips, "peak kept", "map L1", "plain", "stated"], *map(_clip_row, scores)],
+        "Clips": [
+            ["clip", *_FIGURES],
+            *([one.name, *_numbers(*_clip_figures(one))] for one in scores),
+        ],
         "Real videos": [
             videos,
             *([one.name, *_numbers(one.overlap, one.reprojection_m)] for one in real),
@@ -119,12 +134,23 @@ def _gesture_rows(scores: Sequence[ClipScore], speeds: Sequence[str]) -> Iterato
                 yield [label, speed, str(len(some)), *_numbers(*figures)]
 
 
-def _clip_row(one: ClipScore) -> list[str]:
+def _clip_figures(one: ClipScore) -> list[float]:
     velocity = one.velocity
     of_velocity = velocity.error, velocity.correlation, one.spread, velocity.peak_kept
-    maps = _numbers(one.map_l1, one.plain_l1)
-    stated = "" if one.stated_l1 is None else _number(one.stated_l1)
-    return [one.name, *_numbers(float(one.distance_m.mean()), *of_velocity), *maps, stated]
+    stated = math.nan if one.stated_l1 is None else one.stated_l1
+    figures = float(one.distance_m.mean()), *of_velocity, one.map_l1, one.plain_l1, stated
+    return [round(figure, 3) for figure in figures]
+
+
+def _kind_table(scores: Sequence[ClipScore]) -> Table:
+    """Medians over the clips of a kind in which something moves."""
+    rows = [["clips", "number", *_FIGURES]]
+    for name, kinds in _KINDS.items():
+        own = [_clip_figures(one) for one in scores if one.kind in kinds and not one.quiet]
+        if own:
+            medians = [f"{median:.2g}" for median in np.median(own, axis=0)]
+            rows.append([name, str(len(own)), *medians])
+    return rows
 
 
 def reach_rows(scores: Sequence[ClipScore], real: Sequence[RealScore] = ()) -> Iterator[Row]:
@@ -219,7 +245,7 @@ def _captured_rows(scores: Sequence[ClipScore]) -> Iterator[Row]:
     errors = {one.name: one.velocity.error for one in moving}
     same = {one.name: one.velocity.correlation for one in moving}
     spread = {one.name: one.spread for one in moving}
-    what = f"motion of real people, all joints, {len(moving)} clips"
+    what = f"recorded motion, {len(moving)} clips"
     yield Row(f"{what}: median RMS error", _median(list(errors.values())), "m/s", most=0.22)
     worst, least = _top(errors), _bottom(same)
     yield Row(f"{what}: worst", errors[worst], "m/s", most=0.35, detail=worst)
