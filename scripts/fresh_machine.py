@@ -49,13 +49,11 @@ PAGE = """\
 `{packages}`), clones this checkout into each and types what the README says. On {date}, commit
 `{commit}`, {machine}:
 
-| system | Python | typed | came to | time | longest silence | written |
-|---|---|---|---|---|---|---|
 {rows}
 
-*Time* is from typing to the window, to the picture, or to the end; *written* is what the system's
-folder grew by, with system packages and what is fetched.{cuda} The environment, with what tests
-need where they ran, takes {environment_gb:.2f} GB, of which:
+Times are from typing to the window, or to the end; MB are what the system's folder grew by, with
+system packages and what is fetched.{cuda} Nothing was silent for longer than {silence_s:.0f} s. The
+environment, with what tests need where they ran, takes {environment_gb:.2f} GB, of which:
 
 | package | MB |
 |---|---|
@@ -63,20 +61,33 @@ need where they ran, takes {environment_gb:.2f} GB, of which:
 | {others} others | {others_mb:.0f} |
 """
 
-CUDA = """ Where it is some 7 GB, torch's CPU
-build could not be reached for that Python, and its build for GPUs came instead."""
-WITH_CUDA = re.compile(r" [5-9],\d{3} MB \|$")
+CUDA = """ Where it is some 7 GB, torch's CPU build could not
+be reached for that Python, and its build for GPUs came instead."""
+WITH_CUDA = re.compile(r" [5-9],\d{3} MB")
+STEPS = (
+    "`make demo`: the window",
+    "`make demo` again",
+    "`make test`",
+    "`pip install` of the wheel",
+    "`sd2 demo` at first",
+    "the line that it printed",
+    "`sd2 demo` then: the window",
+)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a typed line."""
+    """What came of a typed line; ``result`` is empty where it did what the README says."""
 
-    typed: str
     result: str
     seconds: float
     silence_s: float
     written_mb: float
+
+    @property
+    def cell(self) -> str:
+        """It in the page's table."""
+        return self.result or f"{self.seconds:.0f} s, {self.written_mb:,.0f} MB"
 
 
 def main() -> int:
@@ -87,46 +98,45 @@ def main() -> int:
         print(f"Needs root, and these programs: {', '.join(missing) or 'all there'}")
         return 1
     suites = os.environ.get("SUITES", " ".join(SYSTEMS)).split()
-    rows, weights = [], []
+    rows, outcomes = [["system", "Python", *STEPS]], list[Outcome]()
+    weights: list[tuple[str, float]] = []
     for suite in suites:
-        name, _ = SYSTEMS[suite]
-        python, outcomes = try_system(suite)
-        rows += [
-            f"| {name} | {python} | {one.typed} | {one.result} | {one.seconds:.0f} s |"
-            f" {one.silence_s:.0f} s | {one.written_mb:,.0f} MB |"
-            for one in outcomes
-        ]
+        python, tried = try_system(suite)
+        cells = [tried[step].cell if step in tried else "" for step in STEPS]
+        rows.append([SYSTEMS[suite][0], python, *cells])
+        outcomes += tried.values()
         environment = PLACE / suite / "root/sd2/.venv"
         if not weights and environment.is_dir():
             weights = weigh(environment)
-        print("\n".join(rows), flush=True)
-    write_page(rows, weights)
-    return int(any("failed" in row for row in rows))
+        print(" | ".join(rows[-1]), flush=True)
+    write_page(rows, max(one.silence_s for one in outcomes), weights)
+    return int(any(one.result.startswith("failed") for one in outcomes))
 
 
-def try_system(suite: str) -> tuple[str, list[Outcome]]:
+def try_system(suite: str) -> tuple[str, dict[str, Outcome]]:
     """Make a system, type everything there, and say which Python it has and what came of it."""
+    demo, again, test, pip, lacking, told_line, window = STEPS
     root = bare_system(suite)
     run = Typist(root, PLACE / f"{suite}.log")
     python = run.output("python3 --version").split()[1]
     if tuple(map(int, python.split(".")[:2])) < (3, 11):
-        return python, [run("make demo", printed="is needed")]
-    outcomes = [run("make demo", seen=PLACE / f"{suite}.png"), run("make demo")]
+        return python, {demo: run("make demo", printed="is needed")}
+    tried = {demo: run("make demo", seen=PLACE / f"{suite}.png"), again: run("make demo")}
     if suite in os.environ.get("TESTS", suite).split():
-        outcomes.append(run("make test"))
+        tried[test] = run("make test")
     root = bare_system(suite, again="-pip")
     run = Typist(root, PLACE / f"{suite}-pip.log")
     *lines, last = pip_lines()
-    outcomes.append(run("\n".join(lines)))
+    tried[pip] = run("\n".join(lines))
     # What a bare system lacks is printed as a line to type.
-    window = f". sd2-environment/bin/activate\n{last}"
-    outcomes.append(run(window, printed="apt-get install", display=True))
+    open_it = f". sd2-environment/bin/activate\n{last}"
+    tried[lacking] = run(open_it, printed="apt-get install", display=True)
     told = re.findall(r"apt-get update.*apt-get install.*[^.\s]", run.log.read_text("utf-8"))
     if told:
         install = told[-1].replace("sudo ", "").replace(" install ", " install --yes ")
-        outcomes.append(run(install, shown="the line that it printed"))
-    outcomes.append(run(window, seen=PLACE / f"{suite}-pip.png"))
-    return python, outcomes
+        tried[told_line] = run(install)
+    tried[window] = run(open_it, seen=PLACE / f"{suite}-pip.png")
+    return python, tried
 
 
 def bare_system(suite: str, again: str = "") -> Path:
@@ -215,7 +225,6 @@ class Typist:
         printed: str = "",
         seen: Path | None = None,
         display: bool = False,
-        shown: str = "",
     ) -> Outcome:
         """Type a line and wait for its end; it must print a text, or show the window.
 
@@ -245,14 +254,8 @@ class Typist:
             seconds = time.monotonic() - began
             silence_s = max(silence_s, time.monotonic() - last)
         good = there.is_set() if seen else found if printed else code == 0
-        result = "the window" if seen else "said what to do" if printed else "done"
-        return Outcome(
-            (shown or f"`{line.splitlines()[-1]}`") + (", on a display" if display else ""),
-            result if good else f"failed ({code})",
-            seconds,
-            silence_s,
-            used_mb(self._root) - before,
-        )
+        result = f"failed ({code})" if not good else "said what to do" if printed else ""
+        return Outcome(result, seconds, silence_s, used_mb(self._root) - before)
 
 
 def _watch(picture: Path, process: subprocess.Popen[str], there: threading.Event) -> None:
@@ -319,7 +322,7 @@ def weigh(environment: Path) -> list[tuple[str, float]]:
     return sorted(((name, float(mb)) for name, mb in pairs), key=lambda pair: -pair[1])
 
 
-def write_page(rows: list[str], weights: list[tuple[str, float]]) -> None:
+def write_page(rows: list[list[str]], silence_s: float, weights: list[tuple[str, float]]) -> None:
     """Write docs/fresh-machine.md."""
     commit = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"],
@@ -330,13 +333,16 @@ def write_page(rows: list[str], weights: list[tuple[str, float]]) -> None:
     ).stdout.strip()
     model = re.search(r"^model name\s*: (.+)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
     heavy, others = weights[:WEIGHED], weights[WEIGHED:]
+    head, *lines = (f"| {' | '.join(row)} |" for row in rows)
+    table = "\n".join([head, "|---" * len(rows[0]) + "|", *lines])
     text = PAGE.format(
         packages=PACKAGES.replace(",", " "),
         date=datetime.date.today().isoformat(),
         commit=commit,
         machine=f"{model[1].strip() if model else 'unknown processor'}, {os.cpu_count()} cores",
-        rows="\n".join(rows),
-        cuda=CUDA if any(WITH_CUDA.search(row) for row in rows) else "",
+        rows=table,
+        silence_s=silence_s,
+        cuda=CUDA if WITH_CUDA.search(table) else "",
         environment_gb=sum(mb for _, mb in weights) / 1e3,
         weights="\n".join(f"| {name} | {mb:.0f} |" for name, mb in heavy),
         others=len(others),
