@@ -186,9 +186,10 @@ def page(
         Of :func:`totals_of`.
     """
     plan = results.plan
-    people = ", ".join(
-        f"{one} ({counted(count, 'movement')})" for one, count in results.takes.items()
-    )
+    counts = {counted(count, "movement") for count in results.takes.values()}
+    each = [f"{one} ({counted(count, 'movement')})" for one, count in results.takes.items()]
+    same = len(each) > 3 and len(counts) == 1
+    people = f"{len(each)} people, {counts.pop()} each" if same else ", ".join(each)
     chance = f"{1 / len(results.classes):.0%}"
     parts = [
         f"# {plan.title}",

@@ -1,7 +1,7 @@
 """How long it takes until an edit in the window is on disk, and shown, among 10,000 spans.
 
 ``pytest tests/benchmarks/test_kept_edits_speed.py --benchmark-only --capture=no`` prints the
-95th percentiles, of time and of processor time; decision 33 quotes them.
+95th percentiles, of time and of processor time; docs/performance.md quotes them.
 """
 
 from __future__ import annotations
