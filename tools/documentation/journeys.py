@@ -77,7 +77,7 @@ video, body, mesh, map
 2 sd2core/io/mesh.py save_mesh: a file, which load_mesh reads
 3 sd2core/doppler/prepared.py PreparedMesh.counted: moving vertices of a block
 3 sd2core/doppler/masks.py VisibilityMasks.for_rows: which the sensor sees
-3 sd2core/doppler/frame_counts.py FrameCounts.count: velocities counted in bins
+3 sd2core/doppler/histogram.py count: velocities counted in bins
 3 sd2core/doppler/smoothing.py smooth: DopplerMap.values, (bins, T)
 """,
         "label": """
