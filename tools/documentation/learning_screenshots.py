@@ -84,7 +84,6 @@ def classifier(sample: Path, campaign: Path) -> None:
         model.setup.set_value("steps", _COMPARE_STEPS)
         study = window.features.study
         window.bring_up("Train", "Study")
-        save(window, "study-page.png")
         study.runs.begin()
         _wait_for_end(window, study.runs)
         study.show_result()
