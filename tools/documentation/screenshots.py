@@ -105,12 +105,17 @@ def placements(window: MainWindow) -> None:
     )
 
 
+def stepping_back(window: MainWindow) -> None:
+    """The real person, who steps back."""
+    window.session.playback.seek(2.7)
+
+
 def real() -> None:
     """A real person with the body that `sd2 fit` makes of the video."""
     with tempfile.TemporaryDirectory() as folder:
         video, mesh = WALK, Path(folder) / "walk.zarr"
         if fitted(video, mesh):
-            take("real-video.png", [video, mesh], sample)
+            take("real-video.png", [video, mesh], stepping_back)
         else:
             print("real-video.png is left as it is: the fit failed", file=sys.stderr)
 
