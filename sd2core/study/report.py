@@ -258,7 +258,8 @@ def _folds_in_words(results: Results) -> str:
 def untried(results: Results) -> list[str]:
     """List what this study says nothing about."""
     plan = results.plan
-    left = [f"adding {_maps(one)}" for one in OF_VIDEO if one not in plan.wanted]
+    others = [_maps(one) for one in OF_VIDEO if one not in plan.wanted]
+    left = [f"adding {', '.join(others)}"] if others else []
     runs = Counter(run.task.share for run in results.runs)
     reasons = Counter(
         (name, run.task.share, reason)

@@ -129,7 +129,7 @@ def run_task(plan_text: str, denoiser: str | None, task: Task) -> Run:
         try:
             added = _added(plan, data, condition, filmed, model, reason, task.seed)
         except Sd2Error as error:
-            missing[condition] = str(error)
+            missing[condition] = error.found
             continue
         if condition != REAL and not added:
             missing[condition] = "the data hold no such maps to add"
