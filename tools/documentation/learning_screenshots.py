@@ -23,7 +23,7 @@ from sd2core.placements.placements import PlacementGrid
 from tools.documentation.windows import application, opened, save, settle, wait_for
 
 _CAMPAIGN = ("--people", "4", "--minutes", "4", "--seed", "1")
-_COMPARE_STEPS = 100
+_COMPARE_STEPS = 40
 _LONG_S = 1800.0
 _SIZE = (1280, 960)
 
