@@ -1,16 +1,14 @@
-"""Print the tables of docs/imu.md and of docs/decisions/0065-inertial-sensors.md.
+"""Print the tables of docs/imu.md.
 
 ::
 
-    python -m tools.documentation.inertial_sensors derivatives
     python -m tools.documentation.inertial_sensors board 10_undisturbed_slow_translation_A.hdf5
     python -m tools.documentation.inertial_sensors foot GAITMAP_FOLDER
     python -m tools.documentation.inertial_sensors fit TRUE_MESH FITTED_MESH
 
-The first compares ways to differentiate, on motions whose derivatives are known. The second holds a
-virtual sensor on a board beside the real one on it (a recording of BROAD, its pose tracked by
-cameras), the third one on a shoe (the sample of gaitmap, markers tracked by cameras), the last one
-on a body that `sd2 fit` found in a video beside one on the true body.
+The first holds a virtual sensor on a board beside the real one on it (a recording of BROAD, its
+pose tracked by cameras), the second one on a shoe (the sample of gaitmap, markers tracked by
+cameras), the last one on a body that `sd2 fit` found in a video beside one on the true body.
 """
 
 from __future__ import annotations
@@ -45,8 +43,6 @@ FROM_EAST_NORTH_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0
 
 SHIFTS_S = np.arange(-0.05, 0.0501, 0.0005)
 PLACES = ("chest", "right-upper-arm", "right-forearm", "right-wrist", "right-hand")
-FREQUENCIES_HZ = (1.0, 2.0, 4.0, 6.0, 8.0)
-FRAMES_PER_S = 30.0
 
 
 @dataclass(frozen=True)
@@ -252,50 +248,7 @@ def _unturned(path: RigidPath) -> RigidPath:
     return RigidPath(path.timebase, path.position_m, turns, path.present)
 
 
-# -- Derivatives -----------------------------------------------------------------------------------
-
-
-def derivative_rows() -> list[list[str]]:
-    """Relative errors of ways to differentiate sinusoids, by their frequency."""
-    names = ("p̈ differences", "p̈ cubic", "p̈ quintic", "ω logarithms", "ω cubic", "ω quintic")
-    rows = [["Hz", *names]]
-    times_s = np.arange(300) / FRAMES_PER_S
-    for frequency_hz in FREQUENCIES_HZ:
-        rate = 2 * np.pi * frequency_hz
-        swing = np.sin(rate * times_s)
-        turning = 0.5 * rate * np.cos(rate * times_s)
-        turns = Rotation.from_rotvec(np.outer(0.5 * swing, [0.0, 1.0, 0.0]))
-        dt_s = 1.0 / FRAMES_PER_S
-        second = np.zeros(300)
-        second[1:-1] = (swing[2:] - 2 * swing[1:-1] + swing[:-2]) / dt_s**2
-        logs = np.zeros(300)
-        logs[1:-1] = (turns[:-2].inv() * turns[2:]).as_rotvec()[:, 1] / (2 * dt_s)
-        found = [_error(second, -(rate**2) * swing)]
-        found += [
-            _error(make_interp_spline(times_s, swing, degree)(times_s, 2), -(rate**2) * swing)
-            for degree in (3, 5)
-        ]
-        found.append(_error(logs, turning))
-        found += [_error(_turn_rate(times_s, turns, degree), turning) for degree in (3, 5)]
-        rows.append([f"{frequency_hz:g}", *(f"{100 * value:.2g} %" for value in found)])
-    return rows
-
-
-def _turn_rate(times_s: Floats, turns: Rotation, degree: int) -> Floats:
-    """Turn rate about y by a spline through quaternions that turn about y."""
-    curve = make_interp_spline(times_s, turns.as_quat(), degree)
-    value, slope = curve(times_s), curve(times_s, 1)
-    rate = 2 * (value[:, 3] * slope[:, 1] - slope[:, 3] * value[:, 1])
-    return np.asarray(rate / np.square(value).sum(axis=1))
-
-
-def _error(found: Floats, truth: Floats) -> float:
-    inner = slice(60, 240)  # the ends are another matter
-    return rms((found - truth)[inner]) / rms(truth[inner])
-
-
 TABLES = {
-    "derivatives": derivative_rows,
     "board": board_rows,
     "foot": foot_rows,
     "fit": fit_rows,

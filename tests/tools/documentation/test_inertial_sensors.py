@@ -14,7 +14,6 @@ from tools.documentation.inertial_sensors import (
     beside,
     board,
     board_beside,
-    derivative_rows,
     foot_beside,
 )
 
@@ -60,12 +59,3 @@ def test_the_comparison_finds_a_known_rotation_shift_and_offset(recording: Path)
     # What is left: a low pass of the path, then of what is felt on it, are not quite the same.
     assert found.acceleration_rms_mps2 < 0.02
     assert found.turn_rate_rms_radps < 0.005
-
-
-def test_a_quintic_spline_differentiates_best() -> None:
-    heading, *rows = derivative_rows()
-    assert heading[3].endswith("quintic")
-    for row in rows:
-        values = [float(cell.split()[0]) for cell in row[1:]]
-        assert values[2] <= min(values[:3])
-        assert values[5] <= min(values[3:])
