@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from sd2core.body.rotations import Floats
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.body.track import LANDMARKS
+from sd2core.mesh.made_vertices import MadeVertices
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.timebase import Timebase
@@ -84,7 +84,7 @@ class FittedMotion:
         rig = KeypointSpace(space).rig(self.shape)
         limbs = vertex_limbs(body)
         return MeshSequence(
-            FittedVertices(body, rig, len(self.timebase), self.poses),
+            fitted_vertices(body, rig, len(self.timebase), self.poses),
             body.faces,
             self.timebase,
             present=self.present.copy(),
@@ -92,22 +92,15 @@ class FittedMotion:
         )
 
 
-class FittedVertices:
-    """Vertices (T, V, 3) of a posed body, float32, computed when they are read."""
+def fitted_vertices(body: Body, rig: Rig, frames: int, poses: Poses) -> MadeVertices:
+    """Vertices (T, V, 3) of a body in so many poses, float32, posed when they are read."""
 
-    def __init__(self, body: Body, rig: Rig, frames: int, poses: Poses) -> None:
-        self._body, self._rig, self._poses = body, rig, poses
-        self.shape = (frames, len(body.vertices_m), 3)
-        self.dtype = np.dtype(np.float32)
+    def made(rows: NDArray[np.intp]) -> NDArray[np.float32]:
+        pose = poses(rows)
+        rotations = rig.body_rotations(pose.turns)
+        return pose_vertices(body, body.skeleton.transforms(rotations, pose.translation_m))
 
-    def __getitem__(self, key: Any) -> NDArray[np.float32]:
-        frames, rest = (key[0], key[1:]) if isinstance(key, tuple) else (key, ())
-        rows = np.arange(self.shape[0])[frames]
-        pose = self._poses(np.atleast_1d(rows))
-        rotations = self._rig.body_rotations(pose.turns)
-        transforms = self._body.skeleton.transforms(rotations, pose.translation_m)
-        vertices = pose_vertices(self._body, transforms)
-        return vertices[(slice(None) if rows.ndim else 0, *rest)]
+    return MadeVertices((frames, len(body.vertices_m), 3), np.float32, made)
 
 
 def mean_over_limbs(landmarks: Floats) -> NDArray[np.float32]:

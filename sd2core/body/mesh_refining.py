@@ -19,6 +19,7 @@ from sd2core.body.parts import body_parts
 from sd2core.body.rotations import Floats
 from sd2core.body.solve import liveliness
 from sd2core.errors import Sd2Error
+from sd2core.mesh.made_vertices import MadeVertices
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.progress import Progress, silent
@@ -125,13 +126,13 @@ def refined(mesh: MeshSequence, progress: Progress = silent) -> MeshSequence:
     return replace(mesh, vertices=vertices, uncertainty=uncertainty, notes=(*mesh.notes, note))
 
 
-class RefinedVertices:
+class RefinedVertices(MadeVertices):
     """Vertices (T, V, 3) that are smoothed where they are read, a part of the clip at a time."""
 
     def __init__(self, mesh: MeshSequence) -> None:
+        shape = (mesh.frame_count, mesh.vertex_count, 3)
+        super().__init__(shape, mesh.vertices.dtype, self._smoothed)
         self._mesh = mesh
-        self.shape = (mesh.frame_count, mesh.vertex_count, 3)
-        self.dtype = np.dtype(mesh.vertices.dtype)
         step_s = float(np.median(np.diff(mesh.times_s))) if mesh.frame_count > 1 else 1.0
         self._margin = int(np.ceil(_MARGIN_S / step_s))
         frame_bytes = 3 * mesh.vertex_count * self.dtype.itemsize
@@ -143,15 +144,12 @@ class RefinedVertices:
         frames = self.shape[0]
         return [(k, min(k + self._step, frames)) for k in range(0, frames, self._step)]
 
-    def __getitem__(self, key: Any) -> NDArray[Any]:
-        frames, rest = (key[0], key[1:]) if isinstance(key, tuple) else (key, ())
-        rows = np.arange(self.shape[0])[frames]
-        asked = np.atleast_1d(rows)
-        found = np.empty((len(asked), *self.shape[1:]), self.dtype)
-        for start in np.unique(asked // self._step) * self._step:
-            there = asked // self._step == start // self._step
-            found[there] = self._part(int(start))[asked[there] - start]
-        return found[(slice(None) if rows.ndim else 0, *rest)]
+    def _smoothed(self, rows: NDArray[np.intp]) -> NDArray[Any]:
+        found = np.empty((len(rows), *self.shape[1:]), self.dtype)
+        for start in np.unique(rows // self._step) * self._step:
+            there = rows // self._step == start // self._step
+            found[there] = self._part(int(start))[rows[there] - start]
+        return found
 
     def _part(self, start: int) -> NDArray[Any]:
         if self._kept is None or self._kept[0] != start:

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.denoise.card import ModelCard
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
@@ -41,14 +42,6 @@ class Card(Protocol):
         """Frames per second."""
 
 
-class DenoiserCard(Card, Protocol):
-    """Properties of the maps that a denoiser turns into a radar's."""
-
-    @property
-    def parts(self) -> tuple[str, ...]:
-        """Parts of the body whose limb maps are the input; none: the map is."""
-
-
 Energies = NDArray[np.float32]
 """Energies without a gap, (frames, bins)."""
 
@@ -65,7 +58,7 @@ _BREAK_FRAMES = 5.0
 """Number of missing frames after which a new clip begins."""
 
 
-def check_map(doppler: DopplerMap, card: DenoiserCard) -> None:
+def check_map(doppler: DopplerMap, card: ModelCard) -> None:
     """Raise Sd2Error for a map that is not synthetic or does not fit the model."""
     model = f"the model {card.title or card.name}"
     if doppler.kind != "synthetic":

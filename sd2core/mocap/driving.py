@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.evidence import Evidence
-from sd2core.body.fitted import FittedVertices
+from sd2core.body.fitted import fitted_vertices
 from sd2core.body.initial import Pose, initial_pose
 from sd2core.body.lifter import FEET
 from sd2core.body.model import Resolution, Skeleton
@@ -191,7 +191,7 @@ class DrivenClip:
         body = space.load(resolution, self.puppet.shape)
         rig = Rig(body.skeleton, self.puppet.keypoints)
         pose = resample_pose(self.pose, self.clip.times_s, times_s)
-        vertices = FittedVertices(body, rig, len(times_s), pose.at)
+        vertices = fitted_vertices(body, rig, len(times_s), pose.at)
         return MeshSequence(vertices, body.faces, Timebase(times_s), "body driven by a skeleton")
 
 

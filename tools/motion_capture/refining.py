@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sd2core.body.fitted import FittedVertices
+from sd2core.body.fitted import fitted_vertices
 from sd2core.body.initial import Pose
 from sd2core.body.mesh_refining import refined
 from sd2core.body.model import vertex_normals
@@ -60,7 +60,9 @@ def _before_camera(motion: BodyMotion, space: ShapeSpace, keypoints: KeypointSpa
     frames = min(len(motion), _MAX_FRAMES)
     pose = Pose(from_vector(motion.vectors[:frames]), motion.translation_m[:frames])
     body = space.load("low", motion.shape)
-    posed = FittedVertices(body, keypoints.rig(motion.shape), frames, pose.at)[:].astype(np.float64)
+    posed = fitted_vertices(body, keypoints.rig(motion.shape), frames, pose.at)[:].astype(
+        np.float64
+    )
     posed[..., 0] -= posed[..., 0].mean()
     posed[..., 1] += _ABOVE_FLOOR_M
     posed[..., 2] += _NEAREST_M - posed[..., 2].min()
