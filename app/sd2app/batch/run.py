@@ -29,7 +29,7 @@ class Failed:
 
 class _Facts(NamedTuple):
     about: dict[str, Any]
-    log: str
+    log: str  # its end
     has_plan: bool
 
 
@@ -113,11 +113,6 @@ class BatchMonitor(RunMonitor[BatchFolder]):
         """Steps of the plan, in order."""
         start = self.history.lines[:1]
         return tuple(map(str, start[0].get("steps", ()))) if start else ()
-
-    @property
-    def log(self) -> str:
-        """End of the log."""
-        return self.facts.log
 
     @property
     def resumable(self) -> bool:

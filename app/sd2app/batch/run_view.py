@@ -104,7 +104,7 @@ class BatchRunView(RunView[BatchMonitor]):
         _show(self._failures, "\n\n".join(map(failure_text, failures)) or "None.")
         count = len(failures)
         self._inner.name_page(_FAILURES_PAGE, f"{_FAILURES} ({count})" if count else _FAILURES)
-        _show(self._log, run.log or "Nothing was noted.")
+        _show(self._log, run.facts.log or "Nothing was noted.")
         if results.card != self._shown_card:
             self._shown_card = results.card
             self._card.setMarkdown(results.card or _NO_DATASET)

@@ -29,11 +29,6 @@ class DenoiserChoice:
         path = Path(path)
         return cls(bundled=path.stem) if is_bundled(path) else cls(path=path.absolute())
 
-    @property
-    def fields(self) -> dict[str, object]:
-        """Fields of a recording that remember it."""
-        return {"denoiser": self.path, "bundled_denoiser": self.bundled}
-
 
 UNSAID = DenoiserChoice()
 """The bundled default, where there is one."""

@@ -315,7 +315,8 @@ class Edits:
 
     def choose_denoiser(self, choice: DenoiserChoice) -> None:
         """Denoise the recording with another model, or with none."""
-        self._change("Choose denoiser", choice.fields)
+        fields = {"denoiser": choice.path, "bundled_denoiser": choice.bundled}
+        self._change("Choose denoiser", fields)
 
     # --- the history ----------------------------------------------------------------------
 

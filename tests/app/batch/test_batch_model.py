@@ -270,7 +270,7 @@ def test_a_batch_runs_to_its_end_and_its_results_are_listed(qtbot, made, meshes)
     # What only served to start it is gone.
     assert not run.folder.output.exists()
     assert not plan_of(run.folder.path).exists()
-    assert run.log.splitlines() == [f"looked at {file.name}" for file in meshes]
+    assert run.facts.log.splitlines() == [f"looked at {file.name}" for file in meshes]
     qtbot.waitUntil(lambda: bool(model.results.rows))
     # One row per map, of two stretches each.
     assert [(row.recording, row.placement) for row in model.results.rows] == [
