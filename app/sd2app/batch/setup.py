@@ -115,11 +115,6 @@ class BatchSetupModel(RunSetup[Entry]):
             return "Looking for recordings…"
         return ""
 
-    @property
-    def files(self) -> int:
-        """Number of recordings that were found."""
-        return sum(entry.count or 0 for entry in self.data)
-
     def plan(self) -> BatchPlan:
         """Plan in the form that the library takes; Sd2Error if something is missing."""
         from sd2core.batch.plan import BatchPlan, Recordings

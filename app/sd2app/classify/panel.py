@@ -68,7 +68,7 @@ class ClassSetupView(TrainingForm):
         folder.setToolTip("A campaign or pairs, a data set (.zarr), a recording, or several")
         file = menu.addAction("File…", self._add_file)
         file.setToolTip("A data set (.h5, .npz), or a labelled radar file (.h5)")
-        this = menu.addAction("This recording", self._add_this)
+        this = menu.addAction("This recording", lambda: self._labelled.add(*self._this))
         menu.aboutToShow.connect(lambda: this.setEnabled(bool(self._this)))
 
     def _add_folder(self) -> None:
@@ -79,9 +79,6 @@ class ClassSetupView(TrainingForm):
     def _add_file(self) -> None:
         if path := ask_file(self._shell.dialog_parent, "Data set or labelled radar file", _DATA):
             self._labelled.add(path)
-
-    def _add_this(self) -> None:
-        self._labelled.add(*self._this)
 
     @property
     def _this(self) -> tuple[Path, ...]:

@@ -71,7 +71,7 @@ class FitBar(StateBar):
             # First, so that it never comes to where another button was.
             "discard": ("Discard…", "Delete what was done", discard),
             "change": ("Change…", "Choose person, height and place again", change),
-            "follow": ("Follow", "Show each frame as it is worked on", self._toggle),
+            "follow": ("Follow", "Show each frame as it is worked on", self._follow),
             "cancel": ("Cancel", "Stop; what is done can be continued", fit.cancel),
             "resume": ("Resume", "Continue where it stopped", resume),
             "open": ("Open", "Open the new recording", open_result),
@@ -123,7 +123,5 @@ class FitBar(StateBar):
         left_s = progress.left_s if progress and self._fit.state == "running" else None
         self._left.setText("" if left_s is None else f"{about(left_s)} left")
 
-    # --- what is clicked ------------------------------------------------------------------
-
-    def _toggle(self) -> None:
+    def _follow(self) -> None:
         self._on_screen.set_following(self._buttons["follow"].isChecked())

@@ -192,7 +192,8 @@ class NewFromVideoDialog(Dialog):
     def __init__(self, setup: FitSetupModel, palette: Palette, parent: QWidget) -> None:
         super().__init__("New from video", parent)
         self.setup = setup
-        self._build_picture(palette)
+        self.picker = PersonPicker(setup, palette, self)
+        self._slider = FrameSlider(setup.show_frame, self)
         self._build_form()
         self._buttons, self._begin = accepting(self, "Fit")
         tip = "The same as a command for a terminal, which writes the mesh alone"
@@ -203,10 +204,6 @@ class NewFromVideoDialog(Dialog):
         self.resize(960, 560)
 
     # --- building -------------------------------------------------------------------------
-
-    def _build_picture(self, palette: Palette) -> None:
-        self.picker = PersonPicker(self.setup, palette, self)
-        self._slider = FrameSlider(self.setup.show_frame, self)
 
     def _build_form(self) -> None:
         setup = self.setup

@@ -176,7 +176,8 @@ class MeshDialog(Dialog):
         self._slider.show_frame(preview.frame, preview.frames, preview.time_s)
         persons = preview.persons
         listed = [f"{name}: {counted(count, 'frame')}" for name, count in persons.items()]
-        chosen = [*persons].index(str(preview.read_as.person)) + 1 if self._is_chosen else 0
+        person = str(preview.read_as.person)
+        chosen = [*persons].index(person) + 1 if person in persons else 0
         self._person.offer(["the one seen longest" if persons else "the only one", *listed], chosen)
         self._person.setEnabled(len(persons) > 1)
         scale = preview.read_as.scale
@@ -190,10 +191,6 @@ class MeshDialog(Dialog):
         self._say_state()
         self._notes.setText(preview.notes)
         self._take.setEnabled(preview.taken is not None)
-
-    @property
-    def _is_chosen(self) -> bool:
-        return str(self.preview.read_as.person) in self.preview.persons
 
     def _say_state(self) -> None:
         preview = self.preview

@@ -166,10 +166,6 @@ class ImuModel(ReportingModel):
         if recording is not None:
             self._adder.submit(lambda emit: (recording, path, read_signals(path)))
 
-    def remove_file(self) -> None:
-        """Show no real sensor."""
-        self._session.edits.remove_inertial_file()
-
     def save(self, path: Path) -> None:
         """Write the signals that are shown, in the background."""
         signals = self.signals

@@ -103,18 +103,12 @@ class LabelEdits(QObject):
     def relabel(self, label: str) -> None:
         """Give the selected spans another label."""
         self.labels.set_label(label)
-        ids = self._ids()
-        self.apply(lambda labels, base: field_edits.set_field(labels, ids, "label", label))
+        self.give("label", label)
 
-    def put_on_track(self, track: str) -> None:
-        """Put the selected spans on another track."""
+    def give(self, field: Literal["label", "track", "person"], value: str) -> None:
+        """Give the selected spans another label or track, or say whose they are (nobody's: "")."""
         ids = self._ids()
-        self.apply(lambda labels, base: field_edits.set_field(labels, ids, "track", track))
-
-    def give_to(self, person: str) -> None:
-        """Say whose the selected spans are; nobody's with an empty name."""
-        ids = self._ids()
-        self.apply(lambda labels, base: field_edits.set_field(labels, ids, "person", person))
+        self.apply(lambda labels, base: field_edits.set_field(labels, ids, field, value))
 
     def _rename(self, names: dict[str, str]) -> None:
         """Call the persons whose spans are by their new names."""

@@ -259,8 +259,8 @@ class SpanTable(CellTable):
         menu = QMenu(self)
         for title, listed, run in (
             ("Give label", "label", self._edits.relabel),
-            ("Put on track", "track", self._edits.put_on_track),
-            ("Give to person", "person", self._edits.give_to),
+            ("Put on track", "track", partial(self._edits.give, "track")),
+            ("Give to person", "person", partial(self._edits.give, "person")),
         ):
             if not (choices := self._model.choices(listed)):
                 continue

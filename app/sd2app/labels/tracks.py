@@ -97,7 +97,7 @@ class LabelTracks:
         marked = bool(chosen) and chosen[0].track in names
         place = names.index(chosen[0].track) + towards if marked else -1
         if 0 <= place < len(names):
-            self._edits.put_on_track(names[place])
+            self._edits.give("track", names[place])
             self._labels.set_track(self._labels.selected[0].track)
 
     @property

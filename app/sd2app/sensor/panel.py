@@ -146,11 +146,12 @@ class SensorPanel(QWidget):
         offset = pane(row_of((self._offset, 1), find, spacing_px=6, margins_px=0))
         self._receiver = Choice("Receiver whose signal is shown", self)
         self._transmitter = Choice("Transmitter whose signal is shown", self)
-        for choice, choose in (
-            (self._receiver, edits.choose_receiver),
-            (self._transmitter, edits.choose_transmitter),
-        ):
-            choice.currentIndexChanged.connect(lambda place, choose=choose: choose(place or None))
+        self._receiver.currentIndexChanged.connect(
+            lambda place: edits.choose_channel("receiver", place or None)
+        )
+        self._transmitter.currentIndexChanged.connect(
+            lambda place: edits.choose_channel("transmitter", place or None)
+        )
         self._capture_form = form = _form_of(
             ("Offset", offset),
             ("Clutter", self._clutter),

@@ -14,19 +14,12 @@ class Mode(QObject):
         super().__init__(parent)
         self.active = False
 
-    def begin(self) -> None:
-        """Switch it on."""
-        self._set(True)
-
     def end(self) -> None:
         """Switch it off."""
-        self._set(False)
+        if self.active:
+            self.toggle()
 
     def toggle(self) -> None:
         """Switch it on or off."""
-        self._set(not self.active)
-
-    def _set(self, active: bool) -> None:
-        if active != self.active:
-            self.active = active
-            self.changed.emit()
+        self.active = not self.active
+        self.changed.emit()

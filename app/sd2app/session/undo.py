@@ -294,13 +294,9 @@ class Edits:
         self._document.set_clutter(clutter)
         self._push("Choose clutter removal", self._document.set_clutter, before, clutter)
 
-    def choose_receiver(self, number: int | None) -> None:
-        """Show one receiver of the radar, by its number from 1 on, or all together."""
-        self._change("Choose receiver", {"radar_receiver": number})
-
-    def choose_transmitter(self, number: int | None) -> None:
-        """Show one transmitter of the radar, by its number from 1 on, or all together."""
-        self._change("Choose transmitter", {"radar_transmitter": number})
+    def choose_channel(self, of: Literal["receiver", "transmitter"], number: int | None) -> None:
+        """Show one receiver or transmitter, by its number from 1 on, or all together."""
+        self._change(f"Choose {of}", {f"radar_{of}": number})
 
     # --- levels ---------------------------------------------------------------------------
 

@@ -80,7 +80,9 @@ class ProgramFeature(Feature):
         stack, display = self._session.document.undo_stack, self._session.display
         dragging, shell = self._labels.dragging, self._shell
         return (
-            Action("quit", "File", "Quit", ("Ctrl+Q",), "Close the window", self._quit),
+            Action(
+                "quit", "File", "Quit", ("Ctrl+Q",), "Close the window", shell.dialog_parent.close
+            ),
             Action(
                 "undo", "Edit", "Undo", ("Ctrl+Z",), "Take back the last edit of this recording",
                 stack.undo, lambda: stack.canUndo() and not dragging.dragging,
@@ -166,9 +168,6 @@ class ProgramFeature(Feature):
                 labels, parent,
             )
         )  # fmt: skip
-
-    def _quit(self) -> None:
-        self._shell.dialog_parent.close()
 
     def _find_action(self) -> None:
         self._shell.action("find_action")  # all actions follow the models before they are listed

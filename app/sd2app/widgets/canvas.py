@@ -113,11 +113,6 @@ class Canvas(QWidget):
             self.paint(painter)
 
 
-def no_legend(start_s: float, end_s: float) -> Mapping[str, str]:
-    """Legend of what needs none."""
-    return {}
-
-
 class Overlay(NamedTuple):
     """Painter of something over a map, such as labels, and the signals after which it differs.
 
@@ -126,4 +121,4 @@ class Overlay(NamedTuple):
 
     paint: Callable[[QPainter, QRectF, TimeScale], None]
     changed: tuple[SignalInstance, ...] = ()
-    legend: Callable[[float, float], Mapping[str, str]] = no_legend
+    legend: Callable[[float, float], Mapping[str, str]] = lambda start_s, end_s: {}

@@ -29,11 +29,6 @@ ROUND = ((1,), (1, 3), (1, 2, 5), (1, 2, 3, 5, 7), (1, 1.5, 2, 3, 4, 5, 6, 8))
 _CAP_PX = 3.0
 
 
-def plain_text(value: float) -> str:
-    """Text of a tick: a number as short as it is."""
-    return f"{value:g}".replace("-", "−")
-
-
 @dataclass(frozen=True)
 class Scale:
     """Axis of a chart."""
@@ -43,7 +38,7 @@ class Scale:
     log: bool = False
     whole: bool = False  # ticks at whole numbers only
     values: tuple[float, ...] = ()  # ticks; round numbers where none are given
-    text: Callable[[float], str] = plain_text  # of a tick
+    text: Callable[[float], str] = lambda value: f"{value:g}".replace("-", "−")  # of a tick
 
     @classmethod
     def around(

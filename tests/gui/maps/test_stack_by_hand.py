@@ -234,7 +234,7 @@ def test_a_picture_of_a_map_has_axes_with_units_a_scale_and_a_legend_and_no_read
     # With the pointer on it, the clock elsewhere and a grip: the picture is the same.
     qtbot.mouseMove(view, view.plot_rect().center().toPoint())
     c.playback.seek_frame(40)
-    c.session.aligning.begin()
+    c.session.aligning.toggle()
     assert c.pointer.reading is not None
     assert pixmap_of(view).toImage() == quiet
     c.session.aligning.end()

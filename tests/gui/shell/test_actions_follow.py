@@ -38,7 +38,7 @@ def test_every_action_follows_what_it_depends_on(labelled, fake_models, qtbot) -
         "play": c.playback.play,
         "pause": c.playback.pause,
         "loop": lambda: c.playback.set_loop(not c.playback.loop),
-        "place": c.placing.begin,
+        "place": c.placing.toggle,
         "placed": c.placing.end,
         "colour": lambda: c.display.set_mesh_colour("range"),
         "dots": lambda: c.display.set_as_dots(True),
