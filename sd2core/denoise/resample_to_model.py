@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.denoise.card import ModelCard
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
 from sd2core.progress import Progress
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
+
+if TYPE_CHECKING:
+    from sd2core.denoise.card import ModelCard
 
 
 class Card(Protocol):

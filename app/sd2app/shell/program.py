@@ -81,7 +81,8 @@ class ProgramFeature(Feature):
         dragging, shell = self._labels.dragging, self._shell
         return (
             Action(
-                "quit", "File", "Quit", ("Ctrl+Q",), "Close the window", shell.dialog_parent.close
+                "quit", "File", "Quit", ("Ctrl+Q",), "Close the window",
+                lambda: shell.dialog_parent.close(),
             ),
             Action(
                 "undo", "Edit", "Undo", ("Ctrl+Z",), "Take back the last edit of this recording",

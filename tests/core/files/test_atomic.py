@@ -67,9 +67,10 @@ def test_files_of_other_threads_keep_their_permissions_meanwhile(tmp_path, monke
         other.join()
         return before
 
-    monkeypatch.setattr(os, "umask", interrupted)
-    os.umask(0o027)  # the mask as it is
-    atomic_write_text(tmp_path / "file.json", "text")
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "umask", interrupted)
+        os.umask(0o027)  # the mask as it is
+        atomic_write_text(tmp_path / "file.json", "text")
     assert {*modes} == {0o640}
 
 

@@ -71,7 +71,8 @@ def test_fitted_meshes_are_measured(fitting: Tool, truth: Path, tmp_path: Path) 
     outcome = fitting("score", truth, "--keep", fits, "--markdown", tmp_path / "table.md")
     assert outcome.code == 0
     assert re.search(r"who stands still: .* 0\.000 m/s +≤ 0\.015 +yes", outcome.out)
-    assert "| still |" in (tmp_path / "table.md").read_text("utf-8")
+    assert "who stands still" in (tmp_path / "table.md").read_text("utf-8")
+    assert (tmp_path / "table.csv").read_text("utf-8").splitlines()[1].startswith("still,still,")
 
 
 def test_clips_are_fitted_with_what_is_known(
