@@ -129,15 +129,14 @@ def test_progress_is_told_to_other_programs(sd2: Sd2, store: Path, tmp_path: Pat
 def test_who_stops_keeps_the_best(
     sd2: Sd2, store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    steps = training._Learning.run
+    step = training._ClassifierLoop.step
 
-    def interrupted(self):
-        for number, loss in enumerate(steps(self)):
-            if number == 40:
-                raise KeyboardInterrupt
-            yield loss
+    def interrupted(loop: training._ClassifierLoop) -> None:
+        if loop.position.steps_done == 40:
+            raise KeyboardInterrupt
+        step(loop)
 
-    monkeypatch.setattr(training._Learning, "run", interrupted)
+    monkeypatch.setattr(training._ClassifierLoop, "step", interrupted)
     out = tmp_path / "m.safetensors"
     told = sd2("classify", "train", store, "--out", out, "--json")
     assert told.code == 130
