@@ -15,7 +15,7 @@ class LiveBar(StateBar):
     """Hidden until something is listened to; ``go_on`` and ``show_again`` ask before they act."""
 
     def __init__(
-        self, live: LiveModel, go_on: Callable[[], object], show_again: Callable[[], object]
+        self, live: LiveModel, go_on: Callable[[], None], show_again: Callable[[], None]
     ) -> None:
         super().__init__("Radar that is listened to")
         self._live = live

@@ -46,8 +46,7 @@ class LiveFeature(Feature):
 
     def bars(self) -> Sequence[QWidget]:
         """What comes in, and what can be done about it."""
-        model, may_discard = self.model, self._shell.may_discard
-        return (LiveBar(model, self._go_on, lambda: may_discard() and model.show()),)
+        return (LiveBar(self.model, self._go_on, self._show_again),)
 
     @property
     def _busy(self) -> bool:
@@ -73,6 +72,10 @@ class LiveFeature(Feature):
     def _go_on(self) -> None:
         if self.model.on_screen or self._shell.may_discard():
             self.model.go_on()
+
+    def _show_again(self) -> None:
+        if self._shell.may_discard():
+            self.model.show()
 
     def may_close(self) -> bool:
         """Ask whether listening may stop with the window."""

@@ -61,13 +61,10 @@ class LiveModel(QObject):
         self._is_shown = True  # false where the recording cannot be read
         self._process: LiveProcess | None = None
         self._teller = delayed(self.changed.emit, _TELL_MS, self)
-        # The window has just been painted: the newest frame took so long.
-        waited_s = self._latencies_s.append
-        self._painted = delayed(lambda: waited_s(time.time() - self.received_unix_s), 0, self)
+        self._painted = delayed(self._note_latency, 0, self)
         self._document.changed.connect(self._begin_when_open)
         self._document.failed.connect(self._fail_to_open)
-        # What has ended is forgotten once another recording is open, or none.
-        self._document.opened.connect(lambda: self.on_screen or self.dismiss())
+        self._document.opened.connect(self._leave_with_recording)
 
     # --- what is known --------------------------------------------------------------------
 
@@ -136,6 +133,11 @@ class LiveModel(QObject):
         """Forget it, once it has ended."""
         if not self.busy:
             self._set_state("idle")
+
+    def _leave_with_recording(self) -> None:
+        """Forget what has ended once another recording is open, or none."""
+        if not self.on_screen:
+            self.dismiss()
 
     def show(self) -> None:
         """Show the recording again, in place of what was opened meanwhile."""
@@ -305,6 +307,10 @@ class LiveModel(QObject):
         if strongest > self._reference:
             real.set_reference(strongest)
             self._reference = strongest
+
+    def _note_latency(self) -> None:
+        """Note how long the newest frame took: the window has just been painted."""
+        self._latencies_s.append(time.time() - self.received_unix_s)
 
     def _set_state(self, state: State) -> None:
         if state != self.state:

@@ -6,7 +6,7 @@ import functools
 import threading
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -367,22 +367,19 @@ class SynthesisModel(QObject):
             emit(part if postprocess is None else replace(part, more=postprocess(part)))
 
         with ThreadPoolExecutor(1, "postprocess") as beside:
-            before: Future[None] | None = None
+            before = beside.submit(lambda: None)
             while True:
                 self._woken.clear()
-                ended = before is None or before.done()
+                ended = before.done()
                 try:
                     sweep, postprocess = self._next_sweep.pop()
                 except IndexError:
-                    if not ended:
-                        self._woken.wait()
-                        continue
-                    if before is not None:
-                        before.result()
-                    return
+                    if ended:
+                        return before.result()
+                    self._woken.wait()
+                    continue
                 part = sweep(proceed=lambda: emit(None))
-                if before is not None:
-                    before.result()
+                before.result()
                 before = beside.submit(more_of, part, postprocess)
                 before.add_done_callback(lambda _: self._woken.set())
 

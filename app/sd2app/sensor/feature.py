@@ -56,8 +56,7 @@ class SensorFeature(Feature):
             Action(
                 "aim_sensor", "Edit", "Aim sensor at the body", ("A",),
                 "Turn the sensor towards the body in this frame",
-                lambda: synthesis.torso_m and edits.aim_sensor(synthesis.torso_m),
-                lambda: synthesis.torso_m is not None,
+                self._aim, lambda: synthesis.torso_m is not None,
             ),
             Action(
                 "placements", "Edit", "Placements…", ("Shift+S",),
@@ -98,6 +97,10 @@ class SensorFeature(Feature):
                 lambda: self._shell.bring_up("Sensor", "Sensor"),
             ),
         )  # fmt: skip
+
+    def _aim(self) -> None:
+        if self._synthesis.torso_m is not None:
+            self._session.edits.aim_sensor(self._synthesis.torso_m)
 
     def _align(self) -> None:
         parent, display = self._shell.dialog_parent, self._session.display

@@ -71,7 +71,7 @@ class DocumentModel(QObject):
         self._asked: list[Path] = []  # files that were opened last
         self._cured = False
         self._runner = ListedRunner("open", jobs, self, self._receive)
-        self._runner.failed.connect(lambda error: self._offer(offers_of([error]) or self.offers))
+        self._runner.failed.connect(self._offer_instead)
         self._maps = ListedRunner("radar", jobs, self, self._receive_map)
         for runner in (self._runner, self._maps):
             runner.failed.connect(lambda error: self.failed.emit(words_of(error)))
@@ -219,6 +219,10 @@ class DocumentModel(QObject):
         if offers != self.offers:
             self.offers = offers
             self.offered.emit()
+
+    def _offer_instead(self, error: Exception) -> None:
+        if offers := offers_of([error]):
+            self._offer(offers)
 
     def follow(self, content: Content) -> None:
         """Show a recording that a radar's frames are added to, from now on by :meth:`grow`.
