@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
@@ -13,11 +14,11 @@ from numpy.typing import NDArray
 from sd2core.doppler import histogram, vid2doppler
 from sd2core.doppler.histogram import Counting, Paths
 from sd2core.doppler.prepared import Block, PreparedMesh
-from sd2core.mesh.things import Surface, before_wall
+from sd2core.mesh.things import Surroundings, before_wall
 from sd2core.mesh.walls import Wall
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering import depth_plain, exact_plain
-from sd2core.scattering.behind_things import CORNERS, hide_behind, may_hide
+from sd2core.scattering.behind_things import Hiding, hide_behind
 from sd2core.scattering.depth import depth_visibility_kernel
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.scattering.visibility import facing_kernel, facing_mask
@@ -306,6 +307,7 @@ class VisibilityMasks:
         alone, apart = mask, self._wall is None and self._has_others
         if apart:
             alone = self._block_mask(block.index, place, occlusion, alone=True)
+        needed = functools.cache(needed)
         if not alone.done[rows].all():
             visible, marked = _facing(view, self._prepared.normals(block)[rows]), needed()
             self._test_alone(view, marked, visible, occlusion)
@@ -428,23 +430,12 @@ class VisibilityMasks:
     ) -> None:
         """Set ``visible`` to 0 of what things hide, and of the needed vertices that others hide."""
         # Of all vertices: what hides them is soon looked at, and the share that is seen is right.
-        around = self._prepared.mesh.surroundings
-        if around is not None and around.things:
-            boxes_m = self._prepared.boxes(view.first, view.first + len(view.points))
-            _hide_behind_things(around.surface, around.boxes_m, view, boxes_m, visible)
-        if self.others and (near := self._near_others(view)).any():
-            marked = needed() & near[:, None]
-            boxes_m = view.boxes_m(visible & marked)
+        for thing in _things(self._prepared.mesh.surroundings):
+            view.hide(thing, visible, visible)
+        if self.others:
+            marked = needed()
             for other in self.others:
-                self._hide_behind_body(other, view, boxes_m, marked, visible)
-
-    def _near_others(self, view: _View) -> NDArray[np.bool_]:
-        """Frames (n,) in which others may hide something, by the boxes of all their vertices."""
-        start, stop = view.first, view.first + len(view.points)
-        own_m, places_m = self._prepared.boxes(start, stop), view.places_m + view.origins_m
-        return np.logical_or.reduce(
-            [may_hide(other.boxes(start, stop), own_m, places_m) for other in self.others]
-        )
+                self._hide_behind_body(other, view, marked, visible)
 
     def _hide_by_way_of(
         self,
@@ -457,42 +448,31 @@ class VisibilityMasks:
 
         Where visibility is not needed, too: no share is reported of what comes by a wall.
         """
-        around = self._prepared.mesh.surroundings
-        assert around is not None
         visible &= needed
-        surface, boxes_m = before_wall(wall, *around.surface), view.boxes_m(visible)
-        corners_m = wall.mirrored(boxes_m[:, CORNERS, [0, 1, 2]])
-        image_m = np.stack([corners_m.min(axis=1), corners_m.max(axis=1)], axis=1)
         # The sensor's image sees images as the sensor sees what they are images of.
         image = view.mirrored(wall)
-        self._hide_behind_body(self._prepared, image, image_m, needed, visible)
-        for seen, seen_boxes_m in ((view, boxes_m), (image, image_m)):
-            if around.things:
-                _hide_behind_things(surface, around.boxes_m, seen, seen_boxes_m, visible)
+        self._hide_behind_body(self._prepared, image, needed, visible)
+        things = _things(self._prepared.mesh.surroundings, wall)
+        for seen in (view, image):
+            for thing in things:
+                seen.hide(thing, needed, visible)
             for other in self.others:
-                self._hide_behind_body(other, seen, seen_boxes_m, needed, visible)
+                self._hide_behind_body(other, seen, needed, visible)
 
     def _hide_behind_body(
         self,
         other: PreparedMesh,
         view: _View,
-        boxes_m: NDArray[np.float64],
         needed: NDArray[np.uint8],
         visible: NDArray[np.uint8],
     ) -> None:
         """Set ``visible`` of the needed vertices to 0 where another body hides them."""
-        assert other.faces is not None  # MeshSequence refuses others without
-        start, stop = view.first, view.first + len(view.points)
-        near = may_hide(other.boxes(start, stop), boxes_m, view.places_m + view.origins_m)
-        asked = visible & needed
-        near &= other.mesh.presence.there[start:stop] & asked.any(axis=1)
-        for t in np.flatnonzero(near).tolist():
-            seen = asked[t].copy()
-            surface = other.frame_m(start + t), other.faces
-            if self._wall is not None and other is not self._prepared:
-                surface = before_wall(self._wall, *surface)
-            view.hide(t, *surface, seen)
-            visible[t][asked[t] > seen] = 0
+        wall = None if other is self._prepared else self._wall
+        first, there = view.first, other.mesh.presence.there
+        for start, stop, hiding in other.hiding(first, first + len(visible), wall):
+            rows = slice(start - first, stop - first)
+            asked = needed[rows] & there[start:stop, None]
+            view.rows(rows).hide(hiding, asked, visible[rows])
 
     def _test_body(
         self,
@@ -534,31 +514,20 @@ class _View:
     origins_m: NDArray[np.float64]  # these points, in the camera frame, (n, 3)
     first: int  # number of the first frame in the clip
 
-    def boxes_m(self, marks: NDArray[np.uint8]) -> NDArray[np.float64]:
-        """Lowest and highest corner of the marked vertices in the camera frame, (n, 2, 3)."""
-        marked = marks[:, None] > 0
-        low = np.where(marked, self.points, np.float32(np.inf)).min(axis=2)
-        high = np.where(marked, self.points, np.float32(-np.inf)).max(axis=2)
-        ends = np.stack([low, high], axis=1)
-        ends[~marked.any(axis=(1, 2))] = 0
-        boxes: NDArray[np.float64] = ends + self.origins_m[:, None]
-        return boxes
-
     def mirrored(self, wall: Wall) -> _View:
         """Image behind a wall."""
         turn = np.eye(3) - 2.0 * np.outer(wall.outward, wall.outward)
         points = turn.astype(np.float32) @ self.points
         return _View(points, self.places_m @ turn, wall.mirrored(self.origins_m), self.first)
 
-    def hide(
-        self,
-        t: int,
-        vertices_m: NDArray[np.float64],
-        faces: NDArray[np.int32],
-        seen: NDArray[np.uint8],
-    ) -> None:
-        """Set ``seen`` (V,) to 0 in a frame where a surface in the camera frame hides it."""
-        hide_behind(vertices_m, faces, self.points[t], self.origins_m[t], self.places_m[t], seen)
+    def rows(self, rows: slice) -> _View:
+        """Some of these frames."""
+        first = self.first + rows.start
+        return _View(self.points[rows], self.places_m[rows], self.origins_m[rows], first)
+
+    def hide(self, hiding: Hiding, needed: NDArray[np.uint8], visible: NDArray[np.uint8]) -> None:
+        """Set ``visible`` of the needed vertices to 0 where a surface hides them, (n, V)."""
+        hide_behind(hiding, self.points, self.origins_m, self.places_m, needed, visible)
 
     def stretches(self) -> list[tuple[int, int]]:
         """Half-open runs of frames in which the sensor does not move."""
@@ -567,23 +536,12 @@ class _View:
         return [(t, t + 1) for t in range(len(self.points))]
 
 
-def _hide_behind_things(
-    surface: Surface,
-    things_m: NDArray[np.float64],
-    view: _View,
-    boxes_m: NDArray[np.float64],
-    visible: NDArray[np.uint8],
-) -> None:
-    """Set ``visible`` (n, V) to 0 where things, in boxes (things, 2, 3), hide a body in others."""
-    things, places_m = len(things_m), view.places_m + view.origins_m
-    pairs = np.tile(things_m, (len(boxes_m), 1, 1)), np.repeat(boxes_m, things, axis=0)
-    near = (
-        may_hide(*pairs, np.repeat(places_m, things, axis=0))
-        .reshape(len(boxes_m), things)
-        .any(axis=1)
-    )
-    for t in np.flatnonzero(near).tolist():
-        view.hide(t, *surface, visible[t])
+def _things(around: Surroundings | None, wall: Wall | None = None) -> list[Hiding]:
+    """All things as one surface, or what is before a wall of them; none if there are none."""
+    if around is None or not around.things:
+        return []
+    surface = around.surface if wall is None else before_wall(wall, *around.surface)
+    return [Hiding.still(*surface, around.boxes_m)]
 
 
 def position_of(place_m: NDArray[np.float64]) -> Position:

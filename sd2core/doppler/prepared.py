@@ -6,7 +6,7 @@ import copy
 import itertools
 import math
 import threading
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -30,6 +30,7 @@ from sd2core.numerics.compiled import kernels_ready
 from sd2core.numerics.precision import single_is_enough
 from sd2core.options.bounds import RANGE_EXPONENT
 from sd2core.scattering import amplitude, visibility
+from sd2core.scattering.behind_things import Hiding
 from sd2core.scattering.trajectory import Trajectory
 from sd2core.scattering.velocity import moments
 
@@ -222,22 +223,37 @@ class PreparedMesh:
             points = points - place_m[:, :, None]
         return np.ascontiguousarray(points, np.float32), place_m
 
-    def frame_m(self, frame: int) -> NDArray[np.float64]:
-        """Vertices in the middle of a frame of the clip, in the camera frame, (V, 3)."""
-        index, local = divmod(frame, self.block_frames)
-        return self.points(self.block(index))[local].T + self.origin_m
+    def hiding(
+        self, start: int, stop: int, wall: Wall | None = None
+    ) -> Iterator[tuple[int, int, Hiding]]:
+        """Surface in the middle of some frames of the clip, block by block, with these frames.
 
-    def boxes(self, start: int, stop: int) -> NDArray[np.float64]:
-        """Lowest and highest corner of some frames of the clip in the camera frame, (n, 2, 3)."""
+        Of a body with faces, without those that are wholly behind a wall.
+        """
+        assert self.faces is not None
 
         def ends(block: Block) -> NDArray[np.float64]:
             points = self.points(block)
             return np.stack([points.min(axis=2), points.max(axis=2)], axis=1)
 
-        size = self.block_frames
-        first, last = start // size, (stop - 1) // size
-        found = [self._kept("boxes", self.block(at), ends) for at in range(first, last + 1)]
-        return np.concatenate(found)[start - first * size : stop - first * size] + self.origin_m
+        while start < stop:
+            index, local = divmod(start, self.block_frames)
+            block, last = self.block(index), min(stop, self.span(index)[1])
+            rows = slice(local, local + last - start)
+            points, around_m = self.near_points(block, rows)
+            before = None if wall is None else self.before_wall(block, wall)
+            yield (
+                start,
+                last,
+                Hiding(
+                    points,
+                    around_m + self.origin_m,
+                    self.faces,
+                    self._kept("boxes", block, ends)[rows, None] + self.origin_m,
+                    None if before is None else before[rows],
+                ),
+            )
+            start = last
 
     def normals(self, block: Block, moving: MovingVertices | None = None) -> NDArray[np.int8]:
         """Vertex normals of a block's frames, int8 (n, 3, V).

@@ -143,13 +143,13 @@ class MeshScene:
 
     def _others_before(self, time_s: float) -> list[Surface]:
         """Surfaces of the others that may hide some of this one at an instant."""
-        place_m = np.asarray(self.sensor.position_m, np.float64)[None]
+        place_m = np.asarray(self.sensor.position_m, np.float64)
         own, found = None, []
         for other in self.others:
             if other.there(time_s):
                 own = _box(self.surface(time_s)) if own is None else own
                 surface = other.surface(time_s)
-                if may_hide(_box(surface), own, place_m)[0]:
+                if may_hide(_box(surface), own, place_m):
                     found.append(surface)
         return found
 
@@ -244,5 +244,5 @@ class MeshScene:
 
 
 def _box(surface: Surface) -> NDArray[np.float64]:
-    """Lowest and highest corner, (1, 2, 3)."""
-    return np.stack([surface[0].min(axis=0), surface[0].max(axis=0)])[None]
+    """Lowest and highest corner, (2, 3)."""
+    return np.stack([surface[0].min(axis=0), surface[0].max(axis=0)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -89,7 +90,7 @@ class Wall:
         """Text such as ``floor at 1.1 m, 8.2 dB``."""
         return f"{self.name} at {self.distance_m:g} m, {self.loss_db:g} dB"
 
-    @property
+    @cached_property
     def outward(self) -> NDArray[np.float64]:
         """Unit vector from the room into the wall, (3,)."""
         return np.array(direction_from_angles(self.azimuth_deg, self.elevation_deg))

@@ -33,6 +33,7 @@ KERNEL_MODULES = (
     "sd2core.scattering.beam_kernels",
     "sd2core.scattering.visibility",
     "sd2core.scattering.exact",
+    "sd2core.scattering.behind_things",
     "sd2core.scattering.depth",
     "sd2core.doppler.kernels",
     "sd2core.doppler.moving_kernels",

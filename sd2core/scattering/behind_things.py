@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.numerics.compiled import kernels_ready
-from sd2core.scattering.exact import exact_visibility_kernel
+from sd2core.numerics.compiled import compiled, kernels_ready
+from sd2core.scattering.exact import frame_scratch, see_frame
 from sd2core.scattering.exact_plain import exact_visibility
-
-CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-"""Which end of a box in x, y, z each corner is at, (8, 3)."""
 
 _ROOM = 1e-5
 """Tangent by which pictures are taken to be larger than they are, for roundings."""
@@ -21,80 +18,207 @@ _NEAR_M = 1e-3
 """Depth from which on a picture tells what is where."""
 
 
+@dataclass(frozen=True, eq=False)
+class Hiding:
+    """Surface that may hide something, in each of n frames or the same (1) in all of them."""
+
+    points: NDArray[np.float32]  # (n or 1, 3, W), relative to
+    origins_m: NDArray[np.float64]  # (n or 1, 3), in the camera frame
+    faces: NDArray[np.int32]  # (F, 3)
+    boxes_m: NDArray[np.float64]
+    """Ends of boxes around all of it, in the camera frame, (n or 1, K, 2, 3)."""
+    counts: NDArray[np.uint8] | None = None
+    """Vertices that hide at all, (n, W): faces without any do not. None: all."""
+
+    @classmethod
+    def still(
+        cls,
+        vertices_m: NDArray[np.float64],
+        faces: NDArray[np.int32],
+        boxes_m: NDArray[np.float64] | None = None,
+    ) -> Hiding:
+        """What does not move, by its vertices (W, 3), in boxes (K, 2, 3) or in one around it."""
+        if boxes_m is None:
+            boxes_m = np.stack([vertices_m.min(axis=0), vertices_m.max(axis=0)])[None]
+        origin_m = 0.5 * (boxes_m[:, 0].min(axis=0) + boxes_m[:, 1].max(axis=0))
+        points = (vertices_m - origin_m).T[None]
+        return cls(np.ascontiguousarray(points, np.float32), origin_m[None], faces, boxes_m[None])
+
+
+def may_hide(
+    hiding_m: NDArray[np.float64], hidden_m: NDArray[np.float64], place_m: NDArray[np.float64]
+) -> bool:
+    """True if something in one box may hide something in another.
+
+    It cannot where the boxes do not overlap in the sensor's picture, or the first lies deeper.
+
+    Parameters
+    ----------
+    hiding_m, hidden_m : float64 array, shape (2, 3)
+        Lowest and highest corner of each box, in the frame of the sensor's place.
+    place_m : float64 array, shape (3,)
+        Of the sensor.
+    """
+    # The picture is that along the axis of the frame which points most towards the second box.
+    forward, most, sign = 0, -1.0, 1.0
+    for axis in range(3):
+        away = 0.5 * (hidden_m[0, axis] + hidden_m[1, axis]) - place_m[axis]
+        if abs(away) > most:
+            forward, most, sign = axis, abs(away), -1.0 if away < 0 else 1.0
+    first, last = (0, 1) if sign > 0 else (1, 0)
+    near = sign * (hiding_m[first, forward] - place_m[forward])
+    deep = sign * (hiding_m[last, forward] - place_m[forward])
+    front = sign * (hidden_m[first, forward] - place_m[forward])
+    back = sign * (hidden_m[last, forward] - place_m[forward])
+    # Of a box that reaches around the sensor or behind it, no picture tells.
+    if near <= _NEAR_M or front <= _NEAR_M:
+        return True
+    if near > back:
+        return False
+    for axis in range(3):
+        if axis == forward:
+            continue
+        low, high = hiding_m[0, axis] - place_m[axis], hiding_m[1, axis] - place_m[axis]
+        under, over = hidden_m[0, axis] - place_m[axis], hidden_m[1, axis] - place_m[axis]
+        if min(low / near, low / deep) > max(over / front, over / back) + _ROOM:
+            return False
+        if max(high / near, high / deep) < min(under / front, under / back) - _ROOM:
+            return False
+    return True
+
+
+_may_hide = compiled(may_hide)
+
+
+@compiled
+def _hide_behind_kernel(  # type: ignore[no-untyped-def]
+    surface, surface_origins_m, faces, boxes_m, counts,
+    points, origins_m, places_m, needed, visible,
+) -> None:  # fmt: skip
+    """Do :func:`hide_behind`; ``counts`` (0, W) for all."""
+    vertices, width = points.shape[2], surface.shape[2]
+    room = vertices + width
+    scratch, marked = frame_scratch(room), np.zeros(room, np.uint8)
+    both, seen = np.empty((3, room), np.float32), np.empty(room, np.uint8)
+    asked, kept = np.empty(vertices, np.int32), np.empty_like(faces)
+    box_m = np.empty((2, 3), np.float64)
+    marked[width:] = 1
+    for t in range(points.shape[0]):
+        count = 0
+        for v in range(vertices):
+            asked[count] = v
+            count += visible[t, v] & needed[t, v]
+        if count == 0:
+            continue
+        for axis in range(3):
+            low = high = points[t, axis, asked[0]]
+            for number in range(count):
+                value = points[t, axis, asked[number]]
+                both[axis, width + number] = value
+                low, high = min(low, value), max(high, value)
+            box_m[0, axis] = np.float64(low) + origins_m[t, axis]
+            box_m[1, axis] = np.float64(high) + origins_m[t, axis]
+        place_m = places_m[t] + origins_m[t]
+        boxes, near = boxes_m[min(t, len(boxes_m) - 1)], False
+        for box in range(len(boxes)):
+            near |= _may_hide(boxes[box], box_m, place_m)
+        if not near:
+            continue
+        at = min(t, len(surface) - 1)
+        for axis in range(3):
+            shift_m = surface_origins_m[at, axis] - origins_m[t, axis]
+            for w in range(width):
+                both[axis, w] = np.float64(surface[at, axis, w]) + shift_m
+        hiding = faces
+        if len(counts):
+            left = 0
+            for f in range(len(faces)):
+                i, j, k = faces[f]
+                kept[left] = faces[f]
+                left += (counts[t, i] | counts[t, j] | counts[t, k]) != 0
+            hiding = kept[:left]
+        x, y, z = both[0, : width + count], both[1, : width + count], both[2, : width + count]
+        see_frame(x, y, z, hiding, places_m[t], marked, count, scratch, seen)
+        for number in range(count):
+            visible[t, asked[number]] = seen[width + number]
+
+
 def hide_behind(
-    vertices_m: NDArray[np.float64],
-    faces: NDArray[np.int32],
-    points: NDArray[Any],
-    origin_m: NDArray[np.float64],
-    sensor: NDArray[np.float64],
-    seen: NDArray[np.uint8],
+    hiding: Hiding,
+    points: NDArray[np.float32],
+    origins_m: NDArray[np.float64],
+    places_m: NDArray[np.float64],
+    needed: NDArray[np.uint8],
+    visible: NDArray[np.uint8],
 ) -> None:
-    """Set ``seen`` to 0 for the points of one frame that another surface hides.
+    """Set ``visible`` to 0 for the points of n frames that another surface hides.
 
     A second test beside that of the body itself, and always exact: the pixels of a depth buffer
     are as fine with a table beside the body as without.
 
     Parameters
     ----------
-    vertices_m : float64 array, shape (W, 3)
-        Of that surface, in the camera frame.
-    faces : int32 array, shape (F, 3)
-    points : float array, shape (3, V)
-        Relative to ``origin_m``.
-    origin_m : float64 array, shape (3,)
+    hiding : Hiding
+        That surface.
+    points : float32 array, shape (n, 3, V)
+        Relative to ``origins_m``.
+    origins_m : float64 array, shape (n, 3)
         In the camera frame.
-    sensor : float64 array, shape (3,)
-        In the frame of the points.
-    seen : uint8 array, shape (V,)
-        Written where it is 1; others are not tested.
-    """
-    asked = np.flatnonzero(seen)
-    if not len(asked) or not len(faces):
-        return
-    count = len(vertices_m)
-    both = np.empty((3, count + len(asked)), np.float32)
-    np.subtract(vertices_m.T, origin_m[:, None], out=both[:, :count], casting="same_kind")
-    both[:, count:] = points[:, asked]
-    needed = np.zeros((1, both.shape[1]), np.uint8)
-    needed[0, count:] = 1
-    if not kernels_ready():
-        seen[asked] = exact_visibility(both, faces, sensor, needed[0] > 0)[count:]
-        return
-    visible = np.zeros_like(needed)
-    exact_visibility_kernel(both[None], faces, sensor, needed, 0, 1, visible)
-    seen[asked] = visible[0, count:]
-
-
-def may_hide(
-    hiding_m: NDArray[np.float64], hidden_m: NDArray[np.float64], places_m: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """Frames (n,) in which something in one box may hide something in another.
-
-    It cannot where the boxes do not overlap in the sensor's picture, or the first lies deeper.
-
-    Parameters
-    ----------
-    hiding_m, hidden_m : float64 array, shape (n, 2, 3)
-        Lowest and highest corner of each box, in the frame of the sensor's place.
     places_m : float64 array, shape (n, 3)
-        Of the sensor.
+        Of the sensor, in the frame of the points.
+    needed : uint8 array, shape (n, V)
+        1 for the points that are tested where they are visible.
+    visible : uint8 array, shape (n, V)
     """
-    # The picture is that along the axis of the frame which points most towards the second boxes.
-    away = (hidden_m.mean(axis=1) - places_m).sum(axis=0)
-    forward = int(np.abs(away).argmax())
-    aside, sign = [axis for axis in range(3) if axis != forward], -1.0 if away[forward] < 0 else 1.0
+    if not len(hiding.faces):
+        return
+    if kernels_ready():
+        counts = hiding.counts
+        _hide_behind_kernel(
+            hiding.points, hiding.origins_m, hiding.faces, hiding.boxes_m,
+            np.empty((0, hiding.points.shape[2]), np.uint8) if counts is None else counts,
+            points, origins_m, places_m, needed, visible,
+        )  # fmt: skip
+        return
+    for t in range(len(points)):
+        _hide_plainly(hiding, t, points[t], origins_m[t], places_m[t], needed[t], visible[t])
 
-    def seen(ends_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-        """Depths (n, 8) of a box's corners, and their places in the picture, (n, 8, 2)."""
-        corners = (ends_m - places_m[:, None])[:, CORNERS, [0, 1, 2]]  # (n, 8, 3)
-        depth = sign * corners[:, :, forward]
-        return depth, corners[:, :, aside] / np.maximum(depth, 1e-9)[:, :, None]
 
-    (depth, picture), (far, behind) = seen(hiding_m), seen(hidden_m)
-    overlap = (picture.min(axis=1) <= behind.max(axis=1) + _ROOM) & (
-        picture.max(axis=1) >= behind.min(axis=1) - _ROOM
+def _hide_plainly(
+    hiding: Hiding,
+    t: int,
+    points: NDArray[np.float32],
+    origin_m: NDArray[np.float64],
+    place_m: NDArray[np.float64],
+    needed: NDArray[np.uint8],
+    visible: NDArray[np.uint8],
+) -> None:
+    """Do :func:`hide_behind` in one frame."""
+    asked = np.flatnonzero(visible & needed)
+    if not len(asked):
+        return
+    its = points[:, asked]
+    box_m = np.stack([its.min(axis=1), its.max(axis=1)]) + origin_m
+    boxes = hiding.boxes_m[min(t, len(hiding.boxes_m) - 1)]
+    if not any(may_hide(box, box_m, place_m + origin_m) for box in boxes):
+        return
+    at, faces = min(t, len(hiding.points) - 1), hiding.faces
+    surface = hiding.points[at] + (hiding.origins_m[at] - origin_m)[:, None]
+    if hiding.counts is not None:
+        faces = faces[(hiding.counts[t] > 0)[faces].any(axis=1)]
+    both = np.concatenate([surface, its], axis=1, dtype=np.float32, casting="same_kind")
+    marked = np.arange(both.shape[1]) >= surface.shape[1]
+    visible[asked] = exact_visibility(both, faces, place_m, marked)[surface.shape[1] :]
+
+
+def compile_kernels() -> None:
+    """Call every kernel of this module once."""
+    points = np.array([[[0, 1, 0], [0, 0, 1], [2, 2, 2]]], np.float32)
+    faces, none, marks = (
+        np.array([[0, 1, 2]], np.int32),
+        np.zeros((1, 3)),
+        np.ones((1, 3), np.uint8),
     )
-    nearer = depth.min(axis=1) <= far.max(axis=1)
-    # Of a box that reaches around the sensor or behind it, no picture tells.
-    around = (depth.min(axis=1) <= _NEAR_M) | (far.min(axis=1) <= _NEAR_M)
-    return around | (overlap.all(axis=1) & nearer)
+    _hide_behind_kernel(
+        points, none, faces, np.zeros((1, 1, 2, 3)), marks, points, none, none, marks, marks.copy()
+    )

@@ -319,6 +319,105 @@ def search_view(  # type: ignore[no-untyped-def]
 
 
 @compiled
+def frame_scratch(vertices):  # type: ignore[no-untyped-def]
+    """Work space of :func:`see_frame` for so many vertices."""
+    g, image = np.empty((3, vertices), np.float64), np.empty((2, vertices), np.float32)
+    depth, owned = np.empty(vertices, np.float32), np.empty(vertices, np.uint8)
+    return g, image, depth, owned, search_scratch(vertices), np.empty((3, 3), np.float64)
+
+
+@compiled
+def see_frame(x, y, z, faces, sensor, needed, count, scratch, visible) -> None:  # type: ignore[no-untyped-def]
+    """Set ``visible`` of the needed vertices of one frame that no triangle hides.
+
+    Parameters
+    ----------
+    x, y, z : float array, shape (V,)
+        Places of the vertices in metres.
+    faces : int32 array, shape (F, 3)
+        Oriented in any way.
+    sensor : float64 array, shape (3,)
+        In the frame of the places.
+    needed : uint8 array, shape (V,)
+        Which vertices to test.
+    count : int
+        Number of these.
+    scratch : tuple of arrays
+        Of :func:`frame_scratch`, for so many vertices or more.
+    visible : uint8 array, shape (V,)
+        Written where needed.
+    """
+    vertices = x.shape[0]
+    g, image, depths, owned, searched, axes = scratch
+    depth = depths[:vertices]
+    size = 0.0
+    away = np.empty(3, np.float64)
+    for axis in range(3):
+        p = x if axis == 0 else (y if axis == 1 else z)
+        low = high = p[0]
+        for v in range(vertices):
+            g[axis, v] = sensor[axis] - p[v]
+            low, high = min(low, p[v]), max(high, p[v])
+        size += (np.float64(high) - low) ** 2
+        away[axis] = 0.5 * (np.float64(low) + high) - sensor[axis]
+    size = np.sqrt(size)
+    contact = CONTACT * size
+    distance = np.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
+    for v in range(vertices):
+        if needed[v]:
+            visible[v] = 1
+
+    narrow = distance > 0
+    if narrow:
+        axes_along(away[0] / distance, away[1] / distance, away[2] / distance, axes)
+        for v in range(vertices):
+            gx, gy, gz = -g[0, v], -g[1, v], -g[2, v]
+            right = axes[0, 0] * gx + axes[0, 1] * gy + axes[0, 2] * gz
+            up = axes[1, 0] * gx + axes[1, 1] * gy + axes[1, 2] * gz
+            forward = axes[2, 0] * gx + axes[2, 1] * gy + axes[2, 2] * gz
+            if forward <= 0 or abs(right) + abs(up) > WIDEST * forward:
+                narrow = False
+                break
+            # Scaled to metres at the body, and depth counted from there:
+            # a far sensor becomes an orthographic view without losing digits.
+            image[0, v] = right * distance / forward
+            image[1, v] = up * distance / forward
+            depth[v] = forward - distance
+    if narrow:
+        search_view(
+            x, y, z, faces, g, axes, np.float32(-np.inf), contact, needed, count, image,
+            depth, searched, visible,
+        )  # fmt: skip
+        return
+
+    for side in range(6):
+        sign = 1.0 - 2.0 * (side % 2)
+        main = side // 2
+        axes[:] = 0
+        axes[0, (main + 1) % 3] = 1
+        axes[1, (main + 2) % 3] = 1
+        axes[2, main] = sign
+        mine = 0
+        for v in range(vertices):
+            right, up = -g[(main + 1) % 3, v], -g[(main + 2) % 3, v]
+            forward = -g[main, v] * sign
+            depth[v] = forward
+            owned[v] = 0
+            if forward > contact:
+                image[0, v], image[1, v] = right / forward, up / forward
+                # Ties on the cube's edges belong to both sides: no harm.
+                if needed[v] and abs(right) <= forward and abs(up) <= forward:
+                    owned[v] = 1
+                    mine += 1
+        if mine == 0:
+            continue
+        search_view(
+            x, y, z, faces, g, axes, np.float32(contact), contact, owned, mine, image,
+            depth, searched, visible,
+        )  # fmt: skip
+
+
+@compiled
 def exact_visibility_kernel(
     positions: NDArray[np.float32],
     faces: NDArray[np.int32],
@@ -345,84 +444,14 @@ def exact_visibility_kernel(
     visible : uint8 array, shape (n, V)
         Written where needed.
     """
-    vertices = positions.shape[2]
-    g = np.empty((3, vertices), np.float64)
-    image = np.empty((2, vertices), np.float32)
-    depth = np.empty(vertices, np.float32)
-    owned = np.empty(vertices, np.uint8)
-    scratch = search_scratch(vertices)
-    axes = np.empty((3, 3), np.float64)
+    scratch = frame_scratch(positions.shape[2])
     for t in range(first, last):
         count = 0
-        for v in range(vertices):
-            if needed[t, v]:
-                visible[t, v] = 1
-                count += 1
-        if count == 0:
-            continue
-        x, y, z = positions[t, 0], positions[t, 1], positions[t, 2]
-        size = 0.0
-        away = np.empty(3, np.float64)
-        for axis in range(3):
-            p = positions[t, axis]
-            low = high = p[0]
-            for v in range(vertices):
-                g[axis, v] = sensor[axis] - p[v]
-                low, high = min(low, p[v]), max(high, p[v])
-            size += (np.float64(high) - low) ** 2
-            away[axis] = 0.5 * (np.float64(low) + high) - sensor[axis]
-        size = np.sqrt(size)
-        contact = CONTACT * size
-        distance = np.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
-
-        narrow = distance > 0
-        if narrow:
-            axes_along(away[0] / distance, away[1] / distance, away[2] / distance, axes)
-            for v in range(vertices):
-                gx, gy, gz = -g[0, v], -g[1, v], -g[2, v]
-                right = axes[0, 0] * gx + axes[0, 1] * gy + axes[0, 2] * gz
-                up = axes[1, 0] * gx + axes[1, 1] * gy + axes[1, 2] * gz
-                forward = axes[2, 0] * gx + axes[2, 1] * gy + axes[2, 2] * gz
-                if forward <= 0 or abs(right) + abs(up) > WIDEST * forward:
-                    narrow = False
-                    break
-                # Scaled to metres at the body, and depth counted from there:
-                # a far sensor becomes an orthographic view without losing digits.
-                image[0, v] = right * distance / forward
-                image[1, v] = up * distance / forward
-                depth[v] = forward - distance
-        if narrow:
-            search_view(
-                x, y, z, faces, g, axes, np.float32(-np.inf), contact, needed[t], count, image,
-                depth, scratch, visible[t],
-            )  # fmt: skip
-            continue
-
-        for side in range(6):
-            sign = 1.0 - 2.0 * (side % 2)
-            main = side // 2
-            axes[:] = 0
-            axes[0, (main + 1) % 3] = 1
-            axes[1, (main + 2) % 3] = 1
-            axes[2, main] = sign
-            mine = 0
-            for v in range(vertices):
-                right, up = -g[(main + 1) % 3, v], -g[(main + 2) % 3, v]
-                forward = -g[main, v] * sign
-                depth[v] = forward
-                owned[v] = 0
-                if forward > contact:
-                    image[0, v], image[1, v] = right / forward, up / forward
-                    # Ties on the cube's edges belong to both sides: no harm.
-                    if needed[t, v] and abs(right) <= forward and abs(up) <= forward:
-                        owned[v] = 1
-                        mine += 1
-            if mine == 0:
-                continue
-            search_view(
-                x, y, z, faces, g, axes, np.float32(contact), contact, owned, mine, image,
-                depth, scratch, visible[t],
-            )  # fmt: skip
+        for v in range(positions.shape[2]):
+            count += needed[t, v] != 0
+        if count > 0:
+            x, y, z = positions[t, 0], positions[t, 1], positions[t, 2]
+            see_frame(x, y, z, faces, sensor, needed[t], count, scratch, visible[t])
 
 
 @compiled

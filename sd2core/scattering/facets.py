@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sd2core.mesh.things import Surface
-from sd2core.scattering.behind_things import hide_behind
+from sd2core.scattering.behind_things import Hiding, hide_behind
 from sd2core.scattering.exact import exact_visibility_kernel
 
 
@@ -74,10 +74,11 @@ def facets_before(
 
     ``hiding`` are the other one's vertices (W, 3) and faces.
     """
-    centres = np.asarray(vertices_m, np.float64)[faces].mean(axis=1)
-    origin = np.rint(centres[0])
-    seen = np.ones(len(faces), np.uint8)
-    hide_behind(
-        *hiding, (centres - origin).T, origin, np.asarray(sensor_m, np.float64) - origin, seen
-    )
-    return seen > 0
+    seen = np.ones((1, len(faces)), np.uint8)
+    if len(hiding[1]):
+        centres = np.asarray(vertices_m, np.float64)[faces].mean(axis=1)
+        origin = np.rint(centres[:1])  # (1, 3)
+        points = np.ascontiguousarray((centres - origin).T[None], np.float32)
+        place = np.asarray(sensor_m, np.float64) - origin
+        hide_behind(Hiding.still(*hiding), points, origin, place, np.ones_like(seen), seen)
+    return seen[0] > 0

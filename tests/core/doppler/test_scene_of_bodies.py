@@ -24,7 +24,7 @@ from sd2core.mesh.things import Thing
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.mesh.vertex_parts import VertexParts
 from sd2core.scattering import behind_things
-from sd2core.scattering.behind_things import may_hide
+from sd2core.scattering.behind_things import Hiding, may_hide
 from sd2core.sensor import VirtualSensor
 
 OCCLUSION = pytest.mark.parametrize("visibility", ["depth", "exact"])
@@ -121,12 +121,18 @@ def test_the_cheap_test_of_boxes_lets_no_hiding_pass() -> None:
     for _ in range(300):
         spots = random.normal(size=(2, 3)) * [1.0, 0.5, 1.5] + [0, 0, 2]
         hiding, hidden = (points + spot for spot in spots)
-        ends = [np.stack([one.min(axis=0), one.max(axis=0)])[None] for one in (hiding, hidden)]
-        if may_hide(*ends, np.zeros((1, 3)))[0]:
+        ends = [np.stack([one.min(axis=0), one.max(axis=0)]) for one in (hiding, hidden)]
+        if may_hide(*ends, np.zeros(3)):
             continue
         calls += 1
-        seen = np.ones(len(points), np.uint8)
-        behind_things.hide_behind(hiding, faces, hidden.T, np.zeros(3), np.zeros(3), seen)
+        # In a box around all, it is looked at whatever the cheap test says.
+        everywhere = np.array([[[-9.0] * 3, [9.0] * 3]])
+        seen = np.ones((1, len(points)), np.uint8)
+        single = np.ascontiguousarray(hidden.T[None], np.float32)
+        none = np.zeros((1, 3))
+        behind_things.hide_behind(
+            Hiding.still(hiding, faces, everywhere), single, none, none, seen.copy(), seen
+        )
         assert seen.all()
     assert calls > 100
 
