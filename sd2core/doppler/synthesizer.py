@@ -127,7 +127,7 @@ def _of_bodies(progress: Progress, number: int, of: int) -> Progress:
 
 _MEMORY_BUDGET_BYTES = 512 << 20
 _FAST_FRAMES = 128
-_EXACT_VERTICES = 60_000
+_EXACT_VERTICES = 120_000
 """Vertices times frames whose occlusion is found at once, in a few ms: then a cancel is obeyed."""
 _LIGHT_PAIRS = 500_000
 """Moving vertices, frames together, that are counted about as soon as other threads wake."""
