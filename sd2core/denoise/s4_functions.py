@@ -43,27 +43,34 @@ class _Normalise(torch.autograd.Function):
         return torch.addcmul(passed, back, scale, out=back)
 
 
-def causal_convolution(signal: Tensor, kernel: Tensor) -> Tensor:
+def convolution(signal: Tensor, kernel: Tensor, ahead: Tensor | None = None) -> Tensor:
     """Convolve every channel with its own kernel, by the cheaper of two methods.
 
-    y[h, b, t] = Σ kernel[h, l] signal[h, b, t − l] for l = 0 … t.
+    y[h, b, t] = Σ kernel[h, l] signal[h, b, t − l] for l = 0 … t, and with a kernel that looks
+    ahead Σ ahead[h, l] signal[h, b, t + l] for l = 0 … L − 1 − t more.
 
-    The signal and the result are (H, B, L), the kernel (H, L), all float32 or all float64.
+    The signal and the result are (H, B, L), the kernels (H, L), all float32 or all float64.
     """
     _, signals, length = signal.shape
     short = length < _LONGEST_PRODUCT and signals >= _MIN_SIGNALS
-    return by_product(signal, kernel) if short else by_transform(signal, kernel)
+    return (by_product if short else by_transform)(signal, kernel, ahead)
 
 
-def by_product(signal: Tensor, kernel: Tensor) -> Tensor:
-    """Compute `causal_convolution` by one matrix product per channel."""
-    convolved: Tensor = _ByProduct.apply(signal, kernel)
+def by_product(signal: Tensor, kernel: Tensor, ahead: Tensor | None = None) -> Tensor:
+    """Compute `convolution` by one matrix product per channel."""
+    convolved: Tensor = _ByProduct.apply(signal, kernel, ahead)
     return convolved
 
 
-def by_transform(signal: Tensor, kernel: Tensor) -> Tensor:
-    """Compute `causal_convolution` by Fourier transforms padded so that nothing wraps around."""
-    convolved: Tensor = _ByTransform.apply(signal, kernel)
+def by_transform(signal: Tensor, kernel: Tensor, ahead: Tensor | None = None) -> Tensor:
+    """Compute `convolution` by Fourier transforms padded so that nothing wraps around."""
+    length = signal.shape[-1]
+    points = next_fast_len(2 * length - 1, real=True)
+    around = functional.pad(kernel, (0, points - length))
+    if ahead is not None:  # lag −l is at the end
+        lags = (ahead[:, :1], ahead.new_zeros(len(ahead), points - length), ahead[:, 1:].flip(-1))
+        around = around + torch.cat(lags, -1)
+    convolved: Tensor = _ByTransform.apply(signal, around)
     return convolved
 
 
@@ -76,7 +83,7 @@ _MIN_SIGNALS = 16
 def toeplitz(kernel: Tensor) -> Tensor:
     """Toeplitz matrices of kernels, (H, L) → (H, L, L): lag l at [j, j + l], 0 below."""
     channels, length = kernel.shape
-    padded = torch.nn.functional.pad(kernel, (length - 1, 0))
+    padded = functional.pad(kernel, (length - 1, 0))
     rising = padded.as_strided((channels, length, length), (2 * length - 1, 1, 1))
     return rising.flip(1)
 
@@ -84,7 +91,7 @@ def toeplitz(kernel: Tensor) -> Tensor:
 def diagonal_sums(matrix: Tensor) -> Tensor:
     """Adjoint of `toeplitz`: (H, L, L) → (H, L), sums over [j, j + l]."""
     channels, length, _ = matrix.shape
-    upper = matrix * matrix.new_ones(length, length).triu()
+    upper = (matrix * matrix.new_ones(length, length).triu()).contiguous()
     # One more in the row's stride turns diagonals into columns, which run on into the zeros of the
     # next row; the last row, which has none below it, adds its corner only.
     shape, stride = (channels, length - 1, length), (length * length, length + 1, 1)
@@ -95,26 +102,29 @@ def diagonal_sums(matrix: Tensor) -> Tensor:
 
 class _ByProduct(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, signal: Tensor, kernel: Tensor) -> Tensor:
+    def forward(ctx: Any, signal: Tensor, kernel: Tensor, ahead: Tensor | None) -> Tensor:
         matrix = toeplitz(kernel)
+        if ahead is not None:
+            matrix += toeplitz(ahead).transpose(1, 2)
         ctx.save_for_backward(signal, matrix)
+        ctx.looks_ahead = ahead is not None
         return torch.bmm(signal, matrix)
 
     @staticmethod
-    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, Tensor]:
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, Tensor, Tensor | None]:
         signal, matrix = ctx.saved_tensors
         by_signal = torch.bmm(gradient, matrix.transpose(1, 2))
-        by_kernel = diagonal_sums(torch.bmm(signal.transpose(1, 2), gradient))
-        return by_signal, by_kernel
+        by_matrix = torch.bmm(signal.transpose(1, 2), gradient)
+        by_ahead = diagonal_sums(by_matrix.transpose(1, 2)) if ctx.looks_ahead else None
+        return by_signal, diagonal_sums(by_matrix), by_ahead
 
 
 class _ByTransform(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, signal: Tensor, kernel: Tensor) -> Tensor:
-        length = signal.shape[-1]
-        points = next_fast_len(2 * length - 1, real=True)
+    def forward(ctx: Any, signal: Tensor, around: Tensor) -> Tensor:
+        length, points = signal.shape[-1], around.shape[-1]
         signal_spectrum = torch.fft.rfft(signal, n=points)
-        kernel_spectrum = torch.fft.rfft(kernel, n=points)
+        kernel_spectrum = torch.fft.rfft(around)
         ctx.save_for_backward(signal_spectrum, kernel_spectrum)
         ctx.points = points
         return torch.fft.irfft(signal_spectrum * kernel_spectrum[:, None], n=points)[..., :length]
@@ -126,8 +136,7 @@ class _ByTransform(torch.autograd.Function):
         spectrum = torch.fft.rfft(gradient, n=ctx.points)
         by_signal = torch.fft.irfft(spectrum * kernel_spectrum.conj()[:, None], n=ctx.points)
         product = (spectrum * signal_spectrum.conj()).sum(1)
-        by_kernel = torch.fft.irfft(product, n=ctx.points)
-        return by_signal[..., :length], by_kernel[..., :length]
+        return by_signal[..., :length], torch.fft.irfft(product, n=ctx.points)
 
 
 def mix_gated(

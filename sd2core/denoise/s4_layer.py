@@ -32,7 +32,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from sd2core.denoise.s4_functions import SMALLEST_VARIANCE, causal_convolution, mix_gated, normalise
+from sd2core.denoise.s4_functions import SMALLEST_VARIANCE, convolution, mix_gated, normalise
 from sd2core.denoise.s4_recurrence import BLOCK
 from sd2core.denoise.s4_space import DT_MAX, DT_MIN, Kernel, StateSpace, joint_kernels
 from sd2core.errors import Sd2Error
@@ -77,9 +77,7 @@ class S4Layer(nn.Module):
         if kernels is None:
             kernels = joint_kernels(self.spaces(), signal.shape[1])  # each (H, L)
         u, signal = normalise(_channels_first(signal))  # (H, B, L) both
-        y = causal_convolution(u, kernels[0])
-        if self.future is not None:
-            y = y + causal_convolution(u.flip(-1), kernels[1]).flip(-1)
+        y = convolution(u, *kernels)
         return self._mixed(y, signal, self._dropped(y))
 
     def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from sd2core.denoise.causal_models import S4Denoiser
-from sd2core.denoise.s4_functions import causal_convolution
+from sd2core.denoise.s4_functions import convolution
 from sd2core.denoise.s4_kernel import legs_kernel
 from sd2core.denoise.s4_layer import S4Layer
 from sd2core.denoise.s4_space import SLOWEST_DECAY, Kernel, StateSpace, joint_kernels
@@ -53,7 +53,7 @@ def test_frame_by_frame_is_the_convolution(kernel: str) -> None:
     with torch.no_grad():
         space.log_dt.copy_(torch.tensor([1e-4, 1e-3, 1e-2, 0.1, 1.0]).log())
         signal = torch.randn(5, 1, 2304)
-        at_once = causal_convolution(signal, space.kernel(2304))
+        at_once = convolution(signal, space.kernel(2304))
         recurrence, frames = space.recurrence(), []
         state = recurrence.initial_state(1)
         for frame in signal.double().unbind(-1):

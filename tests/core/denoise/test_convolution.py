@@ -10,12 +10,12 @@ from torch import Tensor
 from sd2core.denoise.s4_functions import (
     by_product,
     by_transform,
-    causal_convolution,
+    convolution,
     mix_gated,
     normalise,
 )
 
-Way = Callable[[Tensor, Tensor], Tensor]
+Way = Callable[..., Tensor]
 
 
 def random(*shape: int, seed: int = 1) -> Tensor:
@@ -23,7 +23,7 @@ def random(*shape: int, seed: int = 1) -> Tensor:
     return torch.randn(*shape, dtype=torch.float64, generator=made)
 
 
-@pytest.mark.parametrize("way", [by_product, by_transform, causal_convolution])
+@pytest.mark.parametrize("way", [by_product, by_transform, convolution])
 @pytest.mark.parametrize("length", [1, 2, 7, 72, 150])
 def test_convolution_is_the_sum_it_says(way: Way, length: int) -> None:
     signal, kernel = random(3, 17, length), random(3, length, seed=2)
@@ -34,11 +34,20 @@ def test_convolution_is_the_sum_it_says(way: Way, length: int) -> None:
             np.testing.assert_allclose(found[channel, row], true, atol=1e-12 * length)
 
 
+@pytest.mark.parametrize("way", [by_product, by_transform, convolution])
+@pytest.mark.parametrize("length", [1, 2, 7, 72, 150])
+def test_a_kernel_that_looks_ahead_is_one_of_the_reversed_signal(way: Way, length: int) -> None:
+    signal, kernel, ahead = random(3, 17, length), random(3, length, seed=2), random(3, length)
+    true = way(signal, kernel) + way(signal.flip(-1), ahead).flip(-1)
+    torch.testing.assert_close(way(signal, kernel, ahead), true, rtol=1e-11, atol=1e-11)
+
+
 @pytest.mark.parametrize("way", [by_product, by_transform])
 @pytest.mark.parametrize("length", [1, 2, 9])
-def test_derivatives_of_the_convolution(way: Way, length: int) -> None:
-    signal, kernel = random(2, 3, length), random(2, length, seed=2)
-    assert torch.autograd.gradcheck(way, (signal.requires_grad_(), kernel.requires_grad_()))
+@pytest.mark.parametrize("kernels", [1, 2])
+def test_derivatives_of_the_convolution(way: Way, length: int, kernels: int) -> None:
+    given = random(2, 3, length), *(random(2, length, seed=2 + at) for at in range(kernels))
+    assert torch.autograd.gradcheck(way, tuple(one.requires_grad_() for one in given))
 
 
 @pytest.mark.parametrize("way", [by_product, by_transform])
