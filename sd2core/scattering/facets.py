@@ -17,7 +17,7 @@ def visible_facets(
     corners = vertices[faces]  # (F, 3, 3)
     centres = corners.mean(axis=1)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facing = ((np.asarray(sensor_m) - centres) * across).sum(axis=1) > 0
+    facing = ((np.asarray(sensor_m, np.float64) - centres) * across).sum(axis=1) > 0
     return _before((vertices, faces), centres, sensor_m, facing)
 
 
@@ -30,7 +30,8 @@ def points_behind(
     """Points (n, 3) that the surface of one frame hides from a sensor, (n,)."""
     vertices = np.asarray(vertices_m, np.float64)
     # Only within the narrowest cone around the surface, and not before it, can one be hidden.
-    away, beyond = vertices - sensor_m, points_m - sensor_m
+    place = np.asarray(sensor_m, np.float64)
+    away, beyond = vertices - place, points_m - place
     range_m, beyond_m = (np.maximum(np.linalg.norm(one, axis=1), 1e-9) for one in (away, beyond))
     axis = (away / range_m[:, None]).mean(axis=0)
     widest = (away @ axis / range_m).min()
