@@ -115,6 +115,8 @@ class _Writer:
     ) -> None:
         self._trained, self._files, self._outs = trained, files, outs
         self._resampled, self._texture = resampled, texture
+        # Of the whole map in each of its stretches: joined, they have the first one's metadata.
+        self._note = trained.note(map(files.part, range(len(outs))))
         self._content: int | None = None
         self._number = 0
         self._energies = self._empty()
@@ -136,7 +138,7 @@ class _Writer:
 
     def _next(self) -> None:
         part = self._files.part(self._number)
-        denoised = self._trained.as_denoised(part, self._energies, self._resampled)
+        denoised = self._trained.as_denoised(part, self._energies, self._resampled, self._note)
         if self._texture is not None:
             if self._content is None:
                 self._content = content_of(denoised)

@@ -168,14 +168,17 @@ class KnownMovements:
             f" spread up to {self.spread_mps:.2f} m/s"
         )
 
-    def note(self, energies: NDArray[np.float32], axis: VelocityAxis) -> str | None:
-        """Sentence on the frames (frames, bins) that are passed through; None if none is."""
-        strange = int(np.count_nonzero(self.strange(energies, axis)))
-        if not strange:
+    def note(self, parts: Iterable[NDArray[np.float32]], axis: VelocityAxis) -> str | None:
+        """Sentence on the frames of a map, given in parts (frames, bins), that are passed through.
+
+        None if none is.
+        """
+        strange = np.concatenate([self.strange(energies, axis) for energies in parts])
+        if not strange.any():
             return None
         return (
-            f"{strange:,} of {len(energies):,} frames move otherwise than what the model learnt"
-            f" from ({self._ranges}): they are the synthetic map's"
+            f"{np.count_nonzero(strange):,} of {len(strange):,} frames move otherwise than what"
+            f" the model learnt from ({self._ranges}): they are the synthetic map's"
         )
 
     @classmethod

@@ -87,15 +87,32 @@ class TrainedDenoiser:
         resampled = matching.apply_to_stretches(
             self.denoise_values, doppler, energies, self.card.frame_rate_hz, denoised, progress
         )
-        return self.as_denoised(doppler, denoised, resampled)
+        return self.as_denoised(doppler, denoised, resampled, self.note([doppler]))
+
+    def note(self, parts: Iterable[DopplerMap]) -> str | None:
+        """Sentence on the frames of a map, given in parts, that the model has learnt nothing of."""
+        known = self.card.known
+        return known and known.note((one.values.T for one in parts), self.card.axis)
 
     def as_denoised(
-        self, doppler: DopplerMap, energies: NDArray[np.float32], resampled: bool
+        self,
+        doppler: DopplerMap,
+        energies: NDArray[np.float32],
+        resampled: bool,
+        note: str | None,
     ) -> DopplerMap:
-        """Denoised map from a synthetic one and its denoised energies, (frames, bins).
+        """Denoised map from a synthetic one, or a part of one.
 
-        The energies are changed: bins that the radar does not see are emptied. ``resampled`` is
-        True if frames were interpolated to the model's rate and back.
+        Parameters
+        ----------
+        doppler : DopplerMap
+            The synthetic one.
+        energies : float32 ndarray, (frames, bins)
+            Its denoised energies; bins that the radar does not see are emptied in them.
+        resampled : bool
+            True if frames were interpolated to the model's rate and back.
+        note : str, optional
+            What :meth:`note` says of the whole map.
         """
         energies[:, list(doppler.unseen_bins)] = 0.0
         return replace(
@@ -104,7 +121,7 @@ class TrainedDenoiser:
             kind="denoised",
             unit=self.card.unit,
             null_bins=self.card.null_bins,
-            meta=self._provenance(doppler, resampled),
+            meta=self._provenance(doppler, resampled, note),
             uncertainty=None,
             limbs=None,
         )
@@ -217,7 +234,7 @@ class TrainedDenoiser:
                 done[first : first + _BATCH] = self.network(batch).cpu().numpy()
         return join(done, starts, len(known))[:frames]
 
-    def _provenance(self, doppler: DopplerMap, resampled: bool) -> dict[str, Any]:
+    def _provenance(self, doppler: DopplerMap, resampled: bool, note: str | None) -> dict[str, Any]:
         card, notes = self.card, []
         emptied = sorted(set(card.null_bins) - set(doppler.null_bins))
         if emptied:
@@ -230,9 +247,8 @@ class TrainedDenoiser:
                 f"frames at {doppler.timebase.frames_per_s:.4g}/s were interpolated to the model's"
                 f" {card.frame_rate_hz:g}/s and back"
             )
-        strange = card.known and card.known.note(doppler.values.T, card.axis)
-        if strange:
-            notes.append(strange)
+        if note:
+            notes.append(note)
         told = {
             "model": card.model,
             "name": card.name,
