@@ -492,6 +492,8 @@ def test_memory_does_not_grow_with_the_number_of_sources(
         return most
 
     peak(2, ".zarr")  # what is imported counts no more
-    few, lots = peak(4, ".zarr"), peak(12, ".zarr")  # more than is written together
-    segments = 8 * 75 * 24 * AXIS.bins * 4 * 2
+    # More than is written together; so many that what threads hold at once on a busy machine,
+    # which differs by some chunks from one time to the next, is little beside them.
+    few, lots = peak(4, ".zarr"), peak(28, ".zarr")
+    segments = (28 - 4) * 75 * 24 * AXIS.bins * 4 * 2
     assert lots - few < segments / 10
