@@ -127,10 +127,10 @@ class Set(Content, SensorPlace, Json):
         what stands in the scene, in place of what did: a box, table, screen, doorway or mesh file,
         the middle of its foot, degrees about the vertical, and width, height, depth in metres;
         again for another
-    body : [NAME=]FILE[@X,Y,Z[,TURN[,LATER]]]
-        who else moves in the scene, in place of who did: a mesh or another recording's, how far
-        it is moved from where it is, degrees about the vertical, and seconds later; again for
-        another
+    body : [NAME=]FILE[,FACES][@X,Y,Z[,TURN[,LATER]]]
+        who else moves in the scene, in place of who did: a mesh or another recording's, a file of
+        its faces where it has none, how far it is moved from where it is, degrees about the
+        vertical, and seconds later; again for another
     wall : DIRECTION@M[,DB]
         what mirrors waves, in place of what did: a floor, a ceiling, a wall ahead, behind, left or
         right of the camera, or in a direction in degrees to the right, how far away it is, and the
@@ -390,11 +390,17 @@ def _body(text: str) -> Body:
     except ValueError:
         what, numbers = text, []
     if len(numbers) not in (0, 3, 4, 5):
-        expected = "[NAME=]FILE[@X,Y,Z[,TURN[,LATER]]], e.g. anna=anna.npz@0.8,0,0.5,90"
+        expected = "[NAME=]FILE[,FACES][@X,Y,Z[,TURN[,LATER]]], e.g. anna=anna.npz@0.8,0,0.5,90"
         raise Sd2Error(f"--body is {text!r}", expected)
     x, y, z, turn_deg, start_s = numbers + [0.0] * (5 - len(numbers))
     person, _, file = ("", "", what) if Path(what).exists() else what.rpartition("=")
-    path, reading, faces = plain_path(Path(file)), {}, None
+    faces = None
+    if "," in file and not is_there(Path(file)):
+        file, _, own = file.rpartition(",")
+        faces = plain_path(Path(own))
+        if not faces.exists():
+            raise Sd2Error(f"The faces file {own} does not exist", "a file of triangles")
+    path, reading = plain_path(Path(file)), {}
     if not is_there(path):
         raise Sd2Error(f"The mesh {file} does not exist", "a file or folder")
     if is_recording(path):
@@ -402,8 +408,9 @@ def _body(text: str) -> Body:
         if of.mesh is None:
             raise Sd2Error(f"{path} holds no mesh", "a recording with one")
         path, person, reading = of.mesh, person or of.subject, of.mesh_reading.options()
-        faces = None if of.faces is None else str(of.faces)
-    return Body(str(path), (x, y, z), turn_deg, start_s, person, reading, faces)
+        faces = faces or of.faces
+    told = None if faces is None else str(faces)
+    return Body(str(path), (x, y, z), turn_deg, start_s, person, reading, told)
 
 
 def _wall(text: str) -> Wall:

@@ -119,7 +119,7 @@ def _placed(body: Body, first: MeshSequence) -> MeshSequence:
             " `sd2 set RECORDING --body`",
         ) from error
     if own.faces is None:
-        raise _no_surface(str(path))
+        raise _no_surface(str(path), "`sd2 set RECORDING --body FILE,FACES`")
     if body.start_s:
         own = replace(own, timebase=own.timebase.shifted(body.start_s))
     on_clock, _ = resample_mesh(own, first.times_s)
@@ -157,9 +157,9 @@ def _turned(mesh: MeshSequence, own: MeshSequence, turn_deg: float) -> MeshSeque
     )
 
 
-def _no_surface(what: str) -> Sd2Error:
+def _no_surface(what: str, how: str = "--faces") -> Sd2Error:
     return Sd2Error(
         f"{what} has no faces, it is a point cloud",
         "surfaces: in a scene of several bodies one hides another",
-        "Give the faces (--faces)",
+        f"Give the faces ({how})",
     )

@@ -142,6 +142,31 @@ def test_a_body_takes_its_faces_along(sd2: Sd2, one: Recording, tmp_path: Path) 
     np.testing.assert_array_equal(faces_of(one), mesh.faces)
 
 
+def test_a_body_whose_file_has_no_faces_takes_those_that_are_named(
+    sd2: Sd2, one: Recording, tmp_path: Path
+) -> None:
+    mesh = one.load_mesh()
+    for name in ("points.npz", "a,b.npz"):
+        np.savez(tmp_path / name, vertices=np.asarray(mesh.vertices), times_s=mesh.times_s)
+    np.save(tmp_path / "faces.npy", mesh.faces)
+    for file in ("points.npz", "a,b.npz"):
+        refused = sd2("set", one.folder, "--body", tmp_path / file)
+        assert "--body FILE,FACES" in " ".join(refused.err.split())
+        typed = f"anna={tmp_path / file},{tmp_path / 'faces.npy'}@1,0,0"
+        outcome = sd2("set", one.folder, "--body", typed)
+        assert outcome.code == 0, outcome.err
+        (anna,) = content(one)["bodies"]
+        assert (anna["person"], anna["path"], anna["faces"]) == (
+            "anna",
+            f"../{file}",
+            "../faces.npy",
+        )
+        (other,) = open_recording(one.folder).load_mesh().others
+        np.testing.assert_array_equal(other.faces, mesh.faces)
+    gone = sd2("set", one.folder, "--body", f"{tmp_path / 'points.npz'},none.npy@1,0,0")
+    assert "The faces file none.npy does not exist" in gone.err
+
+
 NAMES = ("dora", "bert", "")
 
 
