@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -104,11 +104,9 @@ def _named(mesh: MeshSequence, body: Body) -> MeshSequence:
 
 def _placed(body: Body, first: MeshSequence) -> MeshSequence:
     """Body of a file, in its place and at the times of the first."""
-    path, reading = Path(body.path), dict(body.reading)
-    if body.faces is not None:
-        reading["faces"] = body.faces
+    path = Path(body.path)
     try:
-        own = _read(path, tuple(reading.items()), str(signature(body.files)))
+        own = _read(body)
     except Sd2Error as error:
         if path.exists():
             raise
@@ -133,10 +131,32 @@ def _placed(body: Body, first: MeshSequence) -> MeshSequence:
     return _named(shifted(_turned(on_clock, own, body.turn_deg), body.moved_m), body)
 
 
-@lru_cache(maxsize=4)
-def _read(path: Path, reading: tuple[tuple[str, Any], ...], _signature: str) -> MeshSequence:
-    """Mesh of a file, kept while it is moved about; another signature is of another content."""
-    return load_mesh(path, **dict(reading))
+def at_hand(body: Body, scene: MeshSequence) -> bool:
+    """True if a body can be put into a scene without reading its file."""
+    return _there(body, scene) is not None or _file_of(body) in _FILES
+
+
+def _read(body: Body) -> MeshSequence:
+    """Mesh of a file, kept while it is moved about."""
+    file = _file_of(body)
+    if (mesh := _FILES.get(file)) is None:
+        faces = {} if body.faces is None else {"faces": body.faces}
+        mesh = load_mesh(Path(body.path), **{**body.reading, **faces})
+        with _FILES_LOCK:
+            while len(_FILES) >= _FILES_KEPT:
+                del _FILES[next(iter(_FILES))]
+            _FILES[file] = mesh
+    return mesh
+
+
+def _file_of(body: Body) -> tuple[object, ...]:
+    """What a file is kept by; another signature is of another content."""
+    return body.path, body.faces, str(body.reading), str(signature(body.files))
+
+
+_FILES: dict[tuple[object, ...], MeshSequence] = {}  # the last one read is last
+_FILES_LOCK = Lock()
+_FILES_KEPT = 4
 
 
 def _turned(mesh: MeshSequence, own: MeshSequence, turn_deg: float) -> MeshSequence:

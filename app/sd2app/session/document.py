@@ -28,7 +28,7 @@ from sd2app.session.mesh_reading import MeshReader, ReadMesh, mesh_fields
 from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
 from sd2core.errors import Cure, Sd2Error
-from sd2core.io.bodies import with_bodies
+from sd2core.io.bodies import at_hand, with_bodies
 from sd2core.io.things import with_things, with_walls
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
@@ -367,7 +367,11 @@ class DocumentModel(QObject):
         try:
             there = recording.bodies_there if recording.bodies or mesh.others else ()
             if there != tuple(body.placed for body in mesh.others):
-                mesh = with_bodies(mesh, there, person=recording.subject)
+                ready = [body for body in there if at_hand(body, mesh)]
+                for body in there:
+                    if body not in ready and not self._meshes.awaits(body):
+                        self.read_body(body, self._surround_by_read)
+                mesh = with_bodies(mesh, ready, person=recording.subject)
             if recording.walls != (() if around is None else around.walls):
                 mesh = with_walls(mesh, recording.walls)
             if things != (() if around is None else around.things):
@@ -375,6 +379,11 @@ class DocumentModel(QObject):
         except Sd2Error as error:
             self.failed.emit(str(error))
         self.content = replace(content, mesh=mesh)
+
+    def _surround_by_read(self) -> None:
+        """Put bodies into the scene whose files have been read, as after an undo."""
+        self._surround()
+        self.changed.emit()
 
     def set_clutter(self, clutter: Clutter) -> None:
         """Remove static echoes another way."""

@@ -105,6 +105,10 @@ class MeshReader(QObject):
 
         self._bodies.submit(read, f"Reading {body.file_name}")
 
+    def awaits(self, body: Body) -> bool:
+        """True while the file of a body is read."""
+        return any(one == body for one, _ in self._awaited)
+
     def _take_bodies(self, found: list[Exception | None]) -> None:
         awaited, self._awaited = self._awaited, []
         for (_, then), error in zip(awaited, found, strict=True):
