@@ -313,6 +313,23 @@ class DopplerMap:
         ]
         return f"<DopplerMap {' · '.join(said)}>"
 
+    def of_person(self, person: str) -> DopplerMap:
+        """Return the map of one person of a scene of several, less what the others hide.
+
+        Its frames are the same; it needs limb maps.
+        """
+        assert self.limbs is not None
+        limbs = self.limbs.by_person[self.limbs.persons.index(person)]
+        shares = ("visible_share", "beyond_share")  # of everybody
+        meta = {name: value for name, value in self.meta.items() if name not in shares}
+        return replace(
+            self,
+            values=limbs.values.sum(axis=0),
+            meta=meta | {"person": person},
+            uncertainty=None,
+            limbs=limbs,
+        )
+
     def db(self, reference: float | None = None) -> NDArray[np.float64]:
         """Levels in dB, (bins, frames); -inf where a cell is empty, NaN where it was emptied.
 

@@ -99,25 +99,29 @@ def _extent(values: np.ndarray) -> list[float] | None:
 def _count_sources(sources: Iterable[dict[str, Any]], header: Header) -> dict[str, Any]:
     """Return what a card says of sources, by its names there."""
     totals: Counter[str] = Counter()
-    views: Counter[tuple[str, str]] = Counter()
+    views: dict[tuple[tuple[str, ...], str], set[int]] = {}
     how: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
     spans: Counter[str] = Counter()
+    everybody: dict[str, None] = {}  # Kinds in which more people are seen than the subject.
     minutes = 0.0
     cutoffs_hz: list[float] = []
     accuracies: list[MapAccuracy] = []
     for entry in sources:
         provenance = entry["provenance"]
-        recording = entry["subject"], entry["recording"]
-        views[recording] += 1
+        # A scene is one recording, however many of its persons are sources.
+        people = tuple(provenance.get("scene", [entry["subject"]]))
+        seen_from = views.setdefault((people, entry["recording"]), set())
         totals["sources"] += 1
+        everybody |= dict.fromkeys(provenance.get("everybody", ()))
         totals["empty"] += entry["start"] == entry["stop"]
         # Others show the same movement; its own sensor need not be among them.
-        if views[recording] == 1:
+        if not seen_from:
             minutes += entry["frames"] / entry["frame_rate_hz"] / 60
             totals["without person"] += entry["frames"] - entry["frames_with_person"]
             totals["damaged"] += provenance.get("damaged_frames", 0)
             totals["simulated"] += bool(provenance.get("simulated"))
             spans.update(entry.get("spans", {}))
+        seen_from.add(entry["placement"])
         cutoffs_hz += [made["cutoff_hz"] for made in provenance.get("imu", {}).values()]
         for kind, made in provenance["maps"].items():
             how[kind][made_text(kind, made, provenance)] += 1
@@ -128,7 +132,9 @@ def _count_sources(sources: Iterable[dict[str, Any]], header: Header) -> dict[st
         "sources": totals["sources"],
         "recordings": len(views),
         "minutes": minutes,
-        "placements": max(views.values(), default=0),  # from which a recording is seen, at most
+        "placements": max(
+            map(len, views.values()), default=0
+        ),  # from which a recording is seen, at most
         "frames_without_person": totals["without person"],
         "frames_damaged": totals["damaged"],
         "sources_without_segments": totals["empty"],
@@ -136,6 +142,7 @@ def _count_sources(sources: Iterable[dict[str, Any]], header: Header) -> dict[st
         # Of the median source with fitted bodies.
         "accuracy": str(accuracies[len(accuracies) // 2]) if accuracies else "",
         "how": {kind: _most_common(ways) for kind, ways in how.items() if ways},
+        **({"everybody": list(everybody)} if everybody else {}),
     }
     if header.imu:
         found["imu_cutoff_hz"] = [min(cutoffs_hz), max(cutoffs_hz)]
@@ -239,6 +246,12 @@ def limits(card: dict[str, Any]) -> list[str]:
         found.append(
             "Bodies were fitted to videos: in the median source the synthetic map is off the truth"
             f" by {card['accuracy']} (relative L1)."
+        )
+    if kinds := card.get("everybody"):
+        found.append(
+            f"The {' and '.join(kinds)} maps of scenes show everybody, not the subject alone; where"
+            " somebody else is labelled otherwise they are not available. Who is in one scene is"
+            " in these maps together: keep them in one split to test on them."
         )
     missing = [kind for kind, count in card["segments_of_kind"].items() if count < card["segments"]]
     if missing:

@@ -11,6 +11,7 @@ import numpy as np
 
 from sd2core.classify.data import ClipSet, clips_of_map
 from sd2core.datasets.labelled_source import LabelledSource
+from sd2core.datasets.people import subject_of
 from sd2core.datasets.reading import open_dataset
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import RADAR_MAP_SUFFIXES, kind_of
@@ -171,7 +172,8 @@ def labels_given(labels: Labels, path: Path) -> list[Span]:
 
 def _of_recording(source: LabelledSource) -> LabelledFacts:
     recording = open_recording(source.path)
-    spans = labels_given(recording.effective_labels(), source.path)
+    labels, first = recording.effective_labels(), source.subject or recording.person
+    spans = labels_given(labels, source.path)
     maps: list[str] = []
     if recording.mesh is not None:
         shown_without = recording.denoiser is None and recording.bundled_denoiser == ""
@@ -181,7 +183,7 @@ def _of_recording(source: LabelledSource) -> LabelledFacts:
     return LabelledFacts(
         source.path,
         "recording",
-        (source.subject or recording.person,),
+        tuple(subject_of(recording, person, first) for person in labels.persons or ("",)),
         tuple(maps),
         simulated=recording.simulated and recording.radar is not None,
         spans=len(spans),

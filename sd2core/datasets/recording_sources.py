@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from functools import cached_property, lru_cache
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
-
-import numpy as np
-from numpy.typing import NDArray
 
 from sd2core.accuracy.places import choose_for_places, spread
 from sd2core.accuracy.trial import synthesizer_for
 from sd2core.body.parts import known_parts, splits_everybody, synthetic_map
+from sd2core.datasets.people import People, present_frames, subject_of
 from sd2core.datasets.simulating import Simulation, simulated_map
 from sd2core.datasets.source import (
     BACKGROUND,
+    FROM_A_MESH,
     KINDS,
     LazySource,
     Outline,
@@ -41,6 +40,7 @@ from sd2core.imu.virtual import imu_at_frames
 from sd2core.io.stored_vertices import damaged_frames
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
+from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.recording_pairs import on_clock
 from sd2core.placements.body_extent import BodyExtent
@@ -115,7 +115,9 @@ def recording_sources(
 ) -> list[LazySource]:
     """Return one source per recording and placement; nothing is computed yet.
 
-    ``subjects`` names the subject of each recording.
+    Where labels name persons, each of these is a source of their own: with their labels, the
+    synthetic and denoised map of them alone, and everybody's of a radar. ``subjects`` names the
+    subject of each recording, the first person of a scene.
     """
     shared = _Shared(making)
     found = []
@@ -127,9 +129,12 @@ def recording_sources(
                 "one of them",
                 "Fit a mesh with `sd2 fit`",
             )
+        named = recording.effective_labels().persons
         for placement in range(1 + len(places_of(recording, making))):
-            key = SourceKey(subject, recording.folder.stem, placement)
-            found.append(_lazy(shared, recording, key))
+            for person in named or ("",):
+                who = subject_of(recording, person, subject)
+                key = SourceKey(who, recording.folder.stem, placement)
+                found.append(_lazy(shared, recording, key, person))
     return found
 
 
@@ -162,14 +167,17 @@ def radar_map(
     return radar.shifted(recording.radar_offset_s)
 
 
-def _lazy(shared: _Shared, recording: Recording, key: SourceKey) -> LazySource:
+def _lazy(shared: _Shared, recording: Recording, key: SourceKey, person: str) -> LazySource:
     def load(progress: Progress) -> Source:
-        return shared.opened(recording).source(key, progress)
+        return shared.opened(recording).source(key, person, progress)
 
     def outline() -> Outline:
-        return shared.opened(recording).outline(key.placement)
+        return shared.opened(recording).outline(key.placement, person)
 
-    return LazySource(key, load, lambda: _fingerprint(recording, key, shared.making), outline)
+    def fingerprint() -> str:
+        return _fingerprint(recording, key, person, shared.making)
+
+    return LazySource(key, load, fingerprint, outline)
 
 
 class _Shared:
@@ -187,52 +195,70 @@ class _Shared:
 
 
 class _Opened:
-    """Open recording whose placements share mesh, synthesizer and radar map."""
+    """Open recording whose placements share mesh, synthesizer and radar map.
+
+    ``person`` is whom a source is of; empty where labels name nobody: of everybody.
+    """
 
     def __init__(self, recording: Recording, making: Making) -> None:
         self.recording = recording
         self._making = making
         self._mesh = None if recording.mesh is None else recording.load_mesh()
-        labels = recording.effective_labels()
-        self._names, self._classes = labels_and_classes(labels)
-        self._spans = labels.spans
+        self._people = People(recording, self._mesh, recording.effective_labels())
+        self._names, self._classes = labels_and_classes(self._people.labels)
+        self._made: dict[tuple[int, MapKind], DopplerMap] = {}  # of everybody, from one place
+        self._target_m, self._imu = cache(self._target_of), cache(self._imu_of)
 
-    def outline(self, placement: int) -> Outline:
-        timebase, present, radar_kind = self._clock
+    def outline(self, placement: int, person: str) -> Outline:
+        timebase, radar_kind = self._clock
+        bodies, labels = self._people.bodies(person), self._people.labels_of(person)
         for place in self._making.imu:
-            mounted(self._body, place)  # or fail, as the source would
+            mounted(self._body(person), place)  # or fail, as the source would
         kinds: list[MapKind] = []
-        if self._mesh is not None:
+        if bodies:
             kinds += ["synthetic"]
             if self._making.limbs:
-                known_parts(self._mesh)  # or fail, as the source would
+                known_parts(self._people.everybody[0])  # or fail, as the source would
             if "denoised" in self._making.kinds and _models_of(self.recording, self._making):
                 kinds.append("denoised")
             kinds += ["simulated"] if self._simulates else []
         if radar_kind is not None and placement == 0 and radar_kind not in kinds:
             kinds.append(radar_kind)
+        present = (
+            present_frames(bodies)
+            if bodies
+            else ~self._people.unclear(person, self._names, timebase.times_s)
+        )
         return Outline(
             tuple(kind for kind in kinds if kind in self._making.kinds),
             timebase.times_s,
             present,
-            self._label(timebase.times_s),
+            label_per_frame(labels.spans, self._names, timebase.times_s),
             self._names,
-            labelled_spans(self._spans, self._names),
+            labelled_spans(labels.spans, self._names),
             self._damaged,
         )
 
-    def source(self, key: SourceKey, progress: Progress) -> Source:
+    def source(self, key: SourceKey, person: str, progress: Progress) -> Source:
         wanted = self._making.kinds
         maps: dict[MapKind, DopplerMap] = {}
         plan: dict[str, Any] = {}
         sensor = self._sensor(key.placement)
         counted_share = _COUNTED_SHARE if self._simulates else 1.0
-        if self._mesh is not None and {"synthetic", "denoised"} & {*wanted}:
+        bodies, labels = self._people.bodies(person), self._people.labels_of(person)
+        if bodies and {"synthetic", "denoised"} & {*wanted}:
             model = self._model if "denoised" in wanted else None
+            alone = len(bodies) < len(self._people.everybody)
             limbs = self._making.limbs or (model is not None and bool(describe_model(model).parts))
             counting = part_of(progress, 0.0, counted_share)
             synthesizer, plan = self._synthesizer
-            synthetic = synthetic_map(synthesizer, sensor, limbs=limbs, progress=counting)
+            synthetic = self._once(
+                key.placement,
+                "synthetic",
+                lambda: synthetic_map(synthesizer, sensor, limbs=limbs or alone, progress=counting),
+            )
+            if alone:
+                synthetic = replace(synthetic.of_person(person), present=present_frames(bodies))
             maps["synthetic"] = synthetic
             if model is not None:
                 maps["denoised"] = denoised(synthetic, model, self._making.texture)
@@ -242,58 +268,81 @@ class _Opened:
             radar = radar_map(self.recording, self._making.synthesis.axis)
             there = self._mesh.timebase if self._mesh is not None else radar.timebase
             maps[radar.kind] = on_clock(radar, there)
-        if self._simulates:
-            assert self._mesh is not None
-            assert self._making.simulation is not None
-            maps["simulated"] = simulated_map(
-                self._mesh,
-                sensor,
-                self._making.simulation,
-                self._making.synthesis.axis,
-                progress=part_of(progress, counted_share, 1.0),
+        if bodies and self._simulates:
+            mesh, simulation = self._mesh, self._making.simulation
+            assert mesh is not None
+            assert simulation is not None
+            maps["simulated"] = self._once(
+                key.placement,
+                "simulated",
+                lambda: simulated_map(
+                    mesh,
+                    sensor,
+                    simulation,
+                    self._making.synthesis.axis,
+                    progress=part_of(progress, counted_share, 1.0),
+                ),
             )
         maps = {kind: one for kind, one in maps.items() if kind in wanted}
         if not maps:
+            who = "" if bodies or not person else f" of {person}, who is not in its scene"
             raise Sd2Error(
-                f"{self.recording.folder} has no map that is wanted", f"one of {', '.join(wanted)}"
+                f"{self.recording.folder} has no map{who} that is wanted",
+                f"one of {', '.join(wanted)}",
             )
         times_s = next(iter(maps.values())).times_s
+        if person:
+            unclear = self._people.unclear(person, self._names, times_s)
+            for kind in maps.keys() - {*FROM_A_MESH}:
+                known = Presence.of(maps[kind].present, len(times_s)).there & ~unclear
+                maps[kind] = replace(maps[kind], present=known)
         channel = self.recording.channel_in_words
         return Source(
             *key,
             sensor,
             maps,
-            self._label(times_s),
+            label_per_frame(labels.spans, self._names, times_s),
             self._names,
             self._classes,
-            self._target_m,
+            self._target_m(person),
             {
                 "recording": self.recording.title,
                 "simulated": self.recording.simulated,
                 "radar_offset_s": self.recording.radar_offset_s,
                 **({"radar_channel": channel} if channel else {}),
                 **({"damaged_frames": self._damaged} if self._damaged else {}),
+                **self._people.shown(person, maps),
                 **plan,
             },
-            self._imu,
-            labelled_spans(self._spans, self._names),
+            self._imu(person),
+            labelled_spans(labels.spans, self._names),
         )
 
-    @property
-    def _body(self) -> MeshSequence:
+    def _body(self, person: str) -> MeshSequence:
         """Mesh that inertial sensors are fixed to."""
-        if self._mesh is None:
+        bodies = self._people.bodies(person)
+        if not bodies:
             raise Sd2Error(
-                f"{self.recording.folder} has no mesh",
+                f"{self.recording.folder} has no mesh" + (f" of {person}" if person else ""),
                 "one, to which inertial sensors can be fixed",
                 "Fit a mesh with `sd2 fit`, or export without them",
             )
-        return self._mesh
+        return bodies[0]
 
-    @cached_property
-    def _imu(self) -> dict[str, InertialSignals]:
+    def _imu_of(self, person: str) -> dict[str, InertialSignals]:
         """Inertial sensors at the frames of the mesh, the same from every placement."""
-        return {place: imu_at_frames(self._body, place) for place in self._making.imu}
+        return {place: imu_at_frames(self._body(person), place) for place in self._making.imu}
+
+    def _target_of(self, person: str) -> Vector | None:
+        bodies = self._people.bodies(person)
+        return BodyExtent.of(bodies[0]).target_m if bodies else None
+
+    def _once(self, placement: int, kind: MapKind, make: Callable[[], DopplerMap]) -> DopplerMap:
+        """Map of everybody from a place, made for the first of its persons."""
+        if (placement, kind) not in self._made:
+            self._made = {at: one for at, one in self._made.items() if at[0] == placement}
+            self._made[placement, kind] = make()
+        return self._made[placement, kind]
 
     @cached_property
     def _model(self) -> Path | None:
@@ -305,8 +354,8 @@ class _Opened:
         return find_model(default_name(limbs=splits_everybody(self._mesh)))
 
     @cached_property
-    def _clock(self) -> tuple[Timebase, NDArray[np.bool_] | None, MapKind | None]:
-        """Times, frames with a person, and the kind of the radar's map, read cheaply."""
+    def _clock(self) -> tuple[Timebase, MapKind | None]:
+        """Times, and the kind of the radar's map, read cheaply."""
         recording = self.recording
         kind: MapKind | None = None
         own: Timebase | None = None
@@ -317,9 +366,9 @@ class _Opened:
                 capture = recording.load_capture()
                 kind, own = ("simulated" if capture.simulated else "real"), capture.timebase
         if self._mesh is not None:
-            return self._mesh.timebase, self._mesh.present, kind
+            return self._mesh.timebase, kind
         assert own is not None
-        return own.shifted(recording.radar_offset_s), None, kind
+        return own.shifted(recording.radar_offset_s), kind
 
     @property
     def _simulates(self) -> bool:
@@ -330,17 +379,14 @@ class _Opened:
     def _sensor(self, placement: int) -> VirtualSensor:
         if placement == 0:
             return self.recording.sensor
-        assert self._target_m is not None
-        return places_of(self.recording, self._making)[placement - 1].sensor(self._target_m)
+        target_m = self._target_m("")  # of the first person, whoever a source is of
+        assert target_m is not None
+        return places_of(self.recording, self._making)[placement - 1].sensor(target_m)
 
     @property
     def _damaged(self) -> int:
         """Frames of the mesh in damaged chunks, which are in no segment."""
         return 0 if self._mesh is None else damaged_frames(self._mesh.vertices)
-
-    @cached_property
-    def _target_m(self) -> Vector | None:
-        return None if self._mesh is None else BodyExtent.of(self._mesh).target_m
 
     @cached_property
     def _synthesizer(self) -> tuple[Synthesizer, dict[str, Any]]:
@@ -355,9 +401,6 @@ class _Opened:
         found = choose_for_places(mesh, spread(sensors), frames, making.tolerance, making.synthesis)
         return synthesizer_for(found.plan, mesh, making.synthesis), found.provenance()
 
-    def _label(self, times_s: NDArray[np.float64]) -> NDArray[np.int16]:
-        return label_per_frame(self._spans, self._names, times_s)
-
 
 def places_of(recording: Recording, making: Making) -> tuple[Place, ...]:
     """Return the other places from which a recording is seen."""
@@ -365,13 +408,24 @@ def places_of(recording: Recording, making: Making) -> tuple[Place, ...]:
     return () if plan is None or recording.mesh is None else plan.places()
 
 
-def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
+def _fingerprint(recording: Recording, key: SourceKey, person: str, making: Making) -> str:
     """Hash of all that a source is made of: labels, settings and contents of files."""
     models = _models_of(recording, making) if "denoised" in making.kinds else []
     place = None
     if key.placement:
         place = asdict(places_of(recording, making)[key.placement - 1])
     channel = [recording.radar_receiver, recording.radar_transmitter]
+    scene = [
+        [
+            asdict(one) | {"path": [cached_digest(file) for file in one.files], "faces": None}
+            for one in recording.bodies
+        ],
+        [
+            asdict(one) | ({"shape": cached_digest(Path(one.shape))} if one.is_file else {})
+            for one in recording.things
+        ],
+        [asdict(one) for one in recording.walls],
+    ]
     content = {
         "sensor": recording.sensor.as_dict(),
         "place": place,
@@ -379,7 +433,7 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
         **({"radar_channel": channel} if any(channel) else {}),
         "mesh_reading": recording.mesh_reading.model_dump(mode="json"),
         "spans": [
-            (span.track, span.start_s, span.end_s, span.label)
+            (span.track, span.start_s, span.end_s, span.label, *filter(None, [span.person]))
             for span in recording.labelled.spans
             if span.origin != "suggestion"
         ],
@@ -387,6 +441,8 @@ def _fingerprint(recording: Recording, key: SourceKey, making: Making) -> str:
         "tolerance": making.tolerance,
         "simulation": None if making.simulation is None else making.simulation.as_json(),
         "kinds": making.kinds,
+        **({"scene": scene} if any(scene) else {}),
+        **({"person": person} if person else {}),
         **({"imu": making.imu} if making.imu else {}),
         **({} if making.texture is None else {"texture": making.texture}),
         "files": [

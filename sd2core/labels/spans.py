@@ -192,6 +192,16 @@ class Labels:
         """Smallest id above those in use."""
         return max((span.id for span in self.spans), default=0) + 1
 
+    @property
+    def persons(self) -> tuple[str, ...]:
+        """Persons whom spans name; suggestions do not count."""
+        named = (span.person for span in self.spans if span.origin != "suggestion")
+        return tuple(dict.fromkeys(name for name in named if name))
+
+    def of_person(self, person: str) -> Labels:
+        """Return those of a person, and those that name nobody: these hold for everybody."""
+        return replace(self, spans=tuple(one for one in self.spans if one.person in ("", person)))
+
     def of_track(self, name: str) -> tuple[Span, ...]:
         """Return the spans of one track, in order."""
         return tuple(span for span in self.spans if span.track == name)

@@ -43,7 +43,7 @@ from sd2core.files.resources import resource_path
 from sd2core.files.texts import errors_in
 from sd2core.labels.files import FILE_NAME as LABELS_NAME
 from sd2core.labels.files import labels_of, read_labels, write_labels
-from sd2core.mesh.bodies import Body
+from sd2core.mesh.bodies import Body, persons_of
 from sd2core.mesh.things import Thing
 from sd2core.mesh.walls import Wall
 from sd2core.placements.placements import Placements, placements_from_dict
@@ -310,6 +310,11 @@ class Recording:
     def person(self) -> str:
         """Who is in it: the subject, or where that is not known somebody called as the title."""
         return self.subject or self.title
+
+    @property
+    def persons(self) -> tuple[str, ...]:
+        """Name of each of the bodies of its scene, its own mesh first; each once."""
+        return persons_of([self.subject, *(one.person for one in self.bodies)])
 
     @property
     def unlabelled(self) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from sd2core.cli.output import tell_lost
+from sd2core.cli.output import progress_bar, tell_lost
 from sd2core.cli.recording_maps import MapName, maps_of, usual_maps
 from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.errors import Sd2Error
@@ -18,13 +18,15 @@ if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser
     from sd2core.maps import MapKind
     from sd2core.pairs.store import PairSet
+    from sd2core.recording.recording import Recording
 
 DATA_HELP = (
     "DATA is one or several of: a data set (`sd2 export`), a store of pairs (`sd2 simulate\n"
     "campaign`, `sd2 pairs`), a recording (.sd2) with labels, a labelled radar file (.h5 of a\n"
     "K60168A), or a folder of recordings or radar files. Each recording is assumed to show\n"
     "another person, unless named as PERSON=PATH; radar files without a name are assumed to\n"
-    "show one and the same person. The four swipes count as horizontal and vertical, other\n"
+    "show one and the same person. Labels that name persons are of these, and so are synthetic\n"
+    "maps; radar maps show everybody. The four swipes count as horizontal and vertical, other\n"
     "labels by the class that the label set gives them; frames of a labelled recording without\n"
     "a label are background."
 )
@@ -161,6 +163,8 @@ def _single(
 
     recording, labels = open_recording(one.path), labels_at(one.path)
     labels_given(labels, one.path)
+    if labels.persons:
+        return _of_persons(recording, one, maps, frame_rate_hz)
     # Beside maps of a mesh the radar's is on their axis, so that they can be mixed.
     axis = None if recording.mesh is None else PRESETS["paper"].axis
     found: list[ClipSet] = []
@@ -174,4 +178,38 @@ def _single(
                 frame_rate_hz=found[0].frame_rate_hz if found else frame_rate_hz,
             )
         )
+    return found
+
+
+def _of_persons(
+    recording: Recording,
+    one: LabelledSource,
+    maps: Sequence[MapName] | None,
+    frame_rate_hz: float | None,
+) -> list[ClipSet]:
+    """Return the clips of each person whom a recording's labels name."""
+    from sd2core.classify.data import clips_of_map
+    from sd2core.datasets.recording_sources import Making, recording_sources
+    from sd2core.options.exporting import KINDS
+
+    wanted = {*(maps or usual_maps(recording))}
+    kinds = tuple(
+        kind for kind in KINDS if kind in wanted or (kind in _RADARS and "radar" in wanted)
+    )
+    labels, making = recording.effective_labels(), Making(kinds)
+    found: list[ClipSet] = []
+    sources = recording_sources([one.path], [one.subject or recording.person], making)
+    for person, lazy in zip(labels.persons, sources, strict=True):
+        with progress_bar("Synthesising") as progress:
+            source = lazy.load(progress)
+        for doppler in source.maps.values():
+            found.append(
+                clips_of_map(
+                    doppler,
+                    labels.of_person(person),
+                    subject=source.subject,
+                    movement=one.path.stem,
+                    frame_rate_hz=found[0].frame_rate_hz if found else frame_rate_hz,
+                )
+            )
     return found
