@@ -125,10 +125,11 @@ def _imu(options: Imu) -> None:
         print_json({"file": str(options.out), **told, **signals.meta})
         return
     unknown = told["samples"] - told["known_samples"]
+    who = [name for name in ("at", "person") if name in signals.meta]
     print_facts(
         f"{options.out} (simulated)",
         {
-            "at": str(signals.meta["at"]),
+            "at": " of ".join(str(signals.meta[name]) for name in who),
             "axes": str(signals.meta["axes"]),
             "samples": f"{told['samples']:,} at {options.rate:g} Hz"
             + (f", of which {unknown:,} without a body are empty" if unknown else ""),

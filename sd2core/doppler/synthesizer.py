@@ -87,10 +87,12 @@ class _Counted:
         return self.visibility
 
 
-def _body_notes(prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: int) -> list[str]:
+def _body_notes(
+    prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop: int, *, several: bool
+) -> list[str]:
     """Sentences about frames without a person, and about limits of single precision.
 
-    There are none in ordinary scenes.
+    There are none in ordinary scenes. Without one of several people columns are not empty.
     """
     mesh, options = prepared.mesh, prepared.options
     notes = []
@@ -98,7 +100,11 @@ def _body_notes(prepared: PreparedMesh, sensor: VirtualSensor, start: int, stop:
         share = gaps_in_words(
             runs(~measured), mesh.times_s[start:stop], mesh.timebase.frame_duration_s
         )
-        notes.append(f"Without a person: {share}. Those columns are empty.")
+        notes.append(
+            f"Not there in {share}."
+            if several
+            else f"Without a person: {share}. Those columns are empty."
+        )
     if np.dtype(mesh.vertices.dtype) == np.float32:
         duration_s = 2.0 * mesh.timebase.frame_duration_s / options.oversampling
         error_mps = stored_velocity_error_mps(prepared.reach_m, duration_s)
@@ -414,8 +420,9 @@ class Synthesizer:
             if self.mesh.others:
                 notes.append(f"Nobody hides anybody else in visibility {quality}.")
         for person, one in zip(self.mesh.persons, self._bodies, strict=True):
-            of = f"{person}: " if self.mesh.others else ""
-            notes += [of + note for note in _body_notes(one.prepared, sensor, start, stop)]
+            several = bool(self.mesh.others)
+            said = _body_notes(one.prepared, sensor, start, stop, several=several)
+            notes += [f"{person}: {note}" if several else note for note in said]
         return notes
 
     def _described(self) -> list[dict[str, Any]]:

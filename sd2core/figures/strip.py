@@ -199,23 +199,36 @@ def _add_bar(figure: Figure, layout: _Layout, v_max_mps: float) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The mesh of one frame, and the colours (V, 3) of its vertices from 0 to 1."""
+    """Everybody of one frame as one mesh, and the colours (V, 3) of its vertices from 0 to 1."""
 
     vertices_m: NDArray[np.float64]
+    faces: NDArray[np.int32] | None
     colours: NDArray[np.float64]
 
     @classmethod
     def at(cls, source: StripSource, frame: int, options: StripOptions) -> Body | None:
-        """The mesh at a frame of the strip's clock, None where there is none."""
-        mesh = source.mesh
-        number = None if mesh is None else mesh.person_at(source.clock.time_of(frame))
-        if mesh is None or number is None:
+        """Who is there at a frame of the strip's clock, None if nobody is."""
+        time_s = source.clock.time_of(frame)
+        each = () if source.mesh is None else source.mesh.bodies
+        there = [(mesh, at) for mesh in each if (at := mesh.person_at(time_s)) is not None]
+        if not there:
             return None
-        vertices = np.asarray(mesh.frame(number), np.float64)
-        colours = np.tile(rgb(_PLAIN), (len(vertices), 1))
+        vertices = [np.asarray(mesh.frame(number), np.float64) for mesh, number in there]
+        colours = np.tile(rgb(_PLAIN), (sum(map(len, vertices)), 1))
         if options.colour == "velocity":
-            colours = velocity_colours(_velocity(mesh, number, source.sensor), options.v_max_mps)
-        return cls(vertices, colours.astype(np.float64) / 255)
+            velocity = [_velocity(mesh, number, source.sensor) for mesh, number in there]
+            colours = velocity_colours(np.concatenate(velocity), options.v_max_mps)
+        firsts = np.cumsum([0, *map(len, vertices)]).tolist()
+        faces = [
+            mesh.faces + first
+            for (mesh, _), first in zip(there, firsts, strict=False)
+            if mesh.faces is not None
+        ]
+        return cls(
+            np.concatenate(vertices),
+            np.concatenate(faces) if faces else None,
+            colours.astype(np.float64) / 255,
+        )
 
 
 def _velocity(mesh: MeshSequence, frame: int, sensor: VirtualSensor) -> NDArray[np.float64]:
@@ -275,12 +288,10 @@ def _draw_picture(
         axes.text(0.5, 0.5, "no person", transform=where, fontsize=7, color=_MUTED, **_CENTRED)
         return
     over = row == "overlay"
-    mesh = source.mesh
-    assert mesh is not None
-    if options.as_dots or mesh.faces is None:
-        _draw_dots(axes, body, mesh.faces, source.camera, box, over)
+    if options.as_dots or body.faces is None:
+        _draw_dots(axes, body, source.camera, box, over)
     else:
-        image = _surface(body, mesh.faces, source.camera, box, over)
+        image = _surface(body, body.faces, source.camera, box, over)
         axes.imshow(image, extent=extent, aspect="auto", interpolation="antialiased")
 
 
@@ -317,15 +328,14 @@ def _reduced(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def _draw_dots(
     axes: Axes,
     body: Body,
-    faces: NDArray[np.int32] | None,
     camera: PinholeCamera,
     box: Frame,
     over: bool,
 ) -> None:
     pixels, depth = project_vertices(body.vertices_m, camera)
     shown = np.isfinite(depth)
-    if faces is not None:
-        shown &= _faces_camera(body.vertices_m, faces)
+    if body.faces is not None:
+        shown &= _faces_camera(body.vertices_m, body.faces)
     order = np.flatnonzero(shown)[np.argsort(-depth[shown], kind="stable")]
     if over:
         # One dot in a cell, the nearest: what is under it has to stay visible.

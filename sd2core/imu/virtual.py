@@ -113,6 +113,7 @@ def _ideal(
     signals = imu_signals(path, times.times_s, cutoff_hz, up)
     about = {
         "at": mounting.name,
+        **({"person": mesh.persons[0]} if mesh.others else {}),
         "axes": mounting.axes,
         "rate_hz": round(times.frames_per_s, 6),
         "frames_per_s": round(mesh.timebase.frames_per_s, 6),

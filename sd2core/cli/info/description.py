@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sd2core.imu.signals import InertialSignals
     from sd2core.io.radar import RadarCapture, RecordedMap
     from sd2core.io.video import VideoReader
-    from sd2core.maps import DopplerMap
+    from sd2core.maps import DopplerMap, LimbMaps
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.radar_config import RadarConfig
     from sd2core.recording.recording import Recording
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sd2core.timebase import Timebase
 
 
-_SPAN = ("start_s", "end_s", "label")
+_SPAN = ("start_s", "end_s", "label", "person")
 
 
 @dataclass
@@ -317,7 +317,11 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "nulled bins": bins_in_words(doppler.axis, doppler.null_bins),
         "accuracy": str(accuracy) and f"{accuracy} (relative L1)",
         "unseen bins": bins_in_words(doppler.axis, doppler.unseen_bins),
-        "limbs": "" if doppler.limbs is None else ", ".join(doppler.limbs.parts),
+        "people": ", ".join(
+            one["person"] if isinstance(one, dict) else str(one)
+            for one in doppler.meta.get("bodies", ())
+        ),
+        "limbs": _limbs(doppler.limbs),
         **_synthesis_facts(doppler.meta),
     }
     unlikely = judge_map(
@@ -328,6 +332,19 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
     )
     notes = (*doppler.meta.get("notes", ()), *map(str, unlikely))
     return Description(f"Doppler map {path}", data, facts, notes)
+
+
+def _limbs(limbs: LimbMaps | None) -> str:
+    """Parts of the body in limb maps, once for all persons of whom they are the same."""
+    if limbs is None:
+        return ""
+    of: dict[str, list[str]] = {}
+    for person, one in zip(limbs.persons or ("",), limbs.by_person, strict=True):
+        of.setdefault(", ".join(one.parts), []).append(person)
+    return "; ".join(
+        f"{parts} of {', '.join(persons)}" if any(persons) else parts
+        for parts, persons in of.items()
+    )
 
 
 def axis_in_words(axis: VelocityAxis) -> str:

@@ -174,6 +174,13 @@ def test_what_a_map_says_of_a_scene() -> None:
     assert len(prints) == 3
 
 
+def test_columns_without_one_of_several_are_not_called_empty() -> None:
+    one, away = approaching(3.0), np.array([True, True, True, False, False, False])
+    other = replace(beside(one, 2.0, 0.0, 0.0), present=away, person="anna")
+    notes = Synthesizer(together(one, other), RAW).map(SENSOR).meta["notes"]
+    assert notes == ["anna: Not there in 3 of 6 frames (0.10 s)."]
+
+
 def test_progress_is_counted_in_frames_of_the_clip() -> None:
     told: list[tuple[int, int]] = []
     scene = together(approaching(2.0), approaching(3.0), approaching(4.0))

@@ -85,6 +85,16 @@ def test_approaching_is_red_and_receding_is_blue(source, ball) -> None:
     assert blue > 2000
 
 
+def test_everybody_of_a_scene_is_drawn_while_they_are_there(source, ball) -> None:
+    receding = np.asarray(ball.vertices)[::-1] + np.float32([0.6, 0.0, 0.0])
+    there = np.arange(12) < 8
+    both = replace(ball, others=(replace(ball, vertices=receding, present=there),))
+    scene = replace(source, mesh=both)
+    red, blue = strong(without_bar(drawn(scene, [5, 6], rows=("mesh",))))
+    assert min(red, blue) > 1000
+    assert strong(without_bar(drawn(scene, [9, 10], rows=("mesh",))))[1] == 0
+
+
 def test_plain_has_no_velocity_and_no_bar(source) -> None:
     assert strong(drawn(source, [5], rows=("mesh",), colour="plain")) == (0, 0)
 
