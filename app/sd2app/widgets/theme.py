@@ -61,6 +61,9 @@ def apply_theme(application: QApplication, dark: bool) -> None:
     for kind, name in _FRAMES.items():
         window = QColor(getattr(colours, name)).lighter(_OF_A_FRAME)
         palette.setColor(QPalette.ColorRole.Window, window)
+        # What is disabled it draws fainter.
+        fainter = QColor(colours.disabled).lighter(_OF_A_FRAME)
+        palette.setColor(QPalette.ColorGroup.Disabled, QPalette.ColorRole.Window, fainter)
         application.setPalette(palette, kind)  # type: ignore[arg-type]  # not bytes
     application.setStyleSheet(sheet)
 

@@ -75,12 +75,14 @@ def pressed_button() -> QToolButton:
     ],
 )
 @pytest.mark.parametrize("ground", ["window", "panel"])
-def test_its_frame_is_seen(qtbot, theme, kind, ground) -> None:
+@pytest.mark.parametrize("enabled", [True, False])
+def test_its_frame_is_seen(qtbot, theme, kind, ground, enabled) -> None:
     place = QWidget()
     place.setStyleSheet(f"QWidget#place {{ background: {getattr(theme, ground)}; }}")
     place.setObjectName("place")
     qtbot.addWidget(place)
     box = kind()
+    box.setEnabled(enabled)
     box.setParent(place)
     box.setGeometry(10, 10, 80, box.sizeHint().height())
     place.resize(100, 60)
