@@ -6,7 +6,7 @@ from functools import partial
 
 from PySide6.QtCore import QObject, Qt
 from PySide6.QtGui import QGuiApplication, QIcon, QShowEvent
-from PySide6.QtWidgets import QAbstractItemView, QSizePolicy, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QSizePolicy, QWidget
 
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
@@ -39,15 +39,14 @@ _TIPS = (
     "Longest length",
     "Share of the recording that they cover; overlaps count once",
 )
-_WIDE = "■ left-to-right  "
-_PADDING_PX = 10
 
 
 class StatisticsTableModel(RecordTableModel[tuple[str, ...]]):
     """A row per label."""
 
     def __init__(self, labels: LabelsModel, playback: PlaybackModel, parent: QObject) -> None:
-        texts = (text.capitalize().replace("Sd ", "SD ") for text in HEADINGS)
+        # Units stand below, so that all columns have room beside each other.
+        texts = (text.capitalize().replace("Sd ", "SD ").replace(" ", "\n") for text in HEADINGS)
         headings = [
             Heading(text, tip, number=place > 0)
             for place, (text, tip) in enumerate(zip(texts, _TIPS, strict=True))
@@ -84,10 +83,9 @@ class StatisticsPage(QWidget):
         table.setModel(self._model)
         table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         table.setTabKeyNavigation(False)
-        for place, heading in enumerate(self._model.headings):
-            text = heading.text if place else _WIDE
-            wide = self.fontMetrics().horizontalAdvance(text) + _PADDING_PX
-            table.setColumnWidth(place, max(wide, 52))
+        header = table.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setStyleSheet("QHeaderView::section { padding: 4px 1px 2px 1px; }")
         to_paste, csv = (
             outlined(text, tip, partial(self._copy, separator), self)
             for text, tip, separator in (

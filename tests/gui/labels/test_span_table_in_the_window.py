@@ -9,11 +9,11 @@ from finding import splitter_around
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLineEdit, QToolButton
+from PySide6.QtWidgets import QApplication, QLineEdit, QTableView, QToolButton
 from window_models import models_of
 
 from sd2app.labels.label_set_page import LabelSetTable
-from sd2app.labels.panel import LabelsPanel
+from sd2app.labels.panel import LabelsPanel, StatisticsPage
 from sd2app.labels.table import SpanTable
 from sd2app.labels.table_model import COLUMNS
 from sd2app.labels.timeline import ROW_PX, LabelTimeline
@@ -265,6 +265,19 @@ def test_statistics_are_counted_and_copied(labelled) -> None:
     assert bytes(copied.data("text/csv").data()).decode() == copied.text()
     QTest.mouseClick(buttons["Copy table"], LEFT)
     assert QGuiApplication.clipboard().text().splitlines()[0].startswith("label\tspans\t")
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (1600, 1000), (2560, 1440)])
+def test_statistics_need_no_scrolling(labelled, size) -> None:
+    labelled.resize(*size)
+    labelled.side.bring_up("Labels")
+    buttons = {one.text(): one for one in labelled.findChild(LabelsPanel).findChildren(QToolButton)}
+    QTest.mouseClick(buttons["Statistics"], LEFT)
+    QApplication.processEvents()
+    found = labelled.findChild(StatisticsPage).findChild(QTableView)
+    assert found.isVisible()
+    assert found.horizontalScrollBar().maximum() == 0
+    labelled.resize(1280, 800)
 
 
 def test_the_panel_is_as_wide_as_its_table_needs_and_others_are_as_before(labelled) -> None:
