@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QSignalBlocker
 from PySide6.QtWidgets import QSplitter, QWidget
 
@@ -60,6 +62,7 @@ class SideDock(QObject):
         self._otherwise_px = splitter.sizes()[-1]
         self._shown = side.shown
         self._fits: tuple[bool, bool] | None = None
+        self._bars: tuple[QWidget, ...] = ()
         side.turned.connect(self._turn)
         side.folded_changed.connect(self._widen)
         layouts.panes_changed.connect(self._widen)
@@ -81,6 +84,12 @@ class SideDock(QObject):
         """Keep for the layout which panel is open, or that none is."""
         self._layouts.keep(_SHOWN, self._shown)
         self._layouts.keep(_FOLDED, self._side.folded)
+
+    def keep_clear(self, bars: Iterable[QWidget]) -> None:
+        """Let these bars end where the panel lies over them."""
+        self._bars = tuple(bars)
+        for bar in self._bars:
+            bar.installEventFilter(self)
 
     @property
     def _beside(self) -> bool:
@@ -143,6 +152,9 @@ class SideDock(QObject):
         if not self._side.folded and not self._beside:
             place.setLeft(max(place.right() + 1 - self._wide_px, 0))
         self._frame.setGeometry(place)
+        for bar in self._bars:
+            covered_px = bar.mapTo(parent, bar.rect().topRight()).x() + 1 - place.left()
+            bar.setContentsMargins(0, 0, max(covered_px, 0), 0)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Follow the splitter, and the needs of the open panel."""

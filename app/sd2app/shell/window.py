@@ -149,6 +149,7 @@ class MainWindow(QMainWindow):
         bars = [bar for feature in self.features for bar in feature.bars()]
         for bar in bars:
             self._column.insertWidget(0, bar)
+        self._dock.keep_clear([*bars, self._suggestions])
         said = (notice for feature in self.features for notice in feature.notices())
         notices = [notice for notice in said if isinstance(notice, Notice)]
         for notice in notices:
@@ -209,6 +210,7 @@ class MainWindow(QMainWindow):
             self._panels["side"], self._across, self.side, {"Labels": _LABELS_PX}, self._settings,
             self.session.layouts,
         )  # fmt: skip
+        self._suggestions = views["suggestions"]
         stack, self.maps = track_stack(self.session, self.features, views)
         fill(self._panels["tracks"], stack)
         self._scene_comes = sentence("Loading the 3D view…")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, QSignalBlocker
+from PySide6.QtCore import QEvent, QSignalBlocker, Qt
 from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QWidget
 
@@ -26,7 +26,7 @@ class SuggestionBar(QWidget):
     """View of :class:`SuggestionsModel`; hidden until suggestions are asked for.
 
     Where one row would cut its words short, what decides stands above what finds; where that is
-    not enough, each of them stands in two rows itself.
+    not enough, each of them stands in several rows itself.
     """
 
     def __init__(self, model: SuggestionsModel, action: Callable[[str], QAction]) -> None:
@@ -46,19 +46,15 @@ class SuggestionBar(QWidget):
         self._copy = copy_button(lambda: model.line, self)
         buttons = [action_button(action(name), text, outlined=True) for name, text in _BUTTONS]
         ends = row_of(STRETCH, self._copy, spacing_px=6)
-        self._rows = (
-            row_of(
-                (row_of((self._text, 1), self._as, spacing_px=6), 1),
-                row_of(*buttons, STRETCH, spacing_px=6),
-                spacing_px=6,
-            ),
-            row_of(
-                row_of(STRETCH, self._by, self._source, self._threshold, spacing_px=6),
-                ends,
-                spacing_px=6,
-            ),
-        )
-        self._layout = row_of((self._rows[0], 1), self._rows[1], spacing_px=6)
+        each, all_ = row_of(*buttons[:2], spacing_px=6), row_of(*buttons[2:], STRETCH, spacing_px=6)
+        decide = row_of(each, all_, spacing_px=6)
+        decide.setAlignment(each, Qt.AlignmentFlag.AlignLeft)  # also above the others
+        chosen = row_of(STRETCH, self._by, self._source, spacing_px=6)
+        find = row_of(chosen, self._threshold, spacing_px=6)
+        say = row_of((self._text, 1), self._as, spacing_px=6)
+        above, below = row_of((say, 1), decide, spacing_px=6), row_of(find, ends, spacing_px=6)
+        self._rows = all_, decide, chosen, find, above, below
+        self._layout = row_of((above, 1), below, spacing_px=6)
         self._layout.setContentsMargins(*_MARGINS_PX)
         self.setLayout(self._layout)
         # The last one for the keyboard too.
@@ -80,7 +76,7 @@ class SuggestionBar(QWidget):
 
     def _fold(self) -> None:
         left_px, _, right_px, _ = _MARGINS_PX
-        room_px, ways = self.width() - left_px - right_px, QBoxLayout.Direction
+        room_px, ways = self.contentsRect().width() - left_px - right_px, QBoxLayout.Direction
         # The inner ones first: the outer one asks how wide they are.
         for layout in (*self._rows, self._layout):
             parts = (layout.itemAt(place) for place in range(layout.count()))

@@ -157,6 +157,28 @@ def test_no_word_of_the_bar_is_cut_short(moving, qtbot, size) -> None:
     moving.resize(1280, 800)
 
 
+@pytest.mark.parametrize("panel", ["Sensor", "Labels"])
+def test_a_panel_over_the_maps_leaves_the_bar_free(moving, qtbot, panel) -> None:
+    moving.resize(1000, 640)
+    moving.fold_side(True)
+    asked(moving, qtbot)
+    bar, side = moving.findChild(SuggestionBar), moving.side
+    moving.bring_up(panel)
+
+    def beside_each_other() -> None:
+        edge_px = side.mapToGlobal(QPoint(0, 0)).x()
+        assert edge_px < bar.mapToGlobal(bar.rect().topRight()).x(), "it lies over the maps"
+        for one in bar.findChildren(QToolButton):
+            assert one.mapToGlobal(one.rect().topRight()).x() < edge_px, one.text()
+            assert one.width() >= one.sizeHint().width(), one.text()
+            assert one.height() >= one.sizeHint().height(), one.text()
+
+    qtbot.waitUntil(beside_each_other)
+    moving.fold_side(True)
+    qtbot.waitUntil(lambda: bar.contentsMargins().right() == 0)
+    moving.resize(1280, 800)
+
+
 def test_suggestions_are_saved_with_the_labels(moving, qtbot, tmp_path) -> None:
     from sd2core.recording.recording import open_recording
 
