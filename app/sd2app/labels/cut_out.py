@@ -10,6 +10,7 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QMessageBox, QWidget
 
 from sd2app.background.latest import Emit, ReportingModel
+from sd2app.background.quoting import quoted
 from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.manual.help import with_help
@@ -18,16 +19,26 @@ from sd2app.session.tasks import ListedRunner
 from sd2app.widgets.dialogs import Dialog, accepted, accepting, ask_folder
 from sd2app.widgets.inputs import CheckBox, Choice
 from sd2app.widgets.layouts import STRETCH, column_of, form_of
-from sd2app.widgets.panel import sentence, side_by_side
+from sd2app.widgets.panel import copy_button, sentence, side_by_side
 from sd2app.widgets.text import counted
+from sd2core.cli.labels.recording import Cut as CutCommand
 from sd2core.cutouts.cutting import Cut, cut_out, plan_cuts
 from sd2core.cutouts.source import CutSource, Part
 from sd2core.labels.spans import Labels, Span
+from sd2core.options.records import words_of
 
 _ABOUT = (
     "Each span becomes a folder of its own, with 0 s at its first frame, and an index lists them"
     " all. Cut-outs that are in the folder already are kept."
 )
+
+
+class SpanGroup(NamedTuple):
+    """Spans that can be chosen together."""
+
+    name: str
+    spans: tuple[Span, ...]
+    labels: tuple[str, ...] | None = ()  # for the command; None: it cannot choose just these
 
 
 class _Plan(NamedTuple):
@@ -75,6 +86,17 @@ class CutOutModel(ReportingModel):
             recording.sensor.position_m,
         )
         return whole.only(parts)
+
+    def line(self, labels: tuple[str, ...], parts: Sequence[Part]) -> str:
+        """Command for a terminal that cuts spans of the saved recording out, by their labels."""
+        recording, source = self._session.document.recording, self.source(parts)
+        assert recording is not None
+        assert source is not None
+        maps, out = ",".join(source.maps) or None, Path("cuts")
+        cut = CutCommand(
+            recording=recording.folder, out=out, label=labels, parts=",".join(parts), maps=maps
+        )
+        return quoted(words_of("labels cut", cut))
 
     def start(self, spans: Sequence[Span], parts: Iterable[Part], folder: Path) -> None:
         """Compare with the folder, then export."""
@@ -131,10 +153,10 @@ def ask_for_cut_outs(shell: Shell, labels: LabelsModel, model: CutOutModel) -> N
     source, groups = model.source(), _groups(labels.labels, labels.selected)
     if source is None:
         return
-    if not groups[-1][1]:
+    if not groups[-1].spans:
         shell.warn("There is nothing to cut out: accept the suggestions first.")
         return
-    dialog = CutOutDialog(groups, source, shell.dialog_parent)
+    dialog = CutOutDialog(groups, model, source, shell.dialog_parent)
     if not accepted(dialog):
         return
     spans, parts = dialog.spans, dialog.parts
@@ -160,27 +182,28 @@ def ask_about_others(parent: QWidget, model: CutOutModel, count: int, example: s
     box.deleteLater()
 
 
-def _groups(labels: Labels, selected: Sequence[Span]) -> list[tuple[str, tuple[Span, ...]]]:
+def _groups(labels: Labels, selected: Sequence[Span]) -> list[SpanGroup]:
     """Choices of spans: the selection, all, or the spans of one label."""
     decided = tuple(span for span in labels.spans if span.origin != "suggestion")
     chosen = tuple(span for span in selected if span.origin != "suggestion")
     by_label: dict[str, list[Span]] = {}
     for span in decided:
         by_label.setdefault(span.label, []).append(span)
-    found = [("the selected", chosen)] if chosen else []
-    return [*found, ("all", decided), *((name, tuple(spans)) for name, spans in by_label.items())]
+    found = [SpanGroup("the selected", chosen, None)] if chosen else []
+    each = (SpanGroup(name, tuple(spans), (name,)) for name, spans in by_label.items())
+    return [*found, SpanGroup("all", decided), *each]
 
 
 class CutOutDialog(Dialog):
     """Accepted to choose a folder for :attr:`spans` and :attr:`parts`."""
 
     def __init__(
-        self, groups: Sequence[tuple[str, tuple[Span, ...]]], source: CutSource, parent: QWidget
+        self, groups: Sequence[SpanGroup], model: CutOutModel, source: CutSource, parent: QWidget
     ) -> None:
         super().__init__("Export cut-outs", parent)
         self._groups, self._source = groups, source
         self._which = Choice("Which spans", self)
-        self._which.addItems([f"{name} ({len(spans)})" for name, spans in groups])
+        self._which.addItems([f"{one.name} ({len(one.spans)})" for one in groups])
         self._which.currentIndexChanged.connect(self._refresh)
         maps = ", ".join(source.maps)
         there: dict[Part, tuple[str, bool]] = {
@@ -197,16 +220,24 @@ class CutOutDialog(Dialog):
         buttons, self._go = accepting(self, "Export…")
         parts = side_by_side(*self._parts.values(), spacing_px=16)
         form = form_of(("Spans", self._which), ("Parts", parts))
-        foot = with_help("Export cut-outs", buttons)
+        tip = "The same as a command for a terminal, which chooses spans by their labels"
+        self._copy = copy_button(
+            lambda: model.line(self._group.labels or (), self.parts), self, tip
+        )
+        foot = with_help("Export cut-outs", buttons, self._copy)
         content = form, self._size, sentence(_ABOUT), STRETCH, foot
         self.setLayout(column_of(*content, spacing_px=12, margins_px=16))
         self._refresh()
         self.setMinimumWidth(520)
 
     @property
+    def _group(self) -> SpanGroup:
+        return self._groups[self._which.currentIndex()]
+
+    @property
     def spans(self) -> tuple[Span, ...]:
         """Spans chosen."""
-        return self._groups[self._which.currentIndex()][1]
+        return self._group.spans
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -220,3 +251,4 @@ class CutOutDialog(Dialog):
         seconds = sum(one.duration_s for one in self.spans)
         self._size.setText(f"{frames:,} frames, {seconds:.1f} s in all.")
         self._go.setEnabled(bool(self.spans and self.parts))
+        self._copy.setEnabled(self._go.isEnabled() and self._group.labels is not None)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 
 import pytest
 from answering import answer, once_asked
+from finding import button_of
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QCheckBox, QComboBox, QFileDialog, QPushButton
+from PySide6.QtWidgets import QApplication, QCheckBox, QComboBox, QFileDialog, QPushButton
 from window_models import models_of
 
+from sd2app.command_line import main
 from sd2app.labels.cut_out import CutOutDialog
 from sd2core.io.video import open_video
 
@@ -70,6 +73,49 @@ def test_one_label_and_some_parts_then_something_else(window, qtbot, cuts) -> No
     answer(qtbot, "Replace")
     cut(window, qtbot, "all (2)", "video", "mesh")
     assert [files for _, _, files in listed(cuts)] == [["synthetic.npz", "radar.npz"]] * 2
+
+
+@pytest.mark.slow
+def test_the_copied_command_cuts_the_same_out(window, qtbot, cuts, monkeypatch) -> None:
+    copied: list[list[str]] = []
+
+    def copy(dialog: CutOutDialog) -> None:
+        dialog.findChild(QComboBox).setCurrentText("back (1)")
+        next(box for box in dialog.findChildren(QCheckBox) if box.text() == "mesh").click()
+        qtbot.mouseClick(button_of(dialog, "Copy command"), LEFT)
+        copied.append(shlex.split(QApplication.clipboard().text())[1:])
+        dialog.reject()
+
+    once_asked(CutOutDialog, copy)
+    window.action("cut_out").trigger()
+    there = cuts.with_name("there")
+    there.mkdir()
+    monkeypatch.chdir(there)
+    assert main(copied[0]) == 0
+    cut(window, qtbot, "back (1)", "mesh")
+    assert listed(there / "cuts") == listed(cuts) != []
+
+
+def test_a_command_cannot_choose_single_spans(window, qtbot) -> None:
+    labels = models_of(window).labels
+    labels.select([labels.labels.spans[0].id])
+    enabled: dict[str, bool] = {}
+
+    def look(dialog: CutOutDialog) -> None:
+        which = dialog.findChild(QComboBox)
+        for row in range(which.count()):
+            which.setCurrentIndex(row)
+            enabled[which.currentText()] = button_of(dialog, "Copy command").isEnabled()
+        dialog.reject()
+
+    once_asked(CutOutDialog, look)
+    window.action("cut_out").trigger()
+    assert enabled == {
+        "the selected (1)": False,
+        "all (2)": True,
+        "there (1)": True,
+        "back (1)": True,
+    }
 
 
 def test_cancelled_it_leaves_whole_folders_only(window, qtbot, cuts) -> None:

@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialogButtonBox, QToolButton
 from window_models import menu_of
 
-from sd2app.labels.cut_out import CutOutDialog
+from sd2app.labels.cut_out import CutOutDialog, SpanGroup
 from sd2app.manual.help import HELP
 from sd2app.shell.program import ProgramFeature
 from sd2app.shell.side_panel import RailButton
@@ -104,8 +104,9 @@ def test_every_larger_dialog_has_help() -> None:
 
 
 def test_help_in_a_dialog_that_waits_can_be_read(window, manual) -> None:
-    source = window.features.labels.cut_out.source()
-    dialog = CutOutDialog([("all", window.features.labels.model.labels.spans)], source, window)
+    labels = window.features.labels
+    groups = [SpanGroup("all", labels.model.labels.spans)]
+    dialog = CutOutDialog(groups, labels.cut_out, labels.cut_out.source(), window)
     dialog.open()
     QTest.qWaitForWindowExposed(dialog)
     assert QApplication.activeModalWidget() is dialog
