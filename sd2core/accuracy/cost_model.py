@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from sd2core.accuracy.plans import AccuracyPlan, ScenePart
+from sd2core.accuracy.plans import AccuracyPlan
+from sd2core.options.synthesis import ScenePart
 
 _COUNT_NS, _MOMENT_NS = 1.0, 1.5
 _ONE_RANGE = 0.9

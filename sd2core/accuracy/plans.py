@@ -10,13 +10,17 @@ from typing import Any, Literal, get_args
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.options import Motion, WaveOptions
-from sd2core.io.things import with_things, with_walls
-from sd2core.mesh.sequence import MeshSequence
-from sd2core.options.synthesis import Beyond, DepthResolution, RangeLaw, Visibility, Weight
+from sd2core.options.synthesis import (
+    Beyond,
+    DepthResolution,
+    RangeLaw,
+    ScenePart,
+    Visibility,
+    Weight,
+)
 
 Signal = Literal["histogram", "fmcw", "direct"]
 Family = Literal["histogram", "fmcw"]
-ScenePart = Literal["beam", "things", "walls"]
 
 FRAME_RATE_FACTORS = (1, 2, 4, 8)
 MASK_STRIDES = (1, 2, 5, 10)
@@ -141,12 +145,6 @@ class AccuracyPlan:
             beyond=self.beyond,
             oversampling=self.frame_rate_factor,
         )
-
-    def scene(self, mesh: MeshSequence) -> MeshSequence:
-        """Mesh without the things and walls that a counting plan leaves out of account."""
-        if "things" in self.left_out:
-            mesh = with_things(mesh, ())
-        return with_walls(mesh, ()) if "walls" in self.left_out else mesh
 
     def wave(self, base: WaveOptions) -> WaveOptions:
         """Options of an FMCW plan; what it does not choose is taken from ``base``."""

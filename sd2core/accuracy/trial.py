@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from sd2core.accuracy.plans import (
     VERTICES_KEPT,
     AccuracyPlan,
-    ScenePart,
     reference_plan,
     visibility_plans,
 )
@@ -29,6 +28,7 @@ from sd2core.mesh.decimation import decimate
 from sd2core.mesh.made_vertices import shifted_like, unshifted
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import workers
+from sd2core.options.synthesis import ScenePart
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 
@@ -69,8 +69,7 @@ def synthesizer_for(
             for kept, body in zip(like.mesh.others, mesh.others, strict=True)
         )
         counted = replace(like.mesh, surroundings=mesh.surroundings, others=others)
-    beam = "beam" not in plan.left_out
-    return Synthesizer(plan.scene(counted), plan.options(options), blocks_of=like, beam=beam)
+    return Synthesizer(counted, plan.options(options), blocks_of=like, left_out=plan.left_out)
 
 
 _BLOCK_FRAMES = 5
@@ -278,9 +277,9 @@ class Trial:
         key = plan.vertices_kept, plan.frame_rate_factor, block_frames
         like = self._prepared.get(key)
         made = Synthesizer(
-            plan.scene(self._sampled(plan.vertices_kept)),
+            self._sampled(plan.vertices_kept),
             plan.options(self._unsmoothed),
-            beam="beam" not in plan.left_out,
+            left_out=plan.left_out,
             blocks_of=like,
             threads=threads,
             block_frames=block_frames,

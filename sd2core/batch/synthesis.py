@@ -175,11 +175,17 @@ def _synthesizer(mesh: MeshInput, section: Synthesis, plan: dict[str, Any] | Non
     if _kept.synthesizer is None or _kept.made_for != wanted:
         _kept.synthesizer = None
         options, share = chosen_options(section), section.vertices_kept or 1.0
+        left_out = section.left_out or ()
         if plan is not None:
             settings = AccuracyPlan.from_json(plan["plan"])
             options, share = settings.options(options), settings.vertices_kept
+            left_out = settings.left_out
         _kept.synthesizer = Synthesizer(
-            decimate(opened, share), options, memory_budget_bytes=PREPARED_BYTES, threads=1
+            decimate(opened, share),
+            options,
+            memory_budget_bytes=PREPARED_BYTES,
+            threads=1,
+            left_out=left_out,
         )
         _kept.made_for = wanted
     return _kept.synthesizer

@@ -72,6 +72,7 @@ class TaskGraph:
                 "options": asdict(chosen_options(section)),
                 "tolerance": section.tolerance,
                 "vertices_kept": section.vertices_kept,
+                "left_out": section.left_out,
             }
         )
         self._model = None if plan.denoise is None else _model_of(plan)

@@ -98,7 +98,8 @@ def _synth(options: Synth) -> None:
     elif request:
         doppler = _as_chosen(options, mesh, sensor, synthesis)
     else:
-        doppler = _counted(options, Synthesizer(mesh, synthesis), sensor)
+        maker = Synthesizer(mesh, synthesis, left_out=options.left_out or ())
+        doppler = _counted(options, maker, sensor)
     doppler.save(options.out)
     description = describe_map(options.out, doppler)
     description.notes = mesh.notes + description.notes

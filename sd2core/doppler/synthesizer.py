@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -28,6 +28,7 @@ from sd2core.numerics.byte_budget import ByteBudget
 from sd2core.numerics.compiled import compile_in_background, kernels_ready, worker_count
 from sd2core.numerics.parallel import Ticket, run_jobs, run_light_jobs
 from sd2core.numerics.precision import SHARE_OF_A_BIN, stored_velocity_error_mps
+from sd2core.options.synthesis import ScenePart
 from sd2core.progress import Progress, silent
 from sd2core.scattering.amplitude import NEAREST_RANGE_M
 from sd2core.scattering.velocity import radial_velocity
@@ -167,8 +168,8 @@ class Synthesizer:
     blocks_of : Synthesizer, optional
         Another synthesizer of the same mesh, maybe among other things, whose prepared blocks and
         budget are shared where the options allow it.
-    beam : bool
-        False: sensors' beams are left out of account.
+    left_out : collection of {"beam", "things", "walls"}
+        Parts of the scene that are left out of account.
 
     Raises
     ------
@@ -194,7 +195,7 @@ class Synthesizer:
         threads: int | None = None,
         block_frames: int | None = None,
         blocks_of: Synthesizer | None = None,
-        beam: bool = True,
+        left_out: Collection[ScenePart] = (),
     ) -> None:
         if isinstance(preset, str) and preset not in PRESETS:
             raise Sd2Error(f"The preset is {preset!r}", f"one of {', '.join(PRESETS)}")
@@ -206,10 +207,12 @@ class Synthesizer:
             raise Sd2Error(f"threads is {threads}", "1 or more, or None for all cores")
         if block_frames is not None and block_frames < 1:
             raise Sd2Error(f"block_frames is {block_frames}", "1 or more, or None")
+        if mesh.surroundings is not None and left_out:
+            mesh = replace(mesh, surroundings=mesh.surroundings.without(left_out))
         self.mesh = mesh
         self.options = options
         self._threads = threads
-        self._beam = beam
+        self.left_out = tuple(left_out)
         share_bytes = memory_budget_bytes // len(mesh.bodies)
         like = () if blocks_of is None else blocks_of._bodies
         found = (one.prepared.shared(mesh, options) for one in like)
@@ -228,7 +231,7 @@ class Synthesizer:
                     threads=threads,
                     block_frames=block_frames,
                     blocks_of=blocks_of,
-                    beam=beam,
+                    left_out=left_out,
                 )
                 for body in mesh.others
             ),
@@ -641,7 +644,7 @@ class Synthesizer:
     ) -> _Counted:
         """Empty counts of what some frames of this body need, and the jobs that fill them."""
         start, stop = frames_within_reach(self.mesh.times_s, *frames, self.options.time_sigma_s)
-        sensor = sensor if self._beam else replace(sensor, beam=None)
+        sensor = replace(sensor, beam=None) if "beam" in self.left_out else sensor
         if not kernels_ready():
             compile_in_background()
         counts = Counts.empty(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import product
@@ -189,6 +189,11 @@ class Surroundings:
         if not things and not walls:
             return None
         return cls(things, surfaces, *joined(surfaces), walls)
+
+    def without(self, parts: Collection[str]) -> Surroundings | None:
+        """These without ``things`` or ``walls``; None where nothing is left."""
+        kept = ((), ()) if "things" in parts else (self.things, self.surfaces)
+        return self.of(*kept, () if "walls" in parts else self.walls)
 
     @property
     def surface(self) -> Surface:

@@ -15,6 +15,7 @@ Weight = Literal["count", "area", "projected"]
 HowCounted = Literal["plain", "expected"]
 RangeLaw = Literal["vertex", "frame"]
 Beyond = Literal["drop", "wrap", "clip"]
+ScenePart = Literal["beam", "things", "walls"]
 
 CHOSEN = (
     "visibility",
@@ -24,6 +25,7 @@ CHOSEN = (
     "range_law",
     "beyond",
     "oversampling",
+    "left_out",
 )
 """Options that an accuracy plan chooses."""
 
@@ -102,6 +104,8 @@ class Synthesis(Counting, Axis, Tolerance, Limbs):
     oversampling : N
         raise the frame rate N times before velocities are taken, and average each frame
         over its N moments (default: 1)
+    left_out
+        count as if the scene had none of these; may be given several times
     velocity_sigma_bins : BINS
         smooth the map along velocity (sigma in bins)
     time_sigma_s : S
@@ -121,6 +125,7 @@ class Synthesis(Counting, Axis, Tolerance, Limbs):
     range_law: RangeLaw | None = None
     trajectory_smoothing_s: NotNegative | None = None
     oversampling: Count | None = None
+    left_out: Annotated[tuple[ScenePart, ...] | None, Place(many="again")] = None
     velocity_sigma_bins: NotNegative | None = None
     time_sigma_s: NotNegative | None = None
 

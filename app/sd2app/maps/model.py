@@ -263,6 +263,7 @@ class SynthesisModel(QObject):
         chosen: dict[str, Any] = {}
         if plan is not None:
             used, chosen["vertices_kept"] = plan.options(used), plan.vertices_kept
+            chosen["left_out"] = plan.left_out
         for name in (*CHOSEN, "count"):
             if getattr(used, name, None) != getattr(usual, name, None):
                 chosen[name] = getattr(used, name)

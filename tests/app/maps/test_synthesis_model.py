@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
 import threading
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,18 +13,23 @@ import pytest
 import trimesh
 from fake_accuracy import COUNTING, EXACT, FACING, FakeAccuracy
 from fake_denoisers import FakeDenoisers
+from swinging_recordings import recording
 from window_models import build_models
 
+from sd2app.command_line import main as run
 from sd2app.maps import warm_up as map_warm_up
 from sd2app.maps.partial_map import FINAL, ROUGH
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.accuracy.trial import synthesizer_for
+from sd2core.doppler.options import PRESETS
 from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.io.mesh import load_mesh
 from sd2core.maps import DopplerMap
-from sd2core.sensor import VirtualSensor
+from sd2core.mesh.things import Thing
+from sd2core.mesh.walls import Wall
+from sd2core.sensor import Beam, VirtualSensor
 
 
 @pytest.fixture(scope="module")
@@ -424,6 +432,39 @@ def test_the_exported_map_names_its_plan(context, fake, qtbot, ball, tmp_path):
     assert plan.pop("text") == str(fake.plan)
     assert AccuracyPlan.from_json(plan) == fake.plan
     assert saved.meta["plan_error_l1"] == 0.008
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [
+        AccuracyPlan(left_out=("walls",)),
+        AccuracyPlan(left_out=("beam", "things"), mask_stride=2),
+        AccuracyPlan(visibility="depth", frame_rate_factor=2),
+    ],
+)
+def test_the_copied_command_makes_the_map_on_screen(
+    context, fake, qtbot, tmp_path, monkeypatch, plan
+):
+    fake.plan = plan
+    scene = replace(
+        recording(tmp_path / "hall.sd2", radar=False),
+        sensor=VirtualSensor((0.3, 0.1, 0.0), azimuth_deg=5.0, beam=Beam(60.0, 40.0)),
+        things=(Thing("box", (0.15, 0.2, 1.0), size_m=(0.2, 0.4, 0.1)),),
+        walls=(Wall.named("right", 1.0, 3.0),),
+    )
+    scene.save()
+    open_ball(context, qtbot, scene.folder)
+    wait_until_done(context, qtbot)
+    context.edits.place_sensor(replace(scene.sensor, position_m=(-0.2, 0.1, 0.0)))
+    wait_until_done(context, qtbot)
+    monkeypatch.chdir(tmp_path)
+    program, *words = shlex.split(context.synthesis.line("map.npz"))
+    assert (program, run(words)) == ("sd2", 0)
+    made = DopplerMap.load(Path("map.npz"))
+    np.testing.assert_array_equal(made.values, context.synthetic.map.values)
+    everything = Synthesizer(scene.load_mesh(), plan.options(PRESETS["paper"]))
+    full = everything.map(context.sensor.sensor).values
+    assert np.array_equal(full, made.values) == (not plan.left_out)
 
 
 def test_the_library_chooses_for_a_small_scene(qapp, qtbot, ball, compiled_kernels):
