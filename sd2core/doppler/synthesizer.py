@@ -382,9 +382,13 @@ class Synthesizer:
         wanted(sensor, VirtualSensor, _A_SENSOR)
         start, stop = frames or (0, self.mesh.frame_count)
         stretch = self.stretch(sensor, start, stop, visibility, progress, parts)
+        return self.as_map(stretch, sensor, start)
+
+    def as_map(self, stretch: Stretch, sensor: VirtualSensor, start: int = 0) -> DopplerMap:
+        """Doppler map of frames that were counted with their shares, as :meth:`map` gives it."""
         assert stretch.visible_share is not None
         assert stretch.beyond_share is not None
-        options = self.options
+        options, stop = self.options, start + stretch.values.shape[1]
         unshared = stretch.quality in ("none", "facing")
         around, several = self.mesh.surroundings, len(self._bodies) > 1
         spreads = any(one.prepared.spreads for one in self._bodies)

@@ -155,7 +155,7 @@ class DenoiseModel(ReportingModel):
         self._set_model(self._loaded)
 
     def export(self, path: Path) -> None:
-        """Write the denoised map on screen, computed again with its provenance.
+        """Write what the model makes of the synthetic map on screen, with its provenance.
 
         Raises Sd2Error if there is none yet.
         """

@@ -14,7 +14,7 @@ from sd2app.widgets.dialogs import Dialog, ExportButtons, accepted, ask_new
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.panel import copy_button, sentence
 
-_ABOUT = "The map on screen, computed anew, as .npz with all that it was made from and with."
+_ABOUT = "The map on screen as .npz with all that it was made from and with."
 
 
 def export_map(

@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from PySide6.QtCore import QObject, Signal, SignalInstance
 
 from sd2app.accuracy.model import AccuracyModel
@@ -33,13 +34,12 @@ from sd2app.maps.readout import FrameReader, Readout
 from sd2app.maps.warm_up import CompilerModel, MaskPrefetcher
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
-from sd2core.body.parts import synthetic_map
 from sd2core.cli.synth import Synth
+from sd2core.doppler.body_error import body_error
 from sd2core.doppler.options import PRESETS
-from sd2core.doppler.synthesizer import FrameScattering, Synthesizer
+from sd2core.doppler.synthesizer import FrameScattering, Stretch, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
-from sd2core.mesh.presence import runs
 from sd2core.options.records import words_of
 from sd2core.options.synthesis import CHOSEN
 from sd2core.sensor import Vector, VirtualSensor
@@ -280,18 +280,25 @@ class SynthesisModel(QObject):
         return quoted(words_of("synth", self.command(Path(name))))
 
     def whole_map(self) -> DopplerMap:
-        """Recompute the map on screen with its provenance, the plan included.
+        """Copy of the map on screen with its provenance, the plan included.
 
         Raises Sd2Error if it is not complete.
         """
-        if self._synthesizers is None or not self.complete:
+        parts, synthesizers = self._partial.kept(), self._synthesizers
+        if synthesizers is None or not self.complete or not parts:
             raise Sd2Error("The synthetic map is not complete yet", "a final map", "Wait for it")
-        maker, limbs = self._synthesizers.of(self._plan), self._synthesizers.limbs and self.split
-        made = synthetic_map(maker, self._sensor, limbs=limbs)
-        in_use = self._accuracy.in_use
-        if in_use is not None:
-            made = replace(made, meta=made.meta | in_use.plan.provenance(in_use.error))
-        return replace(made, uncertainty=self._track.uncertainty)
+        maker, (part,) = synthesizers.of(self._plan), parts
+        assert part.shares is not None
+        limbs = part.limbs if synthesizers.limbs else None
+        # What is smoothed no more needs no values before.
+        raw, (visible, beyond) = np.empty((0, 0)), part.shares
+        stretch = Stretch(part.values, raw, visible, beyond, maker.options.visibility, limbs)
+        made = maker.as_map(stretch, self._sensor)
+        error = body_error(maker, self._sensor)
+        meta = made.meta | ({} if error is None else {"body_error_l1": error})
+        if (in_use := self._accuracy.in_use) is not None:
+            meta |= in_use.plan.provenance(in_use.error)
+        return replace(made, meta=meta, uncertainty=self._track.uncertainty)
 
     def close(self) -> None:
         """Stop computing."""
@@ -482,16 +489,15 @@ class SynthesisModel(QObject):
 
     def _keep(self) -> None:
         """Keep the final frames of what is being left, for when one comes back to it."""
-        if (left := self._partial.kept()) is not None:
-            self._session.results.put(*left, left[1].size_bytes)
+        if parts := self._partial.kept():
+            self._session.results.put(parts[0].key, parts, sum(one.size_bytes for one in parts))
 
     def _restore(self, final: QualityLevel) -> None:
         """Show final frames that were made before, with the same sensor, plan and options."""
-        key = final.key_of(self._sensor)
-        if (kept := self._session.results.get(key)) is not None:
-            lacking = self._partial.quality_for(self._sensor) < FINAL
-            for start, stop in runs(kept.known & lacking):
-                self._take(kept.part(start, stop, self._sensor, final.words, key))
+        for part in self._session.results.get(final.key_of(self._sensor)) or ():
+            quality = self._partial.quality_for(self._sensor)
+            if quality[part.start : part.stop].min() < FINAL:
+                self._take(part)
 
     def _take(self, part: Part) -> None:
         first = self._track.map is None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from sd2app.session.content import reference_of
 from sd2app.session.maps import MapModel
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.maps import DopplerMap, LimbMaps
+from sd2core.mesh.presence import runs
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 
@@ -22,39 +23,6 @@ ROUGH, PREVIEW, FINAL = 1, 2, 3
 final for another plan), what the plan in use gives. 0 is not computed."""
 
 View = tuple[int, int]
-
-
-class Kept(NamedTuple):
-    """Final frames of a map that was left."""
-
-    known: NDArray[np.bool_]  # (T,)
-    values: NDArray[np.float32]  # (bins, T)
-    limbs: LimbMaps | None
-    unit: str
-
-    @property
-    def size_bytes(self) -> int:
-        """Memory that it takes, about."""
-        split = 0 if self.limbs is None else self.limbs.values.nbytes
-        return self.values.nbytes + split
-
-    def part(self, start: int, stop: int, sensor: VirtualSensor, words: str, key: Hashable) -> Part:
-        """Make a part of some of the frames, as if they were computed now.
-
-        Parameters
-        ----------
-        start, stop : int
-            Frames, half-open.
-        sensor : VirtualSensor
-            Placement that they are of.
-        words : str
-            Their quality.
-        key : hashable
-            Key that they were kept by.
-        """
-        values = self.values[:, start:stop]
-        limbs = None if self.limbs is None else self.limbs.between(start, stop)
-        return Part(sensor, start, values, limbs, FINAL, words, self.unit, key)
 
 
 class PartialMap:
@@ -68,6 +36,7 @@ class PartialMap:
         """Begin without a mesh; what is on the track stays."""
         self._map: DopplerMap | None = None  # with the values so far
         self.quality = np.zeros(0, np.uint8)  # (T,), see FINAL
+        self._shares = np.zeros((2, 0), np.float32)  # (2, T), of final frames
         self.sensor: VirtualSensor | None = None  # placement that all of it is for
         self._key: Hashable = None  # of the final frames
         self._words: dict[int, str] = {}
@@ -77,6 +46,7 @@ class PartialMap:
         """Begin an empty map of another mesh."""
         self.forget()
         self.quality = np.zeros(mesh.frame_count, np.uint8)
+        self._shares = np.zeros((2, mesh.frame_count), np.float32)
         self._map = DopplerMap(
             values=np.zeros((options.axis.bins, mesh.frame_count), np.float32),
             axis=options.axis,
@@ -106,13 +76,20 @@ class PartialMap:
         """True if the map is split by the parts of the body."""
         return self._map is not None and self._map.limbs is not None
 
-    def kept(self) -> tuple[Hashable, Kept] | None:
-        """Key and copy of the final frames; None without any."""
-        known = self.quality >= FINAL
-        if self._map is None or not known.any():
-            return None
-        limbs = deepcopy(self._map.limbs)  # filled in place, as the values are
-        return self._key, Kept(known, self._map.values.copy(), limbs, self._map.unit)
+    def kept(self) -> tuple[Part, ...]:
+        """Copies of the final frames, which can be taken again."""
+        made, sensor, shares = self._map, self.sensor, self._shares
+        if made is None or sensor is None:
+            return ()
+        words, limbs = self._words.get(FINAL, ""), made.limbs
+        return tuple(
+            Part(
+                sensor, start, made.values[:, start:stop].copy(),
+                None if limbs is None else deepcopy(limbs.between(start, stop)),
+                FINAL, words, made.unit, self._key, shares[:, start:stop].copy(),
+            )
+            for start, stop in runs(self.quality >= FINAL)
+        )  # fmt: skip
 
     def mark_stale(self) -> None:
         """Lower final frames to previews; they stay on screen until they are replaced."""
@@ -142,6 +119,8 @@ class PartialMap:
                 limbs = part.limbs.empty(self.frames)
             limbs.put(part.start, part.limbs)
         self.quality[inside] = part.quality
+        if part.shares is not None:
+            self._shares[:, inside] = part.shares
         if part.quality >= FINAL:
             self._key = part.key
         self._words[part.quality] = part.words
@@ -190,8 +169,8 @@ def pieces(
 class Part:
     """Computed frames on their way to the window.
 
-    ``key`` is of all that final ones depend on; ``more`` is what was made of it
-    and is shown with it.
+    ``key`` is of all that final ones depend on; ``shares`` (2, n) are of their vertices that are
+    seen, and of these beyond the axis; ``more`` is what was made of it and is shown with it.
     """
 
     sensor: VirtualSensor
@@ -202,7 +181,13 @@ class Part:
     words: str
     unit: str
     key: Hashable = None
+    shares: NDArray[np.float32] | None = None
     more: Any = None
+
+    @property
+    def size_bytes(self) -> int:
+        """Memory that it takes, about."""
+        return self.values.nbytes + (0 if self.limbs is None else self.limbs.values.nbytes)
 
     @property
     def stop(self) -> int:

@@ -214,15 +214,18 @@ def compute_part(
     synthesizer = level.synthesizer()
     stretch = synthesizer.stretch(
         sensor, start, stop, level.visibility, lambda *_: proceed(), level.parts_of(synthesizer),
-        shares=False,
+        shares=level.quality == FINAL,  # which a map that is exported names
     )  # fmt: skip
+    shares = None
+    if stretch.visible_share is not None and stretch.beyond_share is not None:
+        shares = np.stack([stretch.visible_share, stretch.beyond_share])
     quality, words = level.quality, level.words
     if level.visibility == "frozen" and stretch.quality == "facing":
         # No mask is kept.
         quality, words = ROUGH, _ROUGH_WORDS
     return Part(
         sensor, start, stretch.values, stretch.limbs, quality, words, synthesizer.unit,
-        level.key_of(sensor),
+        level.key_of(sensor), shares,
     )  # fmt: skip
 
 

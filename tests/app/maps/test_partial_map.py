@@ -76,15 +76,15 @@ def test_ranks_rise_to_final():
 
 def test_what_is_left_is_kept_as_far_as_it_is_final():
     (partial, track), here = partial_map(4), VirtualSensor()
-    assert partial.kept() is None
+    assert partial.kept() == ()
     paint(partial, here, 0, values_of(4, 1.0), ROUGH)
-    assert partial.kept() is None
+    assert partial.kept() == ()
     paint(partial, here, 1, values_of(2, 2.0), FINAL)
     assert track.key is None
-    key, kept = partial.kept()
+    (kept,) = partial.kept()
     paint(partial, VirtualSensor(position_m=(1, 0, 0)), 0, values_of(4, 3.0), ROUGH)
-    assert (key, kept.known.tolist()) == ("key", [False, True, True, False])
-    assert kept.values[0, 1:3].tolist() == [2.0, 2.0]
+    assert (kept.key, kept.start, kept.stop) == ("key", 1, 3)
+    assert kept.values[0].tolist() == [2.0, 2.0]
     paint(partial, here, 0, values_of(4, 2.0), FINAL)
     assert track.key == "key"
 

@@ -421,13 +421,30 @@ def test_a_choice_that_fails_leaves_exact_visibility(context, fake, qtbot, ball)
     assert failures == ["There is no choice."]
 
 
-def test_the_exported_map_names_its_plan(context, fake, qtbot, ball, tmp_path):
+def test_the_exported_map_is_not_counted_again_and_names_its_plan(
+    context, fake, qtbot, ball, tmp_path, monkeypatch
+):
     fake.plan, fake.error = AccuracyPlan(mask_stride=5), 0.008
     open_ball(context, qtbot, ball)
     wait_until_done(context, qtbot)
+    maker = synthesizer_for(fake.plan, load_mesh(ball), PRESETS["paper"])
+    maker.map(context.sensor.sensor).save(tmp_path / "counted.npz")
+    counted = DopplerMap.load(tmp_path / "counted.npz")
+    callers, stretch = [], Synthesizer.stretch
+
+    def noted(*given, **more):
+        callers.append(threading.current_thread())
+        return stretch(*given, **more)
+
+    monkeypatch.setattr(Synthesizer, "stretch", noted)
     context.synthesis.export(tmp_path / "map.npz")
+    assert threading.main_thread() not in callers  # others prepare masks
+    assert len(counted.meta["visible_share"]) == len(counted.times_s)
     saved = DopplerMap.load(tmp_path / "map.npz")
     np.testing.assert_array_equal(saved.values, context.synthetic.map.values)
+    np.testing.assert_array_equal(saved.values, counted.values)
+    assert {name: saved.meta[name] for name in counted.meta} == counted.meta
+    assert repr(saved) == repr(counted)
     plan = saved.meta["plan"]
     assert plan.pop("text") == str(fake.plan)
     assert AccuracyPlan.from_json(plan) == fake.plan
