@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import shutil
 import time
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from hypothesis import settings
 
 from sd2app.plain_imports import plain_imports
 from sd2core.body.landmark_models import LandmarkModels, landmark_models
+from sd2core.datasets import kept_maps
 from sd2core.errors import Sd2Error
 from sd2core.files.lock import FileLock
 from sd2core.numerics.compiled import cache_directory, kernels_ready, warm_up
@@ -47,6 +49,14 @@ def no_known_pace(
     path = tmp_path_factory.getbasetemp() / "pace.json"
     path.unlink(missing_ok=True)
     monkeypatch.setattr(pace, "_path", lambda: path)
+
+
+@pytest.fixture(autouse=True)
+def no_kept_maps(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forget the maps that were computed before."""
+    folder = tmp_path_factory.getbasetemp() / "kept"
+    shutil.rmtree(folder, ignore_errors=True)
+    monkeypatch.setattr(kept_maps, "user_cache", lambda name: folder / name)
 
 
 @pytest.fixture(scope="session")

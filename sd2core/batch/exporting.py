@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import open_mesh
-from sd2core.batch.keys import key_of
 from sd2core.batch.synthesis import LONGEST_FRAMES
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.digests import file_digest
+from sd2core.files.keys import key_of
 from sd2core.files.limits import open_regular
 from sd2core.files.paths import remove
 from sd2core.files.texts import parse_json, read_json, whole_lines

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 from pydantic import TypeAdapter
 
 from sd2core.batch.folder import BatchFolder
-from sd2core.batch.keys import code_digest, key_of
 from sd2core.batch.plan import Recordings
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.digests import Digests, signature
+from sd2core.files.keys import code_digest, key_of
 from sd2core.files.paths import files_at, is_there
 from sd2core.files.texts import read_json
 from sd2core.mesh.bodies import Body
@@ -187,19 +187,14 @@ class _Look:
         return Inspection(recording.sensor, mesh, video, self._about(recording))
 
     def _mesh(self, recording: Recording) -> MeshInput:
+        from sd2core.datasets.kept_maps import mesh_identity
         from sd2core.io.unpacking import npz_vertices
 
         path = recording.mesh
         assert path is not None
         reading = recording.mesh_options()
         faces = reading.pop("faces", None)
-        parts = [self._digest(file) for file in files_at(path)]
-        parts += [self._digest(Path(one.shape)) for one in recording.things if one.is_file]
-        parts += [self._digest(file) for one in recording.bodies for file in one.files]
-        identity = [parts, {key: str(value) for key, value in reading.items()}]
-        if faces is not None:
-            identity.append(self._digest(faces))
-        key = key_of("inspect", {"mesh": identity}) if self._folder is not None else ""
+        key = mesh_identity(recording, self._digest) if self._folder is not None else ""
         is_npz = path.suffix.lower() == ".npz" and path.is_file()
         if is_npz and _bytes_in_memory(path) > LARGEST_IN_MEMORY_BYTES:
             if self._folder is None:

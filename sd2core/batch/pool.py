@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from sd2core.batch.folder import BatchFolder
-from sd2core.batch.keys import all_code_digest
 from sd2core.batch.plan import STEPS
 from sd2core.batch.tasks import BEGUN, Outcome, Task, error_fields, probe, run_tasks
 from sd2core.errors import Sd2Error
+from sd2core.files.keys import all_code_digest
 from sd2core.processes import ONE_THREAD
 
 _CONNECT_S = 20.0

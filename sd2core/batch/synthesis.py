@@ -93,11 +93,14 @@ def synthesise(
         Map to write (.npz).
     """
     from sd2core.body.parts import synthetic_map
+    from sd2core.datasets.kept_maps import found_map, synthetic_key
 
     refuse_inside(mesh, sensor)
     plan = None if choosing is None else chosen_plan(mesh, section, choosing)
-    synthesizer = _synthesizer(mesh, section, plan)
-    doppler = synthetic_map(synthesizer, sensor, limbs=section.limbs, frames=stretch)
+    maker, limbs = _synthesizer(mesh, section, plan), section.limbs
+    # Looked for only: the batch's own folder keeps what it makes.
+    key = synthetic_key(mesh.identity, maker, sensor, limbs=limbs, frames=stretch)
+    doppler = found_map(key) or synthetic_map(maker, sensor, limbs=limbs, frames=stretch)
     if plan is not None:
         doppler = replace(doppler, meta=doppler.meta | plan["provenance"])
     out.parent.mkdir(parents=True, exist_ok=True)

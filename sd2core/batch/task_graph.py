@@ -13,13 +13,13 @@ from sd2core.batch.exporting import dataset_key, dataset_path, is_exported, rows
 from sd2core.batch.fitting import fit_choices, fitted
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import Inspection, MeshInput, Origin, VideoInput, known_inspection
-from sd2core.batch.keys import key_of
 from sd2core.batch.plan import STEPS, BatchPlan, Step
 from sd2core.batch.synthesis import Choosing, FrameRange, stretches_of
 from sd2core.batch.tasks import Task
 from sd2core.doppler.options import chosen_options
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import file_digest
+from sd2core.files.keys import key_of
 from sd2core.options.shared import Simulating
 from sd2core.sensor import VirtualSensor
 
@@ -73,6 +73,7 @@ class TaskGraph:
                 "tolerance": section.tolerance,
                 "vertices_kept": section.vertices_kept,
                 "left_out": section.left_out,
+                "limbs": section.limbs,
             }
         )
         self._model = None if plan.denoise is None else _model_of(plan)

@@ -13,10 +13,10 @@ from typing import Any
 
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import MeshInput, Origin, inspect
-from sd2core.batch.keys import all_code_digest
 from sd2core.batch.plan import Step
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import DISK_FULL
+from sd2core.files.keys import all_code_digest
 
 BEGUN = "begun"
 """Folder of the tasks under way; it exists only while a batch runs."""

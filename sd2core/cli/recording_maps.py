@@ -8,7 +8,8 @@ from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
-    from sd2core.denoise.card import ModelCard
+    from pathlib import Path
+
     from sd2core.maps import DopplerMap
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.recording.recording import Recording
@@ -53,50 +54,34 @@ def maps_of(
     """
     made: dict[MapName, DopplerMap] = {}
     if {"synthetic", "denoised"} & {*names}:
+        from sd2core.datasets.kept_maps import computed_maps
+        from sd2core.doppler import Synthesizer
+
         if mesh is None:
             with progress_bar("Reading the mesh") as progress:
                 mesh = recording.load_mesh(progress)
-        model = _model_of(recording, mesh) if "denoised" in names else None
-        synthetic = _synthetic(recording, mesh, limbs=model is not None and bool(model.parts))
-        if "synthetic" in names:
-            made["synthetic"] = synthetic
-        if model is not None:
-            from sd2core.denoise.files import load_model
-            from sd2core.denoise.resample_to_model import check_map
-
-            assert model.path is not None
-            check_map(synthetic, model)
-            with progress_bar("Denoising") as progress:
-                made["denoised"] = load_model(model.path).denoise(synthetic, progress)
+        model = _denoiser_of(recording, mesh) if "denoised" in names else None
+        with progress_bar("Synthesising") as progress:
+            synthetic, denoised = computed_maps(
+                recording, Synthesizer(mesh), recording.sensor, model, progress=progress
+            )
+        made |= {"synthetic": synthetic} if "synthetic" in names else {}
+        made |= {} if denoised is None else {"denoised": denoised}
     if "radar" in names:
         made["radar"] = _radar(recording, axis)
     return made
 
 
-def _synthetic(recording: Recording, mesh: MeshSequence, *, limbs: bool) -> DopplerMap:
-    from sd2core.body.parts import synthetic_map
-    from sd2core.doppler import Synthesizer
+def _denoiser_of(recording: Recording, mesh: MeshSequence) -> Path:
+    from sd2core.datasets.recording_sources import denoiser_of
 
-    with progress_bar("Synthesising") as progress:
-        maker = Synthesizer(mesh, preset="paper")
-        return synthetic_map(maker, recording.sensor, limbs=limbs, progress=progress)
-
-
-def _model_of(recording: Recording, mesh: MeshSequence) -> ModelCard:
-    from sd2core.body.parts import splits_everybody
-    from sd2core.denoise.files import default_name, describe_model, find_model
-
-    if recording.denoiser is None and recording.bundled_denoiser == "":
+    if (found := denoiser_of(recording, mesh)) is None:
         raise Sd2Error(
             f"{recording.title} is set to be shown without a denoiser",
             "a model, for its denoised map",
             "Choose one in the window, or leave the denoised map out",
         )
-    path = recording.denoiser
-    if path is None:
-        name = recording.bundled_denoiser or default_name(limbs=splits_everybody(mesh))
-        path = find_model(name)
-    return describe_model(path)
+    return found
 
 
 def _radar(recording: Recording, axis: VelocityAxis | None) -> DopplerMap:

@@ -6,13 +6,14 @@ import hashlib
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from sd2core.accuracy.places import choose_for_places, spread
 from sd2core.accuracy.trial import synthesizer_for
-from sd2core.body.parts import known_parts, splits_everybody, synthetic_map
+from sd2core.body.parts import known_parts, splits_everybody
+from sd2core.datasets.kept_maps import computed_maps, denoised
 from sd2core.datasets.people import People, present_frames, subject_of
 from sd2core.datasets.simulating import Simulation, simulated_map
 from sd2core.datasets.source import (
@@ -27,8 +28,7 @@ from sd2core.datasets.source import (
     labelled_spans,
     plain_name,
 )
-from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL, default_name, describe_model, find_model
-from sd2core.denoise.resample_to_model import check_map
+from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL, default_name, find_model
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
@@ -51,9 +51,6 @@ from sd2core.recording.recording import Recording, open_recording
 from sd2core.runs.pace import Kind
 from sd2core.sensor import Vector, VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
-
-if TYPE_CHECKING:
-    from sd2core.denoise.live import TrainedDenoiser
 
 _COUNTED_SHARE = 0.05
 """Share of the time that a source takes whose radar is simulated."""
@@ -219,7 +216,7 @@ class _Opened:
             kinds += ["synthetic"]
             if self._making.limbs:
                 known_parts(self._people.everybody[0])  # or fail, as the source would
-            if "denoised" in self._making.kinds and _models_of(self.recording, self._making):
+            if "denoised" in self._making.kinds and _models_of(self.recording, self._making.model):
                 kinds.append("denoised")
             kinds += ["simulated"] if self._simulates else []
         if radar_kind is not None and placement == 0 and radar_kind not in kinds:
@@ -247,21 +244,25 @@ class _Opened:
         counted_share = _COUNTED_SHARE if self._simulates else 1.0
         bodies, labels = self._people.bodies(person), self._people.labels_of(person)
         if bodies and {"synthetic", "denoised"} & {*wanted}:
-            model = self._model if "denoised" in wanted else None
             alone = len(bodies) < len(self._people.everybody)
-            limbs = self._making.limbs or (model is not None and bool(describe_model(model).parts))
-            counting = part_of(progress, 0.0, counted_share)
-            synthesizer, plan = self._synthesizer
-            synthetic = self._once(
-                key.placement,
-                "synthetic",
-                lambda: synthetic_map(synthesizer, sensor, limbs=limbs or alone, progress=counting),
+            model = self._model if "denoised" in wanted else None
+            maker, plan = self._synthesizer
+            synthetic, made = computed_maps(
+                self.recording,
+                maker,
+                sensor,
+                None if alone else model,
+                limbs=self._making.limbs or alone,
+                texture=self._making.texture,
+                progress=part_of(progress, 0.0, counted_share),
             )
             if alone:
                 synthetic = replace(synthetic.of_person(person), present=present_frames(bodies))
+                made = None
+                if model is not None:
+                    made = denoised(synthetic, model, self._making.texture)
             maps["synthetic"] = synthetic
-            if model is not None:
-                maps["denoised"] = denoised(synthetic, model, self._making.texture)
+            maps |= {} if made is None else {"denoised": made}
         if key.placement == 0 and self.recording.radar is not None and {
             "simulated", "real"
         } & {*wanted}:  # fmt: skip
@@ -346,12 +347,8 @@ class _Opened:
 
     @cached_property
     def _model(self) -> Path | None:
-        """The denoiser's file, of the bundled ones that for what is known of the mesh."""
-        models = _models_of(self.recording, self._making)
-        if len(models) < 2:
-            return models[0] if models else None
         assert self._mesh is not None
-        return find_model(default_name(limbs=splits_everybody(self._mesh)))
+        return denoiser_of(self.recording, self._mesh, self._making.model)
 
     @cached_property
     def _clock(self) -> tuple[Timebase, MapKind | None]:
@@ -410,7 +407,7 @@ def places_of(recording: Recording, making: Making) -> tuple[Place, ...]:
 
 def _fingerprint(recording: Recording, key: SourceKey, person: str, making: Making) -> str:
     """Hash of all that a source is made of: labels, settings and contents of files."""
-    models = _models_of(recording, making) if "denoised" in making.kinds else []
+    models = _models_of(recording, making.model) if "denoised" in making.kinds else []
     place = None
     if key.placement:
         place = asdict(places_of(recording, making)[key.placement - 1])
@@ -455,28 +452,17 @@ def _fingerprint(recording: Recording, key: SourceKey, person: str, making: Maki
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
-def _models_of(recording: Recording, making: Making) -> list[Path]:
+def denoiser_of(recording: Recording, mesh: MeshSequence, named: str | None = None) -> Path | None:
+    """Return the denoiser's file, of the bundled ones that for what is known of the mesh."""
+    models = _models_of(recording, named)
+    if len(models) < 2:
+        return models[0] if models else None
+    return find_model(default_name(limbs=splits_everybody(mesh)))
+
+
+def _models_of(recording: Recording, named: str | None) -> list[Path]:
     """Return files of which one is the denoiser; none where the recording is set to have none."""
-    chosen = making.model or recording.denoiser or recording.bundled_denoiser
+    chosen = named or recording.denoiser or recording.bundled_denoiser
     if chosen == "":
         return []
     return [find_model(name) for name in ([chosen] if chosen else [MAP_MODEL, LIMBS_MODEL])]
-
-
-def denoised(synthetic: DopplerMap, path: Path, texture: int | None = None) -> DopplerMap:
-    """Denoise a synthetic map with a model file; the model used last is kept.
-
-    With the seed of a texture it is drawn as the radar would show it.
-    """
-    card = describe_model(path)
-    check_map(synthetic, card)  # before torch is loaded: it takes seconds
-    law = None if texture is None else card.needed_texture()
-    made = _loaded(path, path.stat().st_mtime_ns).denoise(synthetic)
-    return made if law is None or texture is None else law.on(made, texture)
-
-
-@lru_cache(maxsize=1)
-def _loaded(path: Path, changed_ns: int) -> TrainedDenoiser:
-    from sd2core.denoise.files import load_model
-
-    return load_model(path)

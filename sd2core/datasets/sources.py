@@ -14,12 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.datasets.recording_sources import (
-    Making,
-    denoised,
-    labels_and_classes,
-    recording_sources,
-)
+from sd2core.datasets.kept_maps import denoised
+from sd2core.datasets.recording_sources import Making, labels_and_classes, recording_sources
 from sd2core.datasets.source import (
     LazySource,
     Outline,

@@ -12,12 +12,12 @@ from moving_spheres import save_spheres, swinging_sphere
 from sd2core.batch import inputs
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import find_origins, inspect, known_inspection
-from sd2core.batch.keys import all_code_digest
 from sd2core.batch.plan import Recordings
 from sd2core.batch.pool import _check_worker
 from sd2core.batch.run import remove_old_leftovers
 from sd2core.errors import Sd2Error
 from sd2core.files import digests as contents
+from sd2core.files.keys import all_code_digest
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.io.unpacking import npz_vertices, unpack_npz
 from sd2core.recording.recording import Recording

@@ -13,10 +13,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2core.batch import keys
-from sd2core.batch.keys import all_code_digest, code_digest, key_of
+from sd2core.batch.folder import BatchFolder
+from sd2core.batch.inputs import MeshInput, Origin
 from sd2core.batch.plan import STEPS
+from sd2core.batch.plan_file import plan_from_text
+from sd2core.batch.task_graph import TaskGraph
+from sd2core.files import keys
 from sd2core.files.digests import file_digest
+from sd2core.files.keys import all_code_digest, code_digest, key_of
+from sd2core.sensor import VirtualSensor
 
 values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False)
@@ -56,7 +61,7 @@ def test_keys_are_those_of_another_process() -> None:
     content = {"b": [0.1, 1e-300, "ä"], "a": {"y": None, "x": True}}
     code = (
         "import json, sys\n"
-        "from sd2core.batch.keys import key_of\n"
+        "from sd2core.files.keys import key_of\n"
         "print(key_of('fit', json.loads(sys.argv[1])))"
     )
     told = subprocess.run(
@@ -66,6 +71,19 @@ def test_keys_are_those_of_another_process() -> None:
         text=True,
     )
     assert told.stdout.strip() == key_of("fit", content)
+
+
+@pytest.mark.parametrize("more", ["limbs = true", 'left_out = ["walls"]', "vertices_kept = 0.5"])
+def test_maps_that_are_asked_for_otherwise_have_other_keys(more: str, tmp_path: Path) -> None:
+    mesh = MeshInput("anna.npz", "its content", 10, 6, 30.0, (0.0, 0.0, 2.0))
+
+    def key(words: str) -> str:
+        text = f'out = "made"\n[recordings]\nfiles = ["*.npz"]\n[synthesise]\n{words}\n'
+        graph = TaskGraph(plan_from_text(text, tmp_path), BatchFolder(tmp_path), [])
+        (planned,) = graph.maps_of(Origin("anna.npz", "anna", "anna"), mesh, VirtualSensor())
+        return planned.synthesis[0].key
+
+    assert key(more) != key("")
 
 
 def test_every_step_has_code_of_its_own() -> None:
@@ -79,7 +97,7 @@ def test_changed_code_makes_results_anew(step: Any, source: str, tmp_path, monke
     copy = tmp_path / "sd2core"
     package = Path(keys.__file__).parent.parent
     shutil.copytree(package, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    monkeypatch.setattr(keys, "__file__", str(copy / "batch" / "keys.py"))
+    monkeypatch.setattr(keys, "__file__", str(copy / "files" / "keys.py"))
     unkept = code_digest.__wrapped__
     assert unkept(step) == code_digest(step)
     with (copy / source).open("a") as stream:

@@ -9,11 +9,17 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from sd2core.batch.plan import Step
 from sd2core.files.resources import resource_path
 
-_CODE: dict[Step, tuple[str, ...]] = {
-    "inspect": ("batch/inputs.py", "files/digests.py", "io", "recording", "mesh"),
+_CODE: dict[str, tuple[str, ...]] = {
+    "inspect": (
+        "batch/inputs.py",
+        "datasets/kept_maps.py",
+        "files/digests.py",
+        "io",
+        "recording",
+        "mesh",
+    ),
     "fit": ("batch/fitting.py", "body", "io", "mesh", "timebase.py"),
     "synthesise": (
         "batch/synthesis.py",
@@ -52,14 +58,14 @@ _CODE: dict[Step, tuple[str, ...]] = {
 }
 """Modules that a step's results depend on, within sd2core."""
 
-_RESOURCES: dict[Step, tuple[str, ...]] = {
+_RESOURCES: dict[str, tuple[str, ...]] = {
     "fit": ("body.npz", "lifter.npz", "sides.npz"),
     "synthesise": ("body.npz",),
 }
 
 
-def key_of(step: Step, content: dict[str, Any]) -> str:
-    """Return the key of a result: 32 hexadecimal digits, the same on every machine.
+def key_of(step: str, content: dict[str, Any]) -> str:
+    """Return the key of a step's result: 32 hexadecimal digits, the same on every machine.
 
     ``content`` is all that the result depends on besides the code, as JSON can hold it. The
     order of keys does not matter.
@@ -71,7 +77,7 @@ def key_of(step: Step, content: dict[str, Any]) -> str:
 
 
 @cache
-def code_digest(step: Step) -> str:
+def code_digest(step: str) -> str:
     """Hash of the code that makes a step's results, and of its bundled data."""
     package = Path(__file__).parent.parent
     digest = hashlib.sha256()
