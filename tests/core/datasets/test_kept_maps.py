@@ -14,7 +14,7 @@ from swinging_recordings import FRAMES, recording
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import MeshInput, Origin, inspect
 from sd2core.batch.synthesis import synthesise
-from sd2core.cli.recording_maps import maps_of
+from sd2core.cli.recording_maps import MapName, maps_of
 from sd2core.datasets import kept_maps
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
@@ -84,6 +84,20 @@ def test_what_one_command_counted_others_read_with_all_that_is_said_of_it(
     np.testing.assert_array_equal(read.values, made.values)
     assert read.meta["visible_share"] == made.meta["visible_share"]
     assert (read.unit, read.null_bins, read.axis) == (made.unit, made.null_bins, made.axis)
+
+
+def test_what_a_denoiser_made_is_read_too(
+    swinging: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names: tuple[MapName, ...] = ("denoised",)
+    made = maps_of(open_recording(swinging.folder), names)["denoised"]
+    monkeypatch.setattr(kept_maps, "denoised", None)  # nothing can be denoised any more
+    read = maps_of(open_recording(swinging.folder), names)["denoised"]
+    np.testing.assert_array_equal(read.values, made.values)
+    assert read.meta["denoiser"]["name"] == made.meta["denoiser"]["name"]
+    replace(swinging, sensor=VirtualSensor((0.1, 0.0, 0.0))).save()
+    with pytest.raises(TypeError):
+        maps_of(open_recording(swinging.folder), names)
 
 
 @pytest.mark.parametrize(
