@@ -203,7 +203,7 @@ class _Opened:
         self._mesh = None if recording.mesh is None else recording.load_mesh()
         self._people = People(recording, self._mesh, recording.effective_labels())
         self._names, self._classes = labels_and_classes(self._people.labels)
-        self._made: dict[tuple[int, MapKind], DopplerMap] = {}  # of everybody, from one place
+        self._simulated: dict[int, DopplerMap] = {}  # of everybody, from one place
         self._target_m, self._imu = cache(self._target_of), cache(self._imu_of)
 
     def outline(self, placement: int, person: str) -> Outline:
@@ -275,7 +275,6 @@ class _Opened:
             assert simulation is not None
             maps["simulated"] = self._once(
                 key.placement,
-                "simulated",
                 lambda: simulated_map(
                     mesh,
                     sensor,
@@ -338,12 +337,11 @@ class _Opened:
         bodies = self._people.bodies(person)
         return BodyExtent.of(bodies[0]).target_m if bodies else None
 
-    def _once(self, placement: int, kind: MapKind, make: Callable[[], DopplerMap]) -> DopplerMap:
+    def _once(self, placement: int, make: Callable[[], DopplerMap]) -> DopplerMap:
         """Map of everybody from a place, made for the first of its persons."""
-        if (placement, kind) not in self._made:
-            self._made = {at: one for at, one in self._made.items() if at[0] == placement}
-            self._made[placement, kind] = make()
-        return self._made[placement, kind]
+        if placement not in self._simulated:
+            self._simulated = {placement: make()}
+        return self._simulated[placement]
 
     @cached_property
     def _model(self) -> Path | None:
