@@ -48,7 +48,7 @@ def test_a_wrist_moves_and_gravity_is_read(sd2: Sd2, body: Path, tmp_path: Path)
 def test_every_option_changes_what_it_says(sd2: Sd2, body: Path, tmp_path: Path) -> None:
     def made(*options: object) -> np.ndarray:
         out = tmp_path / "one.npz"
-        told = sd2("imu", body, "--at", "right-hand", "--out", out, *options)
+        told = sd2("imu", body, "--at", "right-hand", "--out", out, "--overwrite", *options)
         assert told.code == 0, told.err
         signals = read_signals(out)
         return np.hstack([signals.acceleration_mps2, signals.turn_rate_radps])

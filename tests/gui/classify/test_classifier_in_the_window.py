@@ -276,7 +276,7 @@ def trainable(window, tmp_path, qtbot):
     panel = window.findChild(ClassPanel)
     assert panel.isVisible()
     training.setup.add(write_pairs(tmp_path / "campaign.zarr"))
-    qtbot.waitUntil(lambda: not training.setup.problem, timeout=10_000)
+    qtbot.waitUntil(lambda: not training.setup.problem, timeout=60_000)
     yield window
     if training.under_way:
         training.run.tell("cancel")
