@@ -177,10 +177,10 @@ def _write_one(
     zero_s = source.zero_s(span)
     if video is not None:
         _write_clip(video, span, zero_s, made / "video.mp4", progress)
-    if source.mesh is not None:
-        start, end = source.mesh.timebase.frames_between(span.start_s, span.end_s)
+    if (whole := source.mesh_of(span)) is not None:
+        start, end = whole.timebase.frames_between(span.start_s, span.end_s)
         if end > start:
-            mesh = source.mesh.between(start, end)
+            mesh = whole.between(start, end)
             shifted = replace(mesh, timebase=mesh.timebase.shifted(-zero_s), others=())
             save_mesh(shifted, made / "mesh.zarr")
     label = {"label": span.label, "track": span.track, "start_s": span.start_s, "end_s": span.end_s}

@@ -56,6 +56,12 @@ class CutSource:
         """Return the time of the first frame of a span, which is 0 s in its cut-out."""
         return self.timebase.time_of(self.frames_of(span)[0])
 
+    def mesh_of(self, span: Span) -> MeshSequence | None:
+        """Return the body of whom a span names, of the first where it names none that is there."""
+        if self.mesh is None or span.person not in self.mesh.persons:
+            return self.mesh
+        return self.mesh.bodies[self.mesh.persons.index(span.person)]
+
     def files(self) -> list[str]:
         """List the files of a cut-out besides ``span.json``."""
         files = ["video.mp4"] if self.video is not None else []
@@ -65,7 +71,7 @@ class CutSource:
     def described(self, span: Span) -> dict[str, Any]:
         """Return the content of ``span.json``; the same for the same source and span."""
         first, stop = self.frames_of(span)
-        frames, video = span.frames(self.timebase), self.video
+        frames, video, mesh = span.frames(self.timebase), self.video, self.mesh_of(span)
         told = asdict(span)
         if not span.person:  # as before there were scenes: those that are written stay the same
             del told["person"]
@@ -83,7 +89,7 @@ class CutSource:
             "files": self.files(),
             "sources": {
                 "video": video and {"name": video.name, "bytes": video.stat().st_size},
-                "mesh": None if self.mesh is None else self.mesh.source,
+                "mesh": None if mesh is None else mesh.source,
                 "maps": {
                     name: {"kind": one.kind, "unit": one.unit, "provenance": one.meta}
                     for name, one in self.maps.items()

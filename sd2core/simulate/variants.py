@@ -241,7 +241,8 @@ def _take(
 def varied(movement: _Movement, variant: Variant, rng: np.random.Generator) -> _Movement:
     """Another movement of the same kind; see :data:`Variant`."""
     if variant == "shapes":
-        return replace(movement, mesh=reshaped(movement.mesh, ShapeSpace().random(rng)))
+        first, *others = (reshaped(one, ShapeSpace().random(rng)) for one in movement.mesh.bodies)
+        return replace(movement, mesh=replace(first, others=tuple(others)))
     x, y, z = movement.position_m
     middle_m = _middle_m(movement.mesh)
     if variant == "mirrored":

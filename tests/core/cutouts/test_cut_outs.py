@@ -75,6 +75,18 @@ def test_the_very_frames_with_0_s_at_the_first(source, tmp_path) -> None:
     assert said["simulated"] is True
 
 
+def test_the_mesh_is_of_whom_the_span_names(source, tmp_path) -> None:
+    moved = replace(source.mesh, vertices=source.mesh.read(0, 40) + 1, source="bert.npz")
+    scene = replace(source.mesh, person="anna", others=(replace(moved, person="bert"),))
+    duo = replace(source, mesh=scene, video=None, maps={})
+    for number, name in enumerate(("anna", "bert", "carl", "")):
+        (path,) = cut(duo, tmp_path, replace(WAVE, id=number + 1, person=name))
+        found = load_mesh(path / "mesh.zarr").read(0, 10) - source.mesh.read(5, 15)
+        np.testing.assert_array_equal(found, float(name == "bert"))
+        said = json.loads((path / "span.json").read_text("utf-8"))["sources"]["mesh"]
+        assert (said == "bert.npz") is (name == "bert")
+
+
 def test_the_index_lists_all_that_was_ever_cut_into_the_folder(source, tmp_path) -> None:
     cut(source, tmp_path, PUSH)
     cut(source.only(["maps"]), tmp_path, WAVE)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,16 @@ from sd2core.errors import Sd2Error
 from sd2core.io.mesh import save_mesh
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.pairs.store import PairSet, read_pairs
+from sd2core.pairs.summary import TakeKey
 from sd2core.recording.recording import Recording, Span
 from sd2core.sensor import VirtualSensor
-from sd2core.simulate.variants import VariantOptions, mirrored_label, vary_recordings
+from sd2core.simulate.variants import (
+    VariantOptions,
+    _Movement,
+    mirrored_label,
+    varied,
+    vary_recordings,
+)
 from sd2core.timebase import Timebase
 
 PAPER = PRESETS["paper"]
@@ -81,6 +89,18 @@ def test_places_and_shapes_are_drawn_and_drawn_alike_again(tmp_path: Path) -> No
     (shaped,) = vary(one, tmp_path / "shapes.zarr", "shapes").takes
     assert shaped.sensor_position_m.tolist() == [1.5, 0.0, 0.0]
     assert not np.allclose(shaped.synthetic, own.synthetic)
+
+
+def test_everybody_of_a_scene_is_of_another_shape(tmp_path: Path) -> None:
+    mesh = swaying(tmp_path / "anna.sd2", frames=12).load_mesh()
+    scene = replace(mesh, others=(replace(mesh, vertices=mesh.read(0, 12) + np.float32(1)),))
+    movement = _Movement(
+        TakeKey("anna", "anna-000", 0), scene, (0.0, 0.0, 0.0), ["background"] * 12
+    )
+    made = varied(movement, "shapes", np.random.default_rng(0)).mesh
+    for before, after in zip(scene.bodies, made.bodies, strict=True):
+        heights_m = [np.ptp(one.frame(0)[:, 1]) for one in (before, after)]
+        assert abs(heights_m[1] / heights_m[0] - 1) > 0.01
 
 
 def test_what_is_there_is_not_made_again(tmp_path: Path, monkeypatch) -> None:
