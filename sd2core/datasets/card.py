@@ -109,7 +109,7 @@ def _count_sources(sources: Iterable[dict[str, Any]], header: Header) -> dict[st
     for entry in sources:
         provenance = entry["provenance"]
         # A scene is one recording, however many of its persons are sources.
-        people = tuple(provenance.get("scene", [entry["subject"]]))
+        people = tuple(map(str, provenance.get("scene", [entry["subject"]])))
         seen_from = views.setdefault((people, entry["recording"]), set())
         totals["sources"] += 1
         everybody |= dict.fromkeys(provenance.get("everybody", ()))
@@ -132,9 +132,8 @@ def _count_sources(sources: Iterable[dict[str, Any]], header: Header) -> dict[st
         "sources": totals["sources"],
         "recordings": len(views),
         "minutes": minutes,
-        "placements": max(
-            map(len, views.values()), default=0
-        ),  # from which a recording is seen, at most
+        # From which a recording is seen, at most.
+        "placements": max(map(len, views.values()), default=0),
         "frames_without_person": totals["without person"],
         "frames_damaged": totals["damaged"],
         "sources_without_segments": totals["empty"],

@@ -317,10 +317,7 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "nulled bins": bins_in_words(doppler.axis, doppler.null_bins),
         "accuracy": str(accuracy) and f"{accuracy} (relative L1)",
         "unseen bins": bins_in_words(doppler.axis, doppler.unseen_bins),
-        "people": ", ".join(
-            one["person"] if isinstance(one, dict) else str(one)
-            for one in doppler.meta.get("bodies", ())
-        ),
+        "people": _people(doppler.meta.get("bodies")),
         "limbs": _limbs(doppler.limbs),
         **_synthesis_facts(doppler.meta),
     }
@@ -332,6 +329,12 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
     )
     notes = (*doppler.meta.get("notes", ()), *map(str, unlikely))
     return Description(f"Doppler map {path}", data, facts, notes)
+
+
+def _people(bodies: Any) -> str:
+    """Persons of a scene as a map's provenance tells of them."""
+    told = bodies if isinstance(bodies, list) else []
+    return ", ".join(str(one.get("person") if isinstance(one, dict) else one) for one in told)
 
 
 def _limbs(limbs: LimbMaps | None) -> str:
