@@ -115,7 +115,10 @@ def _style_sheet(c: Palette) -> str:
     QToolButton#preset:checked {{ border-color: {c.accent}; background: {c.well}; }}
     QFrame#opened {{ border: none; border-right: 1px solid {c.border}; border-radius: 0; }}
     QToolButton#rail {{ border-radius: 6px; }}
-    QToolButton:focus {{ border-color: {c.accent}; }}
+    QToolButton:focus, QToolButton#outlined:focus, QToolButton#model:focus {{
+        border-color: {c.accent};
+    }}
+    QToolButton#preset:focus {{ border-color: {c.text}; }}
     QTabBar#layouts::tab {{
         padding: 4px 12px; border: none; border-bottom: 2px solid transparent; color: {c.muted};
     }}

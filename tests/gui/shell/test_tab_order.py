@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -59,6 +60,28 @@ def test_every_control_is_reached_with_tab_and_back(window, qtbot) -> None:
     assert set(back) == set(reached)
     start = back.index(reached[0])
     assert [*back[start:], *back[:start]] == [reached[0], *reversed(reached[1:])]
+
+
+def look_of(control: QWidget) -> QImage:
+    """A control as it is painted in its window."""
+    window = control.window()
+    return window.grab(QRect(control.mapTo(window, QPoint(0, 0)), control.size())).toImage()
+
+
+def test_one_sees_which_control_has_the_keyboard(window, qtbot) -> None:
+    unseen: list[str] = []
+    for panel in ("Sensor", "Accuracy"):
+        window.bring_up(panel)
+        QApplication.processEvents()
+        for _ in walk(window, qtbot):
+            focus = QApplication.focusWidget()
+            assert focus is not None
+            with_keyboard = look_of(focus)
+            QTest.keyClick(focus, Qt.Key.Key_Tab)
+            QApplication.processEvents()
+            if look_of(focus) == with_keyboard:
+                unseen.append(f"{type(focus).__name__} {focus.accessibleName()}")
+    assert unseen == []
 
 
 def test_the_order_is_that_of_reading(window, qtbot) -> None:
