@@ -6,12 +6,14 @@ import pytest
 from finding import button_of, named, panel_of, splitter_around
 from kept_window import close_window, opened
 from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtGui import QFontMetrics
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QSplitter, QSplitterHandle, QWidget
 
 from sd2app.maps.arrangement import HEADER_PX
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
+from sd2app.shell.side_panel import _WORD_PX
 from sd2app.shell.status_bar import StatusLine
 from sd2app.shell.window import MainWindow
 
@@ -100,6 +102,16 @@ def test_it_stands_beside_scene_and_maps_and_shows_every_icon(sized, size) -> No
     if size[0] > 1100:  # a narrow window has no room beside its maps
         for other in ("tracks", "scene"):
             assert place_of(panel_of(window, other)).right() < side.left()
+
+
+def test_words_below_the_icons_stand_clear_of_the_frame(sized) -> None:
+    window = sized(1280, 720)
+    for name in NAMES:
+        icon = window.side.button(name)
+        font = icon.font()
+        font.setPixelSize(_WORD_PX)
+        word_px = QFontMetrics(font).horizontalAdvance(name)
+        assert word_px + 2 * 3 <= icon.width(), name
 
 
 def test_it_lies_over_the_maps_by_choice_and_takes_no_room_of_theirs(windows) -> None:
