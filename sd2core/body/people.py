@@ -15,20 +15,25 @@ from sd2core.body.array_store import ArrayStore
 from sd2core.body.blazepose import PoseDetector, PoseLandmarker
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.people_following import PeopleFollower
-from sd2core.body.people_joining import Somebody, joined
+from sd2core.body.people_joining import Somebody, cleared, joined
 from sd2core.body.roi import PLACES, Floats, Roi, Sightings, roi_numbers, roi_of
 from sd2core.body.tracking import SEARCH_STEP_S, looked_at
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_cache
 from sd2core.io.video import VideoReader
+from sd2core.mesh.presence import runs
 from sd2core.numerics.compiled import worker_count
 from sd2core.progress import Progress, silent
 
-_VERSION = 4
+_VERSION = 5
 _SHORTEST_S = 1.0
 """Time for which somebody has to be seen, if the video is longer."""
 _SURELY_SEEN = 0.75
 """Best score of the detector below which nobody is there, but a shadow or a coat."""
+_GROWN = 0.08
+"""Change of size (logarithm) beside a gap from which on a square is around two people."""
+_KNOWN_LOOKS = 5
+"""Looks farther from the gap that tell the size."""
 _THREADS = 2
 
 
@@ -155,19 +160,46 @@ def _followed(
         for stretch in person.stretches:
             rois[row, stretch.numbers] = stretch.rois
             confidence[row, stretch.numbers] = stretch.confidence
-        # Whose of one person's stretches a body is does not matter.
-        for doubt in follower.doubts:
-            if set(doubt.stretches) <= set(person.stretches):
-                rois[row, doubt.number] = roi_numbers(doubt.sight.roi)
-                confidence[row, doubt.number] = doubt.sight.pose.confidence
+    for row, number, sight in cleared(follower.doubts, people):
+        rois[row, number] = roi_numbers(sight.roi)
+        confidence[row, number] = sight.pose.confidence
+    for person_rois, sure in zip(rois, confidence, strict=True):
+        two = of_two(person_rois[:, 2])
+        person_rois[two], sure[two] = np.nan, 0.0
     return {
         "frames": frames,
         "rois": rois,
         "confidence": confidence,
-        "doubtful": np.isin(np.arange(len(frames)), follower.doubtful),
+        "doubtful": np.isin(np.arange(len(frames)), [each.number for each in follower.doubts]),
         "certainty": np.array([each.certainty for each in people]),
         "may_be": np.array([_number(each.may_be, people) for each in people], np.intp),
     }
+
+
+def of_two(sizes_px: Floats) -> NDArray[np.bool_]:
+    """Looks (N,) beside a gap that are around two people: somebody hides behind another there.
+
+    ``sizes_px`` (N,) are those of one person's squares, NaN where they are not found.
+    """
+    two = np.zeros(len(sizes_px), bool)
+    found = np.isfinite(sizes_px)
+    stretches = list(runs(found))
+    for number, (start, stop) in enumerate(stretches):
+        rows = list(range(start, stop))
+        if number > 0:
+            two[_grown(sizes_px, rows)] = True
+        if number + 1 < len(stretches):
+            two[_grown(sizes_px, rows[::-1])] = True
+    return two
+
+
+def _grown(sizes_px: Floats, rows: list[int]) -> list[int]:
+    """First of the looks, as long as their size is not that of those that follow."""
+    for count in range(len(rows) - _KNOWN_LOOKS):
+        known = np.median(sizes_px[rows[count + 1 : count + 1 + _KNOWN_LOOKS]])
+        if abs(np.log(sizes_px[rows[count]] / known)) < _GROWN:
+            return rows[:count]
+    return []
 
 
 def _number(person: Somebody | None, people: list[Somebody]) -> int:

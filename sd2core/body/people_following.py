@@ -6,6 +6,7 @@ could be taken for begins another; :mod:`sd2core.body.people_joining` says whose
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,7 +24,7 @@ _UNSEEN_S, _HIDDEN_S = 0.35, 1.5
 """Time for which somebody who is not seen is looked for where they should be, and known at once."""
 _AWAY, _AWAY_PER_S = 0.03, 0.2
 _GREW, _GREW_PER_S = 0.06, 0.15
-_UNLIKE = 0.04
+UNLIKE = 0.04
 """Deviation of a person's place (squares) and size (logarithm) from those expected, and what is
 added each second; deviation of the similarity of their looks from 1."""
 _KNOWN_S = 1.5
@@ -38,6 +39,10 @@ _BESIDE = 0.35
 """Distance in squares within which colours of two are mixed up."""
 MIN_LOOKS = 3
 """Looks from which on a stretch is somebody, and no slip."""
+_BACK_BYTES = 64 * 2**20
+"""Memory of the last pictures, in which people are looked for once it is clear who they are."""
+_TRAIL = 6
+"""Looks that make a trail."""
 _MAP_PX = 96
 """Longer side of the small pictures in which bodies are compared."""
 _ONE_BODY = 0.6
@@ -83,10 +88,44 @@ class Stretch:
         self.confidence.append(sight.pose.confidence)
         self.score = max(self.score, sight.score)
 
-    def unlikeness(self, sight: Sight, time_s: float) -> float:
+    def insert(self, row: int, past: Past, sight: Sight) -> None:
+        """Take in a look at an earlier picture."""
+        self.numbers.insert(row, past.number)
+        self.times_s.insert(row, past.time_s)
+        self.rois.insert(row, roi_numbers(sight.roi))
+        self.confidence.insert(row, sight.pose.confidence)
+
+    def unlikeness(self, sight: Sight, time_s: float, trail: Trail | None = None) -> float:
         """How much speaks against a body being this person, as the logarithm of odds."""
         likeness = self.looks.likeness(sight.looks)
-        return against(self.trail, sight.roi, time_s, likeness)
+        return against(trail or self.trail, sight.roi, time_s, likeness)
+
+    def trail_from(self, row: int) -> Trail:
+        """Trail of a look and some after it, played backwards, with times below 0."""
+        return self._trail(range(min(row + _TRAIL, len(self.numbers)) - 1, row - 1, -1), -1.0)
+
+    def trail_to(self, row: int) -> Trail:
+        """Trail of a look and some before it."""
+        return self._trail(range(max(row + 1 - _TRAIL, 0), row + 1), 1.0)
+
+    def _trail(self, rows: range, sense: float) -> Trail:
+        times = [sense * self.times_s[row] for row in rows]
+        rois = [Roi(*self.rois[row].tolist()) for row in rows]
+        trail = Trail(rois[0], times[0], -np.inf)
+        for roi, time_s in zip(rois[1:], times[1:], strict=True):
+            trail = trail.followed(roi, time_s)
+        return trail
+
+
+@dataclass(frozen=True, eq=False)
+class Past:
+    """A picture that was looked at."""
+
+    number: int
+    time_s: float
+    picture: Pixels
+    bodies: list[NDArray[np.bool_]]  # found in it
+    unseen: list[tuple[Stretch, Trail]]  # who were not found, and where they were before
 
 
 def against(trail: Trail, roi: Roi, time_s: float, likeness: float) -> float:
@@ -94,17 +133,17 @@ def against(trail: Trail, roi: Roi, time_s: float, likeness: float) -> float:
     gap_s = min(time_s - trail.time_s, _KNOWN_S)
     away = trail.away(roi, time_s) / (_AWAY + _AWAY_PER_S * gap_s)
     grew = trail.growth(roi) / (_GREW + _GREW_PER_S * gap_s)
-    unlike = (1.0 - likeness) / _UNLIKE
+    unlike = (1.0 - likeness) / UNLIKE
     return float(sum(min(each, _MAX_AGAINST) for each in (0.5 * away**2, 0.5 * grew**2, unlike)))
 
 
 @dataclass(frozen=True, eq=False)
 class Doubt:
-    """One body alone in a picture, and the stretches whose person it may be."""
+    """Bodies of a picture of which it is not sure whom they show."""
 
     number: int
-    sight: Sight
-    stretches: list[Stretch]
+    time_s: float
+    sights: list[Sight]
 
 
 class PeopleFollower:
@@ -115,9 +154,8 @@ class PeopleFollower:
         self._active: list[Stretch] = []
         self._doubted: list[Roi] = []
         self._searched_s = -np.inf
+        self._past: deque[Past] = deque()
         self.stretches: list[Stretch] = []
-        self.doubtful: list[int] = []
-        """Pictures in which it is not sure whom a body shows."""
         self.doubts: list[Doubt] = []
 
     def step(self, picture: Pixels, number: int, time_s: float) -> None:
@@ -134,22 +172,59 @@ class PeopleFollower:
         ).reshape(len(self._active), len(sights))
         order, doubtful = assigned(costs)
         self._doubted = [sights[order[row]].roi for row in doubtful]
-        self.doubtful += [number] * bool(doubtful)
-        if doubtful and len(sights) == 1:
-            may_be = np.flatnonzero(costs[:, 0] < costs.min() + _SURELY)
-            self.doubts.append(Doubt(number, sights[0], [self._active[row] for row in may_be]))
-        for row, column in order.items():
-            if row not in doubtful:
-                alone = self._is_alone(sights[column], self._active[row])
-                self._active[row].add(number, time_s, sights[column], learn=alone)
+        sure = {row: column for row, column in order.items() if row not in doubtful}
+        unseen = [(each, each.trail) for row, each in enumerate(self._active) if row not in sure]
+        bodies = [each.body for each in sights]
+        self._past.append(Past(number, time_s, picture, bodies, unseen))
+        while len(self._past) * picture.nbytes > max(_BACK_BYTES, picture.nbytes):
+            self._past.popleft()
+        for row, column in sure.items():
+            alone = self._is_alone(sights[column], self._active[row])
+            self._active[row].add(number, time_s, sights[column], learn=alone)
+            self._look_back(self._active[row], picture.shape[1], picture.shape[0])
         # A body that may be of one of several is not somebody new.
-        held = range(len(sights)) if doubtful else order.values()
-        for column in set(range(len(sights))) - set(held):
-            sight = sights[column]
+        left = [each for column, each in enumerate(sights) if column not in sure.values()]
+        if doubtful:
+            self.doubts.append(Doubt(number, time_s, left))
+            return
+        for sight in left:
             new = Stretch(Trail(sight.roi, time_s, time_s), Looks(sight.looks))
             new.add(number, time_s, sight)
             self.stretches.append(new)
             self._active.append(new)
+
+    def _look_back(self, stretch: Stretch, width: int, height: int) -> None:
+        """Follow backwards who came into view: where they were half hidden nobody found them."""
+        row = len(stretch.numbers) - MIN_LOOKS
+        before = stretch.numbers[row - 1] if row > 0 else -1
+        if row < 0 or stretch.numbers[-1] - stretch.numbers[row] >= MIN_LOOKS:
+            return
+        trail = stretch.trail_from(row)
+        for past in reversed(self._past):
+            if past.number >= stretch.numbers[row]:
+                continue
+            if past.number <= before:
+                return
+            pose = self._landmarker.in_picture(past.picture, trail.predicted(-past.time_s))
+            body = _small_mask(pose, width, height)
+            if (
+                jumped(pose)
+                or pose.confidence < FOUND
+                or any(_one_body(body, each) for each in past.bodies)
+            ):
+                return
+            sight = Sight(pose, signature(pose.roi.cut(past.picture), pose), body, 0.0)
+            own = stretch.unlikeness(sight, -past.time_s, trail)
+            others = [
+                each.unlikeness(sight, past.time_s, there)
+                for each, there in past.unseen
+                if each is not stretch
+            ]
+            if own > _NOBODY or own + _SURELY > min(others, default=np.inf):
+                return
+            stretch.insert(row, past, sight)
+            past.bodies.append(body)
+            trail = trail.followed(sight.roi, -past.time_s)
 
     def _is_alone(self, sight: Sight, stretch: Stretch) -> bool:
         """True unless somebody else is so near that colours may be theirs."""

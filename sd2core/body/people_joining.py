@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from bisect import bisect
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from sd2core.body.identity import Trail
-from sd2core.body.people_following import MIN_LOOKS, Stretch, against
+from sd2core.body.people_following import (
+    MIN_LOOKS,
+    UNLIKE,
+    Doubt,
+    Sight,
+    Stretch,
+    against,
+    assigned,
+)
 from sd2core.body.roi import Floats, Roi, roi_of
 
 _LEFT = 1.0
@@ -65,6 +75,49 @@ def joined(stretches: list[Stretch], width: int) -> list[Somebody]:
     return people
 
 
+def cleared(
+    doubts: Sequence[Doubt], people: Sequence[Somebody]
+) -> Iterator[tuple[int, int, Sight]]:
+    """Looks whose person is sure once it is known where everybody was before and after.
+
+    Yields row of the person, number of the picture, and the body.
+    """
+    for doubt in doubts:
+        costs = {}
+        for row, person in enumerate(people):
+            against_each = [_against_between(person, each, doubt) for each in doubt.sights]
+            if against_each and against_each[0] < _NEVER:
+                costs[row] = against_each
+        rows = list(costs)
+        order, doubtful = assigned(np.array([costs[row] for row in rows]).reshape(len(rows), -1))
+        for row, column in order.items():
+            person = people[rows[row]]
+            inside = (
+                person.stretches[0].numbers[0] < doubt.number < person.stretches[-1].numbers[-1]
+            )
+            if inside and row not in doubtful:
+                yield rows[row], doubt.number, doubt.sights[column]
+
+
+def _against_between(person: Somebody, sight: Sight, doubt: Doubt) -> float:
+    """How much speaks against a body being somebody who was seen before, after, or both."""
+    if any(doubt.number in each.numbers for each in person.stretches):
+        return _NEVER
+    likeness = max(each.looks.likeness(sight.looks) for each in person.stretches)
+    cost, gap_s = (1.0 - likeness) / UNLIKE, np.inf
+    trails = []
+    before = [each for each in person.stretches if each.numbers[0] < doubt.number]
+    if before:
+        trails.append((before[-1].trail_to(bisect(before[-1].numbers, doubt.number) - 1), 1.0))
+    after = [each for each in person.stretches if each.numbers[-1] > doubt.number]
+    if after:
+        trails.append((after[0].trail_from(bisect(after[0].numbers, doubt.number)), -1.0))
+    for trail, sense in trails:
+        cost += against(trail, sight.roi, sense * doubt.time_s, 1.0)
+        gap_s = min(gap_s, sense * doubt.time_s - trail.time_s)
+    return cost if len(trails) == 2 or gap_s <= _LONG_S else _NEVER
+
+
 def _joins(stretches: list[Stretch], width: int) -> list[tuple[int, int, float]]:
     """Best way to go on: earlier stretch, later one, odds against the next best way."""
     from scipy.optimize import linear_sum_assignment
@@ -73,7 +126,7 @@ def _joins(stretches: list[Stretch], width: int) -> list[tuple[int, int, float]]
     if not count:
         return []
     costs = np.full((2 * count, 2 * count), _NEVER)
-    starts = [_backwards(each) for each in stretches]
+    starts = [each.trail_from(0) for each in stretches]
     last_s = max(each.times_s[-1] for each in stretches)
     first_s = min(each.times_s[0] for each in stretches)
     for one, earlier in enumerate(stretches):
@@ -123,15 +176,6 @@ def _leaving(trail: Trail, width: int) -> float:
     outwards = (1.0 if x > width / 2 else -1.0) * trail.velocity[0]
     near = away_px - 0.5 * max(outwards, 0.0) < _EDGE * size
     return _LEFT if near else _VANISHED
-
-
-def _backwards(stretch: Stretch) -> Trail:
-    """Trail of a stretch played backwards, with times below 0."""
-    times = [-time_s for time_s in stretch.times_s]
-    trail = Trail(_roi(stretch, min(len(times), 6) - 1), times[min(len(times), 6) - 1], -np.inf)
-    for number in range(min(len(times), 6) - 2, -1, -1):
-        trail = trail.followed(_roi(stretch, number), times[number])
-    return trail
 
 
 def _roi(stretch: Stretch, number: int) -> Roi:

@@ -104,13 +104,26 @@ def _walking(part: Part, skeleton: Skeleton, times: Floats) -> tuple[Floats, Flo
 
 def pictures(actors: Sequence[Actor]) -> Iterator[NDArray[np.uint8]]:
     """The scene, the nearest person in front."""
-    layers = sorted(actors, key=lambda each: -each.away_m)
+    return (picture for picture, _ in scenes(actors))
+
+
+def scenes(actors: Sequence[Actor]) -> Iterator[tuple[NDArray[np.uint8], Floats]]:
+    """Pictures, and the share of each actor that nobody hides in them, (A,)."""
+    far_to_near = sorted(range(len(actors)), key=lambda row: -actors[row].away_m)
+    layers = [actors[row] for row in far_to_near]
     for frame in range(len(actors[0].vertices_m)):
         seen = [each.vertices_m[frame] for each in layers]
         shadows = [each.drawer.light_buffer(part) for each, part in zip(layers, seen, strict=True)]
         picture = layers[0].drawer.background(np.maximum.reduce(shadows))
+        drawn = []
         for each, part, shadow in zip(layers, seen, shadows, strict=True):
             colours, coverage = each.drawer.person(part, shadow)
             picture = picture * (1.0 - coverage[..., None]) + colours
+            drawn.append(coverage)
+        shares, free = np.zeros(len(actors)), np.ones(picture.shape[:2])
+        for row, coverage in zip(far_to_near[::-1], drawn[::-1], strict=True):
+            shares[row] = (free * coverage).sum() / max(float(coverage.sum()), 1.0)
+            free *= 1.0 - coverage
         noise = np.random.default_rng(frame).standard_normal(picture.shape, dtype=np.float32)
-        yield (np.clip(srgb(_tone(picture)) + 0.012 * noise, 0.0, 1.0) * 255.0).astype(np.uint8)
+        bright = np.clip(srgb(_tone(picture)) + 0.012 * noise, 0.0, 1.0)
+        yield (bright * 255.0).astype(np.uint8), shares

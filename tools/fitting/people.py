@@ -24,7 +24,7 @@ from sd2core.io.video import open_video
 from sd2core.io.video_writing import write_video
 from sd2core.progress import Progress, silent
 from tools.fitting.cast import PEOPLE
-from tools.fitting.meetings import CAMERA, FRAMES_PER_S, Actor, Part, actor, pictures
+from tools.fitting.meetings import CAMERA, FRAMES_PER_S, Actor, Part, actor, scenes
 
 OWN = PEOPLE["chen"]
 OTHERS = {
@@ -33,6 +33,8 @@ OTHERS = {
 }
 _OFF = 0.1
 """Distance of the hips in squares from where they are, beyond which somebody else is shown."""
+_VISIBLE = 1.0 / 3.0
+"""Share of a person's pixels from which on they are to be seen; hips are in the picture, too."""
 _HIPS = (23, 24)
 _NEAR_M = 3.0
 _SILENT = FitReport(lambda stage: silent, lambda *_: None, lambda *_: None)
@@ -94,7 +96,9 @@ class Outcome:
     meeting: Meeting
     clothes: str
     looks: int  # ten times a second, at one of them in the picture
-    seen: int  # of them, in which somebody was found
+    visible: int  # of them, in which a third of that one or more is to be seen
+    found: int  # of those, in which that one was found
+    seen: int  # looks in which somebody was found
     wrong: int  # of those, in which it was the other one
     people: int  # who were told apart
     place_m: tuple[float, float] | None = None  # mean error, in company and alone
@@ -125,11 +129,12 @@ def told_apart(
     """Film a meeting, find the people in it, and say how often they are taken for one another."""
     frames = int(FRAMES_PER_S * meeting.length_s)
     actors = [actor(part, frames, "office") for part in meeting.parts(clothes)]
-    _film(path, actors)
+    shares = _film(path, actors)
     with open_video(path) as video:
         people = find_people(video, landmark_models())
-    inside = [_hips_px(each)[:, 0] for each in actors]
-    looks = sum(int(((x > 0) & (x < CAMERA.width)).sum()) for x in inside)
+    across_px = np.stack([_hips_px(each)[:, 0] for each in actors])
+    inside = (across_px > 0) & (across_px < CAMERA.width)
+    visible, found = inside & (shares >= _VISIBLE), np.zeros(inside.shape, bool)
     seen = wrong = 0
     for person in people:
         off = _off(person, actors)
@@ -137,7 +142,9 @@ def told_apart(
         own = int(mistaken.sum(axis=1).argmin())
         seen += off.shape[1]
         wrong += int(mistaken[own].sum())
-    outcome = Outcome(meeting, clothes, looks, seen, wrong, len(people))
+        found[own, person.sightings.frames[person.seen][~mistaken[own]]] = True
+    counts = (int(each.sum()) for each in (inside, visible, visible & found))
+    outcome = Outcome(meeting, clothes, *counts, seen, wrong, len(people))
     return actors, people, outcome
 
 
@@ -168,7 +175,8 @@ def _measured(meeting: Meeting, clothes: str, folder: Path) -> Outcome:
         ((_, mesh, _, _),) = fit_people(
             path, folder / "pair.npz", [person], known, lambda number: _SILENT
         )
-        alone = _film(folder / "alone.mp4", [mine])
+        alone = folder / "alone.mp4"
+        _film(alone, [mine])
         fit_video(alone, folder / "alone.npz", known, _SILENT)
         fits = [load_mesh(each) for each in (mesh, folder / "alone.npz")]
         there = np.logical_and.reduce([fit.presence.there for fit in fits])
@@ -185,24 +193,43 @@ def _measured(meeting: Meeting, clothes: str, folder: Path) -> Outcome:
     )
 
 
-def _film(path: Path, actors: Sequence[Actor]) -> Path:
+def _film(path: Path, actors: Sequence[Actor]) -> NDArray[np.float64]:
+    """Film actors; returns the share of each that is to be seen, (A, T)."""
     path.unlink(missing_ok=True)
-    write_video(path, pictures(actors), FRAMES_PER_S, (CAMERA.width, CAMERA.height))
-    return path
+    shares = []
+
+    def drawn() -> Iterator[NDArray[np.uint8]]:
+        for picture, seen in scenes(actors):
+            shares.append(seen)
+            yield picture
+
+    write_video(path, drawn(), FRAMES_PER_S, (CAMERA.width, CAMERA.height))
+    return np.stack(shares, axis=1)
 
 
 def as_table(outcomes: Sequence[Outcome]) -> str:
     """Markdown table of outcomes."""
     away = ["place off by, alone", "velocity, alone"]
-    rows = [["two people", "apart", "clothes", "right", "found", *away]]
+    rows = [["two people", "apart", "clothes", "right", "found", "looks", "listed", *away]]
     for each in outcomes:
-        pairs = (
-            "" if pair is None else f"{pair[0]:.3f}, {pair[1]:.3f} {unit}"
-            for pair, unit in ((each.place_m, "m"), (each.velocity_mps, "m/s"))
-        )
         met = [each.meeting.name, f"{each.meeting.apart_m:g} m", each.clothes]
-        rows.append([*met, f"{100.0 * each.right:.1f} %", f"{each.seen} of {each.looks}", *pairs])
-    seen, wrong = (sum(getattr(each, name) for each in outcomes) for name in ("seen", "wrong"))
-    right = f"{100.0 * (1.0 - wrong / max(seen, 1)):.2f} %"
-    rows.append(["all", "", "", right, str(seen), "", ""])
+        fits = [_beside(each.place_m, "m"), _beside(each.velocity_mps, "m/s")]
+        rows.append([*met, *_told([each]), str(each.people), *fits])
+    rows.append(["all", "", "", *_told(outcomes), "", "", ""])
     return "\n".join(markdown_table(rows, len(rows[0])))
+
+
+def _told(outcomes: Sequence[Outcome]) -> tuple[str, str, str]:
+    looks, visible, found, seen, wrong = (
+        sum(getattr(each, name) for each in outcomes)
+        for name in ("looks", "visible", "found", "seen", "wrong")
+    )
+    right = f"{seen - wrong} of {seen}, {100.0 * (1.0 - wrong / max(seen, 1)):.2f} %"
+    return right, f"{found} of {visible} to be seen", str(looks)
+
+
+def _beside(errors: tuple[float, float] | None, unit: str) -> str:
+    if errors is None:
+        return ""
+    company, alone = errors
+    return f"{company:.3f}, {alone:.3f} {unit}: {company / alone:.2f} ×"
