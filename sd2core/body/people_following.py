@@ -181,7 +181,7 @@ class PeopleFollower:
         for row, column in sure.items():
             alone = self._is_alone(sights[column], self._active[row])
             self._active[row].add(number, time_s, sights[column], learn=alone)
-            self._look_back(self._active[row], picture.shape[1], picture.shape[0])
+            self._look_back(self._active[row])
         # A body that may be of one of several is not somebody new.
         left = [each for column, each in enumerate(sights) if column not in sure.values()]
         if doubtful:
@@ -193,7 +193,7 @@ class PeopleFollower:
             self.stretches.append(new)
             self._active.append(new)
 
-    def _look_back(self, stretch: Stretch, width: int, height: int) -> None:
+    def _look_back(self, stretch: Stretch) -> None:
         """Follow backwards who came into view: where they were half hidden nobody found them."""
         row = len(stretch.numbers) - MIN_LOOKS
         before = stretch.numbers[row - 1] if row > 0 else -1
@@ -206,7 +206,7 @@ class PeopleFollower:
             if past.number <= before:
                 return
             pose = self._landmarker.in_picture(past.picture, trail.predicted(-past.time_s))
-            body = _small_mask(pose, width, height)
+            body = _small_mask(pose, *past.picture.shape[1::-1])
             if (
                 jumped(pose)
                 or pose.confidence < FOUND

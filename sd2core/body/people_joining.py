@@ -83,20 +83,16 @@ def cleared(
     Yields row of the person, number of the picture, and the body.
     """
     for doubt in doubts:
-        costs = {}
-        for row, person in enumerate(people):
-            against_each = [_against_between(person, each, doubt) for each in doubt.sights]
-            if against_each and against_each[0] < _NEVER:
-                costs[row] = against_each
-        rows = list(costs)
-        order, doubtful = assigned(np.array([costs[row] for row in rows]).reshape(len(rows), -1))
+        costs = np.array(
+            [[_against_between(one, each, doubt) for each in doubt.sights] for one in people]
+        ).reshape(len(people), len(doubt.sights))
+        rows = np.flatnonzero(costs[:, 0] < _NEVER)
+        order, doubtful = assigned(costs[rows])
         for row, column in order.items():
-            person = people[rows[row]]
-            inside = (
-                person.stretches[0].numbers[0] < doubt.number < person.stretches[-1].numbers[-1]
-            )
+            stretches = people[rows[row]].stretches
+            inside = stretches[0].numbers[0] < doubt.number < stretches[-1].numbers[-1]
             if inside and row not in doubtful:
-                yield rows[row], doubt.number, doubt.sights[column]
+                yield int(rows[row]), doubt.number, doubt.sights[column]
 
 
 def _against_between(person: Somebody, sight: Sight, doubt: Doubt) -> float:

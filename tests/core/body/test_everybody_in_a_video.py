@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
 from filmed_people import crossing, empty_room, film
 
+from sd2core.body.blazepose import (
+    CENTRE,
+    POINTS,
+    RIM,
+    Detection,
+    Pose,
+    PoseDetector,
+    PoseLandmarker,
+)
 from sd2core.body.identity import Looks, Trail
 from sd2core.body.landmark_models import LandmarkModels
-from sd2core.body.people import SeenPerson, chosen_people, find_people
-from sd2core.body.people_following import Stretch, assigned
-from sd2core.body.people_joining import joined
-from sd2core.body.roi import Roi, roi_numbers
+from sd2core.body.people import SeenPerson, chosen_people, find_people, of_two
+from sd2core.body.people_following import Doubt, PeopleFollower, Sight, Stretch, assigned
+from sd2core.body.people_joining import cleared, joined
+from sd2core.body.roi import MARGIN, Pixels, Roi, roi_numbers
 from sd2core.errors import Sd2Error
 from sd2core.io.video import open_video
 
@@ -92,6 +102,99 @@ class TestJoining:
         assert 0.9 < person.certainty < 1.0
         (whole,) = joined([stretch(0.0, 3.6, 200.0, 920.0)], WIDTH_PX)
         assert whole.certainty == 1.0
+
+
+def body(x_px: float, size: float = 1.0, clothes: int = 0) -> Sight:
+    """Somebody in a picture."""
+    square = Roi(x_px, 300.0, size * SIZE_PX)
+    points = np.zeros((POINTS, 2))
+    points[CENTRE] = points[RIM] = x_px, 300.0
+    points[RIM, 1] -= square.size_px / (2.0 * MARGIN)
+    unseen = np.zeros(33)
+    mask = np.zeros((256, 256), np.float32)
+    pose = Pose(points, unseen, np.zeros((33, 3)), unseen, unseen, 1.0, mask, square)
+    return Sight(pose, looks_of(clothes), mask > 0.5, 1.0)
+
+
+class TestClearing:
+    def who(self, *sights: Sight) -> list[tuple[int, float]]:
+        """Whose the bodies of a picture at 2 s are, between one who stands and one who crosses."""
+        stands = [stretch(0.0, 1.6, 600.0, 600.0), stretch(2.4, 4.0, 600.0, 600.0)]
+        crosses = [
+            stretch(0.0, 1.6, 200.0, 520.0, size=1.5),
+            stretch(2.4, 4.0, 680.0, 1000.0, size=1.5),
+        ]
+        people = joined([stands[0], crosses[0], stands[1], crosses[1]], WIDTH_PX)
+        assert [len(each.stretches) for each in people] == [2, 2]
+        told = cleared([Doubt(20, 2.0, list(sights))], people)
+        return [(row, each.roi.size_px / SIZE_PX) for row, number, each in told if number == 20]
+
+    def test_size_before_and_after_tells_who_was_in_front(self) -> None:
+        assert self.who(body(600.0, 1.5)) == [(1, pytest.approx(1.5))]
+        assert self.who(body(600.0)) == [(0, pytest.approx(1.0))]
+
+    def test_two_bodies_go_to_two_people(self) -> None:
+        told = dict(self.who(body(603.0), body(601.0, 1.5)))
+        assert told == {0: pytest.approx(1.0), 1: pytest.approx(1.5)}
+
+    def test_who_may_be_either_stays_in_doubt(self) -> None:
+        assert self.who(body(600.0, 1.5**0.5)) == []
+
+    def test_who_has_not_come_back_is_not_seen(self) -> None:
+        (person,) = joined([stretch(0.0, 1.6, 600.0, 600.0)], WIDTH_PX)
+        assert list(cleared([Doubt(17, 1.7, [body(600.0)])], [person])) == []
+
+
+class Staged:
+    """Detector and landmark network of one person whose place is in the picture's first pixel."""
+
+    def picture(self, x_px: int, *, shown: bool, detected: bool) -> Pixels:
+        picture = np.zeros((240, 320, 3), np.uint8)
+        picture[0, 0] = x_px, shown, detected
+        return picture
+
+    def look(self, picture: Pixels, square: Roi | None) -> tuple[list[Detection], float]:
+        x_px, _, detected = picture[0, 0].tolist()
+        return [Detection(Roi(x_px, 120.0, 200.0), 1.0)] * detected, float(detected)
+
+    def in_picture(self, picture: Pixels, roi: Roi) -> Pose:
+        x_px, shown, _ = picture[0, 0].tolist()
+        points = np.array([x_px, 120.0]) + np.random.default_rng(0).uniform(-60, 60, (POINTS, 2))
+        points[CENTRE], points[RIM] = (x_px, 120.0), (x_px, 120.0 - 100.0 / MARGIN)
+        seen, mask = np.ones(33), np.ones((256, 256), np.float32)
+        return Pose(points, seen, np.zeros((33, 3)), seen, seen, float(shown), mask, roi)
+
+
+class TestLookingBack:
+    def numbers(self, shown_from: int, detected_from: int) -> list[list[int]]:
+        """Pictures in which each stretch was seen."""
+        stage = Staged()
+        follower = PeopleFollower(cast(PoseDetector, stage), cast(PoseLandmarker, stage))
+        for number in range(10):
+            shown, detected = number >= shown_from, number >= detected_from
+            picture = stage.picture(80 + 3 * number, shown=shown, detected=detected)
+            follower.step(picture, number, STEP_S * number)
+        return [each.numbers for each in follower.stretches]
+
+    def test_who_is_detected_late_is_followed_backwards(self) -> None:
+        assert self.numbers(0, 4) == [list(range(10))]
+
+    def test_nobody_is_followed_to_where_they_are_not_seen(self) -> None:
+        assert self.numbers(2, 4) == [list(range(2, 10))]
+
+
+class TestLooksAtTwo:
+    def test_a_square_that_grows_before_and_after_a_gap_is_around_two(self) -> None:
+        sizes = np.array([100.0] * 8 + [104.0, 112.0, np.nan, np.nan, 125.0] + [101.0] * 8)
+        assert np.flatnonzero(of_two(sizes)).tolist() == [9, 12]
+
+    def test_who_comes_nearer_is_one(self) -> None:
+        sizes = np.linspace(100.0, 130.0, 31)
+        sizes[14:17] = np.nan
+        assert not of_two(sizes).any()
+
+    def test_first_and_last_looks_count(self) -> None:
+        assert not of_two(np.array([np.nan, 120.0] + [100.0] * 8 + [120.0, np.nan])).any()
 
 
 class TestAssigning:
