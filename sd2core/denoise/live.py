@@ -91,8 +91,9 @@ class TrainedDenoiser:
 
     def note(self, parts: Iterable[DopplerMap]) -> str | None:
         """Sentence on the frames of a map, given in parts, that the model has learnt nothing of."""
-        known = self.card.known
-        return known and known.note((one.values.T for one in parts), self.card.axis)
+        if self.card.known is None:
+            return None
+        return self.card.known.note((one.values.T for one in parts), self.card.axis)
 
     def as_denoised(
         self,
