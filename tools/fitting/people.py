@@ -143,8 +143,8 @@ def told_apart(
         seen += off.shape[1]
         wrong += int(mistaken[own].sum())
         found[own, person.sightings.frames[person.seen][~mistaken[own]]] = True
-    counts = (int(each.sum()) for each in (inside, visible, visible & found))
-    outcome = Outcome(meeting, clothes, *counts, seen, wrong, len(people))
+    looks, clear, known = (int(each.sum()) for each in (inside, visible, visible & found))
+    outcome = Outcome(meeting, clothes, looks, clear, known, seen, wrong, len(people))
     return actors, people, outcome
 
 
