@@ -45,6 +45,7 @@ class Hiding:
         return cls(np.ascontiguousarray(points, np.float32), origin_m[None], faces, boxes_m[None])
 
 
+@compiled
 def may_hide(
     hiding_m: NDArray[np.float64], hidden_m: NDArray[np.float64], place_m: NDArray[np.float64]
 ) -> bool:
@@ -87,9 +88,6 @@ def may_hide(
     return True
 
 
-_may_hide = compiled(may_hide)
-
-
 @compiled
 def _hide_behind_kernel(  # type: ignore[no-untyped-def]
     surface, surface_origins_m, faces, boxes_m, counts,
@@ -121,7 +119,7 @@ def _hide_behind_kernel(  # type: ignore[no-untyped-def]
         place_m = places_m[t] + origins_m[t]
         boxes, near = boxes_m[min(t, len(boxes_m) - 1)], False
         for box in range(len(boxes)):
-            near |= _may_hide(boxes[box], box_m, place_m)
+            near |= may_hide(boxes[box], box_m, place_m)
         if not near:
             continue
         at = min(t, len(surface) - 1)
@@ -200,7 +198,8 @@ def _hide_plainly(
     its = points[:, asked]
     box_m = np.stack([its.min(axis=1), its.max(axis=1)]) + origin_m
     boxes = hiding.boxes_m[min(t, len(hiding.boxes_m) - 1)]
-    if not any(may_hide(box, box_m, place_m + origin_m) for box in boxes):
+    overlap = getattr(may_hide, "py_func", may_hide)
+    if not any(overlap(box, box_m, place_m + origin_m) for box in boxes):
         return
     at, faces = min(t, len(hiding.points) - 1), hiding.faces
     surface = hiding.points[at] + (hiding.origins_m[at] - origin_m)[:, None]

@@ -218,7 +218,7 @@ def test_walls_are_put_into_the_scene_and_taken_out(sd2: Sd2, one: Recording) ->
     ("words", "said"),
     [
         (("--body", "gone.npz"), "gone.npz does not exist"),
-        (("--body", "anna.npz@1,2"), "[NAME=]FILE[@X,Y,Z"),
+        (("--body", "anna.npz@1,2"), "[NAME=]FILE[,FACES][@X,Y,Z"),
         (("--wall", "floor"), "DIRECTION@M"),
         (("--wall", "north@2"), "degrees, e.g. right@2"),
         (("--wall", "floor@0"), "The distance of a wall is 0"),

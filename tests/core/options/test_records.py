@@ -76,7 +76,7 @@ def values_of(option: Option) -> st.SearchStrategy[Any] | None:
         one = PLAIN[option.kind]
     if option.section and option.kind is bool:
         return st.just(True)  # a switch cannot be typed to be off
-    least = 1 if option.default is MISSING else 0
+    least = 0 if option.default == () else 1  # where none is another thing, it is not typed
     return st.lists(one, min_size=least, max_size=3).map(tuple) if option.place.many else one
 
 
