@@ -16,7 +16,7 @@ from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import outlined, title
 
 _ICON_PX = 20
-_BARE_PX, _WORDED_PX = QSize(36, 36), QSize(68, 46)
+_BARE_PX, _WORDED_PX = QSize(36, 36), QSize(65, 46)
 """Sizes of an icon alone, and with its word below it."""
 _RAIL_MARGINS_PX = 8
 _WORD_PX = 11

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-_LABELS_PX = 566
+_LABELS_PX = 560
 """Room for the usual columns of the table of spans."""
 _PANELS = ("video", "scene", "tracks", "spectrum", "side")
 _SPLITTERS = ("views", "main")  # whose sizes each layout remembers
