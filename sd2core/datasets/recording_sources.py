@@ -258,7 +258,6 @@ class _Opened:
             )
             if alone:
                 synthetic = replace(synthetic.of_person(person), present=present_frames(bodies))
-                made = None
                 if model is not None:
                     made = denoised(synthetic, model, self._making.texture)
             maps["synthetic"] = synthetic

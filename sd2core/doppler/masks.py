@@ -73,6 +73,7 @@ class VisibilityMasks:
         self._wall = wall
         around = prepared.mesh.surroundings
         self._walls = () if around is None else around.walls
+        self._things = _things(around, wall)
         live = np.ones(counting.bins + 1, np.uint8)
         if not prepared.spreads:
             live[list(prepared.options.null_bins)] = 0
@@ -430,7 +431,7 @@ class VisibilityMasks:
     ) -> None:
         """Set ``visible`` to 0 of what things hide, and of the needed vertices that others hide."""
         # Of all vertices: what hides them is soon looked at, and the share that is seen is right.
-        for thing in _things(self._prepared.mesh.surroundings):
+        for thing in self._things:
             view.hide(thing, visible, visible)
         if self.others:
             marked = needed()
@@ -452,9 +453,8 @@ class VisibilityMasks:
         # The sensor's image sees images as the sensor sees what they are images of.
         image = view.mirrored(wall)
         self._hide_behind_body(self._prepared, image, needed, visible)
-        things = _things(self._prepared.mesh.surroundings, wall)
         for seen in (view, image):
-            for thing in things:
+            for thing in self._things:
                 seen.hide(thing, needed, visible)
             for other in self.others:
                 self._hide_behind_body(other, seen, needed, visible)
@@ -536,7 +536,7 @@ class _View:
         return [(t, t + 1) for t in range(len(self.points))]
 
 
-def _things(around: Surroundings | None, wall: Wall | None = None) -> list[Hiding]:
+def _things(around: Surroundings | None, wall: Wall | None) -> list[Hiding]:
     """All things as one surface, or what is before a wall of them; none if there are none."""
     if around is None or not around.things:
         return []
