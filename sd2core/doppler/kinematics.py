@@ -87,7 +87,8 @@ def kinematics(
     towards = radial_velocity(
         before.transpose(0, 2, 1), after.transpose(0, 2, 1), place, knots.duration_s
     )
-    moved_m = np.linalg.norm(after - before, axis=2)
+    step_m = after - before
+    moved_m = np.sqrt(np.einsum("tjk,tjk->tj", step_m, step_m))
     speed = np.divide(
         moved_m, knots.duration_s, out=np.zeros_like(moved_m), where=knots.duration_s > 0
     )
@@ -96,7 +97,7 @@ def kinematics(
     nearer = place - own[:, 0]
     nearer[:, 1] = 0.0
     nearer /= np.maximum(np.linalg.norm(nearer, axis=1, keepdims=True), 1e-9)
-    aside = np.cross(nearer, [0.0, 1.0, 0.0])
+    aside = nearer[:, ::-1] * [-1.0, 0.0, 1.0]  # nearer × down
     sigma = np.zeros_like(towards)
     if (known := mesh.uncertainty) is not None:
         limbs = [np.bincount(known.vertex_limb[row]).argmax() for row in joints.rows]

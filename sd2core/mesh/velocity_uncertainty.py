@@ -90,8 +90,7 @@ class VelocityUncertainty:
         lines = [end - place for end in np.atleast_2d(np.asarray(sensor_m, np.float64))]
         # On camera or sensor there is no line; the worse of the two is then taken.
         cosines, lengths = zip(*(_cosine(to_camera, line) for line in lines), strict=True)
-        lengths = np.min(lengths, axis=0)
-        squared = np.clip(np.mean(cosines, axis=0), -1.0, 1.0) ** 2
+        squared = np.clip(sum(cosines) / len(lines), -1.0, 1.0) ** 2
         # Square of the mean of unit vectors along these lines.
         level = 1.0 if len(lines) == 1 else 0.5 + 0.5 * _cosine(*lines)[0]
         frames = slice(start, start + len(place))
@@ -100,13 +99,15 @@ class VelocityUncertainty:
         sigma: NDArray[np.float64] = np.sqrt(
             squared * along**2 + np.maximum(level - squared, 0.0) * across**2
         )
-        return np.where(lengths > 0, sigma, np.maximum(along, across))
+        return np.where(np.min(lengths, axis=0) > 0, sigma, np.maximum(along, across))
 
 
 def _cosine(
     one: NDArray[np.float64], other: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Cosine between vectors (..., 3), 1 where one of them is zero, and the product of lengths."""
-    lengths = np.linalg.norm(one, axis=-1) * np.linalg.norm(other, axis=-1)
-    product = (one * other).sum(axis=-1)
+    squares, others, product = (
+        np.einsum("...i,...i", a, b) for a, b in ((one, one), (other, other), (one, other))
+    )
+    lengths = np.sqrt(squares) * np.sqrt(others)
     return np.divide(product, lengths, out=np.ones_like(lengths), where=lengths > 0), lengths
