@@ -5,7 +5,8 @@ from __future__ import annotations
 import base64
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -14,7 +15,6 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QImage
 
 from sd2app.background.latest import delayed
-from sd2app.live.growing_map import extended
 from sd2app.live.process import COMMAND, LiveProcess, why_it_ended
 from sd2app.live.setup import ListenRequest
 from sd2app.session.content import Content
@@ -24,6 +24,7 @@ from sd2core.live.counts import Counts
 from sd2core.maps import DopplerMap
 from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import FILE_NAME, open_recording
+from sd2core.timebase import Timebase
 
 State = Literal["idle", "opening", "starting", "listening", "stopping", "stopped", "failed"]
 
@@ -324,3 +325,24 @@ def _pixels(jpeg: bytes) -> NDArray[np.uint8]:
     image = QImage.fromData(jpeg).convertToFormat(QImage.Format.Format_RGB888)
     rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
     return rows[:, : 3 * image.width()].reshape(image.height(), image.width(), 3).copy()
+
+
+def extended(doppler: DopplerMap, columns: Iterable[tuple[float, Sequence[float]]]) -> DopplerMap:
+    """Map with columns at its end, each a time in seconds and the values of its bins.
+
+    Those that are not later than the last, or of another number of bins, are left out; without any
+    it is the same map.
+    """
+    times_s, values = [float(doppler.times_s[-1])], []
+    for time_s, column in columns:
+        if time_s > times_s[-1] and len(column) == doppler.axis.bins:
+            times_s.append(time_s)
+            values.append(np.array(column, np.float32))
+    if not values:
+        return doppler
+    return replace(
+        doppler,
+        values=np.column_stack([doppler.values, *values]),
+        timebase=Timebase(np.concatenate([doppler.times_s, times_s[1:]])),
+        present=None,
+    )

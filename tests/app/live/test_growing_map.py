@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from sd2app.live.growing_map import extended
+from sd2app.live.model import extended
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
