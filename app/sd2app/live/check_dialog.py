@@ -8,7 +8,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QImage, QPixmap, QResizeEvent
 from PySide6.QtWidgets import QDialogButtonBox, QLabel, QWidget
 
-from sd2app.live.place_check import PlaceCheck
+from sd2app.live.process import PlaceCheck
 from sd2app.manual.help import with_help
 from sd2app.widgets.dialogs import Dialog, closing
 from sd2app.widgets.layouts import STRETCH, column_of, grid_of, row_of

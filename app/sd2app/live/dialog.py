@@ -10,7 +10,7 @@ from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QLabel, QLineEdit, QMessageBox, QToolButton, QWidget
 
 from sd2app.live.check_dialog import CheckDialog
-from sd2app.live.place_check import PlaceCheck
+from sd2app.live.process import PlaceCheck
 from sd2app.live.protocol_dialog import TOML, ProtocolDialog
 from sd2app.live.protocol_draft import ProtocolDraft
 from sd2app.live.setup import DCA1000, REPLAY, ListenSetup, ways

@@ -1,7 +1,8 @@
-"""A command that records, in a process beside the window."""
+"""Commands that record, or watch a place, in a process beside the window."""
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import json
 import sys
@@ -9,7 +10,11 @@ from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, Signal
+from PySide6.QtGui import QImage
 
+from sd2app.live.setup import ListenRequest
+from sd2core.live.checking import Answer
+from sd2core.placements.placements import Place
 from sd2core.processes import ONE_THREAD
 
 COMMAND = (sys.executable, "-m", "sd2core.cli")
@@ -154,3 +159,39 @@ class SteeredCommand(QObject):
 def why_it_ended(said: str) -> str:
     """Reason of a failure, from what was said on standard error."""
     return said.strip().removeprefix("sd2: ") or "It ended without saying why."
+
+
+CHECK_S = 60.0
+
+
+class PlaceCheck(SteeredCommand):
+    """``sd2 record --check`` beside the window."""
+
+    pictured = Signal(QImage)
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        self.findings: tuple[Answer, ...] = ()
+        self.place: Place | None = None  # of a radar beside the camera, as seen from what moves
+        self.left_s = 0
+
+    def start(self, request: ListenRequest) -> None:
+        """Watch both for a minute."""
+        if not self.busy:
+            self.findings, self.place, self.left_s = (), None, round(CHECK_S)
+            self._launch(request.check_words(CHECK_S))
+
+    def _take(self, event: dict[str, Any]) -> None:
+        match event["event"]:
+            case "preview":
+                self.pictured.emit(QImage.fromData(base64.b64decode(event["picture"])))
+            case "findings":
+                self.findings = tuple(Answer(**one) for one in event["findings"])
+                self.place = None if event["place"] is None else Place(**event["place"])
+                self.left_s = event["left_s"]
+                if self.state == "starting":
+                    self._set_state("running")
+
+    def _end(self, code: int, said: str) -> None:
+        # The exit code tells bad findings, too.
+        super()._end(code if self.left_s else 0, said)
