@@ -12,8 +12,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QToolButton
 from window_models import models_of
 
-from sd2app.live.bar import LiveBar
 from sd2app.live.dialog import ListenDialog
+from sd2app.live.feature import LiveBar
 from sd2app.live.setup import ListenRequest
 from sd2app.video.view import VideoView
 from sd2app.widgets.inputs import Choice
