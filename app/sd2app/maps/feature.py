@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 
 from PySide6.QtCore import QObject, QPointF
-from PySide6.QtGui import QAction, QGuiApplication
+from PySide6.QtGui import QAction, QColor, QGuiApplication, QIcon, QPixmap
 from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.accuracy.model import AccuracyModel
@@ -15,7 +15,6 @@ from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.export_dialog import export_map
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.level_bar import LevelBar, MapEdge
-from sd2app.maps.limb_menu import LimbMenu
 from sd2app.maps.limbs import LimbsModel
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.radar_place import RadarPlaceBadge
@@ -23,9 +22,53 @@ from sd2app.maps.readout import reading_lines
 from sd2app.maps.spectrum import SpectrumView
 from sd2app.maps.stack import MapStack
 from sd2app.maps.uncertainty import UncertaintyModel
+from sd2app.session.limbs import colours_of, part_words
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import Overlay
 from sd2app.widgets.layouts import pane
+from sd2core.files.tables import capitalised
+
+
+class LimbMenu(QMenu):
+    """The whole body, or some parts of it; of several people, everybody, or some or their parts."""
+
+    def __init__(self, model: LimbsModel, parent: QWidget) -> None:
+        super().__init__("Synthetic map by limb", parent)
+        self._model = model
+        self.setToolTip("Show the Doppler of some people or parts of the body alone")
+        self._offered: tuple[str, ...] = ()
+        self.triggered.connect(self._choose)
+        self.aboutToShow.connect(self._update)
+        self._update()
+
+    def _choose(self, action: QAction) -> None:
+        if part := action.data():
+            self._model.toggle(part)
+        else:
+            self._model.show()
+
+    def _update(self) -> None:
+        if self._offered != self._model.all_parts:
+            self._offer(self._model.all_parts)
+        parts = self._model.parts
+        colours = colours_of(parts)
+        for action in self.actions():
+            part = action.data()
+            action.setChecked(part in parts or not (parts or part))
+            action.setEnabled(self._model.track.map is not None)
+            swatch = QPixmap(12, 12)
+            swatch.fill(QColor(colours.get(part, "transparent")))
+            action.setIcon(QIcon(swatch))
+
+    def _offer(self, parts: tuple[str, ...]) -> None:
+        """Offer everything, and each of some people and parts."""
+        self._offered, persons = parts, self._model.persons
+        self.clear()
+        for part in ("", *parts):
+            words = capitalised(part_words(part)) if part and part not in persons else part
+            action = self.addAction(words or ("Everybody" if persons else "Whole body"))
+            action.setData(part)
+            action.setCheckable(True)
 
 
 class MapsFeature(Feature):

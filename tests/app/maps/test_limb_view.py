@@ -14,8 +14,8 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QWidget
 from window_models import build_models
 
+from sd2app.maps.feature import LimbMenu
 from sd2app.maps.heatmap_image import heatmap_image
-from sd2app.maps.limb_menu import LimbMenu
 from sd2app.maps.spectrum import SpectrumView
 from sd2app.session.limbs import LIMB_COLOURS, part_words, title_of
 from sd2app.settings import Settings

@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QToolButton, QWidget
 from window_models import models_of
 
-from sd2app.maps.limb_menu import LimbMenu
+from sd2app.maps.feature import LimbMenu
 from sd2app.maps.partial_map import FINAL
 from sd2app.scene.view import SceneView
 from sd2app.sensor.bodies_page import BodiesPage
