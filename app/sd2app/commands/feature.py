@@ -2,15 +2,71 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from PySide6.QtCore import QObject
+from PySide6.QtGui import QFontDatabase
+from PySide6.QtWidgets import QPlainTextEdit, QWidget
 
-from sd2app.commands.model import CommandForms
+from sd2app.background.run_monitor import UNDER_WAY
+from sd2app.commands.form import CommandForm
+from sd2app.commands.model import AnyCommandRun, CommandForms
 from sd2app.commands.refining import MeshRefining
-from sd2app.commands.window import CommandWindow
 from sd2app.feature import Action, Feature, Shell, report
+from sd2app.manual.help import help_button
 from sd2app.session.session import Session
+from sd2app.widgets.dialogs import Dialog, take_room
+from sd2app.widgets.layouts import column_of
+from sd2app.widgets.run_panel import Button, RunPanel, RunView, RunWords
+from sd2app.widgets.run_text import PHASES
+
+
+class CommandRunView(RunView[AnyCommandRun]):
+    """Progress of a command, and what it printed."""
+
+    def __init__(self, forms: CommandForms, refining: MeshRefining, shell: Shell) -> None:
+        self._refining = refining
+        words = RunWords(
+            lambda run: f"sd2 {run.about.get('what', '')} · {PHASES[run.phase]}",
+            lambda run: "",
+            what="command",
+            stop_tip="End it now",
+        )
+        tip = "Put the smooth mesh in the place of the one that is open; undo takes it back"
+        take = Button("take", "Take the mesh", tip, lambda: forms.run and refining.take(forms.run))
+        super().__init__(forms, shell, words, (take,))
+        self._printed = QPlainTextEdit()
+        self._printed.setReadOnly(True)
+        self._printed.setAccessibleName("What the command printed")
+        self._printed.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
+        self.column.addWidget(self._printed, 1)
+        refining.document.changed.connect(self.refresh)
+        self.refresh()
+
+    def shown(self, run: AnyCommandRun) -> Collection[str]:
+        """Names of the buttons that are of use now."""
+        if run.phase in UNDER_WAY:
+            return ("stop", "delete")
+        return ("take", "delete") if self._refining.can_take(run) else ("delete",)
+
+    def show_made(self, run: AnyCommandRun) -> None:
+        """Show what it printed."""
+        if self._printed.toPlainText() != (run.facts or ""):
+            self._printed.setPlainText(run.facts or "")
+
+
+class CommandWindow(Dialog):
+    """A form, or the run in view; the rest of the program can be used meanwhile."""
+
+    def __init__(
+        self, forms: CommandForms, refining: MeshRefining, shell: Shell, parent: QWidget
+    ) -> None:
+        super().__init__("Any command", parent)
+        form, run = CommandForm(forms, shell, self), CommandRunView(forms, refining, shell)
+        tip, guide = "Commands that were started here", help_button("Any command", self)
+        runs = RunPanel(forms, form, run, tip, new="New command", guide=guide)
+        self.setLayout(column_of((runs, 1), margins_px=(8, 8, 8, 10)))
+        take_room(self, 640, 680)
 
 
 class CommandsFeature(Feature):

@@ -19,9 +19,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from sd2app.commands.feature import CommandWindow
 from sd2app.commands.model import CommandForms
 from sd2app.commands.refining import MeshRefining
-from sd2app.commands.window import CommandWindow
 from sd2app.session.session import build_session
 from sd2app.settings import Settings
 from sd2app.widgets.panel import Fold
