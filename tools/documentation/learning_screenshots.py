@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from sd2app.background.runs import Runs
-from sd2app.batch.dialog import BatchWindow
+from sd2app.batch.feature import BatchWindow
 from sd2app.dataset_export.dialog import ExportDialog
 from sd2app.shell.window import MainWindow
 from sd2app.study.result_dialog import ClassResultDialog

@@ -26,9 +26,9 @@ from PySide6.QtWidgets import (
 from window_models import models_of
 
 from sd2app.background import run_monitor
-from sd2app.batch import dialog as batch_dialogs
+from sd2app.batch import feature as batch_dialogs
 from sd2app.batch import questions
-from sd2app.batch.dialog import BatchWindow
+from sd2app.batch.feature import BatchWindow
 from sd2app.batch.model import BatchModel
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
