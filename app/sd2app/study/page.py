@@ -25,8 +25,7 @@ from sd2app.widgets.panel import (
     title,
 )
 from sd2app.widgets.run_panel import Button, RunView, RunWords
-from sd2app.widgets.run_text import PHASES
-from sd2app.widgets.text import counted
+from sd2app.widgets.text import PHASES, counted
 
 _ABOUT = (
     "Trains again and again on a radar's maps alone and with other maps added, and with less and"
