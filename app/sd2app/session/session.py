@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, Signal
 
 from sd2app.session.content import reference_of
 from sd2app.session.display import DisplayModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.layouts import Layouts
 from sd2app.session.maps import MapModel, PointerModel
-from sd2app.session.mode import Mode
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
 from sd2app.session.tasks import TaskList
@@ -21,6 +20,27 @@ from sd2app.session.undo import Edits
 from sd2app.session.video import VideoModel
 from sd2app.settings import Settings
 from sd2core.numerics.byte_budget import ByteBudget
+
+
+class Mode(QObject):
+    """On from the user's request until what was asked for is done, or is given up."""
+
+    changed = Signal()
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        self.active = False
+
+    def end(self) -> None:
+        """Switch it off."""
+        if self.active:
+            self.toggle()
+
+    def toggle(self) -> None:
+        """Switch it on or off."""
+        self.active = not self.active
+        self.changed.emit()
+
 
 _RESULTS_BYTES = 256 << 20
 """For maps and classes of places that were left: some hundred minutes of maps."""

@@ -11,9 +11,9 @@ from PySide6.QtGui import QGuiApplication
 from scene_stage import Document, Drag, Inertial, Limbs, Placements, Stage, Synthesis, two_plates
 
 from sd2app.session.display import DisplayModel
-from sd2app.session.mode import Mode
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
+from sd2app.session.session import Mode
 
 SIZE = (600, 450)
 

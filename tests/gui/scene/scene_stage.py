@@ -12,9 +12,9 @@ from PySide6.QtGui import QColor
 
 from sd2app.sensor.placements import Planned
 from sd2app.session.display import DisplayModel
-from sd2app.session.mode import Mode
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel
+from sd2app.session.session import Mode
 from sd2core.maps import OF
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import VertexParts
