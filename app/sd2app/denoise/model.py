@@ -18,7 +18,7 @@ from sd2app.denoise.text import origin_words, track_words
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.partial_map import Part
 from sd2app.maps.quality import Postprocess
-from sd2app.session.denoiser_choice import NO_MODEL, UNSAID, DenoiserChoice
+from sd2app.session.content import NO_MODEL, UNSAID, DenoiserChoice
 from sd2app.session.session import Session
 from sd2core.cli.denoise import Denoise
 from sd2core.denoise.files import default_name

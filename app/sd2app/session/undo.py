@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from PySide6.QtGui import QUndoCommand
 
-from sd2app.session.denoiser_choice import DenoiserChoice
+from sd2app.session.content import DenoiserChoice
 from sd2app.session.document import DocumentModel
 from sd2app.session.maps import MapModel
 from sd2app.session.mesh_reading import ReadMesh
