@@ -8,8 +8,7 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from sd2app.agreement.model import AgreementModel
-from sd2app.agreement.panel import AgreementPanel
-from sd2app.agreement.timeline import OtherTimeline
+from sd2app.agreement.panel import AgreementPanel, OtherTimeline
 from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.import_dialog import label_files
 from sd2app.labels.model import LabelsModel
