@@ -16,8 +16,7 @@ from PySide6.QtWidgets import QLabel, QMenu, QWidget
 from sd2app.scene.backend import Backend, NoOpenGL, chosen_backend
 from sd2app.scene.camera import Preset
 from sd2app.scene.colours import SceneColours
-from sd2app.scene.inertial import PLACING_HINT, InertialHand
-from sd2app.scene.limbs import LIMB_HINT, LimbHand
+from sd2app.scene.inertial import LIMB_HINT, PLACING_HINT, InertialHand, LimbHand
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.overlay import Overlay
 from sd2app.scene.scene import Scene
