@@ -12,8 +12,7 @@ from sd2app.manual.help import with_help
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import Dialog, accepting, ask_file, ask_new
-from sd2app.widgets.frame_slider import FrameSlider
-from sd2app.widgets.inputs import CheckBox, Choice, option_box
+from sd2app.widgets.inputs import CheckBox, Choice, FrameSlider, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.mesh_painting import paint_picture
 from sd2app.widgets.panel import ElidedLabel, copy_button, outlined, say, sentence, side_by_side
