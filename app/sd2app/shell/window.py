@@ -32,12 +32,11 @@ from sd2app.shell.parts import Parts
 from sd2app.shell.side_dock import SideDock
 from sd2app.shell.side_panel import SidePanel
 from sd2app.shell.window_size import place_on_screen
-from sd2app.widgets.dialogs import accepted
+from sd2app.widgets.dialogs import accepted, tab_to
 from sd2app.widgets.inputs import claims
 from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.notices import Notice, NoticeStack
 from sd2app.widgets.panel import fill, panel, replace_content, sentence, splitter
-from sd2app.widgets.tab_order import tab_to
 from sd2app.widgets.theme import apply_theme, is_dark
 from sd2core.processes import return_free_memory
 

@@ -20,8 +20,8 @@ from sd2app.maps.overview import Overview
 from sd2app.playback.views import TimeRuler
 from sd2app.sensor.things_page import ThingsPage
 from sd2app.shell.keys.dialog import KeysDialog
+from sd2app.widgets.dialogs import controls_of
 from sd2app.widgets.inputs import Choice
-from sd2app.widgets.tab_order import controls_of
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.maps import DopplerMap
 from sd2core.mesh.things import Thing
