@@ -14,8 +14,7 @@ from sd2app.accuracy.text import chosen_sentence, legend
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, grid_of, pane, row_of
-from sd2app.widgets.panel import Fold, outlined, rule, say, sentence, show_words, title
-from sd2app.widgets.progress_bar import ProgressBar
+from sd2app.widgets.panel import Fold, ProgressBar, outlined, rule, say, sentence, show_words, title
 from sd2app.widgets.text import milliseconds, number
 from sd2core.files.tables import capitalised
 from sd2core.numerics.map_accuracy import percent

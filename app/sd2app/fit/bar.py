@@ -9,8 +9,7 @@ from PySide6.QtWidgets import QLabel
 from sd2app.fit.model import FitModel
 from sd2app.fit.on_screen import FitOnScreen
 from sd2app.widgets.notices import Notice
-from sd2app.widgets.panel import ElidedLabel, StateBar, sentence
-from sd2app.widgets.progress_bar import ProgressBar
+from sd2app.widgets.panel import ElidedLabel, ProgressBar, StateBar, sentence
 from sd2app.widgets.text import about
 
 _STATES = {

@@ -10,8 +10,7 @@ from PySide6.QtWidgets import QFrame, QWidget
 
 from sd2app.background.latest import delayed
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
-from sd2app.widgets.panel import outlined, sentence, title
-from sd2app.widgets.progress_bar import ProgressBar
+from sd2app.widgets.panel import ProgressBar, outlined, sentence, title
 
 if TYPE_CHECKING:
     from sd2app.session.document import DocumentModel

@@ -11,8 +11,7 @@ from sd2app.background.latest import delayed
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
 from sd2app.widgets.layouts import STRETCH, row_of
-from sd2app.widgets.panel import outlined
-from sd2app.widgets.progress_bar import ProgressBar
+from sd2app.widgets.panel import ProgressBar, outlined
 
 _QUIET_MS = 300
 

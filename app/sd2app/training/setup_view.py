@@ -11,8 +11,7 @@ from sd2app.training.text import INPUT_WORDS, MODEL_WORDS, division_text, model_
 from sd2app.widgets.dialogs import ask_folder
 from sd2app.widgets.layouts import STRETCH, grid_of, pane, row_of
 from sd2app.widgets.model_page import model_title
-from sd2app.widgets.panel import ElidedLabel, Fold, outlined, sentence, title
-from sd2app.widgets.progress_bar import ProgressBar
+from sd2app.widgets.panel import ElidedLabel, Fold, ProgressBar, outlined, sentence, title
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
 from sd2core.denoise.registry import DENOISERS

@@ -16,8 +16,7 @@ from sd2app.feature import Shell
 from sd2app.widgets.dialogs import may_delete
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
-from sd2app.widgets.panel import outlined, sentence, show_words, title
-from sd2app.widgets.progress_bar import ProgressBar
+from sd2app.widgets.panel import ProgressBar, outlined, sentence, show_words, title
 from sd2app.widgets.text import time_text
 
 
