@@ -6,8 +6,7 @@ from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, QSize, Qt
 from PySide6.QtGui import QColor, QIcon, QImage, QMouseEvent, QPainter, QPainterPath, QPen, QPixmap
 from PySide6.QtWidgets import QLabel, QListWidget, QListWidgetItem, QSizePolicy, QWidget
 
-from sd2app.fit.portraits import PICTURE_PX, Portrait
-from sd2app.fit.setup import DEFAULT_STATURE_M, FitSetupModel
+from sd2app.fit.setup import DEFAULT_STATURE_M, PICTURE_PX, FitSetupModel, Portrait
 from sd2app.manual.help import with_help
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import Canvas

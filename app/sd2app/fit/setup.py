@@ -8,11 +8,12 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QObject
 
-from sd2app.background.latest import LatestRunner
+from sd2app.background.latest import Emit, LatestRunner
 from sd2app.background.quoting import quoted
-from sd2app.fit.portraits import Portrait, portraits_of
 from sd2app.fit.request import FitRequest, Person, read_request
 from sd2app.session.video_frames import VideoFrames
 from sd2core.body.camera import DEFAULT_FIELD_OF_VIEW_DEG
@@ -210,3 +211,48 @@ def folder_for(video: Path, open_now: Recording | None = None) -> Path:
         if not folder.exists() or (kept is not None and kept.video == video):
             return folder
     raise AssertionError
+
+
+PICTURE_PX = 96
+
+
+@dataclass(frozen=True, eq=False)
+class Portrait:
+    """Somebody in a video."""
+
+    number: int
+    from_s: float
+    to_s: float
+    certainty: float  # that all looks show one person, from 0 to 1
+    may_be: int | None  # somebody seen before
+    frame: int  # of the picture
+    picture: NDArray[np.uint8]  # (PICTURE_PX, PICTURE_PX, 3), RGB
+
+    @property
+    def words(self) -> str:
+        """When they are there and how sure that is."""
+        again = f"\nmay be person {self.may_be}" if self.may_be else ""
+        return (
+            f"Person {self.number}\n{self.from_s:.1f} to {self.to_s:.1f} s"
+            f"\n{100.0 * self.certainty:.0f} % certain{again}"
+        )
+
+
+def portraits_of(path: Path, emit: Emit) -> list[Portrait]:
+    """Find everybody in a video; ``emit`` gets the share that is done.
+
+    Raises Sd2Error if nobody is found, or the landmark models are not there.
+    """
+    from sd2core.body.landmark_models import landmark_models
+    from sd2core.body.people import find_people
+    from sd2core.io.video import open_video
+
+    models = landmark_models(progress=lambda *_: emit(None))
+    with open_video(path, lambda *_: emit(None)) as video:
+        people = find_people(video, models, lambda done, total: emit(done / total))
+        portraits = []
+        for each in people:
+            frame, roi = each.portrait
+            facts = (each.number, each.from_s, each.to_s, each.certainty, each.may_be, frame)
+            portraits.append(Portrait(*facts, roi.cut(video.read(frame), PICTURE_PX)))
+        return portraits

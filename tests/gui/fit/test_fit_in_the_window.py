@@ -28,9 +28,8 @@ from window_models import models_of
 
 from sd2app.fit.bar import FitBar, FitOffer
 from sd2app.fit.dialog import NewFromVideoDialog
-from sd2app.fit.portraits import PICTURE_PX, Portrait
 from sd2app.fit.request import FitRequest, Person
-from sd2app.fit.setup import FitSetupModel
+from sd2app.fit.setup import PICTURE_PX, FitSetupModel, Portrait
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
