@@ -24,8 +24,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QMainWindow, QMenu,
 
 from sd2app.background.latest import LatestRunner, delayed
 from sd2app.settings import Settings
-from sd2app.shell.drop import DropOverlay
-from sd2app.shell.loading import LoadingCover
+from sd2app.shell.loading import DropOverlay, LoadingCover
 from sd2app.shell.messages.model import MessagesModel
 from sd2app.shell.messages.views import MessageNotice, MessagesDialog
 from sd2app.shell.parts import Parts
