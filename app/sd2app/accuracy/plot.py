@@ -12,8 +12,8 @@ from sd2app.accuracy.measurements import cheapest_within, front_at_rest, serves_
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.accuracy.text import point_text
 from sd2app.session.display import DisplayModel
+from sd2app.widgets.canvas import tick_text
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
-from sd2app.widgets.plot import tick_text
 from sd2core.numerics.map_accuracy import percent
 
 if TYPE_CHECKING:

@@ -14,8 +14,7 @@ from sd2app.maps.stack import MapStack
 from sd2app.session.limbs import colours_of, part_words, title_of
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import AT_LEFT, Canvas, clipped
-from sd2app.widgets.plot import paint_axes
+from sd2app.widgets.canvas import AT_LEFT, Canvas, clipped, paint_axes
 from sd2app.widgets.time_axis import paint_title, ticks
 from sd2core.maps import DopplerMap
 

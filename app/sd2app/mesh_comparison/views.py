@@ -14,9 +14,8 @@ from sd2app.mesh_comparison.model import ComparisonModel, joint_words
 from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
 from sd2app.video.overlay_settings import OverlayModel
-from sd2app.widgets.canvas import AT_RIGHT, Canvas
+from sd2app.widgets.canvas import AT_RIGHT, Canvas, paint_axes
 from sd2app.widgets.mesh_painting import paint_mesh_over
-from sd2app.widgets.plot import paint_axes
 from sd2app.widgets.time_axis import paint_title, signed_text, ticks
 from sd2core.mesh.presence import runs
 

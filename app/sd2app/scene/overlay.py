@@ -16,8 +16,7 @@ from PySide6.QtWidgets import QWidget
 from sd2app.scene.colours import Colouring, SceneColours
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.scene import Scene
-from sd2app.widgets.canvas import AT_RIGHT, Canvas
-from sd2app.widgets.plot import Themed
+from sd2app.widgets.canvas import AT_RIGHT, Canvas, Themed
 from sd2app.widgets.time_axis import paint_readout, tick_step, ticks
 from sd2core.figures.colours import DIVERGING, SEQUENTIAL, Rgb
 

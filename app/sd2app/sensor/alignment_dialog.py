@@ -7,12 +7,12 @@ from PySide6.QtWidgets import QWidget
 
 from sd2app.manual.help import with_help
 from sd2app.sensor.alignment import AlignmentModel, result_text
+from sd2app.widgets.canvas import Themed
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.dialogs import Dialog, accepting
 from sd2app.widgets.inputs import option_box
 from sd2app.widgets.layouts import column_of, form_of
 from sd2app.widgets.panel import copy_button, sentence, show_words, side_by_side
-from sd2app.widgets.plot import Themed
 from sd2core.cli.align import Align
 
 _ABOUT = (

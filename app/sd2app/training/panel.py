@@ -23,12 +23,12 @@ from sd2app.training.text import (
     point_text,
     remedy_text,
 )
+from sd2app.widgets.canvas import tick_text
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.dialogs import ask_folder
 from sd2app.widgets.inputs import CheckBox, Choice
 from sd2app.widgets.layouts import STRETCH, column_of, pane, row_of
 from sd2app.widgets.panel import FactRows, outlined, sentence, title
-from sd2app.widgets.plot import tick_text
 from sd2app.widgets.run_panel import Button, RunPanel, RunView, RunWords
 
 _CLOSING_TEXT = {"ask": "ask", "keep": "keep training", "stop": "stop, keep the best"}

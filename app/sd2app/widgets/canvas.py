@@ -1,17 +1,18 @@
-"""Bases of the widgets that paint themselves, and what their painting has in common."""
+"""Bases of the widgets that paint themselves, axes, colour maps, and what painting has in common."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, SignalInstance
-from PySide6.QtGui import QContextMenuEvent, QImage, QPainter, QPaintEvent, QPixmap
+from PySide6.QtGui import QColor, QContextMenuEvent, QImage, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QMenu, QWidget
 
+from sd2app.palette import Palette
 from sd2app.widgets.time_axis import TimeScale
 
 MenuPart = Callable[[QMenu, QPointF], None]
@@ -122,3 +123,55 @@ class Overlay(NamedTuple):
     paint: Callable[[QPainter, QRectF, TimeScale], None]
     changed: tuple[SignalInstance, ...] = ()
     legend: Callable[[float, float], Mapping[str, str]] = lambda start_s, end_s: {}
+
+
+Tick = tuple[float, str]
+"""A pixel along an axis, and its text."""
+
+
+class Themed(Protocol):
+    """Colours of the window, which the user may change."""
+
+    @property
+    def palette(self) -> Palette:
+        """Colours in use."""
+
+    @property
+    def theme_changed(self) -> SignalInstance:
+        """Emitted when they change."""
+
+
+def tick_text(value: float) -> str:
+    """Short text of a tick, without exponents."""
+    return f"{value:.10f}".rstrip("0").rstrip(".")
+
+
+def paint_axes(
+    painter: QPainter,
+    plot: QRectF,
+    colours: Palette,
+    across: Iterable[Tick],
+    upwards: Iterable[Tick],
+    below: str,
+) -> None:
+    """Paint both axes with their grid and the name of the lower one; the pen is muted then."""
+    line_px = painter.fontMetrics().height()
+    grid, ink = QPen(QColor(colours.border), 1), QColor(colours.muted)
+    for x, text in across:
+        painter.setPen(grid)
+        painter.drawLine(QPointF(x, plot.top()), QPointF(x, plot.bottom()))
+        painter.setPen(ink)
+        box = QRectF(x - 30, plot.bottom() + 3, 60, line_px)
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+    for y, text in upwards:
+        painter.setPen(grid)
+        painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
+        painter.setPen(ink)
+        box = QRectF(0, y - line_px / 2, plot.left() - 6, line_px)
+        painter.drawText(box, AT_RIGHT, text)
+    painter.setPen(QPen(QColor(colours.hatch), 1))
+    painter.drawLine(plot.bottomLeft(), plot.bottomRight())
+    painter.drawLine(plot.topLeft(), plot.bottomLeft())
+    painter.setPen(ink)
+    name = QRectF(plot.left(), plot.bottom() + line_px + 3, plot.width(), line_px)
+    painter.drawText(name, Qt.AlignmentFlag.AlignCenter, below)

@@ -20,8 +20,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QToolTip
 
-from sd2app.widgets.canvas import Canvas, clipped
-from sd2app.widgets.plot import Themed, paint_axes
+from sd2app.widgets.canvas import Canvas, Themed, clipped, paint_axes
 from sd2app.widgets.time_axis import ticks
 
 ROUND = ((1,), (1, 3), (1, 2, 5), (1, 2, 3, 5, 7), (1, 1.5, 2, 3, 4, 5, 6, 8))

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sd2app.widgets.canvas import tick_text
 from sd2app.widgets.chart import Scale
-from sd2app.widgets.plot import tick_text
 
 positive = st.floats(1e-6, 1e6)
 
