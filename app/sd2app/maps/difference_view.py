@@ -14,8 +14,7 @@ from sd2app.maps.heatmap import BinMarks, HeatmapView
 from sd2app.maps.heatmap_image import difference_image
 from sd2app.session.maps import Reading
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import AT_RIGHT, Overlay, image_of
-from sd2app.widgets.colour_maps import signed_table
+from sd2app.widgets.canvas import AT_RIGHT, Overlay, image_of, signed_table
 
 _BAR_PX = 72
 

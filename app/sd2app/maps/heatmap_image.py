@@ -16,8 +16,7 @@ from sd2app.session.display import HeatmapLevels
 from sd2app.session.limbs import colours_of
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import Overlay, clipped, image_of
-from sd2app.widgets.colour_maps import lookup_table, uncertain_table
+from sd2app.widgets.canvas import Overlay, clipped, image_of, lookup_table, uncertain_table
 from sd2app.widgets.time_axis import TimeScale
 from sd2core.figures.colours import rgb
 

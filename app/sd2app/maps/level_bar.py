@@ -11,8 +11,7 @@ from PySide6.QtWidgets import QWidget
 
 from sd2app.session.display import COLOUR_MAPS
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import Canvas, image_of
-from sd2app.widgets.colour_maps import lookup_table, uncertain_table
+from sd2app.widgets.canvas import Canvas, image_of, lookup_table, uncertain_table
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
 from sd2app.widgets.layouts import ANY_WIDTH_PX, STRETCH, column_of, row_of
 from sd2app.widgets.panel import outlined

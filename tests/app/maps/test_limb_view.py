@@ -20,7 +20,7 @@ from sd2app.maps.spectrum import SpectrumView
 from sd2app.session.limbs import LIMB_COLOURS, part_words, title_of
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
-from sd2app.widgets.colour_maps import lookup_table
+from sd2app.widgets.canvas import lookup_table
 from sd2core.body.parts import known_parts
 from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.files.resources import resource_path

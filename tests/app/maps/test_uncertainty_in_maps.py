@@ -8,7 +8,7 @@ import pytest
 from sd2app.maps.heatmap_image import Columns, heatmap_image
 from sd2app.session.display import COLOUR_MAPS, HeatmapLevels
 from sd2app.session.maps import MapModel
-from sd2app.widgets.colour_maps import lookup_table, uncertain_table
+from sd2app.widgets.canvas import lookup_table, uncertain_table
 from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase

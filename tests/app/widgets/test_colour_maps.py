@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sd2app.session.display import COLOUR_MAPS
-from sd2app.widgets.colour_maps import lookup_table
+from sd2app.widgets.canvas import lookup_table
 
 
 @pytest.mark.parametrize("name", COLOUR_MAPS)
