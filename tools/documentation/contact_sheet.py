@@ -17,7 +17,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from sd2app.palette import palette_for
 from sd2app.session.layouts import LAYOUTS
 from sd2app.shell.window import MainWindow
-from sd2app.widgets.pages import InnerPages
+from sd2app.widgets.panel import InnerPages
 from sd2core.files.resources import resource_path
 from tools.documentation.places import REPOSITORY
 from tools.documentation.windows import opened, settle, wait_for

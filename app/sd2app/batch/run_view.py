@@ -19,8 +19,7 @@ from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.run import BatchMonitor
 from sd2app.batch.text import batch_time_text, failure_text, headline, step_facts
 from sd2app.widgets.layouts import STRETCH, grid_of, pane, row_of
-from sd2app.widgets.pages import InnerPage, InnerPages
-from sd2app.widgets.panel import ElidedLabel, ProgressBar, outlined, sentence
+from sd2app.widgets.panel import ElidedLabel, InnerPage, InnerPages, ProgressBar, outlined, sentence
 from sd2app.widgets.run_panel import Button, RunView, RunWords
 from sd2app.widgets.table import RecordTable
 

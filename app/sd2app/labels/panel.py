@@ -21,8 +21,7 @@ from sd2app.widgets.canvas import AT_RIGHT
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.inputs import Choice, SearchLine
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
-from sd2app.widgets.pages import InnerPage, InnerPages
-from sd2app.widgets.panel import ElidedLabel, outlined
+from sd2app.widgets.panel import ElidedLabel, InnerPage, InnerPages, outlined
 from sd2app.widgets.record_table import Heading, RecordTableModel
 from sd2app.widgets.table import RecordTable
 from sd2core.labels.statistics import HEADINGS, label_statistics, statistics_rows, statistics_text

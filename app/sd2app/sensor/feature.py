@@ -19,7 +19,7 @@ from sd2app.sensor.placements_page import PlacementsPage
 from sd2app.sensor.things_page import ThingsPage
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import accepted
-from sd2app.widgets.pages import InnerPage, paged_panel
+from sd2app.widgets.panel import InnerPage, paged_panel
 
 
 class SensorFeature(Feature):

@@ -45,7 +45,7 @@ from sd2app.video.feature import VideoFeature
 from sd2app.welcome.feature import WelcomeFeature
 from sd2app.welcome.steps import tour_steps
 from sd2app.widgets.layouts import pane
-from sd2app.widgets.pages import InnerPage, paged_panel
+from sd2app.widgets.panel import InnerPage, paged_panel
 from sd2core.cli import build_parser
 from sd2core.files.paths import user_cache
 from sd2core.labels.recovery import recovery_folder

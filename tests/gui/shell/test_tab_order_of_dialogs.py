@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.shell.side_panel import RailButton
-from sd2app.widgets.pages import InnerPages
+from sd2app.widgets.panel import InnerPages
 
 _KINDS = (QAbstractButton, QAbstractSpinBox, QComboBox, QLineEdit, QSlider, QAbstractItemView)
 _ROW_PX = 12

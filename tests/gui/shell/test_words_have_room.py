@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.session.layouts import LAYOUTS
-from sd2app.widgets.pages import InnerPages
+from sd2app.widgets.panel import InnerPages
 
 _FRAME_PX, _ARROWS_PX = 6, 18
 
