@@ -17,7 +17,7 @@ from sd2app.session.sensor import SensorModel
 from sd2app.session.tasks import TaskList
 from sd2app.session.time_window import GROWING_S, TimeWindow
 from sd2app.session.undo import Edits
-from sd2app.session.video import VideoModel
+from sd2app.session.video_frames import VideoModel
 from sd2app.settings import Settings
 from sd2core.numerics.byte_budget import ByteBudget
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sd2app.session.playback import PlaybackModel
-from sd2app.session.video import VideoModel
+from sd2app.session.video_frames import VideoModel
 from sd2core.timebase import Timebase
 
 
