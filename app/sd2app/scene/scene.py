@@ -15,9 +15,8 @@ from sd2app.scene.body import Extent
 from sd2app.scene.camera import EyePose, Margins, Preset, triple
 from sd2app.scene.colours import Colouring, SceneColours, fractions, mesh_colours, range_limits
 from sd2app.scene.parts import Body, GroundGrid, InertialMarkers, Markers, SensorGlyph, Shape
-from sd2app.scene.people import People
+from sd2app.scene.people import People, Walls
 from sd2app.scene.things import Things
-from sd2app.scene.walls import Walls
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.things import Surroundings
 from sd2core.sensor import VirtualSensor
