@@ -19,6 +19,8 @@ from sd2app.background.latest import Emit, delayed
 from sd2app.background.quoting import quoted
 from sd2app.maps.partial_map import FINAL, Part, PartialMap, View
 from sd2app.maps.quality import (
+    CompilerModel,
+    MaskPrefetcher,
     Postprocess,
     QualityLevel,
     SynthesizerCache,
@@ -31,7 +33,6 @@ from sd2app.maps.quality import (
     refine,
 )
 from sd2app.maps.readout import FrameReader, Readout
-from sd2app.maps.warm_up import CompilerModel, MaskPrefetcher
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
 from sd2core.cli.synth import Synth
