@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sd2app.background.model_worker.library import ClassifierLibrary
+from sd2app.background.model_worker.client import ClassifierLibrary
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.features import Features
 from sd2core.errors import Sd2Error

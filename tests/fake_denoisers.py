@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sd2app.background.model_worker.library import DenoiserLibrary
+from sd2app.background.model_worker.client import DenoiserLibrary
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL
 from sd2core.denoise.resample_to_model import input_of

@@ -9,7 +9,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QMenu, QWidget
 
-from sd2app.background.model_worker.library import ClassifierLibrary
+from sd2app.background.model_worker.client import ClassifierLibrary
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.panel import ClassPanel
 from sd2app.classify.strip import ClassStrip

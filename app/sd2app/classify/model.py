@@ -10,8 +10,7 @@ from typing import NamedTuple
 from PySide6.QtCore import QObject, Signal, SignalInstance
 
 from sd2app.background.latest import LatestRunner, ReportingModel, delayed
-from sd2app.background.model_worker.client import RemoteClassifier
-from sd2app.background.model_worker.library import ClassifierLibrary
+from sd2app.background.model_worker.client import ClassifierLibrary, RemoteClassifier
 from sd2app.classify.track import ClassReading, ClassTrack
 from sd2app.denoise.validity import MapValidity
 from sd2app.labels.model import LabelsModel

@@ -9,7 +9,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QMenu
 
-from sd2app.background.model_worker.library import DenoiserLibrary
+from sd2app.background.model_worker.client import DenoiserLibrary
 from sd2app.denoise.live import LiveDenoiseModel
 from sd2app.denoise.model import DenoiseModel
 from sd2app.denoise.text import denoiser_page, kind_words, origin_words

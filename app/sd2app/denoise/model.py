@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import LatestRunner, ReportingModel, delayed
-from sd2app.background.model_worker.client import RemoteDenoiser
-from sd2app.background.model_worker.library import DenoiserLibrary
+from sd2app.background.model_worker.client import DenoiserLibrary, RemoteDenoiser
 from sd2app.background.quoting import quoted
 from sd2app.denoise.map import TEXTURE_SEED, DenoisedMap
 from sd2app.denoise.text import origin_words, track_words

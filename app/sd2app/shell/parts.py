@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from sd2app.accuracy.measurements import Library
-    from sd2app.background.model_worker.library import ClassifierLibrary, DenoiserLibrary
+    from sd2app.background.model_worker.client import ClassifierLibrary, DenoiserLibrary
 
 
 @dataclass(frozen=True)

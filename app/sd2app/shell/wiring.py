@@ -9,8 +9,7 @@ from PySide6.QtWidgets import QWidget
 
 from sd2app.accuracy.feature import AccuracyFeature
 from sd2app.agreement.feature import AgreementFeature
-from sd2app.background.model_worker.client import ModelProcess
-from sd2app.background.model_worker.library import core_classifiers, core_denoisers
+from sd2app.background.model_worker.client import ModelProcess, core_classifiers, core_denoisers
 from sd2app.batch.feature import BatchFeature
 from sd2app.classify.feature import ClassifyFeature
 from sd2app.commands.feature import CommandsFeature

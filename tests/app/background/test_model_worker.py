@@ -180,7 +180,7 @@ def test_the_window_itself_never_loads_torch():
         # It comes last, in a thread: everything else is usable while it loads.
         "assert 'vtkmodules' not in sys.modules, 'vtkmodules'\n"
         "import sd2app.denoise.model\n"
-        "import sd2app.background.model_worker.library as library\n"
+        "import sd2app.background.model_worker.client as library\n"
         "from sd2app.background.model_worker.client import ModelProcess\n"
         "process = ModelProcess()\n"
         "library.core_denoisers(process).available()\n"

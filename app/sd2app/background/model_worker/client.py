@@ -1,4 +1,4 @@
-"""Models that run in a separate process with torch, which the window never loads."""
+"""Models in a separate process with torch, which the window never loads; tests replace them."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ import pickle
 import subprocess
 import sys
 import threading
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.classify.card import ClassifierCard
+from sd2core.classify.files import available_classifiers, describe_classifier
+from sd2core.denoise.card import ModelCard
+from sd2core.denoise.files import available_models, describe_model
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.processes import ONE_THREAD
@@ -220,3 +224,35 @@ class RemoteLive(_RemoteSession):
     ) -> NDArray[np.float32]:
         """Answers to the next frames (frames, features), one row for each."""
         return self._ask("advance", energies, present)
+
+
+Card = TypeVar("Card", bound=Any)
+Model = TypeVar("Model")
+
+
+@dataclass(frozen=True)
+class ModelLibrary(Generic[Card, Model]):
+    """Functions on models of one kind."""
+
+    available: Callable[[], Sequence[Card]]  # bundled models and the user's own
+    describe: Callable[[Path], Card]
+    load: Callable[[Path], Model]  # takes seconds the first time
+    close: Callable[[], None] = lambda: None  # release everything
+
+    def named(self, name: str) -> Card | None:
+        """Card of a model that comes with the program; a user's own of that name goes first."""
+        return next((card for card in self.available() if card.name == name), None)
+
+
+DenoiserLibrary = ModelLibrary[ModelCard, RemoteDenoiser]
+ClassifierLibrary = ModelLibrary[ClassifierCard, RemoteClassifier]
+
+
+def core_denoisers(process: ModelProcess) -> DenoiserLibrary:
+    """Denoisers of the library, in the model process; cards are read here."""
+    return ModelLibrary(available_models, describe_model, process.load, process.close)
+
+
+def core_classifiers(process: ModelProcess) -> ClassifierLibrary:
+    """Classifiers of the library, in the model process; cards are read here."""
+    return ModelLibrary(available_classifiers, describe_classifier, process.load_classifier)
