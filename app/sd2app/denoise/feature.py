@@ -14,7 +14,7 @@ from sd2app.denoise.live import LiveDenoiseModel
 from sd2app.denoise.model import DenoiseModel
 from sd2app.denoise.text import denoiser_page, kind_words, origin_words
 from sd2app.feature import Action, Drop, Feature, Shell, report
-from sd2app.maps.export_dialog import export_map
+from sd2app.maps.feature import export_map
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.stack import MapStack
 from sd2app.session.session import Session

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
+from pathlib import Path
 
 from PySide6.QtCore import QObject, QPointF, QSize, Qt
 from PySide6.QtGui import QAction, QColor, QGuiApplication, QIcon, QPixmap, QResizeEvent
@@ -12,8 +13,8 @@ from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.feature import Action, Feature, Shell
+from sd2app.manual.help import with_help
 from sd2app.maps.difference import DifferenceModel
-from sd2app.maps.export_dialog import export_map
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.level_bar import LevelBar, MapEdge
 from sd2app.maps.limbs import LimbsModel
@@ -25,8 +26,56 @@ from sd2app.maps.uncertainty import UncertaintyModel
 from sd2app.session.limbs import colours_of, part_words
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import Overlay
-from sd2app.widgets.layouts import pane
+from sd2app.widgets.dialogs import Dialog, ExportButtons, accepted, ask_new
+from sd2app.widgets.layouts import column_of, pane
+from sd2app.widgets.panel import copy_button, sentence
 from sd2core.files.tables import capitalised
+
+_ABOUT = "The map on screen as .npz with all that it was made from and with."
+
+
+def export_map(
+    title: str,
+    name: str,
+    line: Callable[[str], str],
+    write: Callable[[Path], object],
+    shell: Shell,
+) -> None:
+    """Show the dialog, and write the map where it was accepted.
+
+    Parameters
+    ----------
+    title : str
+    name : str
+        Proposed for the file.
+    line : callable
+        Says the command that writes the map of the saved recording to a file of this name.
+    write : callable
+        Writes the map on screen.
+    shell : Shell
+    """
+    dialog = MapExportDialog(title, name, partial(line, name), shell.dialog_parent)
+    if accepted(dialog) and (path := dialog.path) is not None:
+        shell.attempt(lambda: write(path))
+
+
+class MapExportDialog(Dialog):
+    """What is written, a copy of the command, and a button that asks for the file."""
+
+    def __init__(self, title: str, name: str, line: Callable[[], str], parent: QWidget) -> None:
+        super().__init__(title, parent)
+        self.path: Path | None = None  # that was chosen
+        self._name = name
+        buttons = ExportButtons(self, self._ask)
+        foot = with_help("Export map", buttons, copy_button(line, self))
+        self.setLayout(column_of(sentence(_ABOUT), foot, spacing_px=16, margins_px=16))
+        self.setMinimumWidth(440)
+
+    def _ask(self) -> None:
+        if path := ask_new(self, self.windowTitle(), self._name, "Doppler map (*.npz)"):
+            self.path = path
+            self.accept()
+
 
 _MIN_M = 0.05
 """A sensor as near as this sees what the radar sees."""

@@ -11,7 +11,7 @@ from finding import button_of
 from PySide6.QtWidgets import QDialog, QFileDialog, QPushButton
 from window_models import models_of
 
-from sd2app.maps.export_dialog import MapExportDialog
+from sd2app.maps.feature import MapExportDialog
 from sd2app.sensor.placements_page import PlacementsPage
 from sd2core.cli.synth import Synth
 from sd2core.placements.placements import PlacementGrid
