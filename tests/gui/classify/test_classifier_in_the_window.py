@@ -20,7 +20,7 @@ from window_models import models_of
 from sd2app.classify.panel import ClassPanel
 from sd2app.classify.strip import ClassPlot, ClassReadout, ClassStrip, stacked_image
 from sd2app.labels.timeline import LabelTimeline
-from sd2app.suggestions.bar import SuggestionBar
+from sd2app.suggestions.feature import SuggestionBar
 from sd2app.widgets.chart import ChartView
 from sd2app.widgets.inputs import Choice, NumberBox, TypedLine
 from sd2app.widgets.model_card_dialog import ModelCardDialog
