@@ -11,7 +11,7 @@ from small_pairs import write_pairs
 from study_results import some_results
 from window_models import models_of
 
-from sd2app.study.page import StudySetupView
+from sd2app.study.feature import StudySetupView
 from sd2app.study.result_dialog import ClassResultDialog, ConfusionView
 from sd2app.widgets.inputs import CheckBox, Choice
 from sd2core.study.report import write_report
