@@ -26,8 +26,8 @@ from PySide6.QtWidgets import (
 )
 from window_models import models_of
 
-from sd2app.fit.bar import FitBar, FitOffer
 from sd2app.fit.dialog import NewFromVideoDialog
+from sd2app.fit.feature import FitBar, FitOffer
 from sd2app.fit.request import FitRequest, Person
 from sd2app.fit.setup import PICTURE_PX, FitSetupModel, Portrait
 from sd2app.settings import Settings

@@ -14,7 +14,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialogButtonBox, QToolButton, QWidget
 from window_models import models_of
 
-from sd2app.fit.bar import FitOffer
+from sd2app.fit.feature import FitOffer
 from sd2app.labels.recovery import LabelNotice
 from sd2app.shell.messages.views import MessageNotice, MessagesDialog
 from sd2app.widgets.notices import Notice, NoticeStack
