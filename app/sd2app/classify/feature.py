@@ -22,8 +22,7 @@ from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import ask_file
-from sd2app.widgets.model_card_dialog import ModelCardDialog
-from sd2app.widgets.model_menu import ModelButton, ModelMenu, Words
+from sd2app.widgets.model_menu import ModelButton, ModelCardDialog, ModelMenu, Words
 from sd2core.errors import Sd2Error
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 

@@ -19,8 +19,7 @@ from sd2app.maps.model import SynthesisModel
 from sd2app.maps.stack import MapStack
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import ask_file
-from sd2app.widgets.model_card_dialog import ModelCardDialog
-from sd2app.widgets.model_menu import ModelButton, ModelMenu, Words
+from sd2app.widgets.model_menu import ModelButton, ModelCardDialog, ModelMenu, Words
 
 _MODELS = "Model (*.safetensors);;All files (*)"
 _WORDS = Words(

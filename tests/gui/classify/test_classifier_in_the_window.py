@@ -23,7 +23,7 @@ from sd2app.labels.timeline import LabelTimeline
 from sd2app.suggestions.feature import SuggestionBar
 from sd2app.widgets.chart import ChartView
 from sd2app.widgets.inputs import Choice, NumberBox, TypedLine
-from sd2app.widgets.model_card_dialog import ModelCardDialog
+from sd2app.widgets.model_menu import ModelCardDialog
 from sd2core.classify.defaults import WIDTH, pace_kind
 from sd2core.classify.files import user_classifiers_folder
 from sd2core.files.resources import resource_path

@@ -20,8 +20,7 @@ from sd2app.figures.dialogs import MapFigureDialog
 from sd2app.maps.feature import MapExportDialog
 from sd2app.maps.readout import reading_lines
 from sd2app.maps.spectrum import SpectrumView
-from sd2app.widgets.model_card_dialog import ModelCardDialog
-from sd2app.widgets.model_menu import ModelButton, ModelMenu
+from sd2app.widgets.model_menu import ModelButton, ModelCardDialog, ModelMenu
 from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
