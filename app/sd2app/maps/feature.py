@@ -23,7 +23,7 @@ from sd2app.maps.readout import reading_lines
 from sd2app.maps.spectrum import SpectrumView
 from sd2app.maps.stack import MapStack
 from sd2app.maps.uncertainty import UncertaintyModel
-from sd2app.session.limbs import colours_of, part_words
+from sd2app.session.maps import colours_of, part_words
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import Overlay
 from sd2app.widgets.dialogs import Dialog, ExportButtons, accepted, ask_new

@@ -17,8 +17,7 @@ from sd2app.maps.arrangement import BELOW_PX, HEADER_PX
 from sd2app.maps.heatmap_image import MapWidget
 from sd2app.maps.readout import body_range_m, reading_lines
 from sd2app.maps.track_mouse import TrackMouse, offset_text
-from sd2app.session.limbs import colours_of, part_words, title_of
-from sd2app.session.maps import UNCERTAIN_SHARE, MapModel, Reading
+from sd2app.session.maps import UNCERTAIN_SHARE, MapModel, Reading, colours_of, part_words, title_of
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT, AT_RIGHT, Overlay, clipped, image_of, lookup_table
 from sd2app.widgets.time_axis import (

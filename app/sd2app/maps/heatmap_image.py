@@ -13,8 +13,7 @@ from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QResizeEvent
 from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.track_mouse import TimePlot
 from sd2app.session.display import HeatmapLevels
-from sd2app.session.limbs import colours_of
-from sd2app.session.maps import MapModel
+from sd2app.session.maps import MapModel, colours_of
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import Overlay, clipped, image_of, lookup_table, uncertain_table
 from sd2app.widgets.time_axis import TimeScale

@@ -11,8 +11,7 @@ from PySide6.QtGui import QBrush, QColor, QFontMetrics, QPainter, QPen, QPolygon
 
 from sd2app.maps.heatmap import paint_velocity_labels, velocity_labels, y_of
 from sd2app.maps.stack import MapStack
-from sd2app.session.limbs import colours_of, part_words, title_of
-from sd2app.session.maps import MapModel
+from sd2app.session.maps import MapModel, colours_of, part_words, title_of
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT, Canvas, clipped, paint_axes
 from sd2app.widgets.time_axis import paint_title, ticks

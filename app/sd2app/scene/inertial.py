@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QMenu
 from sd2app.imu.model import ImuModel, place_words
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.scene import Scene
-from sd2app.session.limbs import colours_of, part_words
+from sd2app.session.maps import colours_of, part_words
 from sd2app.session.session import Session
 from sd2core.maps import OF
 from sd2core.mesh.vertex_parts import VertexParts

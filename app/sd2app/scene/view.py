@@ -20,7 +20,7 @@ from sd2app.scene.inertial import LIMB_HINT, PLACING_HINT, InertialHand, LimbHan
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.overlay import Overlay
 from sd2app.scene.scene import Scene
-from sd2app.session.limbs import part_words
+from sd2app.session.maps import part_words
 from sd2app.widgets.canvas import MenuPart
 from sd2app.widgets.picture import picture_menu
 from sd2core.errors import Sd2Error

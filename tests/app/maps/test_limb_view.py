@@ -17,7 +17,7 @@ from window_models import build_models
 from sd2app.maps.feature import LimbMenu
 from sd2app.maps.heatmap_image import heatmap_image
 from sd2app.maps.spectrum import SpectrumView
-from sd2app.session.limbs import LIMB_COLOURS, part_words, title_of
+from sd2app.session.maps import LIMB_COLOURS, part_words, title_of
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
 from sd2app.widgets.canvas import lookup_table

@@ -21,7 +21,7 @@ from scene_stage import LEFT, RIGHT, Stage, two_plates
 from sd2app.scene import backend as choose
 from sd2app.scene import offscreen_backend as image_backend
 from sd2app.scene.colours import SceneColours
-from sd2app.session.limbs import LIMB_COLOURS
+from sd2app.session.maps import LIMB_COLOURS
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import VertexParts
 from sd2core.placements.placements import Place, PlacementCloud
