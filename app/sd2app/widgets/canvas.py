@@ -1,4 +1,4 @@
-"""Bases of the widgets that paint themselves, axes, colour maps, and what painting has in common."""
+"""Bases of the widgets that paint themselves, axes, colour maps, and what painting shares."""
 
 from __future__ import annotations
 
