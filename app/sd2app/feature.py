@@ -23,8 +23,8 @@ def always() -> bool:
 class Action:
     """Command of the user, with its usual keys; ``menu`` has others of its subject.
 
-    ``checked`` makes it checkable and tells if it is on; ``why_not`` gives the reason why it is
-    disabled, shown in place of the tip, or nothing. Its place in the menus is the shell's matter.
+    ``checked`` makes it checkable and tells if it is on; ``why_not`` gives a reason that disables
+    it, shown in place of the tip, or nothing. Its place in the menus is the shell's matter.
     """
 
     id: str

@@ -78,8 +78,7 @@ class ClassifyFeature(Feature):
                     "find_gestures", "Labels", "Find gestures", ("Shift+G",),
                     "Suggest what the classifier takes for gestures; each is then accepted or"
                     " rejected",
-                    lambda: self._suggest(model), lambda: not model.why_not,
-                    why_not=lambda: model.why_not,
+                    lambda: self._suggest(model), why_not=lambda: model.why_not,
                 ),
             ),
             Action(
@@ -96,8 +95,7 @@ class ClassifyFeature(Feature):
                 "show_classes", "Model", "Probabilities of gestures", ("Shift+I",),
                 "Show under the maps how probable each gesture is, and which one is on screen",
                 lambda: model.set_shown(not model.shown),
-                lambda: model.path is not None,
-                lambda: model.shown and model.path is not None,
+                checked=lambda: model.shown and model.path is not None,
                 why_not=lambda: "" if model.path is not None else "No classifier is in use",
             ),
             Action(

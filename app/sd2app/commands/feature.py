@@ -87,8 +87,7 @@ class CommandsFeature(Feature):
                 "refine_mesh", "File", "Make the mesh smooth…", (),
                 "Take the jitter of another program's mesh away, and say how well its velocities"
                 " are known (sd2 refine)",
-                self._refine, lambda: not self.refining.why_not,
-                why_not=lambda: self.refining.why_not,
+                self._refine, why_not=lambda: self.refining.why_not,
             ),
             Action(
                 "any_command", "File", "Any command…", (),

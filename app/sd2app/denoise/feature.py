@@ -73,7 +73,7 @@ class DenoiseFeature(Feature):
                 "compare_models", "Model", "Compare with the model before", ("B",),
                 "Show the map of the model that was in use before below that of this one",
                 lambda: model.set_comparing(not model.comparing),
-                lambda: model.before is not None, lambda: model.comparing,
+                checked=lambda: model.comparing,
                 why_not=lambda: (
                     "" if model.before is not None else "No other model has been in use here yet"
                 ),
@@ -82,13 +82,7 @@ class DenoiseFeature(Feature):
                 "texture", "Model", "Denoised as the radar would show it", (),
                 "Draw the speckle and the gaps of a radar's map instead of the mean",
                 lambda: model.set_textured(not model.textured),
-                lambda: model.card is not None and model.card.texture is not None,
-                lambda: model.textured,
-                why_not=lambda: (
-                    "There is no denoised map: choose a model under Model"
-                    if model.card is None
-                    else "This model does not know the texture of a radar's maps"
-                ),
+                checked=lambda: model.textured, why_not=self._why_no_texture,
             ),
             Action(
                 "live", "Model", "Denoise live while playing", ("V",),
@@ -97,6 +91,13 @@ class DenoiseFeature(Feature):
                 lambda: live.set_wanted(not live.wanted), checked=lambda: live.wanted,
             ),
         )  # fmt: skip
+
+    def _why_no_texture(self) -> str:
+        card = self.model.card
+        if card is None:
+            return "There is no denoised map: choose a model under Model"
+        known = card.texture is not None
+        return "" if known else "This model does not know the texture of a radar's maps"
 
     def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
         """The models to choose from."""

@@ -38,8 +38,7 @@ class ImuFeature(Feature):
                 "place_inertial", "Edit", "Place inertial sensor…", ("I",),
                 "The next click on the body in the scene fixes a virtual accelerometer and"
                 " gyroscope there; Esc cancels",
-                placing.toggle, lambda: not model.why_not, lambda: placing.active,
-                why_not=lambda: model.why_not,
+                placing.toggle, checked=lambda: placing.active, why_not=lambda: model.why_not,
             ),
             Action(
                 "export_inertial", "File", "Export inertial signals…", (),

@@ -23,16 +23,10 @@ def editing(edits: LabelEdits, *rows: Action) -> tuple[Action, ...]:
 
     # The same question of several actions stays one, which is asked once.
     @cache
-    def enabled(question: Callable[[], bool]) -> Callable[[], bool]:
-        return lambda: question() and not edits.refusal
-
-    @cache
     def why_not(question: Callable[[], str] | None) -> Callable[[], str]:
         return lambda: edits.refusal or (question() if question is not None else "")
 
-    return tuple(
-        replace(row, enabled=enabled(row.enabled), why_not=why_not(row.why_not)) for row in rows
-    )
+    return tuple(replace(row, why_not=why_not(row.why_not)) for row in rows)
 
 
 class LabelActions:

@@ -87,7 +87,7 @@ class LiveFeature(Feature):
             Action(
                 "listen", "File", "Record…", (),
                 "Record a camera and a radar together, or a radar alone, with its Doppler map",
-                self._ask, lambda: not self._busy,
+                self._ask,
                 why_not=lambda: "A recording is being made already" if self._busy else "",
             ),
         )  # fmt: skip

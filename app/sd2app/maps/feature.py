@@ -219,16 +219,14 @@ class MapsFeature(Feature):
                 "Take the colour from cells of the synthetic map that are known to worse than half"
                 " of their value; the pointer reads value ± deviation",
                 lambda: uncertainty.set_shown(not uncertainty.shown),
-                lambda: not uncertainty.why_not,
-                lambda: uncertainty.shown and not uncertainty.why_not,
+                checked=lambda: uncertainty.shown and not uncertainty.why_not,
                 why_not=lambda: uncertainty.why_not,
             ),
             Action(
                 "difference", "Model", "Difference to the radar", ("X",),
                 "Show denoised minus real, in signed colours, below the maps",
                 lambda: difference.set_wanted(not difference.wanted),
-                lambda: not difference.why_not,
-                lambda: difference.shown,
+                checked=lambda: difference.shown,
                 why_not=lambda: difference.why_not,
             ),
         )  # fmt: skip

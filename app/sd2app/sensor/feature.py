@@ -76,13 +76,13 @@ class SensorFeature(Feature):
             Action(
                 "align", "Edit", "Align automatically…", (),
                 "Find the time offset of the radar by the motion that mesh and radar both show",
-                self._align, lambda: not alignment.why_not, why_not=lambda: alignment.why_not,
+                self._align, why_not=lambda: alignment.why_not,
             ),
             Action(
                 "align_by_hand", "Edit", "Align by hand", (),
                 "Show a grip on the radar's map, and on a real inertial sensor, which moves it in"
                 " time; until this is chosen again, or Esc",
-                aligning.toggle, lambda: not alignment.nothing_measured, lambda: aligning.active,
+                aligning.toggle, checked=lambda: aligning.active,
                 why_not=lambda: alignment.nothing_measured,
             ),
             Action(

@@ -208,9 +208,10 @@ class Menus:
         reasons = {question: question() for question in {row.why_not for row in rows} if question}
         for row in rows:
             action = self._actions[row.id]
-            action.setEnabled(enabled[row.enabled])  # which many actions ask alike
+            reason = reasons[row.why_not] if row.why_not is not None else ""
+            action.setEnabled(enabled[row.enabled] and not reason)  # which many actions ask alike
             if row.why_not is not None:
-                action.setToolTip(reasons[row.why_not] or self._tips[row.id])
+                action.setToolTip(reason or self._tips[row.id])
             if row.checked is not None:
                 action.setChecked(row.checked())
         stack = self._session.document.undo_stack

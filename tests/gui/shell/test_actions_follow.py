@@ -20,7 +20,8 @@ def stale(window) -> list[str]:
     return [
         row.id
         for row in rows
-        if window.action(row.id).isEnabled() != row.enabled()
+        if window.action(row.id).isEnabled()
+        != (row.enabled() and not (row.why_not is not None and row.why_not()))
         or (row.checked is not None and window.action(row.id).isChecked() != row.checked())
     ]
 
