@@ -21,12 +21,10 @@ from sd2app.labels.actions import editing
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import ask_file
-from sd2app.widgets.model_menu import ModelButton, ModelCardDialog, ModelMenu, Words
+from sd2app.widgets.model_menu import ModelButton, ModelMenu, Words
 from sd2core.errors import Sd2Error
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 
-_FILES = "Classifiers (*.safetensors)"
 _WORDS = Words(
     "Classify with",
     "Classifier",
@@ -34,6 +32,9 @@ _WORDS = Words(
     "Choose a model that says which gesture a frame shows",
     network_text,
     learned_text,
+    "Open classifier file",
+    "Classifiers (*.safetensors)",
+    classifier_page,
 )
 
 
@@ -84,12 +85,12 @@ class ClassifyFeature(Feature):
             Action(
                 "open_classifier", "Model", "Open classifier file…", (),
                 "Say which gesture each frame shows, with a classifier of your own (.safetensors)",
-                self._open,
+                lambda: self._classifiers.open_file(),
             ),
             Action(
                 "classifier_card", "Model", "About this classifier…", (),
                 "What it is shown, what it learned from, and how well it did",
-                self._show_card, lambda: model.card is not None,
+                lambda: self._classifiers.show_card(), lambda: model.card is not None,
             ),
             Action(
                 "show_classes", "Model", "Probabilities of gestures", ("Shift+I",),
@@ -111,21 +112,8 @@ class ClassifyFeature(Feature):
 
     @cached_property
     def _classifiers(self) -> ModelMenu:
-        below = [self._shell.action(name) for name in ("open_classifier", "classifier_card")]
-        return ModelMenu(self.model, _WORDS, self.use, below, self._shell.dialog_parent)
-
-    def use(self, path: Path | None) -> None:
-        """Classify with a file, or not at all."""
-        self._shell.attempt(lambda: self.model.use(path))
-
-    def _open(self) -> None:
-        start = str(self.model.path or "")
-        if path := ask_file(self._shell.dialog_parent, "Open classifier file", _FILES, start):
-            self.use(path)
-
-    def _show_card(self) -> None:
-        if self.model.card is not None:
-            ModelCardDialog(classifier_page(self.model.card), self._shell.dialog_parent).exec()
+        below = "open_classifier", "classifier_card"
+        return ModelMenu(self.model, _WORDS, self._shell, below)
 
     def panels(self) -> Mapping[str, QWidget]:
         """Probabilities below the maps."""
@@ -144,4 +132,4 @@ class ClassifyFeature(Feature):
             self.model.describe(path)
         except Sd2Error:
             return None  # another kind of model
-        return Drop("Classify with this model", lambda: self.use(path))
+        return Drop("Classify with this model", lambda: self._classifiers.use(path))

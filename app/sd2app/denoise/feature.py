@@ -18,10 +18,8 @@ from sd2app.maps.feature import export_map
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.stack import MapStack
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import ask_file
-from sd2app.widgets.model_menu import ModelButton, ModelCardDialog, ModelMenu, Words
+from sd2app.widgets.model_menu import ModelButton, ModelMenu, Words
 
-_MODELS = "Model (*.safetensors);;All files (*)"
 _WORDS = Words(
     "Denoise with",
     "Denoiser",
@@ -29,6 +27,9 @@ _WORDS = Words(
     "Choose a model that denoises this map",
     kind_words,
     origin_words,
+    "Open model file",
+    "Model (*.safetensors);;All files (*)",
+    denoiser_page,
 )
 
 
@@ -62,12 +63,12 @@ class DenoiseFeature(Feature):
             Action(
                 "open_model", "Model", "Open model file…", (),
                 "Denoise this recording with a model of your own (.safetensors)",
-                self._open, self._session.has_content,
+                lambda: self._models.open_file(), self._session.has_content,
             ),
             Action(
                 "model_card", "Model", "About this model…", (),
                 "What it learned from, what was measured of it, and its limits",
-                self._show_card, lambda: model.card is not None,
+                lambda: self._models.show_card(), lambda: model.card is not None,
             ),
             Action(
                 "compare_models", "Model", "Compare with the model before", ("B",),
@@ -105,31 +106,17 @@ class DenoiseFeature(Feature):
 
     @cached_property
     def _models(self) -> ModelMenu:
-        below = [self._shell.action(name) for name in ("open_model", "model_card")]
-        return ModelMenu(self.model, _WORDS, self.use, below, self._shell.dialog_parent)
+        return ModelMenu(self.model, _WORDS, self._shell, ("open_model", "model_card"))
 
     def put_buttons(self, stack: MapStack) -> None:
         """Offer the models on the maps too."""
         stack.set_denoiser_buttons(ModelButton(self._models), ModelButton(self._models))
 
-    def use(self, path: Path | None) -> None:
-        """Denoise with a model file, or with none."""
-        self._shell.attempt(lambda: self.model.use(path))
-
     def drop_of(self, path: Path) -> Drop | None:
         """Use a model file that is dropped."""
         if path.suffix != ".safetensors":
             return None
-        return Drop("Denoise with this model", lambda: self.use(path))
-
-    def _open(self) -> None:
-        start = str(self.model.path or "")
-        if path := ask_file(self._shell.dialog_parent, "Open model file", _MODELS, start):
-            self.use(path)
-
-    def _show_card(self) -> None:
-        if self.model.card is not None:
-            ModelCardDialog(denoiser_page(self.model.card), self._shell.dialog_parent).exec()
+        return Drop("Denoise with this model", lambda: self._models.use(path))
 
     def _export(self) -> None:
         name, model = self._session.document.file_name("-denoised.npz"), self.model

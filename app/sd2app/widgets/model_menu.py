@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from PySide6.QtCore import Qt, SignalInstance
-from PySide6.QtGui import QAction, QActionGroup
+from PySide6.QtGui import QActionGroup
 from PySide6.QtWidgets import QFormLayout, QLabel, QMenu, QScrollArea, QToolButton, QWidget
 
-from sd2app.widgets.dialogs import Dialog, closing
+from sd2app.feature import Shell
+from sd2app.widgets.dialogs import Dialog, ask_file, closing
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.model_page import ModelPage, model_title
 from sd2app.widgets.panel import sentence, side_by_side, title
-
-Use = Callable[[Path | None], None]
 
 _LONGEST = 14
 
@@ -42,6 +41,9 @@ class Chosen(Protocol):
     def available(self) -> Sequence[Any]:
         """Cards of the models that can be chosen, as they are on disk now."""
 
+    def use(self, path: Path | None) -> None:
+        """Use another model, or none; raises Sd2Error."""
+
 
 class Words(NamedTuple):
     """Texts on models of one kind."""
@@ -52,23 +54,18 @@ class Words(NamedTuple):
     hint: str  # what to choose a model for
     kind: Callable[[Any], str]  # kind of network, by a model's card
     origin: Callable[[Any], str]  # what it learned from, by its card
+    opening: str  # title of the dialog that asks for a file
+    files: str  # its filter
+    page: Callable[[Any], ModelPage]  # facts of a model, by its card
 
 
 class ModelMenu(QMenu):
-    """Menu of all known models, and of actions on them."""
+    """Menu of all known models, and of actions on them, by their ids."""
 
-    def __init__(
-        self,
-        chosen: Chosen,
-        words: Words,
-        use: Use,
-        below: list[QAction],
-        parent: QWidget,
-    ) -> None:
-        super().__init__(words.title, parent)
-        self.chosen, self.words = chosen, words
-        self._use = use
-        self._below = below
+    def __init__(self, chosen: Chosen, words: Words, shell: Shell, below: Sequence[str]) -> None:
+        super().__init__(words.title, shell.dialog_parent)
+        self.chosen, self.words, self._shell = chosen, words, shell
+        self._below = [shell.action(name) for name in below]
         self._group = QActionGroup(self)
         self.setToolTipsVisible(True)
         self.aboutToShow.connect(self.fill)
@@ -89,11 +86,26 @@ class ModelMenu(QMenu):
         self.addActions(self._below)
 
     def _add(self, text: str, tip: str, path: Path | None) -> None:
-        action = self.addAction(text, lambda: self._use(path))
+        action = self.addAction(text, lambda: self.use(path))
         action.setToolTip(tip)
         action.setCheckable(True)
         action.setActionGroup(self._group)
         action.setChecked(self.chosen.path == path)
+
+    def use(self, path: Path | None) -> None:
+        """Use a model file, or none."""
+        self._shell.attempt(lambda: self.chosen.use(path))
+
+    def open_file(self) -> None:
+        """Let the user choose a model file, and use it."""
+        start, words = str(self.chosen.path or ""), self.words
+        if path := ask_file(self._shell.dialog_parent, words.opening, words.files, start):
+            self.use(path)
+
+    def show_card(self) -> None:
+        """Show the facts about the model in use."""
+        if self.chosen.card is not None:
+            ModelCardDialog(self.words.page(self.chosen.card), self._shell.dialog_parent).exec()
 
 
 class ModelButton(QToolButton):

@@ -43,7 +43,7 @@ def classified(window, fake_classes, qtbot):
     """The window on the ball, which approaches and recedes once a second; nothing is marked."""
     c = models_of(window)
     (path,) = fake_classes.cards
-    window.features.classify.use(path)
+    window.features.classify._classifiers.use(path)
     qtbot.waitUntil(lambda: c.classify.track.complete and not c.classify.busy, timeout=10_000)
     for _ in range(2):
         key(window, "N")
@@ -260,7 +260,7 @@ def test_a_classifier_that_is_dropped_is_used(window, fake_classes, qtbot):
 
 
 def test_what_is_no_classifier_is_said(window, tmp_path):
-    window.features.classify.use(tmp_path / "other.safetensors")
+    window.features.classify._classifiers.use(tmp_path / "other.safetensors")
     assert "other.safetensors is no classifier" in window.messages.text
     assert models_of(window).classify.path is None
 
