@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any, Literal
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtGui import QUndoCommand
 
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.model import LabelsModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
+from sd2app.session.undo import Assign
 from sd2core.errors import Sd2Error
 from sd2core.labels import edits, field_edits
 from sd2core.labels.comparison import changed_stretch
@@ -21,26 +21,6 @@ from sd2core.labels.spans import Labels, Span
 from sd2core.recording.divergence import State
 from sd2core.recording.edited import decoded_fields
 from sd2core.recording.recording import Recording
-
-
-class _Step(QUndoCommand):
-    """One edit in the undo history."""
-
-    def __init__(
-        self,
-        name: str,
-        become: Callable[[str, Labels, Labels], None],
-        before: Labels,
-        after: Labels,
-    ) -> None:
-        super().__init__(name)
-        self._become, self._before, self._after = become, before, after
-
-    def undo(self) -> None:
-        self._become(f"Undo {self.text().lower()}", self._after, self._before)
-
-    def redo(self) -> None:
-        self._become(self.text(), self._before, self._after)
 
 
 def _deleted(labels: Labels, ids: Iterable[int]) -> Edit:
@@ -267,7 +247,9 @@ class LabelEdits(QObject):
     def make(self, done: Edit, before: Labels) -> None:
         """Apply a computed edit as one step in the history."""
         if done.labels is not before:
-            step = _Step(done.name, self._become, before, done.labels)
+            there = done.name, before, done.labels
+            back = f"Undo {done.name.lower()}", done.labels, before
+            step = Assign(done.name, lambda change: self._become(*change), back, there)
             step.redo()
             self.undo_stack.push(step)
         if done.ids:

@@ -70,9 +70,7 @@ class Edits:
 
     def place_sensor(self, sensor: VirtualSensor, text: str = "Move sensor") -> None:
         """Place the sensor."""
-        before = self._sensor.sensor
-        self._assign_sensor(sensor)
-        self._push(text, self._assign_sensor, before, sensor)
+        self._push(text, self._assign_sensor, self._sensor.sensor, sensor)
 
     def sensor_to_camera(self) -> None:
         """Put the sensor at the camera, looking along the optical axis."""
@@ -282,17 +280,14 @@ class Edits:
 
     def choose_count(self, count: HowCounted) -> None:
         """HowCounted the vertices of synthetic maps another way."""
-        before = self._document.count
-        self._document.set_count(count)
-        self._push("Choose counting", self._document.set_count, before, count)
+        self._push("Choose counting", self._document.set_count, self._document.count, count)
 
     # --- processing of the capture --------------------------------------------------------
 
     def set_clutter(self, clutter: Clutter) -> None:
         """Remove static echoes another way."""
-        before = self._document.clutter
-        self._document.set_clutter(clutter)
-        self._push("Choose clutter removal", self._document.set_clutter, before, clutter)
+        document = self._document
+        self._push("Choose clutter removal", document.set_clutter, document.clutter, clutter)
 
     def choose_channel(self, of: Literal["receiver", "transmitter"], number: int | None) -> None:
         """Show one receiver or transmitter, by its number from 1 on, or all together."""
@@ -304,7 +299,6 @@ class Edits:
         """Show other values of maps as 0 dB."""
         before = {track: (track.reference, track.by_hand) for track in references}
         after = {track: (reference, by_hand) for track, reference in references.items()}
-        _assign_references(after)
         self._push("0 dB", _assign_references, before, after)
 
     # --- denoising ------------------------------------------------------------------------
@@ -332,5 +326,7 @@ class Edits:
     def _push(
         self, text: str, assign: Callable[[Any], None], before: object, after: object
     ) -> None:
+        """Assign a value, as a step in the history where it is another one."""
+        assign(after)
         if before != after and self._document.content is not None:
             self._document.undo_stack.push(Assign(text, assign, before, after))
