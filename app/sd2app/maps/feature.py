@@ -190,9 +190,8 @@ class MapsFeature(Feature):
         self.difference = DifferenceModel(session, parent)
         self.limbs = LimbsModel(session, self.synthesis, parent)
         session.document.changed.connect(session.follow_capture)
-        self.synthesis.failed.connect(shell.warn)
-        self.uncertainty.failed.connect(shell.warn)
-        self.limbs.failed.connect(shell.warn)
+        for model in (self.synthesis, self.uncertainty, self.limbs):
+            model.failed.connect(shell.warn)
         shown = self.uncertainty.changed, self.difference.state_changed
         self.changing = *self.synthesis.completeness, *shown
         self.closing = (self.uncertainty, self.limbs, self.synthesis)

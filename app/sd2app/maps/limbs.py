@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import LatestRunner
+from sd2app.background.latest import LatestRunner, ReportingModel
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
 from sd2core.body.parts import body_parts
@@ -14,23 +14,20 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS, WHOLE, VertexParts
 
 
-class LimbsModel(QObject):
+class LimbsModel(ReportingModel):
     """Parts of the body that are shown alone, and the split of the synthetic map meanwhile.
 
     Menu and 3D view choose by this model.
     """
 
     changed = Signal()  # what is shown, or whose parts are known
-    failed = Signal(str)
 
     def __init__(self, session: Session, synthesis: SynthesisModel, parent: QObject) -> None:
         super().__init__(parent)
         self.track, self._synthesis = session.maps.synthetic, synthesis
         self._document = session.document
         self._found: tuple[MeshSequence, VertexParts | None] | None = None
-        self._finder = LatestRunner("limbs", self)
-        self._finder.finished.connect(self._take)
-        self._finder.failed.connect(lambda error: self.failed.emit(str(error)))
+        self._finder = LatestRunner("limbs", self, self._take, self._fail)
         synthesis.completed.connect(self._check)
         session.document.opened.connect(self.show)
         session.document.changed.connect(self._leave_out)
@@ -98,10 +95,6 @@ class LimbsModel(QObject):
             self._found = mesh, None
             self._finder.submit(lambda _: (mesh, body_parts(mesh)))
         return self._found[1]
-
-    def close(self) -> None:
-        """Stop looking for parts."""
-        self._finder.close()
 
     def _take(self, found: tuple[MeshSequence, VertexParts | None]) -> None:
         self._found = found
