@@ -53,8 +53,6 @@ class MeasuredModel(ReportingModel):
             signal.connect(self.changed)
         self._memory = LatestRunner("remember", self, self._receive_remembered, self._fail)
 
-    # --- what is known --------------------------------------------------------------------
-
     @property
     def measurement(self) -> Measurement | None:
         """Measurement of the family on screen."""
@@ -74,8 +72,6 @@ class MeasuredModel(ReportingModel):
     def can_measure(self) -> bool:
         """True if the sensor is at rest and no measurement is running."""
         return self._scene is not None and self._place is not None and not self._meter.busy
-
-    # --- requests -------------------------------------------------------------------------
 
     def attach(self, mesh: MeshSequence | None, options: SynthesisOptions) -> None:
         """Take over another scene, or none."""
@@ -134,8 +130,6 @@ class MeasuredModel(ReportingModel):
     def cancel(self) -> None:
         """Stop measuring; what was known stays."""
         self._meter.cancel()
-
-    # --- results --------------------------------------------------------------------------
 
     def _receive(self, answer: tuple[Measurement, VirtualSensor]) -> None:
         measurement, place = answer

@@ -54,8 +54,6 @@ class AccuracyPanel(QWidget):
             signal.connect(self._refresh)
         self._refresh()
 
-    # --- building -------------------------------------------------------------------------
-
     def _use_part(self) -> QWidget:
         self._chosen = sentence("", "plan")
         self._chosen.setAccessibleName("Plan in use, its error and cost")
@@ -88,8 +86,6 @@ class AccuracyPanel(QWidget):
         tip = "What this scene requires of the plan, setting by setting"
         fold = Fold("Why this plan", tip, self._reasons, self)
         return pane(rule(), row_of(fold, STRETCH), self._reasons, spacing_px=4)
-
-    # --- showing --------------------------------------------------------------------------
 
     def _refresh(self) -> None:
         there = self._accuracy.frames > 0

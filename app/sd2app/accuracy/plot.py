@@ -53,8 +53,6 @@ class AccuracyPlot(ChartView):
             return sorted(self.marks, key=lambda mark: mark.y)
         return [mark for mark in self.marks if mark.pull_px]
 
-    # --- painting -------------------------------------------------------------------------
-
     def paint_chart(self, painter: QPainter) -> None:
         """Everything over the tolerance."""
         if self._accuracy.measured.family == "histogram":
@@ -105,8 +103,6 @@ class AccuracyPlot(ChartView):
             painter.setPen(QPen(QColor(self._display.palette.accent), 1.5))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawPolygon(QPolygonF([at + QPointF(*side) for side in sides]))
-
-    # --- pointer and keyboard -------------------------------------------------------------
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Point at the nearest point."""

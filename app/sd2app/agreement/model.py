@@ -44,8 +44,6 @@ class AgreementModel(ReportingModel):
         self._comparer = LatestRunner("agreement", self, self._take, self._fail)
         labels.changed.connect(self._compare)
 
-    # --- what is there --------------------------------------------------------------------
-
     @property
     def active(self) -> bool:
         """True while another person's labels are open."""
@@ -70,8 +68,6 @@ class AgreementModel(ReportingModel):
         now_s = self._playback.timebase.time_of(self._playback.frame)
         places = enumerate(self.disagreements)
         return next((k for k, one in places if one.start_s <= now_s < one.end_s), None)
-
-    # --- asking ---------------------------------------------------------------------------
 
     def open(self, path: Path) -> None:
         """Compare with the labels of a file, in the background."""
@@ -99,8 +95,6 @@ class AgreementModel(ReportingModel):
             self._playback.seek(ahead[0].start_s)
             self._span.reveal(ahead[0].start_s)
             self.changed.emit()
-
-    # --- inside ---------------------------------------------------------------------------
 
     def _receive(self, result: tuple[Path, LabelReading]) -> None:
         self.path, reading = result

@@ -201,8 +201,6 @@ class OtherTimeline(TimePlot):
         self.setToolTip(f"Labels of {model.name}; the line over them marks what differs")
         self.update()
 
-    # --- painting -------------------------------------------------------------------------
-
     def paint(self, painter: QPainter) -> None:
         """Paint marks, names, spans and the cursor."""
         palette, scale, whole = self._session.display.palette, self.scale, self.plot_rect()
@@ -219,8 +217,6 @@ class OtherTimeline(TimePlot):
         paint_tracks(painter, plot, scale, other, rows, palette, foreign=self._model.name)
         painter.translate(0.0, -_MARKS_PX)
         paint_cursor(painter, whole, scale.x_of(self._session.playback.time_s))
-
-    # --- the hand -------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Go to a time."""

@@ -53,13 +53,9 @@ class RunSetup(BackgroundModel, Generic[D]):
         self._runner = LatestRunner("data of a run", self, self._take)
         self.refresh()
 
-    # --- what subclasses say ----------------------------------------------------------------
-
     def look_into(self, source: D) -> D:
         """Read the content of data from disk, in the background."""
         raise NotImplementedError
-
-    # --- what is chosen ---------------------------------------------------------------------
 
     def data_problem(self, nothing: str) -> str:
         """Reason why the data cannot be worked on, ``nothing`` without any; empty if it can."""

@@ -49,8 +49,6 @@ class BatchRunView(RunView[BatchMonitor]):
         self.column.addWidget(self._pages(), 1)
         self.refresh()
 
-    # --- building -------------------------------------------------------------------------
-
     def _bars(self) -> QGridLayout:
         self._steps: list[tuple[QLabel, ProgressBar, QLabel]] = []
         for _ in range(_MAX_STEPS):
@@ -84,8 +82,6 @@ class BatchRunView(RunView[BatchMonitor]):
             )
         )
         return self._inner
-
-    # --- showing --------------------------------------------------------------------------
 
     def shown(self, run: BatchMonitor) -> Collection[str]:
         """Names of the buttons that are of use now; results are the user's to delete."""

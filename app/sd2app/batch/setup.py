@@ -71,8 +71,6 @@ class BatchSetupModel(RunSetup[Entry]):
         """Count what there is, once."""
         return _looked_at(source.path) if source.count is None else source
 
-    # --- what is chosen -------------------------------------------------------------------
-
     @property
     def out(self) -> Path | None:
         """Folder of the results; one beside the first recording until another is chosen."""
@@ -103,8 +101,6 @@ class BatchSetupModel(RunSetup[Entry]):
         """Put sensors elsewhere; ``placed`` says where that is from."""
         self.placements, self.placed = placements, placed
         self.changed.emit()
-
-    # --- what follows ---------------------------------------------------------------------
 
     @property
     def problem(self) -> str:

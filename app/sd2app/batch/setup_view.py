@@ -69,8 +69,6 @@ class BatchSetupView(QWidget):
         batch.changed.connect(self.refresh)
         self.refresh()
 
-    # --- building -------------------------------------------------------------------------
-
     def _recordings_row(self) -> QHBoxLayout:
         asks = self._asks
         add = outlined("Add files…", "Recordings, videos or meshes", asks.add_files, self)
@@ -118,8 +116,6 @@ class BatchSetupView(QWidget):
         tip = "In background processes"
         self._start = outlined("Start", tip, asks.start, self, look="primary")
         return row_of(STRETCH, self._save, self._copy, self._start, spacing_px=6)
-
-    # --- showing --------------------------------------------------------------------------
 
     def refresh(self) -> None:
         """Follow the models, and the choices that the open recording offers."""

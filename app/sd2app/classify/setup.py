@@ -146,8 +146,6 @@ class ClassSetup(RunSetup[DataSource]):
             named = DataSource(path, name)
             self.keep(tuple(named if one.path == path else one for one in self.data))
 
-    # --- what follows ---------------------------------------------------------------------
-
     @property
     def problem(self) -> str:
         """Reason why nothing can be started; empty when something can."""

@@ -41,8 +41,6 @@ class ClassTraining(Runs[ClassRun]):
         self.follow_setup(self.setup)
         self._used: Path | None = None
 
-    # --- what is known --------------------------------------------------------------------
-
     @property
     def in_use(self) -> bool:
         """True if the model of the run in view is in use."""
@@ -57,8 +55,6 @@ class ClassTraining(Runs[ClassRun]):
     def command(self) -> str:
         """Command for a terminal that does what is set up."""
         return quoted(self.setup.train_arguments(Path(MODEL_NAME)))
-
-    # --- one run after another ------------------------------------------------------------
 
     def find(self) -> Sequence[KnownRun]:
         """Read the folder of runs."""

@@ -80,8 +80,6 @@ class CommandForm(QWidget):
         self._left.add(field)
         self.refresh()
 
-    # --- building -----------------------------------------------------------------------------
-
     def _build(self) -> None:
         options = self._forms.options
         summary = self._forms.chosen.summary

@@ -93,8 +93,6 @@ class FitBar(StateBar):
         on_screen.changed.connect(self._refresh)
         self._refresh()
 
-    # --- following the models -------------------------------------------------------------
-
     def _refresh(self) -> None:
         fit, state, request = self._fit, self._fit.state, self._fit.request
         self.setVisible(state != "idle")

@@ -46,8 +46,6 @@ class FitOnScreen(QObject):
             signal.connect(self._notice)
         session.document.opened.connect(self._tell)
 
-    # --- the offer ------------------------------------------------------------------------
-
     @property
     def offered(self) -> Path | None:
         """Video to which a body could be fitted; None where there is nothing to offer."""
@@ -64,8 +62,6 @@ class FitOnScreen(QObject):
         if self.offered is not None:
             self._declined.add(self.offered)
             self.changed.emit()
-
-    # --- the clock ------------------------------------------------------------------------
 
     @property
     def visible(self) -> bool:
@@ -105,8 +101,6 @@ class FitOnScreen(QObject):
     def _notice(self) -> None:
         if not self._moving and self._fit.busy and self._document.content is not None:
             self.set_following(False)
-
-    # --- the result -----------------------------------------------------------------------
 
     def open_result(self) -> None:
         """Open the recording that was made."""

@@ -49,8 +49,6 @@ class MeshPreview(VideoFrames):
         if recording.video is not None:
             self.open_video(recording.video)
 
-    # --- what is known --------------------------------------------------------------------
-
     @property
     def read_as(self) -> MeshReading:
         """How the mesh is read."""
@@ -93,8 +91,6 @@ class MeshPreview(VideoFrames):
             return middle
         return reader.timebase.nearest_frame(float(mesh.times_s[there[len(there) // 2]]))
 
-    # --- what is said of it ---------------------------------------------------------------
-
     def change(self, **settings: Any) -> None:
         """Read it another way: fields of :class:`MeshReading`, None as the file says."""
         self._read_as(self.read_as.model_copy(update=settings))
@@ -107,8 +103,6 @@ class MeshPreview(VideoFrames):
         """Take the triangles of another file."""
         self.recording.faces = path
         self._read()
-
-    # --- inside ---------------------------------------------------------------------------
 
     def _read_as(self, reading: MeshReading) -> None:
         if reading == self.read_as:

@@ -56,8 +56,6 @@ class LabelSetModel(RecordTableModel[Label]):
         self._alike: list[Alike] = []
         self._labels.changed.connect(self._follow)
 
-    # --- what is there --------------------------------------------------------------------
-
     @property
     def warnings(self) -> str:
         """Sentences on labels whose colours look alike; empty without any."""
@@ -78,8 +76,6 @@ class LabelSetModel(RecordTableModel[Label]):
         """Return colours to choose from, names first: the palette and others in use."""
         others = sorted({one.colour for one in self.label_set.labels}.difference(_COLOURS))
         return [*OFFERED, *((colour, colour) for colour in others)]
-
-    # --- changing -------------------------------------------------------------------------
 
     def add(self) -> bool:
         """Add a label with a name, a colour and a key not yet in use."""
@@ -117,8 +113,6 @@ class LabelSetModel(RecordTableModel[Label]):
         }
         return self._apply(changes[index.column()])
 
-    # --- following ------------------------------------------------------------------------
-
     def _refresh(self) -> None:
         labels = self._labels.labels
         count = len(labels.label_set.labels)
@@ -133,8 +127,6 @@ class LabelSetModel(RecordTableModel[Label]):
             self.endResetModel()
         elif count:
             self.dataChanged.emit(self.index(0, 0), self.index(count - 1, SPANS))
-
-    # --- cells ----------------------------------------------------------------------------
 
     def _text(self, record: Label, column: int) -> str:
         if column == COLOUR:

@@ -76,8 +76,6 @@ class LabelSetPage(QWidget):
         menu.addAction("Usual label set", lambda: self._model.use(GESTURES))
         return menu
 
-    # --- what the buttons do --------------------------------------------------------------
-
     def _rename(self) -> None:
         name, shown = self._name.text().strip(), self._model.label_set
         if name != shown.name:
@@ -132,8 +130,6 @@ class LabelSetPage(QWidget):
         if self._model.remove(row, instead):
             last = self._model.rowCount() - 1
             self.table.setCurrentIndex(self._model.index(min(row, last), NAME))
-
-    # --- following ------------------------------------------------------------------------
 
     def _refresh(self) -> None:
         row, count = self.table.currentIndex().row(), self._model.rowCount()

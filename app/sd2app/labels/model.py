@@ -71,8 +71,6 @@ class LabelsModel(QObject):
         """Tracks that new spans can go to: all but that of the suggestions."""
         return tuple(one for one in self.labels.tracks if one.name != SUGGESTIONS)
 
-    # --- changing -------------------------------------------------------------------------
-
     def open(self, labels: Labels) -> None:
         """Show another recording's labels; selection and marks are cleared."""
         self.marks = ()

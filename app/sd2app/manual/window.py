@@ -104,8 +104,6 @@ class ManualWindow(QWidget):
         title = self._manual.titles.get(self.view.page, "Search")
         self.setWindowTitle(f"{title} – SD² Studio manual")
 
-    # --- search ---------------------------------------------------------------------------
-
     def _find(self) -> None:
         self.search.setFocus(Qt.FocusReason.ShortcutFocusReason)
         self.search.selectAll()

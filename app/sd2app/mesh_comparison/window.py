@@ -76,8 +76,6 @@ class ComparisonWindow(QWidget):
         parts = (against, self._reference, self._export, copy, help_button("Compare meshes", self))
         return row_of((self._summary, 1), *parts, spacing_px=8)
 
-    # --- following the model --------------------------------------------------------------
-
     def _refresh(self) -> None:
         model, comparison = self.model, self.model.comparison
         self._reference.offer(list(model.labels), model.reference)

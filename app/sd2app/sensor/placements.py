@@ -58,8 +58,6 @@ class PlacementsModel(ReportingModel):
         self._sensor.changed.connect(self.current_changed)
         accuracy.plan_changed.connect(self.changed)
 
-    # --- what is planned ------------------------------------------------------------------
-
     @property
     def plan(self) -> Placements | None:
         """The recording's plan."""
@@ -98,8 +96,6 @@ class PlacementsModel(ReportingModel):
             len(self.planned.sensors), self._accuracy.frames, in_use.cost_ms, VelocityAxis().bins
         )
 
-    # --- requests -------------------------------------------------------------------------
-
     def set_shown(self, shown: bool) -> None:
         """Draw the places in the scene, or not."""
         if shown != self.shown:
@@ -119,8 +115,6 @@ class PlacementsModel(ReportingModel):
         if count:
             current = self.current
             self.use(0 if current is None else (current + by) % count)
-
-    # --- following ------------------------------------------------------------------------
 
     def _follow(self) -> None:
         mesh, plan = self._document.mesh, self.plan

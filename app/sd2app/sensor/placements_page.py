@@ -84,8 +84,6 @@ class PlacementsPage(QWidget):
             signal.connect(self._refresh)
         self._refresh()
 
-    # --- building -------------------------------------------------------------------------
-
     def _plan_part(self) -> QWidget:
         model = self._model
         self._how, self._problem = sentence(""), sentence("", "warning")
@@ -118,8 +116,6 @@ class PlacementsPage(QWidget):
             self._rows[name] = (label, line)
         return grid_of(*self._rows.values(), gaps_px=(8, 3))
 
-    # --- files ----------------------------------------------------------------------------
-
     def _import_plan(self) -> None:
         parent = self._shell.dialog_parent
         if path := ask_file(parent, "Take placements", _READ):
@@ -140,8 +136,6 @@ class PlacementsPage(QWidget):
             self._shell.warn(f"{path} cannot be written ({error.strerror}).")
         else:
             self._shell.note(f"The placements are in {path}.")
-
-    # --- showing --------------------------------------------------------------------------
 
     def _refresh(self) -> None:
         model, fields = self._model, self._fields

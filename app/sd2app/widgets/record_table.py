@@ -49,8 +49,6 @@ class RecordTableModel(QAbstractTableModel, Generic[Record]):
     def _refresh(self) -> None:
         """Assign the rows; without this they are assigned when there are others."""
 
-    # --- cells ----------------------------------------------------------------------------
-
     def _text(self, record: Record, column: int) -> str:
         raise NotImplementedError
 
@@ -63,8 +61,6 @@ class RecordTableModel(QAbstractTableModel, Generic[Record]):
     def _tip(self, record: Record, column: int) -> str | None:
         # A narrow column cuts words; numbers have their room.
         return None if self.headings[column].number else self._text(record, column)
-
-    # --- Qt's interface -------------------------------------------------------------------
 
     def rowCount(self, parent: Index = NO_PARENT) -> int:
         """Return the number of records."""

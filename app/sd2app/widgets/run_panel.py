@@ -145,8 +145,6 @@ class RunView(QWidget, Generic[Run]):
         self.setLayout(self.column)
         runs.changed.connect(self.refresh)
 
-    # --- what subclasses say ----------------------------------------------------------------
-
     def shown(self, run: Run) -> Collection[str]:
         """Names of the buttons that are of use now."""
         raise NotImplementedError
@@ -154,8 +152,6 @@ class RunView(QWidget, Generic[Run]):
     def show_made(self, run: Run) -> None:
         """Follow what the run has told and made."""
         raise NotImplementedError
-
-    # --- showing ----------------------------------------------------------------------------
 
     def _delete(self) -> None:
         run = self._runs.run

@@ -49,8 +49,6 @@ class TrainingForm(QWidget):
         self.column = column_of(spacing_px=6, margins_px=0)
         self.setLayout(self.column)
 
-    # --- building -------------------------------------------------------------------------
-
     def add_data(self, heading: str, add: str, tip: str, nothing: str) -> QMenu:
         """Add the list of data and who is learnt from; returns the menu for more."""
         menu = QMenu(self)
@@ -93,8 +91,6 @@ class TrainingForm(QWidget):
         self._start = outlined("Start training", tip, partial(attempt, start), self, look="primary")
         self._copy = copy_button(command, self, attempt=attempt)
         self.column.addLayout(side_by_side(self._start, self._copy, spacing_px=6))
-
-    # --- showing --------------------------------------------------------------------------
 
     def below_row(self, one: Any) -> QWidget | None:
         """Make what stands below the row of some data."""

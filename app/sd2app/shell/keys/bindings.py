@@ -78,8 +78,6 @@ class KeyBindings(QObject):
                 return f"the menu {menu} itself"
         return ""
 
-    # --- changing -------------------------------------------------------------------------
-
     def bind(self, action_id: str, keys: Iterable[str]) -> None:
         """Give an action these keys, and no others.
 
@@ -123,8 +121,6 @@ class KeyBindings(QObject):
         """Give every action its usual keys back."""
         self._chosen.clear()
         self._store()
-
-    # --- following ------------------------------------------------------------------------
 
     def _store(self) -> None:
         self._settings.set_value(_CHOSEN, json.dumps(self._chosen))

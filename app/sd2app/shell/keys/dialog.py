@@ -79,8 +79,6 @@ class KeysDialog(Dialog):
         button.clicked.connect(lambda: run())
         return button
 
-    # --- what the buttons do --------------------------------------------------------------
-
     def _find(self) -> None:
         self._model.set_search(self._search.text())
         if self._model.rowCount():

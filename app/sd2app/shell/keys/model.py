@@ -53,8 +53,6 @@ class KeyListModel(RecordTableModel[KeyRow]):
         self._search = text
         self._refresh()
 
-    # --- changing -------------------------------------------------------------------------
-
     def can_change(self, row: int) -> bool:
         """True if keys do it, not the mouse."""
         return not self.rows[row].mouse
@@ -86,8 +84,6 @@ class KeyListModel(RecordTableModel[KeyRow]):
         """Give a row its usual keys back; errors are those of :meth:`change`."""
         if action := self.rows[row].action:
             self._bindings.reset(action)
-
-    # --- the list -------------------------------------------------------------------------
 
     def _refresh(self) -> None:
         rows = self._listed()
@@ -130,8 +126,6 @@ class KeyListModel(RecordTableModel[KeyRow]):
         lent = self._bindings.lent(row.action)
         taken = [f"{native(key)}: now “{label}”" for key, label in lent.items()]
         return ", ".join([*map(native, self._bindings.keys_of(row.action)), *taken])
-
-    # --- cells ----------------------------------------------------------------------------
 
     def _text(self, record: KeyRow, column: int) -> str:
         return (record.menu, record.text, self.keys_text(record))[column]
