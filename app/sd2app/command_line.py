@@ -127,10 +127,7 @@ def _show(paths: Sequence[Path], screenshot: Path | None) -> int:
     if screenshot is not None:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
     elif not has_display(sys.platform, os.environ):
-        raise Sd2Error(
-            "There is no display to open a window on",
-            remedy=_WITHOUT_DISPLAY,
-        )
+        raise Sd2Error("There is no display to open a window on", remedy=_WITHOUT_DISPLAY)
     elif silent := silent_displays(sys.platform, os.environ):
         raise Sd2Error(
             f"The display cannot be reached: {', '.join(silent)}",

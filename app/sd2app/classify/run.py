@@ -57,12 +57,7 @@ class ClassHistory(StepHistory):
     def _end(self, event: dict[str, Any]) -> None:
         self.saving = True
 
-    readers: ClassVar = {
-        "start": _start,
-        "step": _step,
-        "check": _check,
-        "end": _end,
-    }
+    readers: ClassVar = {"start": _start, "step": _step, "check": _check, "end": _end}
 
 
 class ClassRun(CommandRun):

@@ -179,11 +179,7 @@ class ClassSetup(RunSetup[DataSource]):
         """Words of ``sd2 classify train`` for all that differs from the defaults."""
         values = self._values
         command = Train(
-            data=self._sources,
-            out=out,
-            maps=values["maps"],
-            seed=values["seed"],
-            **self._network,
+            data=self._sources, out=out, maps=values["maps"], seed=values["seed"], **self._network
         )
         # Named even where they are the default: one looks for them.
         return words_of("classify train", command, ("model", "steps"))

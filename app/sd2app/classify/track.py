@@ -73,10 +73,7 @@ class ClassTrack(BackgroundModel):
     changed = Signal()  # probabilities of frames
 
     def __init__(
-        self,
-        counts: Callable[[MapModel], bool],
-        results: ByteBudget,
-        parent: QObject | None = None,
+        self, counts: Callable[[MapModel], bool], results: ByteBudget, parent: QObject | None = None
     ) -> None:
         super().__init__(parent)
         self._counts, self._results = counts, results

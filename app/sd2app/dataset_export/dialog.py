@@ -6,14 +6,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QPixmap
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QLabel,
-    QLineEdit,
-    QProgressBar,
-    QScrollArea,
-    QWidget,
-)
+from PySide6.QtWidgets import QFileDialog, QLabel, QLineEdit, QProgressBar, QScrollArea, QWidget
 
 from sd2app.dataset_export.model import MAPS, ExportModel
 from sd2app.dataset_export.text import inertial_words, label_words, size_words, split_words

@@ -86,11 +86,7 @@ class DenoisedMap(BackgroundModel):
     _stumbled = Signal(str)
 
     def __init__(
-        self,
-        track: MapModel,
-        session: Session,
-        view: Callable[[], View],
-        parent: QObject,
+        self, track: MapModel, session: Session, view: Callable[[], View], parent: QObject
     ) -> None:
         super().__init__(parent)
         self.track, self._synthetic = track, session.maps.synthetic
@@ -503,10 +499,7 @@ def touched(piece: View, frames: int) -> slice:
 
 
 def cut_out(
-    doppler: DopplerMap,
-    start: int,
-    values: NDArray[np.float32],
-    limbs: LimbMaps | None = None,
+    doppler: DopplerMap, start: int, values: NDArray[np.float32], limbs: LimbMaps | None = None
 ) -> DopplerMap:
     """Part of a map, with other values (bins, frames), and its split."""
     inside = replace(doppler, uncertainty=None, limbs=None).between(start, start + values.shape[1])

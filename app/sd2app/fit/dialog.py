@@ -244,10 +244,7 @@ class NewFromVideoDialog(Dialog):
         form = form_of(
             ("Video", row_of((self._video, 1), self._other_video, spacing_px=8)),
             ("Person", row_of((self._person, 1), self._clear, self._everybody, spacing_px=8)),
-            (
-                "",
-                _hint("Of several: drag a rectangle around one, or see who is there."),
-            ),
+            ("", _hint("Of several: drag a rectangle around one, or see who is there.")),
             ("", self._people),
             ("Body height", side_by_side(self._known, self._stature)),
             ("", self._scale),

@@ -308,10 +308,7 @@ class LabelsFeature(Feature):
 
     def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
         """Labels with their keys, and tracks."""
-        return {
-            "label keys": self._fill_keys,
-            "tracks": lambda menu: TrackMenu(menu, self.model),
-        }
+        return {"label keys": self._fill_keys, "tracks": lambda menu: TrackMenu(menu, self.model)}
 
     def _fill_keys(self, menu: QMenu) -> None:
         keys = LabelActions(self.edits, self._use_label, menu, self._shell.dialog_parent)

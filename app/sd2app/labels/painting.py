@@ -177,11 +177,7 @@ def paint_tracks(
 
 
 def _paint_names(
-    painter: QPainter,
-    model: LabelsModel,
-    rows: Sequence[TrackRow],
-    palette: Palette,
-    foreign: str,
+    painter: QPainter, model: LabelsModel, rows: Sequence[TrackRow], palette: Palette, foreign: str
 ) -> None:
     room_px = GUTTER_PX - 11
     names = [foreign] if foreign and len(rows) == 1 else [row.name for row in rows]

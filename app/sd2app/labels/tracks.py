@@ -5,14 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from PySide6.QtGui import QAction, QActionGroup
-from PySide6.QtWidgets import (
-    QCheckBox,
-    QFormLayout,
-    QInputDialog,
-    QLineEdit,
-    QMenu,
-    QWidget,
-)
+from PySide6.QtWidgets import QCheckBox, QFormLayout, QInputDialog, QLineEdit, QMenu, QWidget
 
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits

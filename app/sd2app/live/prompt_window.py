@@ -258,10 +258,7 @@ class PromptWindow(QWidget):
         shares = (0.44, 0.36, 0.2) if count else (0.4, 0.0, 0.6) if text else (1.0, 0.0, 0.0)
         top = room.top()
         for words, share, size in zip(
-            (headline(self._model), count, text),
-            shares,
-            (_HEAD, _COUNT, _DETAIL),
-            strict=True,
+            (headline(self._model), count, text), shares, (_HEAD, _COUNT, _DETAIL), strict=True
         ):
             part = QRectF(room.left(), top, room.width(), share * room.height())
             self._write(painter, part, words, size * height, _WRAPPED, bold=size != _DETAIL)

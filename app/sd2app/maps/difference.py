@@ -105,10 +105,7 @@ class DifferenceModel(QObject):
         return 100.0 * 10.0 ** (levels.high_db / 10.0), "%"
 
     def shades(
-        self,
-        denoised: NDArray[np.float32],
-        real: NDArray[np.float32],
-        levels: HeatmapLevels,
+        self, denoised: NDArray[np.float32], real: NDArray[np.float32], levels: HeatmapLevels
     ) -> NDArray[np.float32]:
         """Difference of values (bins, n) each, from −1 to 1; zero where one says nothing."""
         difference = self._shade(denoised, levels) - self.real.shade(real, levels)

@@ -35,11 +35,7 @@ _ABOUT = "The map on screen as .npz with all that it was made from and with."
 
 
 def export_map(
-    title: str,
-    name: str,
-    line: Callable[[str], str],
-    write: Callable[[Path], object],
-    shell: Shell,
+    title: str, name: str, line: Callable[[str], str], write: Callable[[Path], object], shell: Shell
 ) -> None:
     """Show the dialog, and write the map where it was accepted.
 

@@ -46,10 +46,7 @@ class ComparedPicture(Canvas):
         # With a video the picture is what one waits for.
         clock = session.playback if session.video.reader is None else session.video
         self.follow(
-            comparison.changed,
-            session.display.theme_changed,
-            overlay.changed,
-            clock.frame_changed,
+            comparison.changed, session.display.theme_changed, overlay.changed, clock.frame_changed
         )
 
     def paint(self, painter: QPainter) -> None:

@@ -54,11 +54,7 @@ class Navigator:
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        edits: Edits,
-        pick: Callable[[int], None],
-        changed: Callable[[], None],
+        self, scene: Scene, edits: Edits, pick: Callable[[int], None], changed: Callable[[], None]
     ) -> None:
         self._scene, self._edits = scene, edits
         self._pick, self._changed = pick, changed

@@ -129,9 +129,7 @@ class ImageBackend(QWidget):
         if factor == 1:
             return picture.copy()
         return picture.scaled(
-            target,
-            Qt.AspectRatioMode.IgnoreAspectRatio,
-            Qt.TransformationMode.SmoothTransformation,
+            target, Qt.AspectRatioMode.IgnoreAspectRatio, Qt.TransformationMode.SmoothTransformation
         )
 
 

@@ -112,9 +112,7 @@ class Scene:
         self._stale_colours = True
 
     def set_scattering(
-        self,
-        velocity_mps: NDArray[np.floating] | None,
-        visible: NDArray[np.bool_] | None,
+        self, velocity_mps: NDArray[np.floating] | None, visible: NDArray[np.bool_] | None
     ) -> None:
         """Radial velocity and visibility of the frame's vertices, (V,) each; None if unknown."""
         self.change_colours(

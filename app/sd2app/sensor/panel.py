@@ -27,10 +27,7 @@ _CLUTTER_TEXT = {
     "none": "keep",
 }
 _LIMITS: dict[str, tuple[str, Callable[[RadarConfig], str]]] = {
-    "λ": (
-        "Wavelength at the centre frequency",
-        lambda radar: f"{1e3 * radar.wavelength_m:.2f} mm",
-    ),
+    "λ": ("Wavelength at the centre frequency", lambda radar: f"{1e3 * radar.wavelength_m:.2f} mm"),
     "v max": (
         "Largest unambiguous velocity, λ / 4 T_c",
         lambda radar: f"±{radar.v_max_mps:.2f} m/s",

@@ -51,11 +51,7 @@ class MeshReader(QObject):
         self._take: Callable[[ReadMesh], object] = self._tell  # what is done with the next one
         self._refuse: Callable[[Exception], object] = self._say
         self._runner = ListedRunner(
-            "mesh",
-            jobs,
-            self,
-            lambda read: self._take(read),
-            lambda error: self._refuse(error),
+            "mesh", jobs, self, lambda read: self._take(read), lambda error: self._refuse(error)
         )
 
     def reset(self, read: ReadMesh) -> None:

@@ -8,14 +8,7 @@ from itertools import chain
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeyEvent, QKeySequence, QPalette
-from PySide6.QtWidgets import (
-    QHeaderView,
-    QMainWindow,
-    QMenu,
-    QTreeWidget,
-    QTreeWidgetItem,
-    QWidget,
-)
+from PySide6.QtWidgets import QHeaderView, QMainWindow, QMenu, QTreeWidget, QTreeWidgetItem, QWidget
 
 from sd2app.widgets.dialogs import Dialog
 from sd2app.widgets.inputs import SearchLine

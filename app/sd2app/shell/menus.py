@@ -151,11 +151,7 @@ class Menus:
     """Makes the Qt actions, keeps them enabled and checked as the features say."""
 
     def __init__(
-        self,
-        window: QMainWindow,
-        session: Session,
-        actions: Iterable[Action],
-        keys: KeyBindings,
+        self, window: QMainWindow, session: Session, actions: Iterable[Action], keys: KeyBindings
     ) -> None:
         self._window, self._session, self._keys = window, session, keys
         self._rows = {row.id: row for row in actions}
@@ -187,10 +183,7 @@ class Menus:
             give_mnemonics(menu)
 
     def _fill(
-        self,
-        menu: QMenu,
-        entries: Iterable[str],
-        fillers: Mapping[str, Callable[[QMenu], object]],
+        self, menu: QMenu, entries: Iterable[str], fillers: Mapping[str, Callable[[QMenu], object]]
     ) -> None:
         menu.setToolTipsVisible(True)
         for entry in entries:

@@ -18,12 +18,7 @@ _MAX_SHARE = 0.44
 _EDGES_PX = 2
 _BESIDE_FROM_PX, _WORDED_FROM_PX = 1100, 1200
 """Widths of the window that have room for a panel beside the maps, and for words at its icons."""
-_PLACED_AGAIN = {
-    QEvent.Type.Resize,
-    QEvent.Type.Move,
-    QEvent.Type.Show,
-    QEvent.Type.LayoutRequest,
-}
+_PLACED_AGAIN = {QEvent.Type.Resize, QEvent.Type.Move, QEvent.Type.Show, QEvent.Type.LayoutRequest}
 
 
 class SideDock(QObject):

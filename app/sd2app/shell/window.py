@@ -276,10 +276,7 @@ class MainWindow(QMainWindow):
     def _show_panes(self) -> None:
         """Show the panes of the layout that have content."""
         document, filmed = self.session.document, self.session.video.picture is not None
-        there = {
-            "video": filmed or document.video is not None,
-            "scene": document.mesh is not None,
-        }
+        there = {"video": filmed or document.video is not None, "scene": document.mesh is not None}
         shown = {name: there[name] and self.session.layouts.shows(name) for name in there}
         for name, is_shown in shown.items():
             self._panels[name].setVisible(is_shown)

@@ -115,12 +115,7 @@ class Features:
         )
         self.dataset_export = DatasetExportFeature(session, shell, parent)
         self.batch = BatchFeature(
-            session,
-            shell,
-            self.sensor.placements,
-            denoise.model,
-            parts.batch_command,
-            parent,
+            session, shell, self.sensor.placements, denoise.model, parts.batch_command, parent
         )
         self.commands = CommandsFeature(session, shell, parent)
         self.figures = FiguresFeature(

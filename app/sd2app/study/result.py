@@ -136,10 +136,7 @@ def _of_study(path: Path, content: Mapping[str, Any]) -> ClassResult:
 
 
 def _matrix(
-    title: str,
-    seeds: Sequence[NDArray[np.int64]],
-    classes: tuple[str, ...],
-    plain: Sequence[float],
+    title: str, seeds: Sequence[NDArray[np.int64]], classes: tuple[str, ...], plain: Sequence[float]
 ) -> Matrix:
     each = np.array([shares(counts) for counts in seeds])
     if each.shape[1:] != (len(classes), len(classes)):

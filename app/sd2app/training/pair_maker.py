@@ -33,10 +33,7 @@ class PairMaker(QObject):
     failed = Signal(str)  # why there is none
 
     def __init__(
-        self,
-        folder: Path,
-        parent: QObject | None = None,
-        command: Sequence[str] = COMMAND,
+        self, folder: Path, parent: QObject | None = None, command: Sequence[str] = COMMAND
     ) -> None:
         super().__init__(parent)
         self._folder = folder

@@ -16,13 +16,7 @@ from sd2app.training.model import TrainingModel
 from sd2app.training.result import ModelAdoption, gain_rows, gain_summary
 from sd2app.training.run import TrainingHistory, TrainingMonitor
 from sd2app.training.setup_view import TrainingSetupView
-from sd2app.training.text import (
-    about_text,
-    headline,
-    metric_rows,
-    point_text,
-    remedy_text,
-)
+from sd2app.training.text import about_text, headline, metric_rows, point_text, remedy_text
 from sd2app.widgets.canvas import tick_text
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.dialogs import ask_folder

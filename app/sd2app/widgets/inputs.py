@@ -26,13 +26,7 @@ from sd2core.files.quantities import parse_quantity
 from sd2core.options.records import OptionRecord, option_named
 
 _ENDING_KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Return, Qt.Key.Key_Enter)
-_STEP_KEYS = (
-    Qt.Key.Key_Up,
-    Qt.Key.Key_Down,
-    Qt.Key.Key_PageUp,
-    Qt.Key.Key_PageDown,
-    *_ENDING_KEYS,
-)
+_STEP_KEYS = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown, *_ENDING_KEYS)
 
 _PLAIN = (
     Qt.KeyboardModifier.NoModifier,

@@ -40,9 +40,7 @@ def map_and_file_rows(
             yield "File", f"{path} (not there any more)"
 
 
-def about_sections(
-    content: Mapping[str, Any],
-) -> Iterator[tuple[str, list[tuple[str, str]]]]:
+def about_sections(content: Mapping[str, Any]) -> Iterator[tuple[str, list[tuple[str, str]]]]:
     """Notes of a model's makers by heading, limits and measurements first."""
     first = [name for name in ("limits", "metrics", "data", "command") if name in content]
     for name in dict.fromkeys([*first, *content]):
