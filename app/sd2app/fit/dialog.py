@@ -240,11 +240,11 @@ class NewFromVideoDialog(Dialog):
         self._message = sentence("")
 
     def _lay_out(self) -> None:
-        self._scale = _hint("")
+        self._scale = sentence("")
         form = form_of(
             ("Video", row_of((self._video, 1), self._other_video, spacing_px=8)),
             ("Person", row_of((self._person, 1), self._clear, self._everybody, spacing_px=8)),
-            ("", _hint("Of several: drag a rectangle around one, or see who is there.")),
+            ("", sentence("Of several: drag a rectangle around one, or see who is there.")),
             ("", self._people),
             ("Body height", side_by_side(self._known, self._stature)),
             ("", self._scale),
@@ -327,10 +327,3 @@ class NewFromVideoDialog(Dialog):
         start = str(self.setup.choices.folder)
         if folder := ask_new(self, "Save recording as", start, "Recording (*.sd2)"):
             self.setup.change(folder=folder)
-
-
-def _hint(text: str) -> QLabel:
-    label = QLabel(text)
-    label.setObjectName("muted")
-    label.setWordWrap(True)
-    return label

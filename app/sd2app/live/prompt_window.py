@@ -149,7 +149,8 @@ class PromptWindow(QWidget):
 
     def _refresh(self) -> None:
         words = [progress_text(self._model), headline(self._model), detail(self._model)]
-        self._animate(self._picture())
+        if bool(gesture := self._picture()) != self._clock.isActive():
+            self._clock.start() if gesture else self._clock.stop()
         self._full.setVisible(not self._prompts)
         if shown := asks_consent(self._model):
             words.append(self._model.consent)
@@ -170,10 +171,6 @@ class PromptWindow(QWidget):
         if step is None or self._model.state != "running" or step.phase in ("consent", "ready"):
             return ""
         return step.gesture if has_picture(step.gesture) else ""
-
-    def _animate(self, gesture: str) -> None:
-        if bool(gesture) != self._clock.isActive():
-            self._clock.start() if gesture else self._clock.stop()
 
     def _turn_full(self) -> None:
         self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)

@@ -68,6 +68,13 @@ class MainWindow(QMainWindow):
     keys: KeyBindings
     side: SidePanel
     maps: MapStack
+    # Of the shell, what others do for it.
+    note: Callable[[str], None]
+    warn: Callable[[str], None]
+    fold_side: Callable[[bool], None]
+    save: Callable[[], bool]
+    may_discard: Callable[[], bool]
+    open_paths: Callable[[Sequence[Path]], None]
 
     def __init__(self, settings: Settings, parts: Parts | None = None) -> None:
         super().__init__()
@@ -132,9 +139,12 @@ class MainWindow(QMainWindow):
 
         self._drops = DropOverlay(self._centre)
         self.messages = MessagesModel(self)
+        self.note, self.warn = self.messages.note, self.messages.warn
         self.session = s = build_session(self, self._settings)
         s.display.set_dark(is_dark(self._settings.dark))
         self.features = Features(s, self, self._parts, self)
+        files = self.features.files
+        self.save, self.may_discard, self.open_paths = files.save, files.may_discard, files.open
         self._offered = {feature: feature.actions() for feature in self.features}
         actions = in_order(chain.from_iterable(self._offered.values()))
         self.keys = KeyBindings(actions, self.features.labels.model, self._settings, self)
@@ -203,6 +213,7 @@ class MainWindow(QMainWindow):
         assert isinstance(edge, MapEdge)
         self._edge = edge
         self.side = SidePanel(side_pages(self.features, views), self._menus["pane_over"])
+        self.fold_side = self.side.set_folded
         fill(self._panels["side"], self.side)
         self._dock = SideDock(
             self._panels["side"], self._across, self.side, {"Labels": _LABELS_PX}, self._settings,
@@ -347,14 +358,6 @@ class MainWindow(QMainWindow):
         """Menu of the actions that stand at a place of their own, such as spans."""
         return self._menus.elsewhere[place]
 
-    def note(self, text: str) -> None:
-        """Tell the user about something that was done."""
-        self.messages.note(text)
-
-    def warn(self, text: str) -> None:
-        """Tell the user about something that went wrong."""
-        self.messages.warn(text)
-
     def show_messages(self) -> None:
         """Show what was said so far."""
         accepted(MessagesDialog(self.messages, self))
@@ -379,10 +382,6 @@ class MainWindow(QMainWindow):
         """True while the panel at the side is folded away."""
         return self.side.folded
 
-    def fold_side(self, folded: bool) -> None:
-        """Fold the panel at the side away, or bring it back."""
-        self.side.set_folded(folded)
-
     @property
     def starts(self) -> bool:
         """True while the start page is on screen."""
@@ -392,18 +391,6 @@ class MainWindow(QMainWindow):
         """Show the start page over what is open, or what is open again."""
         self._asks_start = shown
         self._start_or_views.start()
-
-    def save(self) -> bool:
-        """Save the recording, asking where if need be; False where the user cancels."""
-        return self.features.files.save()
-
-    def may_discard(self) -> bool:
-        """True once unsaved edits are saved or given up by the user's decision."""
-        return self.features.files.may_discard()
-
-    def open_paths(self, paths: Sequence[Path]) -> None:
-        """Open files in place of what is open."""
-        self.features.files.open(paths)
 
     # --- Qt events ------------------------------------------------------------------------
 

@@ -44,12 +44,7 @@ def about_sections(content: Mapping[str, Any]) -> Iterator[tuple[str, list[tuple
     """Notes of a model's makers by heading, limits and measurements first."""
     first = [name for name in ("limits", "metrics", "data", "command") if name in content]
     for name in dict.fromkeys([*first, *content]):
-        yield _heading(name), list(_lines(content[name]))
-
-
-def _heading(name: str) -> str:
-    text = name.replace("_", " ").strip()
-    return capitalised(text)
+        yield capitalised(name.replace("_", " ").strip()), list(_lines(content[name]))
 
 
 def _lines(value: Any, prefix: str = "") -> Iterator[tuple[str, str]]:
