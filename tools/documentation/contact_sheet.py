@@ -15,7 +15,7 @@ from PySide6.QtGui import QColor, QPainter, QPixmap
 from PySide6.QtWidgets import QApplication, QWidget
 
 from sd2app.palette import palette_for
-from sd2app.session.layouts import LAYOUTS
+from sd2app.session.display import LAYOUTS
 from sd2app.shell.window import MainWindow
 from sd2app.widgets.panel import InnerPages
 from sd2core.files.resources import resource_path

@@ -8,9 +8,8 @@ import numpy as np
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.session.content import reference_of
-from sd2app.session.display import DisplayModel
+from sd2app.session.display import DisplayModel, Layouts
 from sd2app.session.document import DocumentModel
-from sd2app.session.layouts import Layouts
 from sd2app.session.maps import MapModel, PointerModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.sensor import SensorModel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QTabBar, QWidget
 
-from sd2app.session.layouts import LAYOUTS, Layouts
+from sd2app.session.display import LAYOUTS, Layouts
 
 
 class LayoutTabs(QTabBar):

@@ -13,7 +13,7 @@ from sd2app.labels.marking import LONGEST_MS, Reaction
 from sd2app.manual.help import with_help
 from sd2app.manual.pages import FIRST_FIVE_MINUTES, INDEX
 from sd2app.manual.window import ManualOpener
-from sd2app.session.layouts import LAYOUTS
+from sd2app.session.display import LAYOUTS
 from sd2app.session.session import Session
 from sd2app.settings import Settings
 from sd2app.shell.action_search import ActionSearch

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QSignalBlocker
 from PySide6.QtWidgets import QSplitter, QWidget
 
-from sd2app.session.layouts import Layouts
+from sd2app.session.display import Layouts
 from sd2app.settings import Settings
 from sd2app.shell.side_panel import SidePanel
 from sd2app.widgets.layouts import ANY_WIDTH_PX

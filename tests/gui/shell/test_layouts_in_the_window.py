@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QApplication, QSlider
 from window_models import models_of
 
 from sd2app.maps.level_bar import ColourScale
-from sd2app.session.layouts import LAYOUTS
+from sd2app.session.display import LAYOUTS
 from sd2app.settings import Settings
 from sd2app.shell.layout_tabs import LayoutTabs
 from sd2app.shell.parts import Parts

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from sd2app.session.layouts import LAYOUTS
+from sd2app.session.display import LAYOUTS
 from sd2app.widgets.panel import InnerPages
 
 _FRAME_PX, _ARROWS_PX = 6, 18
