@@ -16,7 +16,7 @@ from guide_pages import REPOSITORY, sd2_arguments
 from parsers import arguments_of, options_of
 
 from sd2app.command_line import full_parser
-from sd2app.manual.markup import commands_of
+from sd2app.manual.pages import commands_of
 from sd2core.cli.running import attach_negative_values
 from sd2core.errors import Sd2Error
 from sd2core.options.records import flag

@@ -11,7 +11,7 @@ from guide_pages import REPOSITORY, Page, pages_to_follow, sd2_arguments
 from named_commands import PARSER, fault_of, parsers_of
 from parsers import arguments_of
 
-from sd2app.manual.markup import commands_of
+from sd2app.manual.pages import commands_of
 from sd2core.cli.running import attach_negative_values
 
 COMMAND_PAGES = REPOSITORY / "docs" / "commands"

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from sd2app.command_line import full_parser
-from sd2app.manual.markup import commands_of
+from sd2app.manual.pages import commands_of
 
 WIDTH = 74  # columns of a usage line
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from parsers import arguments_of, groups_of, options_of
 
 from sd2app.command_line import full_parser
-from sd2app.manual.markup import commands_of
+from sd2app.manual.pages import commands_of
 from sd2core.cli.output_folders import OUTPUTS
 
 WITHOUT_FACTS = {"labels figure", "strip", "warm-up", "fetch-models", "open", "demo"}

@@ -13,7 +13,7 @@ import pytest
 from cli_outcome import Sd2
 from parsers import arguments_of
 
-from sd2app.manual.markup import commands_of
+from sd2app.manual.pages import commands_of
 from sd2core.cli import build_parser, run
 from sd2core.cli.running import attach_negative_values
 from sd2core.errors import Sd2Error

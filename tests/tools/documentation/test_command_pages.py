@@ -9,7 +9,7 @@ import pytest
 from named_commands import PARSER
 from parsers import arguments_of
 
-from sd2app.manual.markup import commands_of
+from sd2app.manual.pages import commands_of
 from tools.documentation.command_pages import _sections, write_command_pages
 
 
