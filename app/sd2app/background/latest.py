@@ -166,3 +166,14 @@ class ReportingModel(BackgroundModel):
 
     def _fail(self, error: Exception) -> None:
         self.failed.emit(str(error))
+
+
+class ProblemModel(BackgroundModel):
+    """One that keeps why its work failed."""
+
+    changed = Signal()
+    problem = ""  # why it failed; empty where it did not
+
+    def _refuse(self, error: Exception) -> None:
+        self.problem = str(error)
+        self.changed.emit()

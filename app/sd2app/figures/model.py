@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import BackgroundModel, Emit, LatestRunner
+from sd2app.background.latest import Emit, LatestRunner, ProblemModel
 from sd2app.background.quoting import quoted
 from sd2app.maps.difference import DifferenceModel
 from sd2app.session.content import UNTITLED, Content
@@ -42,13 +42,12 @@ Plot = Callable[[Emit], "Figure"]
 Save = Callable[["Figure", Path], None]
 
 
-class DrawnFigure(BackgroundModel):
+class DrawnFigure(ProblemModel):
     """Draws what is chosen in the background; the newest choice wins.
 
     ``choice`` is a frozen record; a figure says in :meth:`_recipe` how it is drawn and saved.
     """
 
-    changed = Signal()  # a choice, or drawing began or ended
     drawn = Signal()  # another preview
     written = Signal(object)  # Path
 
@@ -56,7 +55,6 @@ class DrawnFigure(BackgroundModel):
         super().__init__(parent)
         self.choice = choice
         self.picture: NDArray[np.uint8] | None = None  # the preview, RGBA of shape (H, W, 4)
-        self.problem = ""  # why the figure cannot be drawn
         self.exporting = False  # the figure is being written
         self._runner = LatestRunner(name, self, self._receive, self._refuse)
         self._runner.idle_changed.connect(lambda _: self.changed.emit())
@@ -121,8 +119,7 @@ class DrawnFigure(BackgroundModel):
     def _refuse(self, error: Exception) -> None:
         self._runner.cancel()
         self.exporting = False
-        self.problem = str(error)
-        self.changed.emit()
+        super()._refuse(error)
 
 
 @dataclass(frozen=True)

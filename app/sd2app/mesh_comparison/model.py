@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import Signal
 
-from sd2app.background.latest import BackgroundModel, Emit
+from sd2app.background.latest import Emit, ProblemModel
 from sd2app.background.quoting import quoted
 from sd2app.session.content import UNTITLED, reference_of
 from sd2app.session.maps import MapModel
@@ -28,20 +27,17 @@ JOINT = "hand.R"
 """Joint whose curves are shown at first."""
 
 
-class ComparisonModel(BackgroundModel):
+class ComparisonModel(ProblemModel):
     """Two meshes: number 0 is the recording's, number 1 the other.
 
     Others read the attributes; the methods change them.
     """
-
-    changed = Signal()  # result, reference, joint, or computing began or ended
 
     def __init__(self, session: Session, other: Path) -> None:
         super().__init__()
         self._session, self._other = session, other
         self.reference = 0  # number of the mesh that the other is measured against
         self.joint = JOINT  # the one whose velocity is shown
-        self.problem = ""  # why the meshes cannot be compared
         self.comparison: Comparison | None = None
         self._meshes: tuple[MeshSequence, MeshSequence] | None = None  # that it is of
         self.tracks = (MapModel("", self), MapModel("", self))
@@ -169,10 +165,6 @@ class ComparisonModel(BackgroundModel):
             track.set_status("reference" if is_reference else f"relative L1 {l1:.2f}")
             track.set_map(comparison.maps[number])
             track.set_reference(top)  # one level for both
-        self.changed.emit()
-
-    def _refuse(self, error: Exception) -> None:
-        self.problem = str(error)
         self.changed.emit()
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 
-from sd2app.background.latest import BackgroundModel, LatestRunner
+from sd2app.background.latest import LatestRunner, ProblemModel
 from sd2app.background.quoting import quoted
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
@@ -17,17 +17,14 @@ from sd2core.options.records import words_of
 _SURE = 0.99
 
 
-class AlignmentModel(BackgroundModel):
+class AlignmentModel(ProblemModel):
     """Looks in the background for the offset at which the maps on screen fit."""
-
-    changed = Signal()
 
     def __init__(self, session: Session, synthesis: SynthesisModel, parent: QObject) -> None:
         super().__init__(parent)
         self._session, self._synthesis = session, synthesis
         self.within_s = WITHIN_S  # how far is searched
         self.found: Alignment | None = None
-        self.problem = ""  # why nothing can be applied
         self._runner = LatestRunner("alignment", self, self._take, self._refuse)
 
     @property
@@ -87,10 +84,6 @@ class AlignmentModel(BackgroundModel):
 
     def _take(self, found: Any) -> None:
         self.found, self.problem = found, found.problem
-        self.changed.emit()
-
-    def _refuse(self, error: Exception) -> None:
-        self.problem = str(error)
         self.changed.emit()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import BackgroundModel, Emit, LatestRunner, ReportingModel
+from sd2app.background.latest import Emit, LatestRunner, ProblemModel, ReportingModel
 from sd2app.session.playback import PlaybackModel
 from sd2core.io.video import VideoReader, open_video
 
@@ -73,15 +73,13 @@ class VideoModel(ReportingModel):
             self._request(self._wanted)
 
 
-class VideoFrames(BackgroundModel):
+class VideoFrames(ProblemModel):
     """Opens a video and decodes the frame that is asked for, both in the background."""
 
-    changed = Signal()  # the frame, or the video's presence
     picture_changed = Signal()
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self.problem = ""  # why the video cannot be shown
         self.frame = 0  # the one to look at
         self.picture: NDArray[np.uint8] | None = None  # RGB, (H, W, 3)
         self.reader: VideoReader | None = None
@@ -150,7 +148,3 @@ class VideoFrames(BackgroundModel):
     def _take_picture(self, picture: Any) -> None:
         self.picture = picture
         self.picture_changed.emit()
-
-    def _refuse(self, error: Exception) -> None:
-        self.problem = str(error)
-        self.changed.emit()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 
-from sd2app.background.latest import BackgroundModel, LatestRunner
+from sd2app.background.latest import LatestRunner, ProblemModel
 from sd2app.background.quoting import quoted
 from sd2app.labels.edits import LabelEdits
 from sd2app.session.maps import MapModel
@@ -17,15 +17,13 @@ from sd2core.labels.spans import Labels, Span
 from sd2core.labels.suggest import LABEL
 
 
-class SuggestionsModel(BackgroundModel):
+class SuggestionsModel(ProblemModel):
     """Suggested spans to be accepted or rejected; the spans themselves are among the labels.
 
     Another threshold takes the place of the step before as long as nothing else was done, so
     that trying thresholds is one step. What was rejected does not come again while the
     recording is open. The first of ``finders`` is the default.
     """
-
-    changed = Signal()  # use of suggestions, their number, or their source
 
     def __init__(self, edits: LabelEdits, finders: Sequence[SpanFinder], parent: QObject) -> None:
         super().__init__(parent)
@@ -37,11 +35,10 @@ class SuggestionsModel(BackgroundModel):
         self._wanted = False
         self._thresholds = {finder.title: finder.threshold.usual for finder in finders}
         self._if_none = ""
-        self._problem = ""
         self._why_not = ""  # of the finder, when it was last looked at
         self._declined: tuple[Span, ...] = ()
         self._made: tuple[Labels, int] | None = None
-        self._runner = LatestRunner("suggest", self, self._receive, self._fail)
+        self._runner = LatestRunner("suggest", self, self._receive, self._refuse)
         self._runner.idle_changed.connect(lambda _: self.changed.emit())
         self._labels.changed.connect(self._follow)
         self._labels.selection_changed.connect(self.changed)
@@ -74,11 +71,11 @@ class SuggestionsModel(BackgroundModel):
     @property
     def text(self) -> str:
         """State of the search, as a sentence."""
-        source, why_not = self.finder.source, self._problem or self.finder.why_not
+        source, why_not = self.finder.source, self.problem or self.finder.why_not
         to_decide = f"{counted(len(self.pending), 'suggestion')} to decide on"
         if why_not or source is None:
             # Those of a file can be decided on before their map is there.
-            return to_decide if self.pending and not self._problem else why_not
+            return to_decide if self.pending and not self.problem else why_not
         if self._wanted:
             title = source.title.lower()
             waits = source.covered is not None
@@ -132,7 +129,7 @@ class SuggestionsModel(BackgroundModel):
 
     def open(self) -> None:
         """Forget everything about the recording before."""
-        self._declined, self._made, self._if_none, self._problem = (), None, "", ""
+        self._declined, self._made, self._if_none, self.problem = (), None, "", ""
         for finder in self.finders:
             finder.set_source(None)
         self._runner.cancel()
@@ -194,7 +191,7 @@ class SuggestionsModel(BackgroundModel):
     # --- looking --------------------------------------------------------------------------
 
     def _look(self) -> None:
-        self._problem = self._if_none = ""
+        self.problem = self._if_none = ""
         if not self.active or self.finder.why_not:
             self._runner.cancel()
             self._wanted = False
@@ -228,10 +225,6 @@ class SuggestionsModel(BackgroundModel):
         after = self._labels.labels
         self._made = (after, self._stack.index()) if after is not before else None
         self._go_on(self._playback.time_s)
-        self.changed.emit()
-
-    def _fail(self, error: Exception) -> None:
-        self._problem = str(error)
         self.changed.emit()
 
     def _follow(self) -> None:
