@@ -11,8 +11,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.text import ago_text, delay_text, reading_text
 from sd2app.classify.track import ClassReading
-from sd2app.labels.arrays import UNKNOWN_COLOUR
-from sd2app.labels.model import LabelsModel
+from sd2app.labels.model import UNKNOWN_COLOUR, LabelsModel
 from sd2app.maps.track_mouse import SeekingPlot, ZoomedPlot
 from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session

@@ -1,16 +1,164 @@
-"""Labels of the open recording, with selection, current track and label, and marks in progress."""
+"""Labels of the open recording: spans, also as arrays, selection, current track, and marks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.labels.arrays import UNKNOWN_COLOUR, SpanArrays
+from sd2core.labels.formats.lanes import apart
 from sd2core.labels.spans import Labels, LabelTrack, Span
+from sd2core.labels.suggest import LABEL as UNNAMED
 from sd2core.labels.suggest import TRACK as SUGGESTIONS
+
+WIDE_PX = 4.0
+"""Smallest width of a span with a box of its own."""
+_SEEN = 1e-3
+UNKNOWN_COLOUR = "#8a8f98"
+"""Colour of labels outside the label set."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpanColumns:
+    """Spans in view at some scale."""
+
+    wide: NDArray[np.int64]  # rows of SpanArrays wide enough for a box of their own, in order
+    share: NDArray[np.float32]  # (lanes, columns): part of a column covered by narrow spans
+    tone: NDArray[np.int64]  # (lanes, columns): colour of those that cover most of it
+    selected: NDArray[np.bool_]  # (lanes, columns): True where one of them is selected
+
+
+@dataclass(frozen=True, eq=False)
+class SpanArrays:
+    """All spans, one row each, in the order of labels."""
+
+    spans: tuple[Span, ...]
+    starts_s: NDArray[np.float64]
+    ends_s: NDArray[np.float64]
+    ids: NDArray[np.int64]
+    tracks: NDArray[np.int64]
+    lanes: NDArray[np.int64]  # lane within the track
+    tones: NDArray[np.int64]  # number of the colour
+    lanes_of_track: tuple[int, ...]  # lanes per track: more than one where spans overlap
+    colours: tuple[str, ...]  # #rrggbb; the last is for labels outside the label set
+
+    @classmethod
+    def of(cls, labels: Labels) -> SpanArrays:
+        """Make the arrays of labels."""
+        offered = labels.label_set.labels
+        # A class looks like the first of its labels; a label's own name goes before that.
+        tone_of = {
+            name: number
+            for names in ("gesture_class", "name")
+            for number, one in reversed(tuple(enumerate(offered)))
+            if (name := getattr(one, names))
+        }
+        track_of = {one.name: number for number, one in enumerate(labels.tracks)}
+        facts = [
+            (one.start_s, one.end_s, one.id, track_of[one.track], tone_of.get(one.label, -1))
+            for one in labels.spans
+        ]
+        columns = np.array(facts, np.float64).reshape(-1, 5).T
+        ids, tracks, tones = columns[2:].astype(np.int64)
+        tones[tones < 0] = len(offered)
+        lanes = np.zeros(len(facts), np.int64)
+        counts = [1] * len(labels.tracks)
+        for number, track in enumerate(labels.tracks):
+            if track.overlap == "free":
+                rows = np.flatnonzero(tracks == number)
+                lanes[rows], counts[number] = _lanes([labels.spans[row] for row in rows])
+        colours = (*(one.colour for one in offered), UNKNOWN_COLOUR)
+        return cls(
+            labels.spans, columns[0], columns[1], ids, tracks, lanes, tones, tuple(counts), colours
+        )
+
+    @cached_property
+    def rows(self) -> NDArray[np.int64]:
+        """Lane of every span, counted over all tracks from the top."""
+        before = np.concatenate([[0], np.cumsum(self.lanes_of_track, dtype=np.int64)])
+        return before[self.tracks] + self.lanes
+
+    @cached_property
+    def ranks(self) -> Mapping[int, int]:
+        """Rank of every suggestion without a name, by its id: 1 is where most moves."""
+        unnamed = [one for one in self.spans if (one.label, one.origin) == (UNNAMED, "suggestion")]
+        surest_first = sorted(unnamed, key=lambda one: -(one.confidence or 0.0))
+        return {one.id: rank for rank, one in enumerate(surest_first, start=1)}
+
+    def rows_of(self, ids: Collection[int]) -> NDArray[np.int64]:
+        """Return the rows of the spans of some ids, in order."""
+        return np.flatnonzero(np.isin(self.ids, list(ids)))
+
+    def within(self, start_s: float, end_s: float) -> NDArray[np.int64]:
+        """Return the rows of spans that overlap an interval."""
+        return np.flatnonzero((self.starts_s < end_s) & (self.ends_s > start_s))
+
+    def columns(
+        self,
+        start_s: float,
+        end_s: float,
+        columns: int,
+        wide_columns: float,
+        chosen: NDArray[np.int64],
+        *,
+        together: bool = False,
+    ) -> SpanColumns:
+        """Compute the content of a time window in a number of columns.
+
+        Spans at least ``wide_columns`` wide get a box; narrower ones share columns. ``chosen`` are
+        the rows of the selected spans. ``together`` puts all tracks in one lane.
+        """
+        view = self.within(start_s, end_s)
+        per_s = columns / (end_s - start_s)
+        lefts = (self.starts_s[view] - start_s) * per_s
+        rights = (self.ends_s[view] - start_s) * per_s
+        wide = rights - lefts >= wide_columns
+        narrow, lefts, rights = view[~wide], lefts[~wide], rights[~wide]
+        lanes = 1 if together else sum(self.lanes_of_track)
+        rows = np.zeros(len(narrow), np.int64) if together else self.rows[narrow]
+        shape = lanes, len(self.colours), columns
+        by_tone = _held(rows * len(self.colours) + self.tones[narrow], lefts, rights, shape)
+        is_chosen = np.isin(narrow, chosen)
+        marked = _held(rows[is_chosen], lefts[is_chosen], rights[is_chosen], (lanes, 1, columns))
+        share = np.minimum(by_tone.sum(axis=1), 1.0).astype(np.float32)
+        return SpanColumns(view[wide], share, by_tone.argmax(axis=1), marked[:, 0] > 0)
+
+
+def _held(
+    rows: NDArray[np.int64],
+    lefts: NDArray[np.float64],
+    rights: NDArray[np.float64],
+    shape: tuple[int, int, int],
+) -> NDArray[np.float64]:
+    """Share of every column that spans cover from left to right, summed in each row."""
+    columns = shape[-1]
+    lefts, rights = np.clip(lefts, 0.0, columns), np.clip(rights, 0.0, columns)
+    first = np.minimum(lefts.astype(np.int64), columns - 1)
+    last = np.clip(np.ceil(rights).astype(np.int64) - 1, first, columns - 1)
+    # One column more, where what goes on until the last one ends.
+    line = rows * (columns + 1)
+    size = shape[0] * shape[1] * (columns + 1)
+    # What is too short to hold anything of its column is still seen.
+    at_first = np.maximum(np.minimum(rights, first + 1) - lefts, _SEEN)
+    at_last = np.where(last > first, rights - last, 0.0)
+    held = np.bincount(line + first, at_first, size) + np.bincount(line + last, at_last, size)
+    more = last > first + 1
+    begun = np.bincount((line + first + 1)[more], minlength=size)
+    ended = np.bincount((line + last)[more], minlength=size)
+    parted = *shape[:2], columns + 1
+    between = np.cumsum((begun - ended).reshape(parted), axis=-1)
+    return np.asarray(held.reshape(parted) + between, np.float64)[..., :-1]
+
+
+def _lanes(spans: list[Span]) -> tuple[list[int], int]:
+    """Lane of each span, and the number of lanes."""
+    found = apart(spans, lambda span: (span.start_s, span.end_s))
+    lane_of = {span.id: lane for lane, row in enumerate(found) for span in row}
+    return [lane_of[span.id] for span in spans], len(found)
 
 
 @dataclass(frozen=True)

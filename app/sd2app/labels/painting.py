@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QLineF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QPen
 
-from sd2app.labels.arrays import WIDE_PX, SpanArrays, SpanColumns
-from sd2app.labels.model import LabelsModel, Mark
+from sd2app.labels.model import WIDE_PX, LabelsModel, Mark, SpanArrays, SpanColumns
 from sd2app.maps.arrangement import BELOW_PX
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import AT_RIGHT, Overlay, clipped, image_of

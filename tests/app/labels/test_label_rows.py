@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from sd2app.labels.arrays import SpanArrays
-from sd2app.labels.model import Mark
+from sd2app.labels.model import Mark, SpanArrays
 from sd2app.labels.painting import ROW_PX, LabelRows
 from sd2core.labels.spans import Labels, LabelTrack, Span
 

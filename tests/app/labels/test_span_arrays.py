@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.labels.arrays import SpanArrays
+from sd2app.labels.model import SpanArrays
 from sd2core.labels.spans import Labels, LabelTrack, Span
 
 TRACKS = (LabelTrack("Left", "free"), LabelTrack("Right", "free"))
