@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from sd2app.batch.run import BatchMonitor, Failed
 from sd2app.batch.setup import Entry
-from sd2app.widgets.text import PHASES, about, bytes_text, counted, time_text
+from sd2app.widgets.run_text import PHASES, time_text
+from sd2app.widgets.text import about, bytes_text, counted
 
 if TYPE_CHECKING:
     from sd2core.batch.estimate import BatchEstimate, StepEstimate

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from sd2app.classify.run import ClassRun
 from sd2app.classify.track import ClassReading
 from sd2app.widgets.model_page import ModelPage, about_sections, map_and_file_rows, model_title
-from sd2app.widgets.text import PHASES
+from sd2app.widgets.run_text import PHASES
 from sd2core.classify.card import ClassifierCard
 
 MODEL_WORDS = {"lstm": "LSTM (the paper's)", "s4": "S4", "kernel": "kernel (few recordings)"}

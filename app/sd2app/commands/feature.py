@@ -18,7 +18,7 @@ from sd2app.session.session import Session
 from sd2app.widgets.dialogs import Dialog, take_room
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.run_panel import Button, RunPanel, RunView, RunWords
-from sd2app.widgets.text import PHASES
+from sd2app.widgets.run_text import PHASES
 
 
 class CommandRunView(RunView[AnyCommandRun]):

@@ -29,7 +29,8 @@ from sd2app.widgets.panel import (
     title,
 )
 from sd2app.widgets.run_panel import Button, RunPanel, RunView, RunWords
-from sd2app.widgets.text import PHASES, counted
+from sd2app.widgets.run_text import PHASES
+from sd2app.widgets.text import counted
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 
 _ABOUT = (

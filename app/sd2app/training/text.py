@@ -6,7 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from sd2app.training.run import EpochPoint, TrainingHistory, TrainingMonitor
-from sd2app.widgets.text import AT_WORK, PHASES, counted, error_text
+from sd2app.widgets.run_text import AT_WORK, PHASES
+from sd2app.widgets.text import counted, error_text
 
 if TYPE_CHECKING:
     from sd2core.train.data import Split

@@ -17,7 +17,7 @@ from sd2app.widgets.dialogs import may_delete
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ProgressBar, outlined, sentence, show_words, title
-from sd2app.widgets.text import time_text
+from sd2app.widgets.run_text import time_text
 
 
 class RunPanel(QWidget):

@@ -1,11 +1,9 @@
-"""Durations, times, errors and the state of runs as texts."""
+"""Durations, times and errors as texts."""
 
 from __future__ import annotations
 
 import time
-from typing import Any
 
-from sd2app.background.run_monitor import UNDER_WAY, Phase, RunMonitor
 from sd2core.files.tables import counted as counted
 
 
@@ -73,32 +71,3 @@ def bytes_text(count: int) -> str:
             value = count / size
             return f"{value:.0f} {unit}" if value >= 100 else f"{value:.2g} {unit}"
     return f"{count} bytes"
-
-
-PHASES: dict[Phase, str] = {
-    "starting": "Starting…",
-    "running": "At work",
-    "pausing": "Pausing…",
-    "paused": "Paused",
-    "resuming": "Going on…",
-    "stopping": "Stopping…",
-    "cancelling": "Cancelling…",
-    "finished": "Finished",
-    "stopped": "Stopped",
-    "failed": "Failed",
-    "died": "Ended unexpectedly",
-    "gone": "Cancelled",
-}
-AT_WORK: tuple[Phase, ...] = ("running", "pausing", "paused", "resuming")
-"""Phases in which a run has begun and is not about to end."""
-
-
-def time_text(run: RunMonitor[Any]) -> str:
-    """Time left and elapsed time, as far as they are known."""
-    history, parts = run.history, []
-    if run.phase in AT_WORK and history.left_s is not None:
-        parts.append(f"{about(history.left_s)} left")
-    if history.elapsed_s is not None:
-        passed = exact_text(history.elapsed_s)
-        parts.append(f"{passed} so far" if run.phase in UNDER_WAY else f"took {passed}")
-    return " · ".join(parts)

@@ -18,7 +18,7 @@ from sd2app.classify.training import ClassTraining
 from sd2app.command_line import full_parser, main
 from sd2app.settings import Settings
 from sd2app.training.text import division_text
-from sd2app.widgets.text import time_text
+from sd2app.widgets.run_text import time_text
 from sd2core.classify.defaults import WIDTH, pace_kind
 from sd2core.cli.classify.comparison import Table
 from sd2core.cli.classify.train import Train
