@@ -111,7 +111,6 @@ def _named(session: Session, features: Features, **others: object) -> SimpleName
         label_edits=f.labels.edits,
         label_dragging=f.labels.dragging,
         label_tracks=f.labels.tracks,
-        reaction=f.labels.reaction,
         cut_out=f.labels.cut_out,
         suggestions=f.suggestions.model,
         agreement=f.agreement.model,

@@ -17,7 +17,7 @@ from sd2app.labels.edits import LabelEdits
 from sd2app.labels.export_dialog import export_labels
 from sd2app.labels.import_dialog import import_labels, is_label_file
 from sd2app.labels.loop import SpanLoop
-from sd2app.labels.marking import LabelMarking, Reaction
+from sd2app.labels.marking import LabelMarking
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import map_overlay, strip_overlay
 from sd2app.labels.panel import LabelsPanel
@@ -50,9 +50,8 @@ class LabelsFeature(Feature):
         self.model = labels = LabelsModel(parent)
         self.autosave = LabelAutosave(session.document, labels, recovery, parent)
         self.edits = LabelEdits(session.document, labels, session.playback, self.autosave, parent)
-        self.reaction = Reaction(session.settings)
         self.dragging = LabelDragging(self.edits, parent)
-        self.marking = LabelMarking(self.edits, self.reaction)
+        self.marking = LabelMarking(self.edits, session.settings)
         self.tracks = LabelTracks(shell, self.edits)
         self.loop = SpanLoop(labels, session.playback, parent)
         self.over_maps, self.over_all = map_overlay(labels), strip_overlay(labels)

@@ -9,31 +9,15 @@ from sd2core.labels import edits
 from sd2core.labels.free_time import LONGEST_REACTION_S, seen_at
 
 LONGEST_MS = round(1000 * LONGEST_REACTION_S)
-_NAME = "reaction_ms"
-
+REACTION = "reaction_ms"
+"""Name of the reaction time in the settings."""
 
 _NO_TRACK = "There is no track to mark on. Add one: Labels → Add track…"
 
 
-class Reaction:
-    """The user's reaction time, kept in the settings; marks are put back by it."""
-
-    def __init__(self, settings: Settings) -> None:
-        self._settings = settings
-
-    @property
-    def reaction_ms(self) -> int:
-        """Reaction time, 0 to :data:`LONGEST_MS`."""
-        return min(max(self._settings.stored(_NAME, 0), 0), LONGEST_MS)
-
-    @property
-    def reaction_s(self) -> float:
-        """Reaction time in seconds."""
-        return self.reaction_ms / 1000.0
-
-    def set_reaction_ms(self, reaction_ms: int) -> None:
-        """Set the reaction time."""
-        self._settings.set_value(_NAME, min(max(reaction_ms, 0), LONGEST_MS))
+def reaction_ms(settings: Settings) -> int:
+    """Reaction time of the user, 0 to :data:`LONGEST_MS`; marks are put back by it."""
+    return min(max(settings.stored(REACTION, 0), 0), LONGEST_MS)
 
 
 class LabelMarking:
@@ -42,9 +26,9 @@ class LabelMarking:
     The reaction time is real time: played at half speed, half as much of the recording goes by.
     """
 
-    def __init__(self, edits: LabelEdits, reaction: Reaction) -> None:
+    def __init__(self, edits: LabelEdits, settings: Settings) -> None:
         self._labels, self._playback, self._edits = edits.labels, edits.playback, edits
-        self._reaction = reaction
+        self._settings = settings
 
     def mark(self, label: str) -> None:
         """Begin a span with this label, or end the one that has begun.
@@ -80,7 +64,9 @@ class LabelMarking:
     def _seen_s(self, track: str) -> float:
         playback = self._playback
         now_s = playback.timebase.time_of(playback.frame)
-        reaction_s = self._reaction.reaction_s * playback.speed if playback.playing else 0.0
+        reaction_s = (
+            1e-3 * reaction_ms(self._settings) * playback.speed if playback.playing else 0.0
+        )
         return seen_at(self._labels.labels, playback.timebase, track, now_s, reaction_s)
 
     def _end(self, mark: Mark, seen_s: float, *, cutting: bool = False) -> None:

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QMainWindow, QMessageBox, QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.feature import LabelsFeature
-from sd2app.labels.marking import LONGEST_MS, Reaction
+from sd2app.labels.marking import LONGEST_MS, REACTION, reaction_ms
 from sd2app.manual.help import with_help
 from sd2app.manual.pages import FIRST_FIVE_MINUTES, INDEX
 from sd2app.manual.window import ManualOpener
@@ -170,8 +170,7 @@ class ProgramFeature(Feature):
         labels = partial(shell.bring_up, "Labels", "Label set")
         accepted(
             PreferencesDialog(
-                self._session.settings, self._labels.reaction, self.set_dark, self._show_keys,
-                labels, parent,
+                self._session.settings, self.set_dark, self._show_keys, labels, parent,
             )
         )  # fmt: skip
 
@@ -208,7 +207,6 @@ class PreferencesDialog(Dialog):
     Parameters
     ----------
     settings : Settings
-    reaction : Reaction
     use_theme : callable
         Shows a theme: dark, light, or (None) the system's.
     open_keys, open_labels : callable
@@ -219,7 +217,6 @@ class PreferencesDialog(Dialog):
     def __init__(
         self,
         settings: Settings,
-        reaction: Reaction,
         use_theme: Callable[[bool | None], object],
         open_keys: Callable[[], object],
         open_labels: Callable[[], object],
@@ -228,12 +225,12 @@ class PreferencesDialog(Dialog):
         super().__init__("Preferences", parent)
         theme = Choice("Dark or light", self, _THEMES, use_theme)
         theme.show_value(settings.dark)
-        reaction_ms = NumberBox(
+        reaction = NumberBox(
             0.0, LONGEST_MS, " ms", "Marks made while it plays begin and end earlier by so much",
             decimals=0, step=50.0,
         )  # fmt: skip
-        reaction_ms.show_value(reaction.reaction_ms)
-        reaction_ms.valueChanged.connect(lambda value: reaction.set_reaction_ms(round(value)))
+        reaction.show_value(reaction_ms(settings))
+        reaction.valueChanged.connect(lambda value: settings.set_value(REACTION, round(value)))
 
         def go(then: Callable[[], object]) -> None:
             self.accept()
@@ -243,7 +240,7 @@ class PreferencesDialog(Dialog):
         labels = outlined("Label set…", "Names, keys and colours", lambda: go(open_labels), self)
         rows = form_of(
             ("Theme", theme),
-            ("Reaction time", reaction_ms),
+            ("Reaction time", reaction),
             ("Keys and labels", side_by_side(keys, labels)),
         )
         self.setLayout(column_of(rows, with_help("Preferences", closing(self))))

@@ -17,7 +17,7 @@ from PySide6.QtCore import QTimer
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.dragging import LabelDragging
 from sd2app.labels.edits import LabelEdits
-from sd2app.labels.marking import LabelMarking, Reaction
+from sd2app.labels.marking import LabelMarking
 from sd2app.labels.model import LabelsModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel
@@ -41,7 +41,7 @@ class Desk:
         self.labels, self.playback = LabelsModel(), PlaybackModel()
         self.session = LabelAutosave(self.document, self.labels, root, self.document)
         self.edits = LabelEdits(self.document, self.labels, self.playback, self.session)
-        self.marking = LabelMarking(self.edits, Reaction(Settings.forgetful()))
+        self.marking = LabelMarking(self.edits, Settings.forgetful())
         self.hand = LabelDragging(self.edits)
         self.said: list[str] = []
         for signal in (self.session.failed, self.session.noted, self.edits.failed):

@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import QTimer
 
 from sd2app.labels.loop import SpanLoop
-from sd2app.labels.marking import LONGEST_MS, Reaction
+from sd2app.labels.marking import LONGEST_MS, REACTION, reaction_ms
 from sd2app.labels.model import LabelsModel
 from sd2app.session import playback as playback_module
 from sd2app.session.playback import PlaybackModel
@@ -100,11 +100,7 @@ def test_the_loop_follows_its_span(playback) -> None:
 
 def test_the_reaction_time_is_remembered_and_stays_within_a_second() -> None:
     settings = Settings.forgetful()
-    reaction = Reaction(settings)
-    assert reaction.reaction_ms == 0
-    reaction.set_reaction_ms(250)
-    assert Reaction(settings).reaction_s == 0.25
-    reaction.set_reaction_ms(5000)
-    assert reaction.reaction_ms == LONGEST_MS
-    settings.set_value("reaction_ms", "nonsense")
-    assert reaction.reaction_ms == 0
+    assert reaction_ms(settings) == 0
+    for stored, kept in ((250, 250), (5000, LONGEST_MS), (-1, 0), ("nonsense", 0)):
+        settings.set_value(REACTION, stored)
+        assert reaction_ms(settings) == kept

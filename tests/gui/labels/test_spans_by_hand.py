@@ -26,6 +26,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolButton
 from window_models import models_of
 
+from sd2app.labels.marking import REACTION
 from sd2app.playback.views import TimeRuler
 
 THERE, BACK = ("there", 6, 24), ("back", 30, 60)
@@ -186,7 +187,7 @@ def test_marks_go_back_by_the_reaction_time_while_it_plays(labelled, qtbot) -> N
     c = models_of(labelled)
     key(labelled, "A", CONTROL)
     key(labelled, "Backspace")
-    c.reaction.set_reaction_ms(200)
+    c.settings.set_value(REACTION, 200)
     c.playback.set_speed(0.1)
     c.playback.play()
     # At a tenth of the speed 200 ms are 20 ms of the recording: into the frame before.

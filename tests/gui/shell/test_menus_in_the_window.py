@@ -10,6 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from window_models import menu_of, models_of
 
+from sd2app.labels.marking import reaction_ms
 from sd2app.settings import MAX_RECENT
 from sd2app.shell.menus import menus_in
 from sd2app.widgets.inputs import Choice, NumberBox
@@ -87,7 +88,7 @@ def test_preferences_hold_at_once_and_stay(labelled, qtbot) -> None:
     QTimer.singleShot(0, choose)
     QTest.keyClick(labelled, Qt.Key.Key_Comma, Qt.KeyboardModifier.ControlModifier)
     assert (display.dark, settings.dark) == (not before, not before)
-    assert models_of(labelled).reaction.reaction_ms == 200
+    assert reaction_ms(settings) == 200
     labelled.features.program.set_dark(None)
     assert settings.dark is None
 
