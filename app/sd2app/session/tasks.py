@@ -29,12 +29,7 @@ class TaskList(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._jobs: list[Job] = []
-
-    @property
-    def jobs(self) -> tuple[Job, ...]:
-        """Running tasks."""
-        return tuple(self._jobs)
+        self.jobs: tuple[Job, ...] = ()  # that run
 
     def start(self, title: str, cancel: Callable[[], None]) -> Job:
         """Announce a job."""
@@ -44,7 +39,7 @@ class TaskList(QObject):
 
     def add(self, job: Job) -> None:
         """Announce a job that is known already."""
-        self._jobs.append(job)
+        self.jobs = (*self.jobs, job)
         self.changed.emit()
 
     def report(self, job: Job, done: int, total: int) -> None:
@@ -55,13 +50,13 @@ class TaskList(QObject):
 
     def finish(self, job: Job) -> None:
         """Remove an ended job."""
-        if job in self._jobs:
-            self._jobs.remove(job)
+        if job in self.jobs:
+            self.jobs = tuple(one for one in self.jobs if one is not job)
             self.changed.emit()
 
     def cancel(self, job: Job) -> None:
         """Stop a job; it says so at once."""
-        if job in self._jobs and not job.cancelling:
+        if job in self.jobs and not job.cancelling:
             job.cancelling = True
             self.changed.emit()
             job.cancel()
