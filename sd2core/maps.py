@@ -56,8 +56,7 @@ class CellUncertainty:
         sqrt(sd² + (expected − value)²). The standard deviation alone would call a value
         certain that is almost certainly wrong.
         """
-        deviation: NDArray[np.float32] = np.hypot(self.sd, self.expected - values)
-        return deviation
+        return np.hypot(self.sd, self.expected - values)
 
     def between(self, start: int, stop: int) -> CellUncertainty:
         """Uncertainty of frames ``start`` to ``stop`` (exclusive)."""

@@ -52,8 +52,7 @@ class Network:
         for n, dilation in enumerate(self.dilations):
             inner = _convolved(_silu(_rms_norm(state, a["gain"][n])), a["wide"][n], dilation)
             state = state + _silu(inner + a["wide_bias"][n]) @ a["flat"][n] + a["flat_bias"][n]
-        result: Singles = _silu(_rms_norm(state, a["last_gain"])) @ a["leave"] + a["leave_bias"]
-        return result
+        return _silu(_rms_norm(state, a["last_gain"])) @ a["leave"] + a["leave_bias"]
 
 
 def network_of(meta: Mapping[str, Any], data: Mapping[str, NDArray[Any]]) -> Network:

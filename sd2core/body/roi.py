@@ -79,14 +79,13 @@ def _sampled(picture: Pixels, matrix: Floats, crop_px: int) -> Pixels:
     # OpenCV counts from the centre of the first pixel, we from its corner.
     centred = matrix.copy()
     centred[:, 2] += matrix[:, :2] @ [0.5, 0.5] - 0.5
-    crop: Pixels = cv2.warpAffine(
+    return cv2.warpAffine(
         picture,
         centred,
         (crop_px, crop_px),
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_CONSTANT,
     )
-    return crop
 
 
 PLACES = ("left of the person", "right of the person", "without the person", "like the person")

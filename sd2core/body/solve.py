@@ -366,8 +366,7 @@ def one_thread() -> AbstractContextManager[object]:
     import scipy.linalg  # noqa: F401
     from threadpoolctl import threadpool_limits
 
-    limits: AbstractContextManager[object] = threadpool_limits(limits=1, user_api="blas")
-    return limits
+    return threadpool_limits(limits=1, user_api="blas")
 
 
 _FIRST_ROTATION_RADPS2 = 60.0

@@ -134,13 +134,11 @@ def build(name: str, size: int, classes: int, **given: Any) -> Classifier:
         check_option(f"classifier {name}", option, value, known, _LARGEST)
 
     def built(entry: Architecture) -> Classifier:
-        made: Classifier = entry.made(size, classes, **entry.fixed, **{**known, **given})
-        return made
+        return entry.made(size, classes, **entry.fixed, **{**known, **given})
 
     if name in ENTRIES:
         return built(ENTRIES[name])
-    made: Classifier = _plug_in(name).use(built, Classifier)
-    return made
+    return _plug_in(name).use(built, Classifier)
 
 
 def _plug_in(name: str) -> PlugIn[Architecture]:

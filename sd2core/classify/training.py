@@ -294,8 +294,7 @@ class _ClassifierLoop(Loop):
         """Numbers of the clips of a batch."""
         batch = self._chosen.batch
         if self._chances is not None:
-            clips: list[int] = self._rng.choice(len(self._chances), batch, p=self._chances).tolist()
-            return clips
+            return self._rng.choice(len(self._chances), batch, p=self._chances).tolist()
         while len(self._waiting) < batch:
             # The last are taken first.
             self._waiting[:0] = self._rng.permutation(len(self._material.labels)).tolist()

@@ -62,7 +62,4 @@ def bar(what: str, unit: str, total: int | None = None) -> AbstractContextManage
         return Lines(what, unit, total)
     from tqdm import tqdm
 
-    found: AbstractContextManager[Any] = tqdm(
-        desc=what, unit=unit, total=total, file=sys.stderr, leave=False
-    )
-    return found
+    return tqdm(desc=what, unit=unit, total=total, file=sys.stderr, leave=False)

@@ -151,7 +151,6 @@ def _add(
     commands: argparse._SubParsersAction, plug_in: PlugIn[AddedCommand], command: AddedCommand
 ) -> None:
     def handler(options: OptionRecord) -> int | None:
-        code: int | None = plug_in.use(lambda made: made.run(options), int | None)
-        return code
+        return plug_in.use(lambda made: made.run(options), int | None)
 
     add_command(commands, plug_in.name, options=command.options, handler=handler, about=command.run)

@@ -54,10 +54,9 @@ def line_of_sight_velocity(
     """
     stencil = moments(times_s, np.arange(len(times_s)), 1, presence)
     paths = np.ascontiguousarray(np.swapaxes(positions_m, 1, 2), dtype=np.float64)  # (T, 3, N)
-    velocity: Floats = radial_velocity(
+    return radial_velocity(
         paths[stencil.before[:, 0]], paths[stencil.after[:, 0]], sensor_m, stencil.duration_s
     )
-    return velocity
 
 
 def rms(values: NDArray[Any]) -> float:

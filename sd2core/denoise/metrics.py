@@ -191,8 +191,7 @@ def stands_out(
     counted = np.delete(energies, list(null_bins), axis=1)
     if not counted.size:
         return np.zeros(len(energies), bool)
-    out: NDArray[np.bool_] = counted.max(axis=1) > factor * np.median(counted)
-    return out
+    return counted.max(axis=1) > factor * np.median(counted)
 
 
 def _correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:

@@ -51,8 +51,7 @@ class Architecture:
     def made(self) -> Callable[..., Any]:
         """Class of the network."""
         module, _, name = self.place.rpartition(".")
-        found: Callable[..., Any] = getattr(import_module(module), name)
-        return found
+        return getattr(import_module(module), name)
 
 
 _S4 = {
@@ -179,10 +178,7 @@ def build(name: str, bins: int = 32, parts: int = 1, more: int = 0, **given: Any
 
     if name in _ENTRIES:
         return _built(name, _ENTRIES[name], bins, parts, more, given)
-    built: Denoiser = _plug_in(name).use(
-        lambda entry: _built(name, entry, bins, parts, more, given), Denoiser
-    )
-    return built
+    return _plug_in(name).use(lambda entry: _built(name, entry, bins, parts, more, given), Denoiser)
 
 
 def _built(

@@ -58,8 +58,7 @@ def convolution(signal: Tensor, kernel: Tensor, ahead: Tensor | None = None) -> 
 
 def by_product(signal: Tensor, kernel: Tensor, ahead: Tensor | None = None) -> Tensor:
     """Compute `convolution` by one matrix product per channel."""
-    convolved: Tensor = _ByProduct.apply(signal, kernel, ahead)
-    return convolved
+    return _ByProduct.apply(signal, kernel, ahead)
 
 
 def by_transform(signal: Tensor, kernel: Tensor, ahead: Tensor | None = None) -> Tensor:
@@ -70,8 +69,7 @@ def by_transform(signal: Tensor, kernel: Tensor, ahead: Tensor | None = None) ->
     if ahead is not None:  # lag −l is at the end
         lags = (ahead[:, :1], ahead.new_zeros(len(ahead), points - length), ahead[:, 1:].flip(-1))
         around = around + torch.cat(lags, -1)
-    convolved: Tensor = _ByTransform.apply(signal, around)
-    return convolved
+    return _ByTransform.apply(signal, around)
 
 
 # A matrix product does L² work per channel and signal but at the machine's full speed; measured
@@ -156,8 +154,7 @@ def mix_gated(
     share : optional
         Broadcast to the signal; multiplies what the activation lets through (dropout).
     """
-    mixed: Tensor = _MixGated.apply(signal, residual, weight, bias, share)
-    return mixed
+    return _MixGated.apply(signal, residual, weight, bias, share)
 
 
 class _MixGated(torch.autograd.Function):
@@ -282,8 +279,7 @@ def vandermonde_product(poles: Tensor, weights: Tensor, length: int) -> Tensor:
     Poles, (H, n), are shared by q sums with the weights (H, q, n), both complex128; the result is
     (H, q, length) float64.
     """
-    sums: Tensor = _VandermondeProduct.apply(poles, weights, length)
-    return sums
+    return _VandermondeProduct.apply(poles, weights, length)
 
 
 class _VandermondeProduct(torch.autograd.Function):
@@ -366,8 +362,7 @@ def woodbury_quotient(series: Tensor, points: int, radius: float) -> Tensor:
     ``series``, (H, 4, L) float64, holds a, b, c, d already damped: term l times radiusˡ. Points and
     radius are those of `damping_circle`. The result, (H, L) float64, is not damped.
     """
-    closed: Tensor = _WoodburyQuotient.apply(series, points, radius)
-    return closed
+    return _WoodburyQuotient.apply(series, points, radius)
 
 
 # A series is divided on a circle of this many points per term, of a radius that damps what

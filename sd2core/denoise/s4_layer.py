@@ -131,8 +131,7 @@ class S4Layer(nn.Module):
     def _in_full_precision(self, signal: Tensor, kernels: Sequence[Tensor] | None) -> Tensor:
         # Half precision would cost the kernel its tail and save little: products are small.
         with torch.autocast(signal.device.type, enabled=False):
-            whole: Tensor = self(signal.to(self.mixing.weight.dtype), kernels)
-            return whole
+            return self(signal.to(self.mixing.weight.dtype), kernels)
 
     def _live(self) -> StateSpace:
         if self.future is not None:

@@ -136,18 +136,15 @@ class StateSpace(Keeping):
 
     def kernel(self, length: int) -> Tensor:
         """Convolution kernel, (H, length), D included, of the parameters' type."""
-        kernel: Tensor = self.keep(length, lambda: self(length))
-        return kernel
+        return self.keep(length, lambda: self(length))
 
     def recurrence(self) -> Recurrence:
         """Recurrence of the same systems, one frame at a time."""
-        recurrence: Recurrence = self.keep("recurrence", self._made_recurrence)
-        return recurrence
+        return self.keep("recurrence", self._made_recurrence)
 
     def block(self) -> Block:
         """Recurrence of the same systems, a block of frames at a time."""
-        block: Block = self.keep("block", lambda: block_of(self.recurrence()))
-        return block
+        return self.keep("block", lambda: block_of(self.recurrence()))
 
     def ssm_parameters(self) -> Iterator[nn.Parameter]:
         """Parameters that shape the dynamics: all but C and D."""

@@ -78,14 +78,12 @@ class Compression:
     def compress(self, energy: Values) -> Values:
         """Compress energies, which are not negative."""
         scaled: Any = energy
-        compressed: Values = (scaled / self.reference) ** self.exponent
-        return compressed
+        return (scaled / self.reference) ** self.exponent
 
     def expand(self, compressed: Values) -> Values:
         """Expand compressed values to energies; negative values become zero."""
         scaled: Any = compressed
-        energy: Values = (scaled * (scaled > 0)) ** (1 / self.exponent) * self.reference
-        return energy
+        return (scaled * (scaled > 0)) ** (1 / self.exponent) * self.reference
 
 
 @dataclass(frozen=True)

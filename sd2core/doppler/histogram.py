@@ -214,8 +214,7 @@ class Counting:
     def scale(self, duration_s: NDArray[np.float64], precision: Any) -> NDArray[Any]:
         """Bins per metre of range change, in the precision of the positions."""
         rate = np.divide(1.0, duration_s, out=np.zeros_like(duration_s), where=duration_s > 0)
-        scale: NDArray[Any] = (rate * (0.5 * self.bins / self.v_max_mps)).astype(precision)
-        return scale
+        return (rate * (0.5 * self.bins / self.v_max_mps)).astype(precision)
 
     def arguments(self) -> tuple[int, int, float, np.float32]:
         """What kernels take."""
@@ -271,8 +270,7 @@ def relative_range(positions: NDArray[Any], sensor: NDArray[np.float64]) -> NDAr
     distance = np.linalg.norm(place.astype(np.float64)).astype(positions.dtype)
     away = np.sqrt((x - sx) ** 2 + (y - sy) ** 2 + (z - sz) ** 2)
     difference = x * (x - two * sx) + y * (y - two * sy) + z * (z - two * sz)
-    ranges: NDArray[Any] = difference / np.maximum(away + distance, np.float32(1e-30))
-    return ranges
+    return difference / np.maximum(away + distance, np.float32(1e-30))
 
 
 def bins_plain(
@@ -318,8 +316,7 @@ def places_plain(
     closer = range_at(frames.before[t, sample]) - range_at(frames.after[t, sample])
     precision = frames.positions.dtype
     per_bin = closer * counting.scale(frames.duration_s[t, sample : sample + 1], precision)
-    places: NDArray[Any] = per_bin + np.float32(0.5 * counting.bins)
-    return places
+    return per_bin + np.float32(0.5 * counting.bins)
 
 
 def place_in_bins(

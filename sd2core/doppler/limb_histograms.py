@@ -68,8 +68,7 @@ class FineAxis:
         below += turns * total
         if self.counting.beyond == CLIP:
             below[..., 0], below[..., -1] = 0.0, total[:, 0]
-        coarse: NDArray[np.float64] = np.diff(below, axis=2)
-        return coarse
+        return np.diff(below, axis=2)
 
 
 def fine_histograms(

@@ -374,10 +374,7 @@ class VisibilityMasks:
             visible = np.zeros((stop - start, self._prepared.mesh.vertex_count), np.uint8)
             return _BlockMask(visible, np.zeros(stop - start, bool)), visible.nbytes
 
-        mask: _BlockMask = self._prepared.budget.get_or_make(
-            self._key(occlusion, index, place, alone), make
-        )
-        return mask
+        return self._prepared.budget.get_or_make(self._key(occlusion, index, place, alone), make)
 
     def _needed(self, block: Block, rows: slice, place: NDArray[np.float64]) -> NDArray[np.uint8]:
         """Mark the vertices whose visibility can change the map, uint8 (n, V)."""

@@ -140,8 +140,7 @@ class PreparedMesh:
     def closed(self) -> bool:
         """True if the mesh is a closed surface; computed when a depth buffer first needs it."""
         faces = self._faces()
-        closed: bool = self.budget.get_or_make("closed", lambda: (visibility.encloses(faces), 0))
-        return closed
+        return self.budget.get_or_make("closed", lambda: (visibility.encloses(faces), 0))
 
     @property
     def block_count(self) -> int:
@@ -168,8 +167,7 @@ class PreparedMesh:
             block = self._prepare(index)
             return block, block.frames.positions.nbytes
 
-        block: Block = self.budget.get_or_make(("block", index), make)
-        return block
+        return self.budget.get_or_make(("block", index), make)
 
     def counted(self, index: int, counting: Counting, *, points: bool = False) -> Block:
         """Block for counting: without positions where only what moves is counted.
@@ -345,8 +343,7 @@ class PreparedMesh:
             return (moving,), 0 if moving is None else moving.nbytes
 
         kept = self.budget.get_or_make(self._moving_key("moving", block.index), make)
-        moving: MovingVertices | None = kept[0]
-        return moving
+        return kept[0]
 
     def pairs_moving(self, index: int) -> int | None:
         """Number of pairs of a frame and a vertex that moves in a block.
@@ -402,8 +399,7 @@ class PreparedMesh:
             return made, made.nbytes
 
         key = (what, block.index) if moving is None else self._moving_key(what, block.index)
-        kept: NDArray[Any] = self.budget.get_or_make(key, sized)
-        return kept
+        return self.budget.get_or_make(key, sized)
 
     def _normals(self, block: Block) -> NDArray[np.int8]:
         points, faces = self._at_frames(block), self._faces()
@@ -470,8 +466,7 @@ class PreparedMesh:
 
     def _read(self, index: int) -> Block:
         """Block with its positions, from memory or read now and not kept."""
-        block: Block = self.budget.get(("block", index)) or self._prepare(index)
-        return block
+        return self.budget.get(("block", index)) or self._prepare(index)
 
     def _prepare(self, index: int) -> Block:
         start, stop = self.span(index)

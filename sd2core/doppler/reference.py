@@ -206,8 +206,7 @@ def _range_law(
     if options.range_law == "frame":
         points = np.average(points, axis=1, weights=mesh.vertex_counts)[:, None]
     ratio = options.reference_range_m / mean_distance_m(points, ends_m)
-    law: NDArray[np.float64] = ratio**options.range_exponent
-    return law
+    return ratio**options.range_exponent
 
 
 def _on_axis(

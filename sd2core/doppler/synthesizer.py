@@ -730,5 +730,4 @@ def _no_surface(mesh: MeshSequence, wanted: str) -> Sd2Error:
 
 
 def _rounded(shares: NDArray[np.float32]) -> list[float]:
-    rounded: list[float] = np.round(shares.astype(np.float64), 5).tolist()
-    return rounded
+    return np.round(shares.astype(np.float64), 5).tolist()

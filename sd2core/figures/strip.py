@@ -236,10 +236,7 @@ def _velocity(mesh: MeshSequence, frame: int, sensor: VirtualSensor) -> NDArray[
     stencil = moments(mesh.times_s, np.array([frame]), 1, mesh.presence)
     before, after = int(stencil.before[0, 0]), int(stencil.after[0, 0])
     a, b = (np.asarray(mesh.frame(k), np.float64).T for k in (before, after))  # (3, V)
-    velocity: NDArray[np.float64] = radial_velocity(
-        a, b, sensor.position_m, stencil.duration_s[0, 0]
-    )
-    return velocity
+    return radial_velocity(a, b, sensor.position_m, stencil.duration_s[0, 0])
 
 
 def _strip_box(source: StripSource, bodies: Sequence[Body | None], options: StripOptions) -> Frame:

@@ -62,8 +62,7 @@ class VisibleTriangles:
     @property
     def shown(self) -> NDArray[np.bool_]:
         """Pixels that the mesh covers, (height, width)."""
-        covered: NDArray[np.bool_] = self.owner >= 0
-        return covered
+        return self.owner >= 0
 
     def interpolated(self, attributes: NDArray[np.floating]) -> NDArray[np.float32]:
         """Attributes (V, K) of the vertices at the pixels that are covered, (N, K)."""

@@ -166,8 +166,7 @@ def parse_toml(text: str, place: str | Path, expected: str, remedy: str = "") ->
     text, place, expected, remedy
         As for :func:`parse_json`.
     """
-    content: dict[str, Any] = _parsed("TOML", text, place, expected, remedy)
-    return content
+    return _parsed("TOML", text, place, expected, remedy)
 
 
 @contextmanager

@@ -136,14 +136,12 @@ class FrameChain:
             transform = scipy.fft.fft if np.iscomplexobj(signal) else scipy.fft.rfft
             signal = transform(signal, axis=3)
         profiles = signal[..., self.gates] * self._slow
-        spectra: NDArray[np.complex64] = scipy.fft.fft(profiles, n=self.doppler_bins, axis=2)
-        return spectra
+        return scipy.fft.fft(profiles, n=self.doppler_bins, axis=2)
 
     def power_over_doppler(self, signal: Signal) -> NDArray[np.float32]:
         """Power of :meth:`spectra` summed over channels and gates, (n, doppler)."""
         parts = self.spectra(signal).view(np.float32)  # real, imaginary, real …
-        summed: NDArray[np.float32] = np.einsum("nrdk,nrdk->nd", parts, parts)
-        return summed
+        return np.einsum("nrdk,nrdk->nd", parts, parts)
 
 
 class Chain(FrameChain):
@@ -191,8 +189,7 @@ class Chain(FrameChain):
     def cell_power(self, frame: int) -> NDArray[np.float32]:
         """Power of one frame summed over channels, (doppler, gates)."""
         spectra = self.spectra(self._without_clutter(frame, frame + 1))[0]
-        power: NDArray[np.float32] = (spectra.real**2 + spectra.imag**2).sum(axis=0)
-        return power
+        return (spectra.real**2 + spectra.imag**2).sum(axis=0)
 
     def _without_clutter(self, start: int, stop: int) -> Signal:
         signal = self.capture.read(start, stop)
@@ -221,8 +218,7 @@ class Chain(FrameChain):
     def _mean_chirp(self, start: int, stop: int) -> Signal:
         signal = self.capture.read(start, stop)
         self._remove_offset(signal)
-        mean: Signal = signal.mean(axis=2)  # (n, rx, samples)
-        return mean
+        return signal.mean(axis=2)  # (n, rx, samples)
 
 
 @cache

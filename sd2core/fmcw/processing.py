@@ -51,8 +51,7 @@ class RangeDoppler:
     @property
     def range_profile(self) -> NDArray[np.float32]:
         """Power per gate, shape (gates,)."""
-        profile: NDArray[np.float32] = self.values.sum(axis=1)
-        return profile
+        return self.values.sum(axis=1)
 
 
 def doppler_map(
@@ -197,8 +196,7 @@ def binned(weights: NDArray[np.float32], power: NDArray[np.float32]) -> NDArray[
     A column does not depend on how many are computed together, as it would by a matrix product of
     BLAS.
     """
-    columns: NDArray[np.float32] = np.einsum("bd,nd->bn", weights, power)
-    return columns
+    return np.einsum("bd,nd->bn", weights, power)
 
 
 def rebinning(config: RadarConfig, axis: VelocityAxis, doppler_bins: int) -> NDArray[np.float64]:

@@ -194,10 +194,7 @@ class MeshScene:
         """Central difference of the frames around one, one-sided at the ends."""
         presence, times = self.mesh.presence, self.mesh.times_s
         low, high = max(index - 1, presence.first[index]), min(index + 1, presence.last[index])
-        slope: NDArray[np.float64] = (self._frame(high) - self._frame(low)) / (
-            times[high] - times[low]
-        )
-        return slope
+        return (self._frame(high) - self._frame(low)) / (times[high] - times[low])
 
     def _stretch(self, time_s: float) -> tuple[int, int]:
         """First and last mesh frame of the part with a person that an instant lies in."""
@@ -239,8 +236,7 @@ class MeshScene:
                 block = self.mesh.read(first, stop).astype(np.float64)
                 refuse_missing(block, first, self.mesh.source)
                 self._first, self._block = first, block
-            frame: NDArray[np.float64] = self._block[index - self._first]
-            return frame
+            return self._block[index - self._first]
 
 
 def _box(surface: Surface) -> NDArray[np.float64]:

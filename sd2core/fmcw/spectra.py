@@ -103,5 +103,4 @@ def signal_spectra(
     scaled = (signal / (np.abs(signal).max() or 1.0)).astype(single)
     power = chain.power_over_doppler(chain.without_own_clutter(scaled))
     weights = rebinning(config, axis or VelocityAxis(), chain.doppler_bins).astype(np.float32)
-    columns: NDArray[np.float32] = weights @ power.T
-    return columns
+    return weights @ power.T

@@ -220,5 +220,4 @@ def turns_of(echoes: Echoes, config: RadarConfig) -> Turns:
 
 def _angle(turns: NDArray[np.float64]) -> NDArray[np.float64]:
     """Radians within half a turn of 0."""
-    angle: NDArray[np.float64] = 2.0 * np.pi * (turns - np.rint(turns))
-    return angle
+    return 2.0 * np.pi * (turns - np.rint(turns))

@@ -205,8 +205,7 @@ def _read(path: Path, hints: MeshHints) -> RawMesh:
             return reader.read(path, hints)
     plug_in, said = plug_in_for(path, MESH_FILES)
     if plug_in is not None:
-        read: RawMesh = plug_in.use(lambda reader: reader.read(path, hints), RawMesh)
-        return read
+        return plug_in.use(lambda reader: reader.read(path, hints), RawMesh)
     if path.suffix.lower() in MOTION_SUFFIXES:
         refuse_motion(path)
     raise Sd2Error(f"{path} is not a mesh of a kind that is known", f"a mesh: {_KNOWN}", said)

@@ -179,8 +179,7 @@ def read_faces(path: Path) -> NDArray[Any]:
         arrays = {"": np.array(open_npy_file(path, expected))}
     names = [name for name in (*FACE_NAMES, "f") if name in arrays]
     if names or len(arrays) == 1:
-        array: NDArray[Any] = arrays[names[0]] if names else next(iter(arrays.values()))
-        return array
+        return arrays[names[0]] if names else next(iter(arrays.values()))
     held = ", ".join(arrays) or "nothing"
     raise Sd2Error(f"{path} holds {held}", "an array 'faces' of shape (faces, 3)")
 

@@ -175,8 +175,7 @@ def _choose(
 ) -> dict[Any, Any]:
     lengths = {key: frames_of(value, path) for key, value in people.items()}
     key = chosen_person(lengths, person, str(path), notes)
-    chosen: dict[Any, Any] = people[key]
-    return chosen
+    return people[key]
 
 
 def frames_of(entry: dict[Any, Any], path: Path) -> int:

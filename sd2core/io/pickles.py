@@ -209,8 +209,7 @@ def read_object_arrays(path: Path) -> dict[str, Any]:
                         arrays[name.removesuffix(".npy")] = _array_or_objects(stream, limit)
         return arrays
 
-    read: dict[str, Any] = _read(path, content, "numpy.save or numpy.savez")
-    return read
+    return _read(path, content, "numpy.save or numpy.savez")
 
 
 def _array_or_objects(stream: Any, limit: int) -> Any:

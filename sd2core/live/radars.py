@@ -67,8 +67,7 @@ def open_radar(name: str, setup: Path | None = None) -> Source:
 
         return TiSource(place, setup)
     if (plug_in := LIVE_RADARS.find(word)) is not None:
-        source: Source = plug_in.use(lambda radar: radar.open(place, setup), Source)
-        return source
+        return plug_in.use(lambda radar: radar.open(place, setup), Source)
     if setup is not None:
         return dca1000(name, setup)
     if not Path(name).exists():

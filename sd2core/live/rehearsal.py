@@ -135,7 +135,4 @@ class TestSource(Source):
         frequency_hz = np.linspace(
             radar.start_frequency_hz, radar.end_frequency_hz, radar.samples_per_chirp
         )
-        beat: NDArray[np.float64] = np.cos(
-            4.0 * np.pi * range_m[:, None] * frequency_hz / SPEED_OF_LIGHT_MPS
-        )
-        return beat
+        return np.cos(4.0 * np.pi * range_m[:, None] * frequency_hz / SPEED_OF_LIGHT_MPS)

@@ -40,10 +40,8 @@ class MadeVertices:
             return np.empty((*rows.shape, *self.shape[1:]), self.dtype)[(slice(None), *rest)]
         made = self._make(np.atleast_1d(rows)).astype(self.dtype, copy=False)
         if rows.ndim == 0:
-            one: NDArray[Any] = made[0][tuple(rest)]
-            return one
-        part: NDArray[Any] = made[(slice(None), *rest)]
-        return part
+            return made[0][tuple(rest)]
+        return made[(slice(None), *rest)]
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         return np.asarray(self[:], dtype)

@@ -225,8 +225,7 @@ class MeshSequence:
 
     def frame(self, index: int) -> NDArray[Any]:
         """Vertices of one frame, (V, 3)."""
-        vertices: NDArray[Any] = self.read(index, index + 1)[0]
-        return vertices
+        return self.read(index, index + 1)[0]
 
     def person_at(self, time_s: float) -> int | None:
         """Frame at a time, None where the mesh has no frame or no person."""

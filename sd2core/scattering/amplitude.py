@@ -152,10 +152,7 @@ def projected_areas(
     """
     ray = sensor[:, None] - points
     along = (ray * vectors).sum(axis=0)
-    projected: NDArray[np.float64] = np.maximum(along, 0) / np.maximum(
-        np.linalg.norm(ray, axis=0), 1e-30
-    )
-    return projected
+    return np.maximum(along, 0) / np.maximum(np.linalg.norm(ray, axis=0), 1e-30)
 
 
 def range_weight(
@@ -167,8 +164,7 @@ def range_weight(
     :data:`NEAREST_RANGE_M` count as that range.
     """
     ratio = reference_range_m / np.maximum(range_m, NEAREST_RANGE_M)
-    weight: NDArray[np.float32] = np.power(ratio, exponent).astype(np.float32)
-    return weight
+    return np.power(ratio, exponent).astype(np.float32)
 
 
 def compile_kernels() -> None:

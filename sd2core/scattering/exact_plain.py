@@ -185,5 +185,4 @@ def crosses(
     w = (direction * q).sum(axis=1) / safe
     along = (edge2 * q).sum(axis=1) / safe
     inside = (u >= -EDGE) & (w >= -EDGE) & (u + w <= 1 + EDGE)
-    crossing: NDArray[np.bool_] = solid & inside & (along > contact) & (along < length - contact)
-    return crossing
+    return solid & inside & (along > contact) & (along < length - contact)

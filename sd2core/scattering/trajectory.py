@@ -93,8 +93,7 @@ class Trajectory:
         frames = slice(first_frame, first_frame + len(vertices))
         weights = self._weights(frames, first_knot, last_knot)
         flat = vertices.reshape(len(vertices), -1).astype(np.float64, copy=False)
-        path: NDArray[Any] = (weights @ flat).reshape(last_knot - first_knot, -1, 3)
-        return path
+        return (weights @ flat).reshape(last_knot - first_knot, -1, 3)
 
     def _weights(self, frames: slice, first_knot: int, last_knot: int) -> csr_array:
         from scipy.sparse import csr_array

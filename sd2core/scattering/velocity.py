@@ -43,8 +43,7 @@ def radial_velocity(
     ranges = np.maximum(ranges, precision(1e-30))
     duration = np.asarray(duration_s, dtype=precision)
     rate = np.divide(1, duration, out=np.zeros_like(duration), where=duration > 0)
-    velocity: NDArray[Any] = -_dot(step, middle) / ranges * rate
-    return velocity
+    return -_dot(step, middle) / ranges * rate
 
 
 def _dot(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:

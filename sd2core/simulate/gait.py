@@ -14,7 +14,6 @@ from dataclasses import astuple
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats, about, applied, product, transposed
@@ -285,5 +284,4 @@ def _leg_length_m(skeleton: Skeleton) -> float:
 def _smoothed(values: Floats, sigma_s: float) -> Floats:
     from scipy.ndimage import gaussian_filter1d
 
-    smooth: NDArray[np.float64] = gaussian_filter1d(values, sigma_s * GRID_HZ, mode="nearest")
-    return smooth
+    return gaussian_filter1d(values, sigma_s * GRID_HZ, mode="nearest")

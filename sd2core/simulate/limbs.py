@@ -192,8 +192,7 @@ def elbow_position(
     along = (distance**2 + upper_m**2 - lower_m**2) / (2.0 * distance)
     aside = pole - (pole * line).sum(axis=1, keepdims=True) * line
     aside = aside / np.linalg.norm(aside, axis=1, keepdims=True)
-    elbow: Floats = shoulder + along * line + np.sqrt(upper_m**2 - along**2) * aside
-    return elbow
+    return shoulder + along * line + np.sqrt(upper_m**2 - along**2) * aside
 
 
 def turn_about(axis: int, angle_deg: Floats) -> Floats:

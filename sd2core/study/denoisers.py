@@ -152,5 +152,4 @@ def added_map(
         denoised = np.float32(1.0 if card.known is None else card.known.gain) * take.synthetic
     if not condition.endswith("+texture"):
         return denoised
-    drawn: NDArray[np.float32] = card.needed_texture().drawn(np.ascontiguousarray(denoised), seed)
-    return drawn
+    return card.needed_texture().drawn(np.ascontiguousarray(denoised), seed)

@@ -119,5 +119,4 @@ class Learner(nn.Module):
             nn.functional.smooth_l1_loss(*pair, beta=0.1, reduction="none")
             for pair in errors.values()
         )
-        loss: torch.Tensor = (off * moving).sum() / moving.sum().clamp(min=1.0)
-        return loss
+        return (off * moving).sum() / moving.sum().clamp(min=1.0)

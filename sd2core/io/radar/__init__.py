@@ -110,8 +110,7 @@ def load_capture(path: Path | str) -> RadarCapture:
             return capture if own else judged(capture)
     plug_in, said = plug_in_for(path, RADAR_FILES)
     if plug_in is not None:
-        read: RadarCapture = plug_in.use(lambda reader: reader.read(path), RadarCapture)
-        return read
+        return plug_in.use(lambda reader: reader.read(path), RadarCapture)
     holds = sorted(entry.name for entry in path.iterdir())[:6] if path.is_dir() else []
     found = f"; it holds {', '.join(holds) or 'nothing'}" if path.is_dir() else ""
     raise Sd2Error(f"{path} is not a radar recording that can be read{found}", SUPPORTED, said)
