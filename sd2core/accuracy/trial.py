@@ -10,12 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.accuracy.plans import (
-    VERTICES_KEPT,
-    AccuracyPlan,
-    reference_plan,
-    visibility_plans,
-)
+from sd2core.accuracy.plans import VERTICES_KEPT, AccuracyPlan, reference_plan, visibility_plans
 from sd2core.accuracy.results import Errors, compute_errors
 from sd2core.accuracy.sample import Run, Sample
 from sd2core.doppler.masks import Visibility

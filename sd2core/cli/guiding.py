@@ -39,11 +39,7 @@ _OPEN_S = 15.0
 
 
 def guide(
-    protocol: Protocol,
-    folder: Path,
-    open_take: Callable[[Path], JointRecording],
-    *,
-    as_json: bool,
+    protocol: Protocol, folder: Path, open_take: Callable[[Path], JointRecording], *, as_json: bool
 ) -> None:
     """Record the takes of a protocol that are not in a folder yet, and say what is missing.
 

@@ -14,15 +14,7 @@ from sd2core.cli.output import print_json, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.bounds import AZIMUTH_DEG, ELEVATION_DEG, RANGE_M
 from sd2core.options.kinds import DemoScene, Names, Vector
-from sd2core.options.records import (
-    ARGUMENT,
-    Group,
-    OptionError,
-    Place,
-    changed,
-    given,
-    given_flags,
-)
+from sd2core.options.records import ARGUMENT, Group, OptionError, Place, changed, given, given_flags
 from sd2core.options.shared import Channel, Json, Looking, MeshReading
 
 if TYPE_CHECKING:

@@ -158,10 +158,7 @@ def chosen(
 
 
 def _measured(
-    mesh: MeshSequence,
-    sensor: VirtualSensor,
-    synthesis: SynthesisOptions,
-    options: Ladder,
+    mesh: MeshSequence, sensor: VirtualSensor, synthesis: SynthesisOptions, options: Ladder
 ) -> Measurement:
     from sd2core.accuracy.cache import cached_measurement, store_measurement
     from sd2core.accuracy.measuring import REPEATS, measure

@@ -169,10 +169,7 @@ def _radar(recording: Recording | None) -> RadarConfig:
 
 
 def _cost(
-    mesh: MeshSequence,
-    placements: Placements,
-    sensors: tuple[VirtualSensor, ...],
-    options: Placing,
+    mesh: MeshSequence, placements: Placements, sensors: tuple[VirtualSensor, ...], options: Placing
 ) -> tuple[Choice, PlacementCost]:
     """Plan and cost for the sensor at the median range."""
     from sd2core.accuracy.choosing import check_options

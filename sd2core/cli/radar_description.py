@@ -93,11 +93,7 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
         write_description,
     )
     from sd2core.io.radar.point_tables import TEXT_SUFFIXES
-    from sd2core.io.radar.points import (
-        COLUMNS_OPTION,
-        holds_unnamed_columns,
-        looks_like_points,
-    )
+    from sd2core.io.radar.points import COLUMNS_OPTION, holds_unnamed_columns, looks_like_points
     from sd2core.io.radar.stored_arrays import array_names
 
     told = given(options, DESCRIPTION)

@@ -108,10 +108,7 @@ def _synth(options: Synth) -> None:
 
 
 def _as_chosen(
-    options: Synth,
-    mesh: MeshSequence,
-    sensor: VirtualSensor,
-    base: SynthesisOptions,
+    options: Synth, mesh: MeshSequence, sensor: VirtualSensor, base: SynthesisOptions
 ) -> DopplerMap:
     """Map by the plan that the scene requires; plan and reasons go into its provenance."""
     from sd2core.accuracy.trial import synthesizer_for

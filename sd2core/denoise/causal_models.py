@@ -119,11 +119,7 @@ class GruDenoiser(Denoiser):
         super().__init__(bins, parts, more)
         self.lift = self.lifting(channels)
         self.recurrent = nn.GRU(
-            channels,
-            channels,
-            depth,
-            batch_first=True,
-            dropout=dropout if depth > 1 else 0.0,
+            channels, channels, depth, batch_first=True, dropout=dropout if depth > 1 else 0.0
         )
         self.head = nn.Linear(channels, bins)
 

@@ -46,9 +46,7 @@ class KnownMovements:
 
     @classmethod
     def of(
-        cls,
-        pairs: Iterable[tuple[NDArray[np.float32], NDArray[np.float32]]],
-        axis: VelocityAxis,
+        cls, pairs: Iterable[tuple[NDArray[np.float32], NDArray[np.float32]]], axis: VelocityAxis
     ) -> KnownMovements | None:
         """From maps to learn from and the radar's, (frames, bins) each; None if nothing moves."""
         inputs, targets = (np.concatenate(each) for each in zip(*pairs, strict=True))

@@ -96,11 +96,7 @@ class TrainedDenoiser:
         return self.card.known.note((one.values.T for one in parts), self.card.axis)
 
     def as_denoised(
-        self,
-        doppler: DopplerMap,
-        energies: NDArray[np.float32],
-        resampled: bool,
-        note: str | None,
+        self, doppler: DopplerMap, energies: NDArray[np.float32], resampled: bool, note: str | None
     ) -> DopplerMap:
         """Denoised map from a synthetic one, or a part of one.
 

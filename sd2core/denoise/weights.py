@@ -113,11 +113,7 @@ def format_of(path: Path) -> str:
 
 
 def read_network(
-    path: Path,
-    build: Callable[[], Network],
-    name: str,
-    shapes: Shapes,
-    expected: str,
+    path: Path, build: Callable[[], Network], name: str, shapes: Shapes, expected: str
 ) -> Network:
     """Build a network as a file describes it, and load its weights into it.
 

@@ -137,12 +137,7 @@ class FrameCounts:
         return quality
 
     def _count_all(
-        self,
-        block: Block,
-        rows: slice,
-        path: EchoPath,
-        scatterers: Scatterers,
-        into: Counts,
+        self, block: Block, rows: slice, path: EchoPath, scatterers: Scatterers, into: Counts
     ) -> None:
         """Count all vertices of some of a block's frames."""
         place, known = self.prepared.sensor(path.ends_m), self.mesh.uncertainty

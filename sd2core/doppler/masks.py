@@ -436,11 +436,7 @@ class VisibilityMasks:
                 self._hide_behind_body(other, view, marked, visible)
 
     def _hide_by_way_of(
-        self,
-        wall: Wall,
-        view: _View,
-        needed: NDArray[np.uint8],
-        visible: NDArray[np.uint8],
+        self, wall: Wall, view: _View, needed: NDArray[np.uint8], visible: NDArray[np.uint8]
     ) -> None:
         """Set ``visible`` to 0 where something is in the way to a wall, or from it to the sensor.
 

@@ -16,11 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from sd2core.doppler import vid2doppler
 from sd2core.doppler.histogram import Counting, Frames
 from sd2core.doppler.moving import MovingVertices, find_moving, still_bins
-from sd2core.doppler.moving_kernels import (
-    STEADY,
-    add_still_kernel,
-    steadiness_kernel,
-)
+from sd2core.doppler.moving_kernels import STEADY, add_still_kernel, steadiness_kernel
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.made_vertices import unshifted
 from sd2core.mesh.sequence import MeshSequence, refuse_missing

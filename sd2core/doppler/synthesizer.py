@@ -674,13 +674,7 @@ class Synthesizer:
                     into = counts.rows(target), totals[target]
                     used.add(
                         self._frames.count(
-                            block,
-                            rows,
-                            sensor,
-                            visibility,
-                            *into,
-                            numbers,
-                            shares=shares,
+                            block, rows, sensor, visibility, *into, numbers, shares=shares
                         )
                     )
                     ticket.advance(last - first)

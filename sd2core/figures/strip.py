@@ -322,13 +322,7 @@ def _reduced(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.rint(blocks.mean(axis=(1, 3))).astype(np.uint8)
 
 
-def _draw_dots(
-    axes: Axes,
-    body: Body,
-    camera: PinholeCamera,
-    box: Frame,
-    over: bool,
-) -> None:
+def _draw_dots(axes: Axes, body: Body, camera: PinholeCamera, box: Frame, over: bool) -> None:
     pixels, depth = project_vertices(body.vertices_m, camera)
     shown = np.isfinite(depth)
     if body.faces is not None:

@@ -56,12 +56,7 @@ Change = Callable[[Labels, Timebase], Edit]
 
 
 def create(
-    labels: Labels,
-    timebase: Timebase,
-    track: str,
-    start_s: float,
-    end_s: float,
-    label: str,
+    labels: Labels, timebase: Timebase, track: str, start_s: float, end_s: float, label: str
 ) -> Edit:
     """Create a span between two times, clipped to the free time of the track.
 
@@ -336,12 +331,7 @@ def fill_gaps(labels: Labels, timebase: Timebase, track: str, label: str) -> Edi
 
 
 def overwrite(
-    labels: Labels,
-    timebase: Timebase,
-    track: str,
-    start_s: float,
-    end_s: float,
-    label: str,
+    labels: Labels, timebase: Timebase, track: str, start_s: float, end_s: float, label: str
 ) -> Edit:
     """Create a span between two times, cutting away other spans of the track there.
 

@@ -112,9 +112,7 @@ def read_labels(path: Path) -> LabelFile:
         labels = document.made()
     folder = plain_path(path).parent
     return LabelFile(
-        labels,
-        located_path(document.recording, folder),
-        located_path(document.video, folder),
+        labels, located_path(document.recording, folder), located_path(document.video, folder)
     )
 
 

@@ -107,8 +107,7 @@ def head_circles(mesh: MeshSequence, camera: PinholeCamera) -> NDArray[np.float6
     resolution = own_resolution(mesh)
     if resolution is None:
         raise Sd2Error(
-            f"Of {mesh.source or 'the mesh'} it is not known where its head is",
-            "a body of sd2 fit",
+            f"Of {mesh.source or 'the mesh'} it is not known where its head is", "a body of sd2 fit"
         )
     head = np.flatnonzero(vertex_limbs(Body.load(resolution)) == LIMBS.index("head"))
     circles_px = np.full((mesh.frame_count, 3), np.inf)

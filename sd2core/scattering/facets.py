@@ -40,10 +40,7 @@ def points_behind(
 
 
 def facets_before(
-    vertices_m: NDArray[np.floating],
-    faces: NDArray[np.int32],
-    sensor_m: ArrayLike,
-    hiding: Surface,
+    vertices_m: NDArray[np.floating], faces: NDArray[np.int32], sensor_m: ArrayLike, hiding: Surface
 ) -> NDArray[np.bool_]:
     """Facets (F,) of one frame whose centre another surface does not hide, whatever its own does.
 
@@ -54,10 +51,7 @@ def facets_before(
 
 
 def _before(
-    hiding: Surface,
-    points_m: NDArray[np.float64],
-    sensor_m: ArrayLike,
-    wanted: NDArray[np.bool_],
+    hiding: Surface, points_m: NDArray[np.float64], sensor_m: ArrayLike, wanted: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """The wanted ones of n points, (n, 3), that a surface does not hide, (n,)."""
     seen = wanted[None].astype(np.uint8)

@@ -207,10 +207,7 @@ def _append(
 
 
 def _take(
-    movement: _Movement,
-    options: VariantOptions,
-    labels: Sequence[str],
-    rng: np.random.Generator,
+    movement: _Movement, options: VariantOptions, labels: Sequence[str], rng: np.random.Generator
 ) -> Take:
     """See a movement by the synthetic map and by the simulated radar."""
     mesh, synthesis = movement.mesh, options.synthesis

@@ -21,11 +21,7 @@ from sd2core.classify.data import (
     seen_first,
 )
 from sd2core.datasets.clips import clips_of_dataset
-from sd2core.datasets.labelled import (
-    clips_of_radar_file,
-    labels_given,
-    unfolded,
-)
+from sd2core.datasets.labelled import clips_of_radar_file, labels_given, unfolded
 from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import radar_map

@@ -182,8 +182,7 @@ def _hash(*content: Any) -> str:
 
 def _run_path(folder: Path, plan: StudyPlan, digest: str, task: Task) -> Path:
     used = plan.model_dump(
-        mode="json",
-        include={"added", "speeds", "added_weight", "classifiers", "folds", "parts"},
+        mode="json", include={"added", "speeds", "added_weight", "classifiers", "folds", "parts"}
     )
     denoised = any(one not in ("radar", "simulated", "synthetic") for one in plan.wanted)
     used["denoiser"] = plan.denoiser.model_dump(mode="json") if denoised else None

@@ -254,12 +254,7 @@ class _Facts:
     known: KnownMovements | None
 
     def save(
-        self,
-        path: Path,
-        network: Denoiser,
-        found: Validation,
-        live: Validation | None,
-        epoch: int,
+        self, path: Path, network: Denoiser, found: Validation, live: Validation | None, epoch: int
     ) -> None:
         training = network.training
         try:

@@ -144,8 +144,7 @@ def check(config: TrainConfig) -> None:
         if not is_pair_store(path):
             what = "holds no pairs" if path.exists() else "does not exist"
             raise Sd2Error(
-                f"{path} {what}",
-                "a folder made by `sd2 simulate campaign` or `sd2 pairs`",
+                f"{path} {what}", "a folder made by `sd2 simulate campaign` or `sd2 pairs`"
             )
     name = config.model.name
     if not is_network(name):

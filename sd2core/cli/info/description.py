@@ -322,10 +322,7 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         **_synthesis_facts(doppler.meta),
     }
     unlikely = judge_map(
-        doppler.values,
-        doppler.timebase.times_s,
-        doppler.present,
-        measured=doppler.kind == "real",
+        doppler.values, doppler.timebase.times_s, doppler.present, measured=doppler.kind == "real"
     )
     notes = (*doppler.meta.get("notes", ()), *map(str, unlikely))
     return Description(f"Doppler map {path}", data, facts, notes)

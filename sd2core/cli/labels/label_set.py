@@ -7,13 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.labels.reading import (
-    LabelFile,
-    check_label_output,
-    print_lost,
-    read_named,
-    write,
-)
+from sd2core.cli.labels.reading import LabelFile, check_label_output, print_lost, read_named, write
 from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.options.records import OptionError
 from sd2core.options.shared import Json, Overwrite

@@ -7,12 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.labels.reading import (
-    check_label_output,
-    print_lost,
-    recording_clock,
-    write,
-)
+from sd2core.cli.labels.reading import check_label_output, print_lost, recording_clock, write
 from sd2core.cli.output import counted, picked, print_json, print_rows
 from sd2core.cli.recording_maps import MapName, maps_of
 from sd2core.errors import Sd2Error

@@ -17,12 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import (
-    atomic_folder,
-    atomic_write,
-    atomic_write_json,
-    atomic_write_text,
-)
+from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_json, atomic_write_text
 from sd2core.files.texts import errors_in, faults_in, read_json, read_toml
 from sd2core.files.toml import toml_lines
 from sd2core.io.radar.capture import LazySamples, RadarCapture

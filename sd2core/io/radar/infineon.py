@@ -20,12 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import AliasPath, BaseModel, ConfigDict, Field
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import (
-    atomic_folder,
-    atomic_write,
-    atomic_write_json,
-    atomic_write_text,
-)
+from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_json, atomic_write_text
 from sd2core.files.limits import open_regular
 from sd2core.files.numpy_files import open_npy_file
 from sd2core.files.texts import errors_in, faults_in, lines_of, read_json

@@ -152,10 +152,7 @@ def _clock(
 
 
 def _in_seconds(
-    first: NDArray[np.float64],
-    steps: NDArray[np.float64],
-    unit_s: float | None,
-    notes: list[str],
+    first: NDArray[np.float64], steps: NDArray[np.float64], unit_s: float | None, notes: list[str]
 ) -> tuple[NDArray[np.float64] | None, float | None]:
     """Times of frames in seconds, and the usual step; None where they tell nothing."""
     if not np.isfinite(first).all():
@@ -181,11 +178,7 @@ def _weights(points: RadarPoints, notes: list[str]) -> NDArray[np.float64]:
 
 
 def _sign(
-    points: RadarPoints,
-    rows: NDArray[np.intp],
-    stated: int | None,
-    path: Path,
-    notes: list[str],
+    points: RadarPoints, rows: NDArray[np.intp], stated: int | None, path: Path, notes: list[str]
 ) -> int:
     """1 if a positive velocity recedes, as TI's radars say it, -1 if it approaches."""
     if stated is not None:

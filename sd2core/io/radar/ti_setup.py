@@ -398,8 +398,7 @@ def _setup(device: _Device, lanes: int, notes: list[str]) -> TiSetup:
     samples, rate_hz = profile.numAdcSamples, profile.digOutSampleRate * 1e3
     if not 1 < samples < _MAX or not rate_hz > 0:
         raise Sd2Error(
-            f"A chirp has {samples} samples at {rate_hz:g} Hz",
-            "two samples or more, at a rate",
+            f"A chirp has {samples} samples at {rate_hz:g} Hz", "two samples or more, at a rate"
         )
     adc_start_s = profile.adcStartTimeConst_usec * 1e-6
     ramp_s = profile.rampEndTime_usec * 1e-6

@@ -23,19 +23,9 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.files.paths import plain_path, stored_path
 from sd2core.files.tables import counted
-from sd2core.labels.formats.elan_reading import (
-    DETAILS,
-    LABELS,
-    PROPERTY,
-    VOCABULARY_LANGUAGE,
-)
+from sd2core.labels.formats.elan_reading import DETAILS, LABELS, PROPERTY, VOCABULARY_LANGUAGE
 from sd2core.labels.formats.lanes import Lane, edges_s, lanes_of
-from sd2core.labels.formats.losses import (
-    ASPECTS,
-    LabelFormat,
-    Loss,
-    hold_texts,
-)
+from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, hold_texts
 from sd2core.labels.formats.rows import clean_name
 from sd2core.labels.label_set import LabelSet
 from sd2core.labels.spans import Labels, Span

@@ -129,8 +129,7 @@ class FitErrors:
             )
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise Sd2Error(
-                f"{path} cannot be read as errors of fits ({error})",
-                _EXPECTED,
+                f"{path} cannot be read as errors of fits ({error})", _EXPECTED
             ) from error
 
     def as_dict(self) -> dict[str, Any]:

@@ -25,12 +25,7 @@ from sd2core.progress import Progress, silent
 from sd2core.simulate.campaign.fit_errors import FitErrors
 from sd2core.simulate.campaign.motion import LABELS
 from sd2core.simulate.campaign.scene import subject_name
-from sd2core.simulate.campaign.takes import (
-    Campaign,
-    TakeMaker,
-    motions_of,
-    take_name,
-)
+from sd2core.simulate.campaign.takes import Campaign, TakeMaker, motions_of, take_name
 from sd2core.version import __version__
 
 _AHEAD = 3

@@ -244,10 +244,7 @@ def _phasors(turns: Floats, count: int, first: Floats) -> NDArray[np.complex128]
 
 
 def _received(
-    signals: Samples,
-    config: RadarConfig,
-    link: LinkBudget | None,
-    rng: np.random.Generator,
+    signals: Samples, config: RadarConfig, link: LinkBudget | None, rng: np.random.Generator
 ) -> tuple[Samples, float]:
     """Samples relative to the converter's half range, with noise and rounded; that range."""
     kind: Any = np.complex64 if config.sampling == "complex" else np.float32
