@@ -21,7 +21,6 @@ from sd2core.accuracy.trial import Trial, synthesizer_for
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.reference import reference_stretch
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
 
 MAX_PLACES = 3
@@ -68,7 +67,6 @@ def choose_for_places(
     frames: int,
     tolerance: float,
     options: SynthesisOptions,
-    progress: Progress = silent,
 ) -> PlacedPlan:
     """Choose the cheapest plan that holds a tolerance at all these places.
 
@@ -89,8 +87,6 @@ def choose_for_places(
         up to 1.
     options : SynthesisOptions
         For what a plan does not choose; taken as a plan, they are tried too.
-    progress : Progress
-        May raise Cancelled.
 
     Raises
     ------
@@ -99,7 +95,7 @@ def choose_for_places(
     """
     check_wish(tolerance)
     options = check_options(mesh, options)
-    search = PlanSearch(mesh, places, tolerance, options, progress)
+    search = PlanSearch(mesh, places, tolerance, options)
     if frames < _MIN_FRAMES:
         return search.top(f"{frames:,} frames of maps are too few to choose a plan for")
     reference_s, top_s = search.reference_s(), search.frame_s(search.most_accurate)
@@ -129,10 +125,9 @@ class PlanSearch:
         places: Sequence[VirtualSensor],
         tolerance: float,
         options: SynthesisOptions,
-        progress: Progress,
     ) -> None:
         self._mesh, self._places, self._tolerance = mesh, places, tolerance
-        self._options, self._progress = options, progress
+        self._options = options
         self.most_accurate = reference_plan(
             "histogram", options.weight, surface=mesh.faces is not None
         )
@@ -156,7 +151,7 @@ class PlanSearch:
         worst = 0.0
         for trial in self._tried():
             runs = trial.sample.checked_on
-            worst = max(worst, trial.errors(plan, runs, progress=self._progress).l1)
+            worst = max(worst, trial.errors(plan, runs).l1)
             if worst > self._tolerance:
                 return None
         return PlacedPlan(plan, worst, reasons)
@@ -164,7 +159,7 @@ class PlanSearch:
     def chosen(self) -> PlacedPlan | None:
         """First plan that is the cheapest at one place and holds at all of them, or None."""
         for place, trial in zip(self._places, self._tried(), strict=True):
-            survey = survey_scene(self._mesh, place, self._options, self._progress, trial=trial)
+            survey = survey_scene(self._mesh, place, self._options, trial=trial)
             choice = choose(
                 self._mesh,
                 place,
@@ -172,7 +167,6 @@ class PlanSearch:
                 options=self._options,
                 dragging=False,
                 survey=survey,
-                progress=self._progress,
             )
             if not choice.holds:
                 return None

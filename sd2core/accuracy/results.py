@@ -241,8 +241,7 @@ def shares(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _peaks(values: NDArray[np.float64], centres_mps: NDArray[np.float64]) -> NDArray[np.float64]:
-    peaks: NDArray[np.float64] = centres_mps[values.argmax(axis=0)]
-    return np.where(values.sum(axis=0) > 0, peaks, 0.0)
+    return np.where(values.sum(axis=0) > 0, centres_mps[values.argmax(axis=0)], 0.0)
 
 
 FLOOR = 1e-5

@@ -38,7 +38,8 @@ def initial_pose(rig: Rig, seen_m: Floats, trust: Floats) -> Pose:
     fit.ball("root", _pairs("hip.L", "hip.R") + _across("hip", "shoulder"))
     # A third of the turn between pelvis and shoulders in each of three places.
     fit.shared("spine", _pairs("shoulder.L", "shoulder.R") + _across("hip", "shoulder"), 3)
-    fit.shared("head", _spokes("nose", _FACE[1:]) + _pairs("ear.L", "ear.R"), 3)
+    face = [(LANDMARK["nose"], LANDMARK[other]) for other in _FACE[1:]]
+    fit.shared("head", face + _pairs("ear.L", "ear.R"), 3)
     for side in "LR":
         arm = [f"{part}.{side}" for part in ("shoulder", "elbow", "wrist")]
         fit.hinge(f"elbow.{side}", arm)
@@ -57,10 +58,6 @@ def initial_pose(rig: Rig, seen_m: Floats, trust: Floats) -> Pose:
 
 def _pairs(first: str, second: str) -> list[tuple[int, int]]:
     return [(LANDMARK[first], LANDMARK[second])]
-
-
-def _spokes(hub: str, others: tuple[str, ...]) -> list[tuple[int, int]]:
-    return [(LANDMARK[hub], LANDMARK[other]) for other in others]
 
 
 def _across(low: str, high: str) -> list[tuple[int, int]]:

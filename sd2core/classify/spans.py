@@ -44,8 +44,6 @@ def predicted_spans(
     options: SpanOptions | None = None,
     *,
     present: NDArray[np.bool_] | None = None,
-    background: str = BACKGROUND,
-    track: str = TRACK,
     first_id: int = 1,
 ) -> tuple[Span, ...]:
     """Find the runs of frames whose most probable class is a gesture.
@@ -59,8 +57,6 @@ def predicted_spans(
     present : bool array, shape (frames,), optional
         False in frames without a person: no span reaches across them, nor across a
         pause of the recording.
-    background : str
-        The class that makes no spans.
     first_id : int
         Of the first span; the others count on.
 
@@ -79,7 +75,7 @@ def predicted_spans(
     runs = [
         (start, stop, number)
         for start, stop, number in _runs(winner, first)
-        if number >= 0 and classes[number] != background
+        if number >= 0 and classes[number] != BACKGROUND
     ]
     joined: list[tuple[int, int, int]] = []
     for start, stop, number in runs:
@@ -104,7 +100,7 @@ def predicted_spans(
         spans.append(
             Span(
                 id=first_id + len(spans),
-                track=track,
+                track=TRACK,
                 start_s=start_s,
                 end_s=end_s,
                 label=classes[number],

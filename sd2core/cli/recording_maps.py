@@ -68,7 +68,10 @@ def maps_of(
         made |= {"synthetic": synthetic} if "synthetic" in names else {}
         made |= {} if denoised is None else {"denoised": denoised}
     if "radar" in names:
-        made["radar"] = _radar(recording, axis)
+        from sd2core.datasets.recording_sources import radar_map
+
+        with progress_bar("Processing") as progress:
+            made["radar"] = radar_map(recording, axis, progress)
     return made
 
 
@@ -82,10 +85,3 @@ def _denoiser_of(recording: Recording, mesh: MeshSequence) -> Path:
             "Choose one in the window, or leave the denoised map out",
         )
     return found
-
-
-def _radar(recording: Recording, axis: VelocityAxis | None) -> DopplerMap:
-    from sd2core.datasets.recording_sources import radar_map
-
-    with progress_bar("Processing") as progress:
-        return radar_map(recording, axis, progress)

@@ -273,25 +273,6 @@ def relative_range(positions: NDArray[Any], sensor: NDArray[np.float64]) -> NDAr
     return difference / np.maximum(away + distance, np.float32(1e-30))
 
 
-def bins_plain(
-    frames: Frames, t: int, sample: int, ends: NDArray[np.float64], counting: Counting
-) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Bin of every vertex (``bins`` where dropped), and a mask of those beyond the axis.
-
-    Parameters
-    ----------
-    frames : Frames
-        With all vertices.
-    t, sample : int
-        Frame and velocity sample, which has something to measure.
-    ends : float64 ndarray, (1 or 2, 3)
-        Of the path, in the frame of the positions.
-    counting : Counting
-        Axis, and what happens beyond it.
-    """
-    return place_in_bins(places_plain(frames, t, sample, ends, counting), counting)
-
-
 def places_plain(
     frames: Frames, t: int, sample: int, ends: NDArray[np.float64], counting: Counting
 ) -> NDArray[Any]:
@@ -322,9 +303,9 @@ def places_plain(
 def place_in_bins(
     f: NDArray[Any], counting: Counting
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Bin numbers from positions on the axis, which runs from 0 to ``bins``.
+    """Bin of every position on the axis (``bins`` where dropped), and a mask of those beyond it.
 
-    The axis is closed at both ends, as in ``np.histogram``.
+    The axis runs from 0 to ``bins`` and is closed at both ends, as in ``np.histogram``.
     """
     bins = counting.bins
     beyond = (f < 0) | (f > bins)
@@ -359,13 +340,8 @@ def count_plain(
     into : Counts
         Written; zero at first.
     bins_of : callable, optional
-        ``bins_of(t, sample)`` replaces what :func:`bins_plain` finds.
+        ``bins_of(t, sample)`` replaces what :func:`place_in_bins` finds.
     """
-    if bins_of is None:
-
-        def bins_of(t: int, sample: int) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-            return bins_plain(frames, t, sample, ends, counting)
-
     _, parts, bins = into.histogram.shape
     multiplicity = scatterers.multiplicity(frames.positions.shape[2])
     # Bins of a part, and one for what is dropped.
@@ -377,7 +353,11 @@ def count_plain(
         into.visible[t] = multiplicity[seen].sum()
         measured = max(1, int((frames.duration_s[t] > 0).sum()))
         for sample in np.flatnonzero(frames.duration_s[t] > 0).tolist():
-            number, beyond = bins_of(t, sample)
+            if bins_of is None:
+                places = places_plain(frames, t, sample, ends, counting)
+                number, beyond = place_in_bins(places, counting)
+            else:
+                number, beyond = bins_of(t, sample)
             total = np.bincount((number + base)[seen], weight[seen], parts * (bins + 1))
             into.histogram[t] += total.reshape(parts, bins + 1)[:, :bins] / measured
             into.beyond[t] += multiplicity[beyond & seen].sum() / measured
@@ -468,6 +448,6 @@ def mark_needed_plain(
     for t in range(len(frames.centre)):
         for sample in range(frames.before.shape[1]):
             if frames.duration_s[t, sample] > 0:
-                number, _ = bins_plain(frames, t, sample, ends, counting)
-                needed[t] |= live[number]
+                places = places_plain(frames, t, sample, ends, counting)
+                needed[t] |= live[place_in_bins(places, counting)[0]]
     return needed

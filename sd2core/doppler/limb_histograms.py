@@ -97,8 +97,8 @@ def fine_histograms(
     """
     limb, counting = scatterers.parts, axis.counting
     assert limb is not None
+    fine = np.zeros((len(frames), limbs, axis.parts))
     if kernels_ready() and velocity_mps is None:
-        fine = np.zeros((len(frames), limbs, axis.parts))
         place = ends.astype(frames.positions.dtype)
         fine_kernel(
             tuple(frames.paths()), counting.scale(frames.duration_s, place.dtype),
@@ -107,7 +107,6 @@ def fine_histograms(
             np.empty((0, 1, 0)), np.zeros(len(frames)), np.zeros(len(frames)),
         )  # fmt: skip
         return fine
-    fine = np.zeros((len(frames), limbs, axis.parts))
     for t, knot in enumerate(frames.centre):
         points = frames.positions[knot]
         seen = scatterers.seen(t, points, ends)

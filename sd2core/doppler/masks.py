@@ -145,11 +145,10 @@ class VisibilityMasks:
         place = self._prepared.sensor(position_m)
         if visibility == "exact" or visibility == "depth":
             visible = np.empty((1, self._prepared.mesh.vertex_count), np.uint8)
-            serving = int(self._serving(block.start + local)) - block.start
-            if 0 <= serving < block.stop - block.start:
-                view = self._view(block, slice(serving, serving + 1), place)
-            else:
-                view = self._view_of(block.start + serving, place)
+            serving = int(self._serving(block.start + local))
+            home, row = divmod(serving, self._prepared.block_frames)
+            its = block if home == block.index else self._counted(home)
+            view = self._view(its, slice(row, row + 1), place)
             every = np.ones_like(visible)
             self._test_alone(view, every, visible, visibility)
             if self._wall is None:
@@ -350,11 +349,6 @@ class VisibilityMasks:
 
         rows = slice(local, local + 1)
         return self._mask(self._counted(home), rows, place, occlusion, needed)[0]
-
-    def _view_of(self, frame: int, place: NDArray[np.float64]) -> _View:
-        """View of one frame of the clip."""
-        home, local = divmod(frame, self._prepared.block_frames)
-        return self._view(self._counted(home), slice(local, local + 1), place)
 
     def _view(self, block: Block, rows: slice, place: NDArray[np.float64]) -> _View:
         points, around_m = self._prepared.near_points(block, rows)

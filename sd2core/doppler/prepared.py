@@ -322,10 +322,7 @@ class PreparedMesh:
             return (None,) if before.all() else (before.astype(np.uint8),), before.size
 
         plane = wall.distance_m, wall.azimuth_deg, wall.elevation_deg
-        kept: tuple[NDArray[np.uint8] | None] = self.budget.get_or_make(
-            ("before", plane, self.stand, block.index), make
-        )
-        return kept[0]
+        return self.budget.get_or_make(("before", plane, self.stand, block.index), make)[0]
 
     def moving(self, block: Block, counting: Counting) -> MovingVertices | None:
         """Vertices of a block that can enter a kept bin; None where counting all is as fast."""
@@ -338,8 +335,7 @@ class PreparedMesh:
             moving = find_moving(whole.frames, whole.reach_m, counting, still)
             return (moving,), 0 if moving is None else moving.nbytes
 
-        kept = self.budget.get_or_make(self._moving_key("moving", block.index), make)
-        return kept[0]
+        return self.budget.get_or_make(self._moving_key("moving", block.index), make)[0]
 
     def pairs_moving(self, index: int) -> int | None:
         """Number of pairs of a frame and a vertex that moves in a block.

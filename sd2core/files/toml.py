@@ -10,6 +10,9 @@ from typing import Any
 
 from sd2core.files.paths import stored_path
 
+_BARE = re.compile("[A-Za-z0-9_-]+")
+"""Keys without quotation marks."""
+
 
 def toml_value(value: Any, folder: Path) -> str:
     """Write a flag, number, text, path or list; paths relative to a folder."""
@@ -25,7 +28,7 @@ def toml_value(value: Any, folder: Path) -> str:
 def toml_lines(table: Mapping[str, Any], folder: Path) -> list[str]:
     """One ``key = value`` per entry; entries that are None are left out."""
     return [
-        f"{_bare(key)} = {toml_value(value, folder)}"
+        f"{key if _BARE.fullmatch(key) else _line(key)} = {toml_value(value, folder)}"
         for key, value in table.items()
         if value is not None
     ]
@@ -50,7 +53,3 @@ def _text(value: str) -> str:
 def _line(value: str) -> str:
     """Write a basic string of TOML: JSON's, but for one character."""
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _bare(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _line(key)

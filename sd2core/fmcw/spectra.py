@@ -74,15 +74,6 @@ def frame_spectra(
     return signal_spectra(np.stack(list(found)), config, axis=axis, processing=processing)
 
 
-def _refuse_moving(options: ProcessingOptions) -> None:
-    if options.clutter == "moving":
-        raise Sd2Error(
-            "A moving average of the clutter is asked for single frames",
-            "clutter 'none', 'mean' or 'regression', which a frame knows by itself",
-            "Simulate the whole clip with simulate_radar",
-        )
-
-
 def signal_spectra(
     signal: BeatSignal,
     config: RadarConfig,
@@ -96,7 +87,12 @@ def signal_spectra(
     :func:`~sd2core.fmcw.reference.converged_frame`.
     """
     options = processing or ProcessingOptions()
-    _refuse_moving(options)
+    if options.clutter == "moving":
+        raise Sd2Error(
+            "A moving average of the clutter is asked for single frames",
+            "clutter 'none', 'mean' or 'regression', which a frame knows by itself",
+            "Simulate the whole clip with simulate_radar",
+        )
     chain = FrameChain(config, options)
     # Brought to 1, or far echoes would be lost below the smallest float32.
     single = np.complex64 if np.iscomplexobj(signal) else np.float32

@@ -100,7 +100,8 @@ def _person_of(path: Path, hints: MeshHints) -> RawMesh:
     held = [first_of(person, ESTIMATED) for person in people.values()]
     if hints.body_model is None and all(vertices is None for vertices in held):
         raise _no_vertices(path, people)
-    entry = _choose(path, people, hints.person, notes)
+    lengths = {key: frames_of(value, path) for key, value in people.items()}
+    entry: dict[Any, Any] = people[chosen_person(lengths, hints.person, str(path), notes)]
     vertices = first_of(entry, ESTIMATED)
     if vertices is None and hints.body_model is None:
         raise _no_vertices(path, entry)
@@ -168,14 +169,6 @@ def weak_perspective_shift(
         ],
         axis=1,
     )
-
-
-def _choose(
-    path: Path, people: dict[Any, Any], person: int | str | None, notes: list[str]
-) -> dict[Any, Any]:
-    lengths = {key: frames_of(value, path) for key, value in people.items()}
-    key = chosen_person(lengths, person, str(path), notes)
-    return people[key]
 
 
 def frames_of(entry: dict[Any, Any], path: Path) -> int:

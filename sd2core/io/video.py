@@ -36,6 +36,8 @@ class VideoReader:
     path : Path
     timebase : Timebase
         When each frame that really decodes is shown; the first at 0 s.
+    metadata : mapping of str to str
+        Of the file: of the container, then of the stream.
     width, height : int
         Of the upright picture.
 
@@ -64,7 +66,7 @@ class VideoReader:
         self._entry = 0  # where decoding began
         self._gave_earlier = False
         self._container, self._stream = open_stream(path)
-        self._metadata = {**self._container.metadata, **self._stream.metadata}
+        self.metadata: Mapping[str, str] = {**self._container.metadata, **self._stream.metadata}
         try:
             self._begin(0)
             first = self._find(0)
@@ -80,11 +82,6 @@ class VideoReader:
             self._notes.append(
                 f"Pixels are not square (ratio {aspect}); the picture is shown as stored."
             )
-
-    @property
-    def metadata(self) -> Mapping[str, str]:
-        """Metadata of the file: names and texts of the container, then of the stream."""
-        return self._metadata
 
     @property
     def notes(self) -> tuple[str, ...]:

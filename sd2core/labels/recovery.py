@@ -168,18 +168,13 @@ class RecoveryPlace:
     """
 
     def __init__(self, root: Path, recording: Path, beside: EditLock | None = None) -> None:
-        self._recording = Path(recording).resolve()
-        number = hashlib.sha256(os.path.normcase(self._recording).encode()).hexdigest()[:12]
-        name = "".join(one if one.isalnum() else "-" for one in self._recording.stem[:40])
+        self.recording = Path(recording).resolve()
+        number = hashlib.sha256(os.path.normcase(self.recording).encode()).hexdigest()[:12]
+        name = "".join(one if one.isalnum() else "-" for one in self.recording.stem[:40])
         self._folder = Path(root) / f"{name}-{number}"
         self._lock = EditLock(self._folder / _LOCK_NAME, self._folder / _HOLDER_NAME)
         self._beside = beside
         self._begun: set[int] = set()
-
-    @property
-    def recording(self) -> Path:
-        """Path of the labelled recording, with links resolved."""
-        return self._recording
 
     @property
     def held(self) -> bool:
@@ -237,7 +232,7 @@ class RecoveryPlace:
         earlier = self.offers()
         known = journals(self._folder, (SUFFIX, DECLINED, DAMAGED))
         session = max(map(session_of, known), default=0) + 1
-        kept = Kept(self._recording, labels)
+        kept = Kept(self.recording, labels)
         if recovered is not None:
             others = recovered.others
             kept = replace(kept, edits=recovered.edits, last=recovered.last, others=others)
@@ -268,7 +263,7 @@ class RecoveryPlace:
         if not self.held:
             holder = self.holder()
             raise Sd2Error(
-                f"The labels of {self._recording} are edited by {holder or 'nobody yet'}",
+                f"The labels of {self.recording} are edited by {holder or 'nobody yet'}",
                 "labels that this window edits",
                 "Close the other window, and open the recording here again",
             )

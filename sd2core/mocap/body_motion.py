@@ -46,7 +46,7 @@ class BodyMotion:
 
         ``own`` is the skeleton of the person's shape.
         """
-        scale = _leg_m(skeleton) / _leg_m(own)
+        scale = skeleton.length_m(*_LEG) / own.length_m(*_LEG)
         place_m = scale * (own.heads_m[0] + self.translation_m[frames]) - skeleton.heads_m[0]
         return Pose(from_vector(self.vectors[frames]), place_m)
 
@@ -74,11 +74,6 @@ class BodyMotion:
             return cls(shape=BodyShape(shape[:-1], float(shape[-1])), **known)
         except (KeyError, TypeError, ValueError) as error:
             raise Sd2Error(f"{path} holds no body's motion ({error})", _EXPECTED) from error
-
-
-def _leg_m(skeleton: Skeleton) -> float:
-    heads_m = skeleton.heads_m[[skeleton.index[bone] for bone in _LEG]]
-    return float(np.linalg.norm(np.diff(heads_m, axis=0), axis=1).sum())
 
 
 def load_motions(folder: Path, role: Role) -> list[BodyMotion]:

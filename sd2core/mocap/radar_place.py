@@ -52,13 +52,18 @@ def estimate_place(seen: Sequence[Seen]) -> RadarPlace:
     taken to be at the camera.
     """
     before = _correlation(seen, np.zeros(3))
+    steps = np.vstack([np.zeros(3), np.diag([0.1, 0.15, 0.03])])
     best = min(
         (
             minimize(
                 lambda place: -_correlation(seen, place),
                 [*start_m, 0.0],
                 method="Nelder-Mead",
-                options={"xatol": 2e-3, "fatol": 1e-5, "initial_simplex": _simplex(start_m)},
+                options={
+                    "xatol": 2e-3,
+                    "fatol": 1e-5,
+                    "initial_simplex": np.add(steps, (*start_m, 0.0)),
+                },
             )
             for start_m in _STARTS_M
         ),
@@ -68,11 +73,6 @@ def estimate_place(seen: Sequence[Seen]) -> RadarPlace:
         return RadarPlace(correlation=before, correlation_before=before)
     x, y, offset_s = (round(float(value), 3) for value in best.x)
     return RadarPlace((x, y, 0.0), offset_s, -float(best.fun), before)
-
-
-def _simplex(start_m: tuple[float, float]) -> Floats:
-    steps = np.vstack([np.zeros(3), np.diag([0.1, 0.15, 0.03])])
-    return np.asarray(steps + np.array([*start_m, 0.0]))
 
 
 def _correlation(seen: Sequence[Seen], place: Floats) -> float:

@@ -103,7 +103,7 @@ def gait(skeleton: Skeleton, times_s: Floats, path: Path, arm_scale: float = 1.0
     duration_s = float(times_s[-1]) + 1.0
     fine = np.arange(0.0, duration_s, 1.0 / GRID_HZ)
     rotations = np.tile(np.eye(3), (len(fine), len(skeleton), 1, 1))
-    leg_m = _leg_length_m(skeleton)
+    leg_m = skeleton.length_m("upperleg01.L", "lowerleg01.L", "foot.L")
     steps = plan_steps(path, float(times_s[-1]), _HALF_BASE * leg_m)
     feet = [_foot(skeleton, fine, steps, path, side, leg_m) for side in (0, 1)]
     pace = _smoothed(np.abs(np.gradient(path.forward_m(fine), fine)), 0.15)
@@ -275,10 +275,6 @@ def _swing_arms(
         swing = about(_ACROSS, -(_ARM_SWING_DEG * ahead - 2.0 * vigour))
         rotations[:, upper] = product(swing, rotations[:, upper])
     rotations[:, 0] = turned
-
-
-def _leg_length_m(skeleton: Skeleton) -> float:
-    return skeleton.length_m("upperleg01.L", "lowerleg01.L", "foot.L")
 
 
 def _smoothed(values: Floats, sigma_s: float) -> Floats:

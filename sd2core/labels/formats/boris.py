@@ -200,31 +200,18 @@ def _chosen(path: Path, observations: dict[str, Any], wanted: str | None) -> str
 
 
 def _add_rows(
-    found: LabelRows, path: Path, events: list[Any], points: set[str], zero_s: float
+    found: LabelRows, path: Path, events: list[Any], points: set[str], video_s: float
 ) -> None:
-    """Add spans of events: each second one of a subject, behaviour and modifiers is a stop.
-
-    Parameters
-    ----------
-    found : LabelRows
-        Gets the rows.
-    path : Path
-    events : list
-        Of the observation.
-    points : set of str
-        Codes of behaviours without a duration.
-    zero_s : float
-        Time of events at which the video begins.
-    """
+    """Add spans of events: each second one of a subject, behaviour and modifiers is a stop."""
     begun: dict[tuple[str, str, str], tuple[float, str]] = {}
     for number, event in enumerate(events, start=1):
         place = f"event {number}"
         with found.entry():
             time_s, subject, code, modifiers, comment = _event(path, place, event)
-            time_s -= zero_s
+            time_s -= video_s  # when the video begins
             track = track_of(subject or _NO_SUBJECT)[0]
             key = (subject, code, modifiers)
-            if code in points:
+            if code in points:  # behaviours without a duration
                 note = _note(modifiers, comment, "")
                 found.rows.append(Row(place, time_s, time_s, code, track, note))
             elif key not in begun:
