@@ -30,6 +30,7 @@ from sd2core.body.track import LANDMARK, Landmarks, parts
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text, replace_folder
 from sd2core.files.lock import FileLock
+from sd2core.files.numpy_files import npz_names
 from sd2core.files.resources import resource_path
 from sd2core.files.stores import open_group
 from sd2core.io.mesh import save_mesh
@@ -318,13 +319,7 @@ def check_fit_output(out: Path) -> None:
 
 def _is_mesh(path: Path) -> bool:
     """True if a file or folder holds an array named ``vertices``."""
-    if path.is_dir():
-        return (path / "vertices").is_dir()
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return "vertices.npy" in archive.namelist()
-    except (OSError, zipfile.BadZipFile):
-        return False
+    return (path / "vertices").is_dir() if path.is_dir() else "vertices" in npz_names(path)
 
 
 def _is_ours(partial: Path) -> bool:

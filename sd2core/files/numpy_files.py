@@ -93,6 +93,15 @@ def open_npy_file(path: Path, expected: str, remedy: str = "") -> NDArray[Any]:
         raise Sd2Error(found, expected, remedy) from error
 
 
+def npz_names(path: Path) -> set[str]:
+    """Names of the arrays in an ``.npz``; none in a damaged one, which its reader refuses."""
+    try:
+        with open_regular(path) as stream, zipfile.ZipFile(stream) as archive:
+            return {name.removesuffix(".npy") for name in archive.namelist()}
+    except (Sd2Error, OSError, ValueError, NotImplementedError, zipfile.BadZipFile):
+        return set()
+
+
 @contextmanager
 def open_zip(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open a zip to read; Sd2Error if its files are larger than its size allows."""

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 import re
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import open_regular
+from sd2core.files.numpy_files import npz_names
 from sd2core.plausibility.clock import UNITS_S
 
 STANDARD_GRAVITY_MPS2 = 9.80665
@@ -44,7 +44,7 @@ _NAMES = {
 _PARTS = re.compile(r"(?P<name>.*?)[\s_]*(?:[\[(](?P<unit>[^\])]*)[\])])?\s*")
 _LONGEST_TITLE = 100
 _LOOKED_AT_BYTES = 1 << 16
-_MEMBERS = {"acceleration_mps2.npy", "turn_rate_radps.npy"}
+_MEMBERS = {"acceleration_mps2", "turn_rate_radps"}
 
 
 @dataclass(frozen=True)
@@ -108,15 +108,14 @@ def holds_inertial_signals(path: Path) -> bool:
     (True, False)
     """
     suffix = path.suffix.lower()
+    if suffix == ".npz":
+        return npz_names(path) >= _MEMBERS
+    if suffix not in (".csv", ".sto"):
+        return False
     try:
-        if suffix == ".npz":
-            with open_regular(path) as stream, zipfile.ZipFile(stream) as archive:
-                return _MEMBERS.issubset(archive.namelist())
-        if suffix not in (".csv", ".sto"):
-            return False
         with open_regular(path) as stream:
             text = stream.read(_LOOKED_AT_BYTES).decode("utf-8-sig", errors="replace")
-    except (OSError, ValueError, Sd2Error, zipfile.BadZipFile, NotImplementedError):
+    except (OSError, Sd2Error):
         return False
     lines = [line.strip() for line in text.splitlines()]
     return _is_table(lines) if suffix == ".csv" else _is_sto(lines)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import zipfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular
+from sd2core.files.numpy_files import npz_names
 from sd2core.files.paths import PICKLE_SUFFIXES, is_pattern
 from sd2core.files.stores import read_attributes
 from sd2core.io.estimator_files import files_of_people, holds_bodies
@@ -97,17 +99,16 @@ def is_dataset(path: Path) -> bool:
     if path.is_dir():
         return bool(read_attributes(path).get("format") == DATASET_FORMAT)
     check_regular(path)
-    try:
-        if suffix == ".npz":
-            with zipfile.ZipFile(path) as archive:
-                return "segment_label.npy" in archive.namelist()
-        if suffix in RADAR_MAP_SUFFIXES:
-            import h5py
+    if suffix == ".npz":
+        return "segment_label" in npz_names(path)
+    if suffix in RADAR_MAP_SUFFIXES:
+        import h5py
 
-            with h5py.File(path, "r") as file:
-                return bool(file.attrs.get("format", "") == DATASET_FORMAT)
-    except (OSError, ValueError, KeyError, TypeError, RecursionError, zipfile.BadZipFile):
-        return False
+        with (
+            suppress(OSError, ValueError, KeyError, TypeError, RecursionError),
+            h5py.File(path, "r") as file,
+        ):
+            return bool(file.attrs.get("format", "") == DATASET_FORMAT)
     return False
 
 

@@ -6,7 +6,6 @@ has. A body that is centred on its root is placed by the camera in the file.
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_size
-from sd2core.files.numpy_files import open_zip
+from sd2core.files.numpy_files import npz_names
 from sd2core.files.paths import PICKLE_SUFFIXES
 from sd2core.io.body_model import read_body_model
 from sd2core.io.body_parameters import PARAMETER_NAMES, first_of, parameters_of
@@ -51,22 +50,13 @@ def is_estimate(path: Path) -> bool:
     if path.is_dir():
         return bool(files_of_people(path))
     if suffix == ".npz":
-        names = _names_in(path)
+        names = npz_names(path)
         return not names & {*VERTEX_NAMES} and bool(
             names & {*ESTIMATED, *PARAMETER_NAMES, *RIG_NAMES, "results"}
         )
     if suffix == ".npy":
         return holds_bodies(path)
     return suffix in (*PICKLE_SUFFIXES, *TORCH_SUFFIXES, ".json")
-
-
-def _names_in(path: Path) -> set[str]:
-    """Names of the arrays in an ``.npz``; none in a damaged one, which its reader refuses."""
-    try:
-        with open_zip(path) as archive:
-            return {name.removesuffix(".npy") for name in archive.namelist()}
-    except (Sd2Error, OSError, ValueError, zipfile.BadZipFile):
-        return set()
 
 
 def read_model_output(path: Path, hints: MeshHints = _NO_HINTS) -> RawMesh:

@@ -12,6 +12,7 @@ from typing import Any
 from pydantic.dataclasses import dataclass
 
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import remove_leftovers
 from sd2core.files.paths import make_folder
 from sd2core.runs.folder import LIVE, RunFolder, State
 from sd2core.runs.progress import Event, effective, last_of, read_events
@@ -88,9 +89,7 @@ class TrainingFolder(RunFolder):
         made = (self.config, self.best, self.last, self.last_record, self.progress, self.control)
         for path in (*made, self.log, self.description, self._lock):
             path.unlink(missing_ok=True)
-        # What a write left that was killed.
-        for rest in self.path.glob(".sd2-*.tmp"):
-            rest.unlink(missing_ok=True)
+        remove_leftovers(self.path)
         if self.path.is_dir() and not any(self.path.iterdir()):
             self.path.rmdir()
 

@@ -220,16 +220,10 @@ def _note_failure(folder: TrainingFolder, writer: ProgressWriter, error: BaseExc
     with folder.log.open("a", encoding="utf-8") as log:
         log.write(time.strftime("%Y-%m-%d %H:%M:%S\n"))
         log.write("".join(traceback.format_exception(error)) + "\n")
-    if isinstance(error, Sd2Error):
-        said = {"found": error.found, "expected": error.expected, "remedy": error.remedy}
-    elif isinstance(error, MemoryError):
-        said = {
-            "found": "There is not enough memory for this",
-            "expected": "",
-            "remedy": "Choose a smaller batch or a smaller model",
-        }
-    else:
+    if isinstance(error, MemoryError):
+        remedy = "Choose a smaller batch or a smaller model"
+        error = Sd2Error("There is not enough memory for this", remedy=remedy)
+    elif not isinstance(error, Sd2Error):
         found = f"This should not happen ({type(error).__name__}: {error})"
-        remedy = f"Please report it, with {folder.log.name}"
-        said = {"found": found, "expected": "", "remedy": remedy}
-    _say_end(folder, writer, "failed", {}, said)
+        error = Sd2Error(found, remedy=f"Please report it, with {folder.log.name}")
+    _say_end(folder, writer, "failed", {}, vars(error))
