@@ -36,7 +36,6 @@ def modelled_ns(
 
     Parameters
     ----------
-    plan : AccuracyPlan
     vertices : int
         Of the full mesh.
     moving_share : float

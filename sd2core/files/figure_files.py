@@ -36,7 +36,6 @@ def save_figure(
 
     Parameters
     ----------
-    figure : Figure
     path : Path
         In a folder that exists.
     provenance : mapping, optional

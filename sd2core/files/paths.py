@@ -107,7 +107,6 @@ def free_path(folder: Path, name: str, prefix: str, *, reserved: str) -> Path:
 
     Parameters
     ----------
-    folder : Path
     name : str
         Wanted name of a file or folder.
     prefix : str

@@ -136,7 +136,6 @@ def parse_json(text: str, place: str | Path, expected: str, remedy: str = "") ->
 
     Parameters
     ----------
-    text : str
     place : str or Path
         Where it stands, such as a file, for the error.
     expected : str

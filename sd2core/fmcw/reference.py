@@ -53,7 +53,6 @@ def converged_frame(
 
     Parameters
     ----------
-    scene : WaveScene
     time_s : float
         Middle of the frame.
     tolerance : float

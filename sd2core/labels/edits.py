@@ -62,14 +62,12 @@ def create(
 
     Parameters
     ----------
-    labels : Labels
     timebase : Timebase
         Of the recording.
     track : str
         Name of one of the tracks.
     start_s, end_s : float
         In either order; the edges go to the nearest frame edges.
-    label : str
 
     Raises
     ------
@@ -87,7 +85,6 @@ def duplicate(labels: Labels, timebase: Timebase, ids: Collection[int], start_s:
 
     Parameters
     ----------
-    labels : Labels
     timebase : Timebase
         Of the recording.
     ids : collection of int
@@ -126,13 +123,10 @@ def resize(labels: Labels, timebase: Timebase, span_id: int, side: Side, time_s:
 
     Parameters
     ----------
-    labels : Labels
     timebase : Timebase
         Of the recording.
-    span_id : int
     side : {"start", "end"}
         Edge that is moved.
-    time_s : float
     """
     frames = Frames.of(timebase)
     span = labels.span(span_id)
@@ -157,7 +151,6 @@ def move(
 
     Parameters
     ----------
-    labels : Labels
     timebase : Timebase
         Of the recording.
     ids : collection of int
@@ -188,10 +181,8 @@ def nudge(labels: Labels, timebase: Timebase, ids: Collection[int], count: int) 
 
     Parameters
     ----------
-    labels : Labels
     timebase : Timebase
         Of the recording.
-    ids : collection of int
     count : int
         Frames; negative to earlier ones.
     """
@@ -219,10 +210,8 @@ def split(labels: Labels, timebase: Timebase, span_id: int, time_s: float) -> Ed
 
     Parameters
     ----------
-    labels : Labels
     timebase : Timebase
         Of the recording.
-    span_id : int
     time_s : float
         Within the span.
 
@@ -275,7 +264,6 @@ def join_at(labels: Labels, timebase: Timebase, one_id: int, other_id: int, time
 
     Parameters
     ----------
-    labels : Labels
     timebase : Timebase
         Of the recording.
     one_id, other_id : int
@@ -314,7 +302,6 @@ def fill_gaps(labels: Labels, timebase: Timebase, track: str, label: str) -> Edi
 
     Parameters
     ----------
-    labels : Labels
     timebase : Timebase
         Of the recording.
     track : str
@@ -339,14 +326,12 @@ def overwrite(
 
     Parameters
     ----------
-    labels : Labels
     timebase : Timebase
         Of the recording.
     track : str
         Name of one of the tracks.
     start_s, end_s : float
         In either order; the edges go to the nearest frame edges.
-    label : str
     """
     frames = Frames.of(timebase)
     labels.track(track)

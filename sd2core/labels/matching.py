@@ -70,7 +70,6 @@ def match_spans(
 
     Parameters
     ----------
-    a, b : sequence of Span
     timebase : Timebase
         Of the recording, for differences in frames.
     min_iou : float

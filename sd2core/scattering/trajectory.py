@@ -81,7 +81,6 @@ class Trajectory:
             The frames that :meth:`frames_needed` names.
         first_frame : int
             Number of the first of them.
-        first_knot, last_knot : int
 
         Returns
         -------

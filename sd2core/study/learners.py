@@ -40,10 +40,8 @@ def learnt(
 
     Parameters
     ----------
-    learner : Learner
     known : ClipSet
         Classes, axis and frame rate of the clips.
-    real, added : sequence of Clip
     added_weight : float
         All added frames together weigh this many times as much as all real ones.
     seed : int

@@ -177,7 +177,6 @@ def page(
 
     Parameters
     ----------
-    results : Results
     findings : sequence of Finding
         Of :func:`findings_of`.
     said : str

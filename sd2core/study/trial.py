@@ -87,8 +87,6 @@ def drawn(plan: StudyPlan, data: StudyData, real: Sequence[str], share: float, s
 
     Parameters
     ----------
-    plan : StudyPlan
-    data : StudyData
     real : sequence of str
         Groups whose radar is looked at.
     share : float

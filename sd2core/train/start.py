@@ -52,8 +52,6 @@ def begin(
 
     Parameters
     ----------
-    config : TrainConfig
-    out : Path
     command : str
         Kept with the model.
     watch : callable, optional

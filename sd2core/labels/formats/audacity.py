@@ -34,8 +34,6 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
 
     Parameters
     ----------
-    path : Path
-    labels : Labels
     timebase, media
         Not used: the format has neither frames nor a video.
 

@@ -57,8 +57,6 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
 
     Parameters
     ----------
-    path : Path
-    labels : Labels
     timebase : Timebase
         Of the video: frames of the events, and its length.
     media : Path, optional

@@ -66,8 +66,6 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
 
     Parameters
     ----------
-    path : Path
-    labels : Labels
     timebase : Timebase
         Not used: the format has no frames.
     media : Path, optional

@@ -74,8 +74,6 @@ class CapturedMotions:
 
         Parameters
         ----------
-        rng : Generator
-        subject : Subject
         number : int
             Of the subject: it chooses the recorded person.
         skeleton : Skeleton

@@ -36,7 +36,6 @@ def footwork(
 
     Parameters
     ----------
-    rng : Generator
     times_s : float64 array, shape (T,)
     mode : {"stand", "shift", "walk", "turn", "sit"}
     still : bool
