@@ -36,6 +36,7 @@ def modelled_ns(
 
     Parameters
     ----------
+    plan : AccuracyPlan
     vertices : int
         Of the full mesh.
     moving_share : float

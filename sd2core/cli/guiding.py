@@ -45,6 +45,7 @@ def guide(
 
     Parameters
     ----------
+    protocol : Protocol
     folder : Path
         Is made where only its parent exists.
     open_take : callable

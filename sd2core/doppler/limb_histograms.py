@@ -87,6 +87,7 @@ def fine_histograms(
         Of the path, in the frame of the positions.
     scatterers : Scatterers
         Their ``parts`` are the limbs.
+    limbs : int
     velocity_mps : float64 array, shape (n, V), optional
         Velocities of another rule, for the frames with something to measure.
 

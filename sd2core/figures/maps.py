@@ -209,6 +209,7 @@ def save_maps(figure: Figure, path: Path, rows: Sequence[MapRow], about: dict[st
 
     Parameters
     ----------
+    figure : Figure
     path : Path
         Ends in ``.png``, ``.svg`` or ``.pdf``; errors are those of :func:`save_figure`.
     rows : sequence of MapRow

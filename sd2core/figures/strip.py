@@ -56,6 +56,7 @@ def plot_strip(
 
     Parameters
     ----------
+    source : StripSource
     frames : sequence of int
         Numbers on :attr:`StripSource.clock`, in the order in which they are drawn; 1 to 100.
     options : StripOptions, optional
@@ -111,6 +112,8 @@ def save_strip(
         Of :func:`plot_strip`.
     path : Path
         Ends in ``.png``, ``.svg`` or ``.pdf``; errors are those of :func:`save_figure`.
+    source : StripSource
+    frames : sequence of int
     options : StripOptions
         What the figure was made of, for its provenance.
     """

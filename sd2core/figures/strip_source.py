@@ -74,6 +74,7 @@ class StripSource:
             Gives the focal length, the sensor, and whether it is simulated.
         video : VideoReader or None
             Without one the camera's picture has 640 × 480 pixels.
+        mesh : MeshSequence or None
         name : str
             Of the recording, for provenance and errors.
         """
@@ -141,6 +142,7 @@ def frames_around(frame: int, count: int, step: int, total: int) -> list[int]:
 
     Parameters
     ----------
+    frame : int
     count, step : int
         1 or more; of an even count one frame more follows than precedes.
     total : int

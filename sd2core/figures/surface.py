@@ -90,6 +90,7 @@ def find_visible_triangles(
         camera) are left out.
     faces : int32 array, shape (F, 3)
         Counter-clockwise seen from outside; those that face away are not seen.
+    camera : PinholeCamera
     frame : Frame, optional
         Part of the picture; by default the whole at its own size.
 
@@ -137,6 +138,7 @@ def shade_mesh(
     faces : int32 array, shape (F, 3), or None
         Counter-clockwise seen from outside. None: the vertices are drawn as dots of value 1
         (:func:`draw_dots`).
+    camera : PinholeCamera
     frame : Frame, optional
         Part of the picture; by default the whole at its own size.
 

@@ -36,6 +36,7 @@ def save_figure(
 
     Parameters
     ----------
+    figure : Figure
     path : Path
         In a folder that exists.
     provenance : mapping, optional

@@ -50,6 +50,7 @@ def open_npz_file(path: Path, what: str, expected: str, remedy: str = "") -> Ite
 
     Parameters
     ----------
+    path : Path
     what : str
         Name of the content in the message: "… cannot be read as ``what``".
     expected : str

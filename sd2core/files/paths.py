@@ -107,6 +107,7 @@ def free_path(folder: Path, name: str, prefix: str, *, reserved: str) -> Path:
 
     Parameters
     ----------
+    folder : Path
     name : str
         Wanted name of a file or folder.
     prefix : str

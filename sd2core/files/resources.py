@@ -55,6 +55,7 @@ def open_bundled_arrays(
 
     Parameters
     ----------
+    path : Path
     kind : str
         Name of the format that is wanted.
     version : int

@@ -136,6 +136,7 @@ def parse_json(text: str, place: str | Path, expected: str, remedy: str = "") ->
 
     Parameters
     ----------
+    text : str
     place : str or Path
         Where it stands, such as a file, for the error.
     expected : str

@@ -122,10 +122,13 @@ def simulated_capture(
     ----------
     samples : array, shape (frames, receivers, chirps, samples)
         As :func:`digitise` wrote them.
+    config : RadarConfig
     times_s : float64 array, shape (frames,)
         Middles of the frames on the scene's clock; the capture's own begins at 0.
     source : str
         File of the scene; empty if there is none.
+    sensor : VirtualSensor
+    options : SignalOptions
     levels : dict
         What :func:`digitise` returned.
     how : dict, optional

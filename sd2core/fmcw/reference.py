@@ -53,6 +53,7 @@ def converged_frame(
 
     Parameters
     ----------
+    scene : WaveScene
     time_s : float
         Middle of the frame.
     tolerance : float

@@ -80,6 +80,8 @@ def direct(
 
     Parameters
     ----------
+    echoes : Echoes
+    config : RadarConfig
     chirps : int, optional
         Number around the frame's middle; by default the radar's own.
     go_on : callable, optional
@@ -134,6 +136,8 @@ def nufft(
 
     Parameters
     ----------
+    echoes : Echoes
+    config : RadarConfig
     blocks : int
         Each, no more than there are chirps, has beat frequencies of its own. One block leaves
         2 pi (2 / c) S r t_m t_n out of the phase at its ends.

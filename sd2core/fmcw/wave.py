@@ -169,6 +169,7 @@ class WaveScene:
             Of the vertices, in the middle of the frame, or at a chirp.
         visible : bool array, shape (F,), or None
             Facets that nothing hides; None: all. Of these, those that face both antennas echo.
+        receiver : int
         faces : int32 array, shape (F, 3), optional
             Others than the mesh's own belong to other vertices, and are for a smooth surface: the
             phases of a rough one belong to its facets.

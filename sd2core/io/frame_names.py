@@ -141,6 +141,7 @@ def chosen_person(
     ----------
     frames : mapping
         Number of frames of each person.
+    person : int, str or None
     source : str
         For the error if there is no such person.
     notes : list of str

@@ -34,6 +34,7 @@ def write_video(
 
     Parameters
     ----------
+    path : Path
     frames : iterable of uint8 arrays, shape (height, width, 3)
         Taken one by one.
     frames_per_s : int

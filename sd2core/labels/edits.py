@@ -62,12 +62,14 @@ def create(
 
     Parameters
     ----------
+    labels : Labels
     timebase : Timebase
         Of the recording.
     track : str
         Name of one of the tracks.
     start_s, end_s : float
         In either order; the edges go to the nearest frame edges.
+    label : str
 
     Raises
     ------
@@ -85,6 +87,7 @@ def duplicate(labels: Labels, timebase: Timebase, ids: Collection[int], start_s:
 
     Parameters
     ----------
+    labels : Labels
     timebase : Timebase
         Of the recording.
     ids : collection of int
@@ -123,10 +126,13 @@ def resize(labels: Labels, timebase: Timebase, span_id: int, side: Side, time_s:
 
     Parameters
     ----------
+    labels : Labels
     timebase : Timebase
         Of the recording.
+    span_id : int
     side : {"start", "end"}
         Edge that is moved.
+    time_s : float
     """
     frames = Frames.of(timebase)
     span = labels.span(span_id)
@@ -151,6 +157,7 @@ def move(
 
     Parameters
     ----------
+    labels : Labels
     timebase : Timebase
         Of the recording.
     ids : collection of int
@@ -181,8 +188,10 @@ def nudge(labels: Labels, timebase: Timebase, ids: Collection[int], count: int) 
 
     Parameters
     ----------
+    labels : Labels
     timebase : Timebase
         Of the recording.
+    ids : collection of int
     count : int
         Frames; negative to earlier ones.
     """
@@ -210,8 +219,10 @@ def split(labels: Labels, timebase: Timebase, span_id: int, time_s: float) -> Ed
 
     Parameters
     ----------
+    labels : Labels
     timebase : Timebase
         Of the recording.
+    span_id : int
     time_s : float
         Within the span.
 
@@ -264,6 +275,7 @@ def join_at(labels: Labels, timebase: Timebase, one_id: int, other_id: int, time
 
     Parameters
     ----------
+    labels : Labels
     timebase : Timebase
         Of the recording.
     one_id, other_id : int
@@ -302,6 +314,7 @@ def fill_gaps(labels: Labels, timebase: Timebase, track: str, label: str) -> Edi
 
     Parameters
     ----------
+    labels : Labels
     timebase : Timebase
         Of the recording.
     track : str
@@ -326,12 +339,14 @@ def overwrite(
 
     Parameters
     ----------
+    labels : Labels
     timebase : Timebase
         Of the recording.
     track : str
         Name of one of the tracks.
     start_s, end_s : float
         In either order; the edges go to the nearest frame edges.
+    label : str
     """
     frames = Frames.of(timebase)
     labels.track(track)

@@ -27,6 +27,8 @@ def set_field(labels: Labels, ids: Iterable[int], field: SpanField, value: Any) 
 
     Parameters
     ----------
+    labels : Labels
+    ids : iterable of int
     field : {"label", "note", "author", "confidence", "track", "person"}
     value : str, float or None
         An empty note or person removes it; a confidence is 0 to 1, or None for unknown.
@@ -71,6 +73,7 @@ def offer(
 
     Parameters
     ----------
+    labels : Labels
     timebase : Timebase
         Of the recording.
     found : sequence of Span
@@ -108,6 +111,7 @@ def take(
 
     Parameters
     ----------
+    labels : Labels
     timebase : Timebase
         Of the recording.
     ids : iterable of int
@@ -115,6 +119,7 @@ def take(
         free part, in this order; those for which there is none stay suggestions.
     track : str
         Added where it is not there.
+    label : str
     keep_known : bool
         Keeps the label of suggestions that name a gesture or a label of the set.
 

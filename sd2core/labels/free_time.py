@@ -130,6 +130,8 @@ def steps_free(frames: Frames, span: Span, room: TimeRange, count: int) -> int:
 
     Parameters
     ----------
+    frames : Frames
+    span : Span
     room : (float, float)
         Limits of the span, as :func:`limits_of` finds them.
     count : int
@@ -171,10 +173,12 @@ def clip_to_free(labels: Labels, track: str, wanted: TimeRange, frames: Frames) 
 
     Parameters
     ----------
+    labels : Labels
     track : str
         Name of one of the tracks.
     wanted : (float, float)
         Start and end in seconds.
+    frames : Frames
 
     Raises
     ------
@@ -208,8 +212,10 @@ def snap(
 
     Parameters
     ----------
+    labels : Labels
     timebase : Timebase
         Of the recording.
+    time_s : float
     within_s : float
         Distance from which a span attracts, some pixels of the time axis; 0: only exact hits.
     ignore : collection of int
@@ -243,12 +249,14 @@ def seen_at(
 
     Parameters
     ----------
+    labels : Labels
     timebase : Timebase
         Of the recording.
     track : str
         Name of the track on which the event is marked.
     now_s : float
         Time of the frame on screen.
+    reaction_s : float
     """
     frame = timebase.frame_at(now_s - reaction_s)
     if labels.track(track).overlap == "exclusive":

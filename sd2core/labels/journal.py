@@ -143,6 +143,8 @@ def change(name: str, time_unix_s: float, before: Labels, after: Labels) -> dict
     ----------
     name : str
         Of the edit.
+    time_unix_s : float
+    before, after : Labels
     """
     content: dict[str, Any] = {"name": name, "time_unix_s": time_unix_s}
     if before.spans is not after.spans:

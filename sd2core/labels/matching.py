@@ -70,6 +70,7 @@ def match_spans(
 
     Parameters
     ----------
+    a, b : sequence of Span
     timebase : Timebase
         Of the recording, for differences in frames.
     min_iou : float

@@ -143,6 +143,7 @@ def check_place(config: RadarConfig, seen: Sequence[Seen], moved: Sequence[Moved
 
     Parameters
     ----------
+    config : RadarConfig
     seen : sequence of Seen
         By the radar, in order of time, on the clock of the pictures.
     moved : sequence of Moved

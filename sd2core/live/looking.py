@@ -45,6 +45,8 @@ def look(
 
     Parameters
     ----------
+    source : Source
+    camera : Camera
     delays_s : (float, float)
         From what happened to the arrival of its picture, and of its frame.
     seconds : float

@@ -31,6 +31,7 @@ def prompted_span(
     ----------
     doppler : DopplerMap
         What the radar saw.
+    label : str
     prompt_s, end_s : float
         When the person was told to begin, and when the prompt went, on the clock of the map.
     reaction_s : float
@@ -70,6 +71,8 @@ def label_take(folder: Path, protocol: Protocol, take: Take, prompt_s: float, en
     ----------
     folder : Path
         Recording that has ended.
+    protocol : Protocol
+    take : Take
     prompt_s, end_s : float
         When the prompt came and went, by the monotonic clock.
     """

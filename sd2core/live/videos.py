@@ -41,6 +41,7 @@ def hide_person(folder: Path, how: Literal["blur", "drop"], progress: Progress =
 
     Parameters
     ----------
+    folder : Path
     how : {"blur", "drop"}
     progress : Progress
         Counts the pictures that are written.

@@ -110,10 +110,12 @@ def body_doppler(
 
     Parameters
     ----------
+    driven : DrivenClip
     choices : MarsChoices
         Synthesis, resolution, poses per frame, and whether the map is also split by limbs.
     place : RadarPlace
         Position and clock's offset of the radar.
+    progress : Progress
     """
     frames = len(driven.clip.times_s)
     times_s = np.arange((frames - 1) * choices.moments + 1) / (FRAMES_PER_S * choices.moments)

@@ -60,6 +60,7 @@ def make_recording_pairs(
 
     Parameters
     ----------
+    recordings : sequence of Path
     out : Path
         Store of the pairs.
     synthesis : SynthesisOptions
@@ -68,6 +69,7 @@ def make_recording_pairs(
         People in the recordings; by default a different one in each, named like it.
     limbs : bool
         The input is also split by the parts of the body.
+    progress : Progress
 
     Raises
     ------

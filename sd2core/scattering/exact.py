@@ -58,6 +58,7 @@ def hides(  # type: ignore[no-untyped-def]
     ----------
     x, y, z : float array, shape (V,)
         Places of the vertices.
+    i, j, k, v : int
     gx, gy, gz : float
         Vector from the vertex to the sensor.
     contact : float

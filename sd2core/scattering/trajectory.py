@@ -81,6 +81,7 @@ class Trajectory:
             The frames that :meth:`frames_needed` names.
         first_frame : int
             Number of the first of them.
+        first_knot, last_knot : int
 
         Returns
         -------

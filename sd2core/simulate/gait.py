@@ -88,8 +88,10 @@ def gait(skeleton: Skeleton, times_s: Floats, path: Path, arm_scale: float = 1.0
 
     Parameters
     ----------
+    skeleton : Skeleton
     times_s : float64 array, shape (T,)
         Multiples of 1 / :data:`GRID_HZ`, from 0 on.
+    path : Path
     arm_scale : float
         As the scale of :func:`sd2core.simulate.limbs.reach`.
 

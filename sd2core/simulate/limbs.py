@@ -58,6 +58,7 @@ def turn_torso(skeleton: Skeleton, rotations: Floats, times: Floats, across_deg:
 
     Parameters
     ----------
+    skeleton : Skeleton
     rotations : float64 array, shape (T, B, 3, 3)
         Those of spine, collar bones, neck and head are written.
     times : float64 array, shape (T,)
@@ -100,6 +101,7 @@ def reach(
 
     Parameters
     ----------
+    skeleton : Skeleton
     rotations : float64 array, shape (T, B, 3, 3)
         Of the whole body, which faces the camera; those of the arm are replaced.
     side : {"L", "R"}
@@ -211,6 +213,7 @@ def place_limb(
 
     Parameters
     ----------
+    skeleton : Skeleton
     rotations : float64 array, shape (T, B, 3, 3)
         Those of the first two bones are written.
     bones : (str, str, str)
@@ -252,6 +255,7 @@ def turn_hand(
 
     Parameters
     ----------
+    skeleton : Skeleton
     rotations : float64 array, shape (T, B, 3, 3)
         Those of forearm, wrist and fingers are written.
     side : {"L", "R"}

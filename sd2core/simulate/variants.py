@@ -85,8 +85,10 @@ def vary_recordings(
 
     Parameters
     ----------
+    recordings : sequence of Path
     out : Path
         Store of the pairs; what it holds is not made again.
+    options : VariantOptions
     subjects : sequence of str, optional
         People in the recordings; by default a different one in each, named like it.
     progress : Progress
@@ -140,6 +142,7 @@ def vary_mars(
         Each with one person's parts.
     out : Path
         Store of the pairs; what it holds is not made again.
+    options : VariantOptions
     progress : Progress
         Counts people.
     """

@@ -37,10 +37,12 @@ def learn_denoiser(
     place : Path
         Folder, made anew if a denoiser failed in it or was stopped; a reason is in its file
         ``done``.
+    chosen : Denoiser
     pairs : PairSet
         Axis, frame rate and the like of the takes.
     takes : sequence of Take
         What is learnt from; those shorter than a segment are left out.
+    seed : int
 
     Raises
     ------
@@ -121,6 +123,7 @@ def added_map(
     Parameters
     ----------
     condition : {"synthetic", "synthetic+texture", "denoised", "denoised+texture"}
+    take : Take
     model : TrainedDenoiser or None
         Needed by all but the first.
     reason : str

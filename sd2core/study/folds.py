@@ -68,6 +68,7 @@ def groups_of(
     ----------
     known : ClipSet
         The classes, of which every part gets its share.
+    movements : sequence of Movement
     parts : int or None
         Number of parts; None: people are the groups.
     seed : int
@@ -94,8 +95,11 @@ def share_of(
 
     Parameters
     ----------
+    known : ClipSet
+    movements : sequence of Movement
     share : float
         Of the frames of each class, or of its movements beside background; above 0, up to 1.
+    seed : int
     """
     if BACKGROUND in known.classes:
         return _whole(known, movements, share, seed)

@@ -40,8 +40,10 @@ def learnt(
 
     Parameters
     ----------
+    learner : Learner
     known : ClipSet
         Classes, axis and frame rate of the clips.
+    real, added : sequence of Clip
     added_weight : float
         All added frames together weigh this many times as much as all real ones.
     seed : int

@@ -177,6 +177,7 @@ def page(
 
     Parameters
     ----------
+    results : Results
     findings : sequence of Finding
         Of :func:`findings_of`.
     said : str

@@ -87,6 +87,8 @@ def drawn(plan: StudyPlan, data: StudyData, real: Sequence[str], share: float, s
 
     Parameters
     ----------
+    plan : StudyPlan
+    data : StudyData
     real : sequence of str
         Groups whose radar is looked at.
     share : float

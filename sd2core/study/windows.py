@@ -43,6 +43,8 @@ def window_features(
     Parameters
     ----------
     energies : float32 array, shape (frames, bins)
+    axis : VelocityAxis
+    frame_rate_hz : float
     window_s : float
         Length of the window, which is cut at both ends of the take.
 

@@ -288,6 +288,7 @@ def segments_of(
 
     Parameters
     ----------
+    takes : sequence of Take
     length, overlap : int
         Frames, as for :func:`~sd2core.pairs.segments.segment_starts`.
     null_bins : sequence of int

@@ -163,6 +163,8 @@ def evaluate(
 
     Parameters
     ----------
+    models : sequence of TrainedDenoiser
+    pairs : PairSet
     subjects : iterable of str, optional
         To be judged; by default the test subjects of the first model, or all.
     first_only : bool

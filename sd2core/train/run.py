@@ -61,6 +61,10 @@ def carry_out(
 
     Parameters
     ----------
+    folder : TrainingFolder
+    config : TrainConfig
+    writer : ProgressWriter
+    control : Control
     resume : bool
         Goes on from the last checkpoint.
     command : str

@@ -52,6 +52,8 @@ def begin(
 
     Parameters
     ----------
+    config : TrainConfig
+    out : Path
     command : str
         Kept with the model.
     watch : callable, optional

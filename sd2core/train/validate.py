@@ -55,8 +55,10 @@ class Validator:
 
         Parameters
         ----------
+        segments : Segments
         scaling : Scaling
             Compresses inputs and targets.
+        axis : VelocityAxis
         null_bins : tuple of int
             Not counted, in error or peak.
         """

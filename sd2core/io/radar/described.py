@@ -148,6 +148,7 @@ def write_described(
         Of one transmitter, with complex samples.
     times_s : array_like, shape (frames,)
         Times of the frames, which follow one another regularly.
+    simulated : bool
     meta : dict
         Written to ``meta.json``, e.g. how it was simulated and the truth.
     """

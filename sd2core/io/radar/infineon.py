@@ -148,6 +148,7 @@ def write_capture(
         Becomes the folder with ``radar.npy``. A folder that is something else
         than a radar recording is never replaced.
     samples : uint16 array, shape (frames, receivers, chirps, samples)
+    config : RadarConfig
     times_s : array_like, shape (frames,)
         Time of every frame relative to ``start_unix_s``.
     simulated : bool

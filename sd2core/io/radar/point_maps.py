@@ -43,6 +43,8 @@ def velocity_histogram(
     columns : int array, shape (P,)
         Frame of every point.
     velocity_mps, weight : float64 array, shape (P,)
+    frames : int
+    axis : VelocityAxis
     step_mps : float
         Resolution of the radar. A point says no more than that something moves within half a step
         of its velocity: its weight is spread evenly over that cell. 0: it counts in one bin.

@@ -34,6 +34,8 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
 
     Parameters
     ----------
+    path : Path
+    labels : Labels
     timebase, media
         Not used: the format has neither frames nor a video.
 

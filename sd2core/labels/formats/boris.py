@@ -57,6 +57,8 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
 
     Parameters
     ----------
+    path : Path
+    labels : Labels
     timebase : Timebase
         Of the video: frames of the events, and its length.
     media : Path, optional

@@ -88,6 +88,8 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
 
     Parameters
     ----------
+    path : Path
+    labels : Labels
     timebase : Timebase
         Of the recording: for the columns of frames.
     media : Path, optional

@@ -66,6 +66,8 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
 
     Parameters
     ----------
+    path : Path
+    labels : Labels
     timebase : Timebase
         Not used: the format has no frames.
     media : Path, optional

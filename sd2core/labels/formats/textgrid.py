@@ -44,6 +44,8 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
 
     Parameters
     ----------
+    path : Path
+    labels : Labels
     timebase : Timebase
         Of the video: for its first and last instant.
     media : Path, optional

@@ -74,6 +74,8 @@ class CapturedMotions:
 
         Parameters
         ----------
+        rng : Generator
+        subject : Subject
         number : int
             Of the subject: it chooses the recorded person.
         skeleton : Skeleton

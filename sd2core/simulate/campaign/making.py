@@ -54,6 +54,7 @@ def make_campaign(
     ----------
     out : Path
         Folder of the pairs.
+    campaign : Campaign
     subjects : int
         1 or more.
     minutes : float

@@ -116,6 +116,8 @@ def perform(
 
     Parameters
     ----------
+    rng : Generator
+    subject : Subject
     skeleton : Skeleton
         The subject's.
     base : Skeleton
@@ -124,6 +126,7 @@ def perform(
         Multiples of 1/240 s.
     kind : Kind, optional
         By default drawn, or without other movements it follows from the take's number.
+    protocol : Protocol
     number : int
         Of the take; the one kind of swipe of a take to and fro follows from it as well.
     """
@@ -157,8 +160,11 @@ def plan_arms(
 
     Parameters
     ----------
+    rng : Generator
+    subject : Subject
     duration_s : float
         Of the take.
+    protocol : Protocol
     number : int
         Of the take; the one kind of swipe of a take to and fro follows from it.
 

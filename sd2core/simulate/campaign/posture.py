@@ -116,6 +116,7 @@ def change_posture(
         Of the result; it may be of another shape than the one that the posture was read from.
     transforms : float64 array, shape (T, B, 3, 4)
         Of the body in the true posture.
+    true : Posture
     change : mapping of (group, side) to float64 array, shape (T, n)
         Metres along the axes of the line of sight for the place, rotation vectors in them for the
         trunk, differences of directions for limbs; ``place`` and ``trunk`` have the side "".

@@ -109,6 +109,9 @@ def radar_target(
     ----------
     mesh : MeshSequence
         With faces; the radar's frames are at its times.
+    config : RadarConfig
+    sensor : VirtualSensor
+    axis : VelocityAxis
     null_bins : sequence of int
         Emptied, as in the synthetic map.
     reflectors : tuple of Reflector

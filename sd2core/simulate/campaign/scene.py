@@ -114,6 +114,7 @@ def random_setting(
 
     Parameters
     ----------
+    rng : Generator
     stature_m : float
         Of the person: sensors are aimed at the chest.
     placements : int

@@ -41,9 +41,12 @@ def random_motion(
 
     Parameters
     ----------
+    rng : Generator
+    skeleton : Skeleton
     stature_m : float
         Of the person with this skeleton.
     times_s : float64 array, shape (T,)
+    deed : Deed
     """
     while True:
         motion = _drawn(rng, skeleton, stature_m, times_s, deed)

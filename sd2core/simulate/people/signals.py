@@ -42,7 +42,9 @@ def wander(rng: np.random.Generator, times_s: Floats, cutoff_hz: float, count: i
 
     Parameters
     ----------
+    rng : Generator
     times_s : float64 array, shape (T,)
+    cutoff_hz : float
     count : int
         Number of independent signals.
     """
@@ -60,6 +62,7 @@ def envelope(times_s: Floats, start_s: float, end_s: float, ramp_s: float) -> Fl
     Parameters
     ----------
     times_s : float64 array, shape (T,)
+    start_s, end_s : float
     ramp_s : float
         Length of each ramp.
     """

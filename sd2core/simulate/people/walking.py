@@ -36,6 +36,7 @@ def footwork(
 
     Parameters
     ----------
+    rng : Generator
     times_s : float64 array, shape (T,)
     mode : {"stand", "shift", "walk", "turn", "sit"}
     still : bool
