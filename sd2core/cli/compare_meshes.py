@@ -149,7 +149,8 @@ def _load(path: Path, options: CompareMeshes) -> MeshSequence:
     from sd2core.recording.recording import is_recording, open_recording
 
     if is_recording(path):
-        return open_recording(path).load_mesh()
+        mesh = open_recording(path).load_mesh()
+        return mesh.body(options.person) if mesh.others else mesh
     told: dict[str, Any] = mesh_reading(options).options() | {"faces": options.faces}
     if is_estimate(path):
         return load_mesh(path, **told)

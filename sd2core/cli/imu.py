@@ -95,7 +95,7 @@ def _imu(options: Imu) -> None:
     away from the trunk or up it, and z points out of the body. On a vertex of any other
     surface z points out of it, x as near to upwards as lies in it, in the first frame.
     y completes them right-handed. Where there is no body for a while, the samples are
-    empty. See docs/imu.md.
+    empty. Of several people --person says who. See docs/imu.md.
 
       sd2 imu walk.zarr --at left-wrist --out wrist.csv
       sd2 imu walk.npz --at 4711 --rate 200 --out spot.sto

@@ -79,15 +79,18 @@ def looking(
 
 def mesh_and_its_sensor(options: MeshInput) -> tuple[MeshSequence, VirtualSensor]:
     """Mesh, and sensor of the recording or the camera."""
-    from sd2core.recording.recording import is_recording
+    from sd2core.recording.recording import is_recording, open_recording
     from sd2core.sensor import VirtualSensor
 
     sensor = VirtualSensor()
     if is_recording(options.mesh):
-        recording = open_recording_from_options(options.mesh, options)
+        whom = options.person if open_recording(options.mesh).bodies else None
+        read = options if whom is None else replace(options, person=None)
+        recording = open_recording_from_options(options.mesh, read)
         sensor = recording.sensor
         with progress_bar("Reading the mesh") as progress:
             mesh = recording.load_mesh(progress)
+        mesh = mesh if whom is None else mesh.body(whom)
     else:
         mesh = load_mesh_from_options(options.mesh, options)
     return mesh, sensor

@@ -45,7 +45,7 @@ def _refine(options: Refine) -> None:
 
     mesh, _ = mesh_and_its_sensor(_told_by_video(options))
     with progress_bar("Finding the jitter") as progress:
-        smooth = refined(mesh, progress)
+        smooth = refined(mesh.body(), progress)
     with progress_bar("Writing the mesh") as progress:
         save_mesh(smooth, options.out, progress)
     assert smooth.uncertainty is not None

@@ -35,7 +35,7 @@ def virtual_imu(
     Parameters
     ----------
     mesh : MeshSequence
-        In metres. Its frames may come unevenly; in a gap nothing is known.
+        In metres, of one person. Its frames may come unevenly; in a gap nothing is known.
     at : str or int
         Place on the bundled body, such as ``"left-wrist"``, or the number of a vertex of any
         surface; see :func:`sd2core.imu.mounting.mounted`, also for the sensor's axes.
@@ -79,6 +79,7 @@ def virtual_imu(
             f"{2 * cutoff_hz:g} or more",
             "Raise --rate, or lower --cutoff",
         )
+    mesh = mesh.body()
     start_s, end_s = mesh.times_s[[0, -1]]
     count = int(np.floor((end_s - start_s) * rate_hz + 1e-6)) + 1
     times = Timebase.regular(count, rate_hz, float(start_s))
@@ -113,7 +114,7 @@ def _ideal(
     signals = imu_signals(path, times.times_s, cutoff_hz, up)
     about = {
         "at": mounting.name,
-        **({"person": mesh.persons[0]} if mesh.others else {}),
+        **({"person": mesh.person} if mesh.person else {}),
         "axes": mounting.axes,
         "rate_hz": round(times.frames_per_s, 6),
         "frames_per_s": round(mesh.timebase.frames_per_s, 6),

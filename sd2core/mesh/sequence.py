@@ -205,6 +205,21 @@ class MeshSequence:
         """Name of each of the bodies: its own, or ``person 2`` by its number; each once."""
         return persons_of(body.person for body in self.bodies)
 
+    def body(self, person: str | None = None) -> MeshSequence:
+        """Body of a person of the scene alone; Sd2Error without a name where there are several."""
+        names = self.persons
+        if person is None and not self.others:
+            return self
+        if person not in names:
+            asked = "" if person is None else f", not {person}"
+            raise Sd2Error(
+                f"{self.source or 'The scene'} shows {' and '.join(names)}{asked}",
+                "one of them by name",
+                "Name one with --person or mesh.body(NAME), for data sets in the labels",
+            )
+        number = names.index(person)
+        return replace(self.bodies[number], others=(), person=names[number])
+
     def read(self, start: int, stop: int) -> NDArray[Any]:
         """Vertices of frames ``start`` to ``stop`` (exclusive) in memory, (n, V, 3)."""
         if not 0 <= start < stop <= self.frame_count:

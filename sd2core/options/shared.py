@@ -93,7 +93,7 @@ class MeshReading(OptionRecord):
         metres per unit of the mesh, e.g. 0.001 for millimetres (default: 1)
     person : ID
         which person of a file, or of a folder with a file per person and frame (default: seen
-        longest)
+        longest), or, by name, of a recording of several (default: everybody)
     distance_m : M
         move a mesh that is centred on the body's root this far forward
     turn : AXIS

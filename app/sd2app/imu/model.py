@@ -267,7 +267,7 @@ def _feel(
     mesh: MeshSequence, request: _Request, known: InertialSignals | None, emit: Emit
 ) -> InertialSignals:
     """Compute in the background: where sensors sit first, then what the current one feels."""
-    vertices = {}
+    vertices, mesh = {}, mesh.body(mesh.persons[0] if mesh.others else None)
     for place in request.places:
         try:
             vertices[place] = mounted(mesh, place).vertex
