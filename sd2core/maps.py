@@ -304,7 +304,7 @@ class DopplerMap:
     def __repr__(self) -> str:
         emptied = len(self.null_bins)
         said = [
-            f"{self.kind}, {self.axis.bins} bins over ±{self.axis.v_max_mps:g} m/s",
+            f"{self.kind}, {self.axis.words}",
             self.timebase.words,
             *([self.unit] if self.unit else []),
             *([f"{emptied} bins emptied"] if emptied else []),

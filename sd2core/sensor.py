@@ -58,6 +58,11 @@ class VelocityAxis:
             )
 
     @property
+    def words(self) -> str:
+        """Text such as ``32 bins over ±2 m/s``."""
+        return f"{self.bins} bins over ±{self.v_max_mps:g} m/s"
+
+    @property
     def bin_width_mps(self) -> float:
         """Width of one bin."""
         return 2.0 * self.v_max_mps / self.bins

@@ -165,7 +165,7 @@ def _count(
             mesh = MeshInput("", "", video.frames, vertices, video.frames_per_s, nowhere)
     if graph.plan.synthesise is None:
         return
-    for planned in graph.maps_of(origin, mesh, found.sensor):
+    for planned in graph.maps_of(origin, found, mesh):
         for task in planned.tasks:
             steps[task.step].count(task, bool(mesh.identity) and graph.is_done(task), weight)
 

@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
-from functools import cache, lru_cache, partial
+from functools import cache, cached_property, lru_cache, partial
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,15 +25,17 @@ from sd2core.maps import DopplerMap, MapKind, joined
 from sd2core.options.exporting import Exporting
 from sd2core.options.records import changed
 from sd2core.progress import Progress
-from sd2core.sensor import VelocityAxis, VirtualSensor
+from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
     from sd2core.datasets.source import LazySource, Source, SourceKey
     from sd2core.imu.signals import InertialSignals
+    from sd2core.mesh.sequence import MeshSequence
 
 Row = dict[str, Any]
 """A line of ``results.jsonl``: one stretch of one map."""
 
+_OF_ONE_MAP = "recording", "placement", "person"
 _NOTE = "dataset.json"
 
 _NEW = ("imu", "label_rule", "min_share", "null_bins")
@@ -134,18 +136,18 @@ class _Counted:
 
 
 def rows_of(folder: BatchFolder) -> Iterator[list[Row]]:
-    """Yield the rows of one map after the other."""
+    """Yield the rows of one person's map, or everybody's, after the other."""
     with open_regular(folder.results) as stream:
         place, expected = folder.results, "lines that `sd2 batch` wrote"
         rows = (parse_json(line.decode(), place, expected) for line in whole_lines(stream))
-        for _, group in groupby(rows, lambda row: (row["recording"], row["placement"])):
+        for _, group in groupby(rows, lambda row: [row.get(name) for name in _OF_ONE_MAP]):
             yield list(group)
 
 
 def _sources(folder: BatchFolder, export: Exporting) -> Iterator[LazySource]:
     from sd2core.datasets.source import LazySource, SourceKey
 
-    opened, imu_signals = lru_cache(maxsize=1)(_opened), lru_cache(maxsize=1)(_imu_signals)
+    opened = lru_cache(maxsize=1)(_Opened)
     for rows in rows_of(folder):
         parts = _parts(rows[-1]["stop"], export)
         for number, (start, stop) in enumerate(parts):
@@ -153,8 +155,7 @@ def _sources(folder: BatchFolder, export: Exporting) -> Iterator[LazySource]:
             if len(parts) > 1:
                 name = f"{name} part {number + 1} of {len(parts)}"
             key = SourceKey(rows[0]["subject"], name, rows[0]["placement"])
-            imu = partial(imu_signals, rows[0]["source"], rows[0]["mesh"], export.imu)
-            load = _loader(folder, rows, key, (start, stop), opened, imu)
+            load = partial(_source, folder, rows, key, (start, stop), opened, export.imu)
             told = json.dumps([rows, start, stop], sort_keys=True)
             fingerprint = hashlib.sha256(told.encode()).hexdigest()[:32]
             yield LazySource(key, load, partial(str, fingerprint))
@@ -168,49 +169,49 @@ def _parts(frames: int, export: Exporting) -> list[tuple[int, int]]:
     return [(start, min(start + length + export.overlap_frames, frames)) for start in starts]
 
 
-def _loader(
+def _source(
     folder: BatchFolder,
     rows: Sequence[Row],
     key: SourceKey,
     part: tuple[int, int],
-    opened: Callable[[Path], Any],
-    imu: Callable[[], dict[str, InertialSignals]],
-) -> Any:
-    def load(_: Progress) -> Source:
-        from sd2core.datasets.recording_sources import labels_and_classes
-        from sd2core.datasets.source import Source, label_per_frame, labelled_spans
-        from sd2core.labels.spans import Labels
-        from sd2core.mocap.recording_pairs import on_clock
+    opened: Callable[[str, str], _Opened],
+    imu: Sequence[str],
+    _: Progress,
+) -> Source:
+    from sd2core.datasets.recording_sources import labels_and_classes
+    from sd2core.datasets.source import Source, labelled_spans
+    from sd2core.labels.per_frame import label_per_frame
+    from sd2core.mocap.recording_pairs import on_clock
 
-        maps: dict[MapKind, DopplerMap] = {}
-        kinds: tuple[MapKind, ...] = ("synthetic", "denoised", "simulated")
-        for kind in kinds:
-            if all(row[kind] is not None for row in rows):
-                maps[kind] = _stretch_of(folder, rows, kind, part)
-        recording, radar_of = opened(Path(rows[0]["source"]))
-        first = next(iter(maps.values()))
-        if recording is not None and recording.radar is not None and key.placement == 0:
-            radar = on_clock(radar_of(first.axis), first.timebase)
-            maps.setdefault(radar.kind, radar)
-        labels = Labels() if recording is None else recording.labelled
-        names, classes = labels_and_classes(labels)
-        return Source(
-            *key,
-            VirtualSensor.from_dict(rows[0]["sensor"]),
-            maps,
-            label_per_frame(labels.spans, names, first.times_s),
-            names,
-            classes,
-            tuple(rows[0]["target_m"]),
-            {
-                "recording": key.recording if recording is None else recording.title,
-                "simulated": recording is not None and recording.simulated,
-            },
-            {place: signals.between(*part) for place, signals in imu().items()},
-            labelled_spans(labels.spans, names),
-        )
-
-    return load
+    maps: dict[MapKind, DopplerMap] = {}
+    kinds: tuple[MapKind, ...] = ("synthetic", "denoised", "simulated")
+    for kind in kinds:
+        if all(row[kind] is not None for row in rows):
+            maps[kind] = _stretch_of(folder, rows, kind, part)
+    there, person = opened(rows[0]["source"], rows[0]["mesh"]), rows[0].get("person", "")
+    recording, people = there.recording, there.people
+    first = _stretch_of(folder, rows, "clock" if "clock" in rows[0] else "synthetic", part)
+    if recording.radar is not None and key.placement == 0:
+        radar = on_clock(there.radar_of(first.axis), first.timebase)
+        maps.setdefault(radar.kind, radar)
+    names, classes = labels_and_classes(people.labels)
+    maps, own = people.known(person, names, maps), people.labels_of(person)
+    return Source(
+        *key,
+        VirtualSensor.from_dict(rows[0]["sensor"]),
+        maps,
+        label_per_frame(own.spans, names, first.times_s),
+        names,
+        classes,
+        tuple(rows[0]["target_m"]),
+        {
+            "recording": recording.title or key.recording,
+            "simulated": recording.simulated,
+            **people.shown(person, maps),
+        },
+        {place: there.imu_of(place, person).between(*part) for place in imu},
+        labelled_spans(own, names),
+    )
 
 
 def _stretch_of(
@@ -231,25 +232,28 @@ def _stretch_of(
     return replace(whole, meta=kept)
 
 
-def _opened(path: Path) -> tuple[Any, Callable[[VelocityAxis], DopplerMap]]:
-    """Open a recording, None for a mesh or a video alone; its radar's map is made once."""
-    from sd2core.datasets.recording_sources import radar_map
-    from sd2core.recording.recording import is_recording, open_recording
+class _Opened:
+    """Open recording, or mesh or video alone, whose sources share what is made once."""
 
-    recording: Any = open_recording(path) if is_recording(path) else None
-    return recording, cache(partial(radar_map, recording))
+    def __init__(self, source: str, mesh: str) -> None:
+        from sd2core.datasets.people import People
+        from sd2core.datasets.recording_sources import radar_map
+        from sd2core.recording.recording import Recording, is_recording, open_recording
 
+        path, self._mesh = Path(source), Path(mesh)
+        self.recording = open_recording(path) if is_recording(path) else Recording(path.parent)
+        self.people = People(self.recording, None, self.recording.effective_labels())
+        self.radar_of = cache(partial(radar_map, self.recording))
+        self.imu_of = cache(self._imu_of)
 
-def _imu_signals(source: str, mesh: str, places: tuple[str, ...]) -> dict[str, InertialSignals]:
-    """Inertial sensors at the frames of a mesh, the same from every placement."""
-    if not places:
-        return {}
-    from sd2core.imu.virtual import imu_at_frames
-    from sd2core.recording.recording import is_recording, open_recording
+    def _imu_of(self, place: str, person: str) -> InertialSignals:
+        """Inertial sensor at the frames of a mesh, the same from every placement."""
+        from sd2core.imu.virtual import imu_at_frames
 
-    own = open_recording(Path(source)) if is_recording(Path(source)) else None
-    if own is not None and own.mesh is not None:
-        body = own.load_mesh()
-    else:
-        body = open_mesh(Path(mesh), None, {})
-    return {place: imu_at_frames(body, place) for place in places}
+        return imu_at_frames(replace(self.people, mesh=self._opened_mesh).body(person), place)
+
+    @cached_property
+    def _opened_mesh(self) -> MeshSequence:
+        if self.recording.mesh is not None:
+            return self.recording.load_mesh()
+        return open_mesh(self._mesh, None, {})

@@ -26,6 +26,7 @@ from sd2core.mesh.walls import Wall
 from sd2core.sensor import Vector, VirtualSensor
 
 if TYPE_CHECKING:
+    from sd2core.labels.spans import Labels
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.recording.recording import Recording
 
@@ -54,6 +55,7 @@ class MeshInput:
     target_m: Vector  # see sd2core.placements.body_extent.BodyExtent
     faces: str | None = None
     reading: Mapping[str, Any] | None = None  # arguments for load_mesh
+    others_m: tuple[Vector, ...] = ()  # as target_m, of the other bodies of a scene
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,15 @@ class VideoInput:
 
 
 @dataclass(frozen=True)
+class Somebody:
+    """Whom a source of a data set is of: a person whom labels of a recording name, or everybody."""
+
+    person: str = ""  # empty: everybody
+    subject: str = ""  # empty: the recording's, as the plan says
+    body: int | None = 0  # number in the scene; None where they are not in it
+
+
+@dataclass(frozen=True)
 class Inspection:
     """Content of a recording; a mesh takes precedence over a video."""
 
@@ -75,6 +86,7 @@ class Inspection:
     mesh: MeshInput | None = None
     video: VideoInput | None = None
     about: str = ""  # hash of what else a data set takes from it: labels, and what its radar saw
+    people: tuple[Somebody, ...] = ()  # whom labels name
 
 
 _INSPECTION = TypeAdapter(Inspection)
@@ -163,6 +175,8 @@ class _Look:
         self._folder, self._digests = folder, digests
 
     def at(self, path: Path) -> Inspection:
+        from sd2core.datasets.people import People
+        from sd2core.datasets.people import subject_of as subject_in
         from sd2core.files.recording_json import FILE_NAME
         from sd2core.io.kinds import kind_of
         from sd2core.labels.files import FILE_NAME as LABELS_NAME
@@ -184,7 +198,14 @@ class _Look:
         video = self._video(recording) if mesh is None and recording.video is not None else None
         if mesh is None and video is None:
             raise Sd2Error(f"{path} holds neither a mesh nor a video", "one of them")
-        return Inspection(recording.sensor, mesh, video, self._about(recording))
+        labels = recording.effective_labels()
+        people = People(recording, None, labels)
+        named = (
+            Somebody(one, subject_in(recording, one, ""), people.number(one))
+            for one in labels.persons
+        )
+        about = self._about(recording, labels)
+        return Inspection(recording.sensor, mesh, video, about, tuple(named))
 
     def _mesh(self, recording: Recording) -> MeshInput:
         from sd2core.datasets.kept_maps import mesh_identity
@@ -223,14 +244,14 @@ class _Look:
                 str(path), identity, len(video), video.timebase.frames_per_s, focal_px
             )
 
-    def _about(self, recording: Recording) -> str:
+    def _about(self, recording: Recording, labels: Labels) -> str:
         if self._folder is None:
             return ""
-        labels, radar = recording.labelled, recording.radar
+        radar = recording.radar
         return key_of(
             "inspect",
             {
-                "spans": [repr(span) for span in labels.spans],
+                "spans": [repr(span) for span in labels.decided],
                 "set": repr(labels.label_set),
                 "title": recording.title,
                 "simulated": recording.simulated,
@@ -302,9 +323,12 @@ def mesh_input_of(
 
     mesh = open_mesh(path, faces, reading or {})
     x, y, z = (round(value, 6) for value in BodyExtent.of(mesh).target_m)
+    # Who comes in too late is nowhere.
+    there = (body if body.presence.there.any() else mesh for body in mesh.others)
+    others_m = tuple(BodyExtent.of(body).target_m for body in there)
     rate = mesh.timebase.frames_per_s
     shape = mesh.frame_count, mesh.vertex_count
-    return MeshInput(str(path), identity, *shape, rate, (x, y, z), faces, reading)
+    return MeshInput(str(path), identity, *shape, rate, (x, y, z), faces, reading, others_m)
 
 
 def _record_path(folder: BatchFolder, origin: Origin) -> Path:

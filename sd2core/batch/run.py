@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack, suppress
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
@@ -240,28 +241,29 @@ class _Run:
             for number, (origin, about, mesh, planned) in enumerate(self._graph.all_maps()):
                 if number % 256 == 0:
                     self._tick()
-                for index, task in enumerate(planned.synthesis):
-                    start, stop = planned.stretches[index]
+                for share, index in product(planned.shares, range(len(planned.stretches))):
+                    who, (start, stop) = share.who, planned.stretches[index]
+                    of_all = planned.synthesis[index].out
+                    simulated = [task.out for task in planned.simulation]
                     row = {
                         "source": origin.path,
                         "mesh": mesh.path,
                         "recording": origin.name,
-                        "subject": origin.subject,
+                        "subject": who.subject or origin.subject,
+                        **({"person": who.person} if who.person else {}),
                         "placement": planned.placement,
                         "sensor": planned.sensor.as_dict(),
-                        "target_m": mesh.target_m,
+                        "target_m": (mesh.target_m, *mesh.others_m)[who.body or 0],
                         "about": about,
                         "start": start,
                         "stop": stop,
-                        "synthetic": _if_there(task.out, root),
-                        "denoised": _if_there(planned.denoised[index], root)
-                        if planned.denoised
-                        else None,
-                        "simulated": _if_there(planned.simulation[index].out, root)
-                        if planned.simulation
-                        else None,
+                        "synthetic": _if_there(share.synthetic[index : index + 1], root),
+                        "denoised": _if_there(share.denoised[index : index + 1], root),
+                        "simulated": _if_there(simulated[index : index + 1], root),
+                        # Of somebody who is not in the scene: a map with the axis and the times.
+                        **({} if share.synthetic else {"clock": _if_there([of_all], root)}),
                     }
-                    if row["synthetic"] is not None:
+                    if Path(of_all).exists():
                         stream.write((json.dumps(row, ensure_ascii=False) + "\n").encode())
 
     def _end(self, outcome: str, error: Sd2Error | None) -> dict[str, Any]:
@@ -306,9 +308,10 @@ class _Run:
             stream.write(b"\n  ]\n}\n")
 
 
-def _if_there(out: str | Path, root: Path) -> str | None:
-    path = Path(out)
-    return path.relative_to(root).as_posix() if path.exists() else None
+def _if_there(out: Sequence[str | Path], root: Path) -> str | None:
+    """Path of a file below the root; None where none is made, or it is missing."""
+    there = (path.relative_to(root).as_posix() for path in map(Path, out) if path.exists())
+    return next(there, None)
 
 
 def remove_old_leftovers(folder: Path, old_s: float = _OLD_S) -> None:

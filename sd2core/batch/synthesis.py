@@ -70,7 +70,7 @@ def synthesise(
     section: Synthesis,
     stretch: FrameRange,
     choosing: Choosing | None,
-    out: Path,
+    outs: Sequence[Path],
 ) -> None:
     """Make the map of some frames and write it.
 
@@ -89,22 +89,29 @@ def synthesise(
         Half-open range of frames.
     choosing : Choosing or None
         For a section with a tolerance: maps that share an accuracy plan.
-    out : Path
-        Map to write (.npz).
+    outs : sequence of Path
+        Map to write (.npz), or one of each body of the scene alone, in order.
     """
     from sd2core.body.parts import synthetic_map
     from sd2core.datasets.kept_maps import found_map, synthetic_key
+    from sd2core.datasets.people import map_of
 
     refuse_inside(mesh, sensor)
     plan = None if choosing is None else chosen_plan(mesh, section, choosing)
-    maker, limbs = _synthesizer(mesh, section, plan), section.limbs
+    maker, limbs = _synthesizer(mesh, section, plan), section.limbs or len(outs) > 1
     # Looked for only: the batch's own folder keeps what it makes.
     key = synthetic_key(mesh.identity, maker, sensor, limbs=limbs, frames=stretch)
     doppler = found_map(key) or synthetic_map(maker, sensor, limbs=limbs, frames=stretch)
     if plan is not None:
         doppler = replace(doppler, meta=doppler.meta | plan["provenance"])
-    out.parent.mkdir(parents=True, exist_ok=True)
-    doppler.save(out)
+    outs[0].parent.mkdir(parents=True, exist_ok=True)
+    if len(outs) == 1:
+        doppler.save(outs[0])
+        return
+    scene = kept_mesh(mesh)
+    for person, body, out in zip(scene.persons, scene.bodies, outs, strict=True):
+        one = map_of(person, body, doppler, stretch[0])
+        (one if section.limbs else replace(one, limbs=None)).save(out)
 
 
 def simulate(
@@ -113,7 +120,7 @@ def simulate(
     simulation: Simulation,
     axis: VelocityAxis,
     stretch: FrameRange,
-    out: Path,
+    outs: Sequence[Path],
 ) -> None:
     """Make the map that a radar would show of some frames and write it.
 
@@ -131,15 +138,15 @@ def simulate(
         Of the map.
     stretch : tuple of 2 int
         Half-open range of frames.
-    out : Path
-        Map to write (.npz).
+    outs : sequence of Path
+        Map to write (.npz), one.
     """
     from sd2core.datasets.simulating import simulated_map
 
     refuse_inside(mesh, sensor)
     doppler = simulated_map(kept_mesh(mesh), sensor, simulation, axis, stretch)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    doppler.save(out)
+    outs[0].parent.mkdir(parents=True, exist_ok=True)
+    doppler.save(outs[0])
 
 
 def refuse_inside(mesh: MeshInput, sensor: VirtualSensor) -> None:

@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Any
 from sd2core.batch.exporting import dataset_key, dataset_path, is_exported, rows_of
 from sd2core.batch.fitting import fit_choices, fitted
 from sd2core.batch.folder import BatchFolder
-from sd2core.batch.inputs import Inspection, MeshInput, Origin, VideoInput, known_inspection
+from sd2core.batch.inputs import (
+    Inspection,
+    MeshInput,
+    Origin,
+    Somebody,
+    VideoInput,
+    known_inspection,
+)
 from sd2core.batch.plan import STEPS, BatchPlan, Step
 from sd2core.batch.synthesis import Choosing, FrameRange, stretches_of
 from sd2core.batch.tasks import Task
@@ -33,26 +40,39 @@ _MAPS: tuple[Step, ...] = ("synthesise", "denoise", "simulate")
 
 
 @dataclass(frozen=True)
+class PlannedShare:
+    """Share of a person in the maps from one place, or everybody's: one file per stretch."""
+
+    who: Somebody
+    synthetic: tuple[Path, ...]  # none of somebody who is not in the scene
+    denoising: Task | None = None  # covers all stretches, because a model carries its state on
+
+    @property
+    def denoised(self) -> tuple[Path, ...]:
+        """Files of the denoised stretches, or none."""
+        return () if self.denoising is None else tuple(self.denoising.arguments["outs"])
+
+
+@dataclass(frozen=True)
 class PlannedMap:
-    """Map of one recording from one place: one file per stretch."""
+    """Map of one recording from one place."""
 
     placement: int  # 0 is the recording's own sensor; 1 and up are the places of the plan
     sensor: VirtualSensor
     stretches: tuple[FrameRange, ...]
     synthesis: tuple[Task, ...]  # one per stretch
-    denoising: Task | None = None  # covers all stretches, because a model carries its state on
-    simulation: tuple[Task, ...] = ()  # one per stretch, or none
+    shares: tuple[PlannedShare, ...]
+    simulation: tuple[Task, ...] = ()  # one per stretch, or none; of everybody
+
+    @property
+    def denoising(self) -> tuple[Task, ...]:
+        """Tasks that denoise the shares."""
+        return tuple(one.denoising for one in self.shares if one.denoising is not None)
 
     @property
     def tasks(self) -> tuple[Task, ...]:
         """All tasks of this map."""
-        denoising = () if self.denoising is None else (self.denoising,)
-        return (*self.synthesis, *denoising, *self.simulation)
-
-    @property
-    def denoised(self) -> list[Path]:
-        """Files of the denoised stretches, or none."""
-        return [] if self.denoising is None else list(self.denoising.arguments["outs"])
+        return (*self.synthesis, *self.denoising, *self.simulation)
 
 
 class TaskGraph:
@@ -65,22 +85,16 @@ class TaskGraph:
     def __init__(self, plan: BatchPlan, folder: BatchFolder, origins: Sequence[Origin]) -> None:
         self.plan, self.folder, self.origins = plan, folder, origins
         section = plan.synthesise
-        self._scene = (
-            {}
-            if section is None
-            else {
-                "options": asdict(chosen_options(section)),
-                "tolerance": section.tolerance,
-                "vertices_kept": section.vertices_kept,
-                "left_out": section.left_out,
-                "limbs": section.limbs,
-            }
-        )
+        self._scene: dict[str, Any] = {}
+        if section is not None:
+            told = ("tolerance", "vertices_kept", "left_out", "limbs")
+            self._scene = {name: getattr(section, name) for name in told}
+            self._scene["options"] = asdict(chosen_options(section))
         self._model = None if plan.denoise is None else _model_of(plan)
         self._simulation = None if plan.simulate is None else simulation_of(plan.simulate)
         # Of a map whose stretches are not all there yet: how many are missing.
         self._missing: dict[tuple[str, int], int] = {}
-        self._denoising: dict[tuple[str, int], Task] = {}
+        self._denoising: dict[tuple[str, int], tuple[Task, ...]] = {}
         self.total: Counter[str] = Counter()
         self.total["inspect"] = len(origins)
         if plan.export is not None:
@@ -136,7 +150,7 @@ class TaskGraph:
             mesh, found = fitted(Path(task.out)), known_inspection(self.folder, task.origin)
             if mesh is None or found is None:
                 raise _changing(task.origin)
-            return self._synthesis(task.origin, mesh, found.sensor)
+            return self._synthesis(task.origin, found, mesh)
         if task.step == "synthesise":
             return self._after_map(task)
         return iter(())
@@ -148,8 +162,7 @@ class TaskGraph:
         where = (task.origin.name, task.placement or 0)
         if task.step == "synthesise" and where in self._missing:
             del self._missing[where]
-            del self._denoising[where]
-            return {"denoise": 1}
+            return {"denoise": len(self._denoising.pop(where))}
         return {}
 
     def _maps_of_one(self, recordings: int) -> dict[str, int]:
@@ -158,7 +171,7 @@ class TaskGraph:
 
     def _after_inspection(self, origin: Origin, found: Inspection) -> Iterator[Task]:
         if found.mesh is not None:
-            return self._synthesis(origin, found.mesh, found.sensor)
+            return self._synthesis(origin, found, found.mesh)
         assert found.video is not None
         if self.plan.fit is None:
             raise Sd2Error(
@@ -182,19 +195,21 @@ class TaskGraph:
         }
         return Task("fit", key, origin, arguments, None, video.frames, origin.name, out)
 
-    def _synthesis(self, origin: Origin, mesh: MeshInput, own: VirtualSensor) -> Iterator[Task]:
+    def _synthesis(self, origin: Origin, found: Inspection, mesh: MeshInput) -> Iterator[Task]:
         if self.plan.synthesise is None:
             return
-        for planned in self.maps_of(origin, mesh, own):
+        for planned in self.maps_of(origin, found, mesh):
             self.total["synthesise"] += len(planned.stretches) - 1
-            if planned.denoising is not None:
+            if self._model is not None:
+                self.total["denoise"] += len(planned.denoising) - 1
+            if planned.denoising:
                 where = (origin.name, planned.placement)
                 self._missing[where] = len(planned.stretches)
                 self._denoising[where] = planned.denoising
             yield from planned.synthesis
         if self._simulation is not None:
             # After all that is quick, so that this can be given out together.
-            for planned in self.maps_of(origin, mesh, own):
+            for planned in self.maps_of(origin, found, mesh):
                 self.total["simulate"] += len(planned.stretches) - 1
                 yield from planned.simulation
 
@@ -206,20 +221,31 @@ class TaskGraph:
         if self._missing[where]:
             return iter(())
         del self._missing[where]
-        return iter((self._denoising.pop(where),))
+        return iter(self._denoising.pop(where))
 
-    def maps_of(self, origin: Origin, mesh: MeshInput, own: VirtualSensor) -> Iterator[PlannedMap]:
-        """Yield all maps of one recording."""
+    def maps_of(self, origin: Origin, found: Inspection, mesh: MeshInput) -> Iterator[PlannedMap]:
+        """Yield all maps of one recording, for a data set those of whom its labels name."""
+        people = () if self.plan.export is None else found.people
+        bodies = 1 + len(mesh.others_m) if people else 1
         stretches = tuple(stretches_of(mesh.frames))
-        sensors = self.plan.sensors(own, mesh.target_m)
+        sensors = self.plan.sensors(found.sensor, mesh.target_m)
         choosing = self._choosing(mesh, list(sensors.values()))
         for placement, sensor in sensors.items():
             where = (origin, mesh, placement, sensor)
-            synthesis = tuple(self._synthesis_task(where, one, choosing) for one in stretches)
-            denoising = None if self._model is None else self._denoising_task(synthesis)
+            synthesis = tuple(
+                self._synthesis_task(where, one, choosing, bodies) for one in stretches
+            )
+            shares = tuple(self._share(synthesis, one) for one in people or (Somebody(),))
             simulated = () if self._simulation is None else stretches
             simulation = tuple(self._simulation_task(where, one) for one in simulated)
-            yield PlannedMap(placement, sensor, stretches, synthesis, denoising, simulation)
+            yield PlannedMap(placement, sensor, stretches, synthesis, shares, simulation)
+
+    def _share(self, synthesis: Sequence[Task], who: Somebody) -> PlannedShare:
+        if who.body is None:
+            return PlannedShare(who, ())
+        maps = tuple(one.arguments["outs"][who.body] for one in synthesis)
+        denoising = None if self._model is None else self._denoising_task(synthesis, maps)
+        return PlannedShare(who, maps, denoising)
 
     def _choosing(self, mesh: MeshInput, sensors: Sequence[VirtualSensor]) -> Choosing | None:
         """Describe the choice of an accuracy plan for a mesh; None without a tolerance."""
@@ -232,9 +258,12 @@ class TaskGraph:
         key = key_of("synthesise", {"mesh": mesh.identity, **self._scene, **about})
         return Choosing(self.folder.result("plans", key, ".json"), places, frames)
 
-    def _synthesis_task(self, where: _View, stretch: FrameRange, choosing: Choosing | None) -> Task:
+    def _synthesis_task(
+        self, where: _View, stretch: FrameRange, choosing: Choosing | None, bodies: int
+    ) -> Task:
         arguments = {"section": self.plan.synthesise, "choosing": choosing}
-        return self._map_task("synthesise", "synthetic", where, stretch, self._scene, arguments)
+        content = self._scene | ({"bodies": bodies} if bodies > 1 else {})
+        return self._map_task("synthesise", where, stretch, content, arguments, bodies)
 
     def _simulation_task(self, where: _View, stretch: FrameRange) -> Task:
         assert self._simulation is not None
@@ -242,36 +271,39 @@ class TaskGraph:
         axis = chosen_options(self.plan.synthesise).axis
         content = {"axis": asdict(axis), "simulation": self._simulation.as_json()}
         arguments = {"axis": axis, "simulation": self._simulation}
-        return self._map_task("simulate", "simulated", where, stretch, content, arguments)
+        return self._map_task("simulate", where, stretch, content, arguments)
 
     def _map_task(
         self,
         step: Step,
-        kind: str,
         where: _View,
         stretch: FrameRange,
         content: dict[str, Any],
         arguments: dict[str, Any],
+        maps: int = 1,
     ) -> Task:
-        """Return the task for a stretch of a map; its key hashes ``content``, mesh and sensor."""
+        """Return the task for a stretch of maps; its key hashes ``content``, mesh and sensor."""
         origin, mesh, placement, sensor = where
         view = {"sensor": sensor.as_dict(), "stretch": list(stretch)}
         key = key_of(step, {"mesh": mesh.identity, **view, **content})
-        out = self.folder.result(kind, key, ".npz")
-        arguments |= {"mesh": mesh, "sensor": sensor, "stretch": stretch, "out": out}
-        frames = stretch[1] - stretch[0]
-        return Task(step, key, origin, arguments, placement, frames, origin.name, str(out))
+        outs = self._files("synthetic" if step == "synthesise" else "simulated", key, maps)
+        arguments |= {"mesh": mesh, "sensor": sensor, "stretch": stretch, "outs": outs}
+        frames = (stretch[1] - stretch[0]) * maps
+        return Task(step, key, origin, arguments, placement, frames, origin.name, str(outs[-1]))
 
-    def _denoising_task(self, synthesis: Sequence[Task]) -> Task:
+    def _files(self, kind: str, key: str, count: int) -> list[Path]:
+        ends = [".npz"] if count == 1 else [f"-{number}.npz" for number in range(count)]
+        return [self.folder.result(kind, key, end) for end in ends]
+
+    def _denoising_task(self, synthesis: Sequence[Task], maps: Sequence[Path]) -> Task:
         assert self.plan.denoise is not None
         (model, digest), texture = self.model, self.plan.denoise.texture
         drawn = {} if texture is None else {"texture": texture}
-        key = key_of("denoise", {"model": digest, "maps": [one.key for one in synthesis], **drawn})
-        ends = [".npz"] if len(synthesis) == 1 else [f"-{n}.npz" for n in range(len(synthesis))]
-        outs = [self.folder.result("denoised", key, end) for end in ends]
-        maps = [Path(one.out) for one in synthesis]
+        key = key_of("denoise", {"model": digest, "maps": [one.stem for one in maps], **drawn})
+        outs = self._files("denoised", key, len(maps))
         arguments = {"maps": maps, "model": model, "digest": digest, "outs": outs, **drawn}
-        one, frames = synthesis[0], sum(each.frames for each in synthesis)
+        one = synthesis[0]
+        frames = sum(each.frames // len(each.arguments["outs"]) for each in synthesis)
         return Task(
             "denoise", key, one.origin, arguments, one.placement, frames, one.group, str(outs[-1])
         )
@@ -288,7 +320,7 @@ class TaskGraph:
                 assert found.video is not None
                 mesh = fitted(Path(self.fit_task(origin, found.video).out))
             if found is not None and mesh is not None:
-                for planned in self.maps_of(origin, mesh, found.sensor):
+                for planned in self.maps_of(origin, found, mesh):
                     yield origin, found.about, mesh, planned
 
 

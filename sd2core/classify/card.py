@@ -13,12 +13,10 @@ from sd2core.classify.features import Features
 from sd2core.denoise.network_card import CardKind, NetworkCard, axis_json, axis_of
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import check_name
+from sd2core.labels.per_frame import BACKGROUND
 from sd2core.sensor import VelocityAxis
 
 FORMAT = "sd2-classifier"
-
-BACKGROUND = "background"
-"""The class of frames in which there is none of the gestures."""
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.classify.card import BACKGROUND
 from sd2core.denoise import resample_to_model as matching
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import GESTURES, LabelSet
+from sd2core.labels.per_frame import BACKGROUND
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
+from sd2core.pairs.rows import UNKNOWN as UNKNOWN
 from sd2core.pairs.store import PairSet
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
@@ -28,9 +29,6 @@ budget at 36 dB (a person at 2.2 m), and synthetic maps and a campaign's targets
 """
 _MAX_LOOKS = 8.0
 """Noise of one look is exponential; of several, whose powers are averaged, less uneven."""
-
-UNKNOWN = -1
-"""Of a frame that is neither learnt from nor judged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,16 +150,14 @@ def clips_of_pairs(
         _check_denoiser(pairs, denoiser)
     names = gesture_classes(pairs.labels) if names is None else names
     classes = in_order(names)
-    table = np.array([classes.index(name) for name in names], np.int8)
     clips = []
     for take in pairs.takes:
         if denoiser is not None and kind == "denoised":
             energies = denoiser.denoise_values(take.inputs(denoiser.card.parts))
         else:
             energies = take.synthetic if kind == "synthetic" else take.radar
-        clips.append(
-            Clip(take.subject, take.name, kind, energies, table[take.label], take.placement)
-        )
+        label = _renumbered(take.label, names, classes)
+        clips.append(Clip(take.subject, take.name, kind, energies, label, take.placement))
     return ClipSet(
         pairs.axis,
         pairs.null_bins,
@@ -226,7 +222,7 @@ def clips_of_map(
 
 def frame_labels(timebase: Timebase, labels: Labels) -> tuple[NDArray[np.int8], tuple[str, ...]]:
     """Return the class of every frame, and the classes; see :func:`clips_of_map`."""
-    spans = [span for span in labels.spans if span.origin != "suggestion"]
+    spans = labels.decided
     names = {span.label: _class_of(span.label, labels.label_set) for span in spans}
     classes = in_order([BACKGROUND, *(name for name in names.values() if name)])
     found = np.zeros(len(timebase), np.int8)
@@ -249,9 +245,7 @@ def merged(sets: Sequence[ClipSet]) -> ClipSet:
     for other in sets[1:]:
         if other.axis != first.axis:
             raise Sd2Error(
-                f"The data cannot be mixed: {first.axis.bins} bins up to"
-                f" ±{first.axis.v_max_mps:g} m/s and {other.axis.bins} bins up to"
-                f" ±{other.axis.v_max_mps:g} m/s",
+                f"The data cannot be mixed: {first.axis.words} and {other.axis.words}",
                 "the same velocity axis",
             )
         if abs(other.frame_rate_hz / first.frame_rate_hz - 1.0) > matching.SAME_RATE:
@@ -272,7 +266,7 @@ def merged(sets: Sequence[ClipSet]) -> ClipSet:
 
 
 def _renumbered(
-    label: NDArray[np.int8], own: tuple[str, ...], classes: tuple[str, ...]
+    label: NDArray[np.int8], own: Sequence[str], classes: tuple[str, ...]
 ) -> NDArray[np.int8]:
     # The last place is that of UNKNOWN.
     table = np.array([*(classes.index(name) for name in own), UNKNOWN], np.int8)
@@ -296,9 +290,8 @@ def _check_denoiser(pairs: PairSet, denoiser: TrainedDenoiser | None) -> None:
     card = denoiser.card
     if card.axis != pairs.axis or set(card.null_bins) != set(pairs.null_bins):
         raise Sd2Error(
-            f"The denoiser {card.name} knows {card.axis.bins} bins up to"
-            f" ±{card.axis.v_max_mps:g} m/s",
-            f"the {pairs.axis.bins} bins up to ±{pairs.axis.v_max_mps:g} m/s of the pairs",
+            f"The denoiser {card.name} knows {card.axis.words}",
+            f"the {pairs.axis.words} of the pairs",
         )
     if abs(pairs.frame_rate_hz / card.frame_rate_hz - 1.0) > matching.SAME_RATE:
         raise Sd2Error(

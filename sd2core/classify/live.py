@@ -182,10 +182,8 @@ def judge(classifier: TrainedClassifier, clips: Sequence[Clip], known: ClipSet) 
         )
     if known.axis != card.axis or not set(known.null_bins) <= set(card.null_bins):
         raise Sd2Error(
-            f"The maps have {known.axis.bins} bins up to ±{known.axis.v_max_mps:g} m/s, bins"
-            f" {list(known.null_bins)} emptied",
-            f"{card.axis.bins} bins up to ±{card.axis.v_max_mps:g} m/s, bins"
-            f" {list(card.null_bins)} emptied, as the classifier knows them",
+            f"The maps have {known.axis.words}, bins {list(known.null_bins)} emptied",
+            f"{card.axis.words}, bins {list(card.null_bins)} emptied, as the classifier knows them",
         )
     if abs(known.frame_rate_hz / card.frame_rate_hz - 1.0) > matching.SAME_RATE:
         raise Sd2Error(

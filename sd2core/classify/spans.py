@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.classify.card import BACKGROUND
 from sd2core.errors import Sd2Error
+from sd2core.labels.per_frame import BACKGROUND
 from sd2core.labels.spans import Span
 from sd2core.labels.suggest import TRACK, frame_ends_s, stretches
 from sd2core.mesh.presence import checked

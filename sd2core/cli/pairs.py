@@ -180,9 +180,8 @@ def _label(options: Label) -> None:
         reading = read_label_file(Path(file), clocks[name])
         print(f"sd2: {file}: {reading.sentence}", file=sys.stderr)
         rows += [
-            TakeLabel(subject, take, span.label, span.start_s, span.end_s)
-            for span in reading.labels.spans
-            if span.origin != "suggestion"
+            TakeLabel(subject, take, span.label, span.start_s, span.end_s, span.person)
+            for span in reading.labels.decided
         ]
     if not rows:
         raise Sd2Error("There are no labels to put on pairs", "--table, or --take with a file")
@@ -217,7 +216,8 @@ def _recordings(options: Recordings) -> None:
     """Pairs from recordings that have a mesh and a radar capture.
 
     The synthetic Doppler of each recording's mesh is the input, the Doppler of its
-    radar capture the target, aligned by the recording's offset. Labels are its spans.
+    radar capture the target, aligned by the recording's offset. Labels are its spans. In
+    a scene of several both show everybody; where two are labelled differently, neither counts.
 
       sd2 pairs recordings anna.sd2 ben.sd2 carla.sd2 --out mine.zarr
       sd2 pairs recordings a1.sd2 a2.sd2 b1.sd2 --subjects anna,anna,ben --out mine.zarr
@@ -239,14 +239,8 @@ def _recordings(options: Recordings) -> None:
             name: {"takes": takes, "frames": frames}
             for name, (takes, frames) in made.subjects.items()
         }
-        print_json(
-            {
-                "pairs": str(options.out),
-                "subjects": subjects,
-                "left_out_s": made.left_out_s,
-                "damaged_frames": made.damaged,
-            }
-        )
+        lost = {"left_out_s": made.left_out_s, "damaged_frames": made.damaged}
+        print_json({"pairs": str(options.out), "subjects": subjects} | lost)
         return
     facts = {
         name: f"{takes} takes, {frames:,} frames" for name, (takes, frames) in made.subjects.items()

@@ -9,9 +9,10 @@ from typing import Any
 from sd2core.datasets.cutting import count_spans
 from sd2core.datasets.layout import Header
 from sd2core.datasets.options import DatasetOptions
-from sd2core.datasets.source import BACKGROUND, Source
+from sd2core.datasets.source import Source
 from sd2core.denoise.resample_to_model import MAX_RESAMPLED
 from sd2core.errors import Sd2Error
+from sd2core.labels.per_frame import BACKGROUND
 from sd2core.maps import DopplerMap, joints_of
 from sd2core.mesh.vertex_parts import KINEMATICS
 from sd2core.sensor import VelocityAxis
@@ -127,8 +128,8 @@ def check_fits(source: Source, header: Header) -> None:
     for one in source.maps.values():
         if one.axis != header.axis:
             raise Sd2Error(
-                f"{title} has {one.axis.bins} bins over ±{one.axis.v_max_mps:g} m/s",
-                f"{header.axis.bins} over ±{header.axis.v_max_mps:g} m/s, as the data set has",
+                f"{title} has {one.axis.words}",
+                f"{header.axis.words}, as the data set has",
             )
         extra = sorted({*one.null_bins} - {*header.null_bins})
         if extra:

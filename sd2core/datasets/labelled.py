@@ -158,16 +158,15 @@ def clips_of_radar_file(source: LabelledSource, frame_rate_hz: float | None) -> 
     )
 
 
-def labels_given(labels: Labels, path: Path) -> list[Span]:
+def labels_given(labels: Labels, path: Path) -> tuple[Span, ...]:
     """Return the labels that are no suggestions; Sd2Error where a recording has none."""
-    spans = [span for span in labels.spans if span.origin != "suggestion"]
-    if not spans:
+    if not labels.decided:
         raise Sd2Error(
             f"{path} has no labels",
             "a recording in which gestures are labelled",
             "Label it in the window, or leave it out",
         )
-    return spans
+    return labels.decided
 
 
 def _of_recording(source: LabelledSource) -> LabelledFacts:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.datasets.source import FROM_A_MESH, label_per_frame
+from sd2core.datasets.source import FROM_A_MESH
+from sd2core.errors import Sd2Error
+from sd2core.labels.per_frame import label_per_frame
 from sd2core.labels.spans import Labels
-from sd2core.maps import MapKind
+from sd2core.maps import DopplerMap, MapKind
+from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.recording import Recording
 
@@ -39,13 +42,36 @@ class People:
         """All bodies of the scene."""
         return () if self.mesh is None else self.mesh.bodies
 
+    @property
+    def there(self) -> tuple[str, ...]:
+        """Persons who are in the scene, in the order of the bodies; a video is fitted to one."""
+        return self.recording.persons[: None if self.recording.mesh else 1]
+
+    def number(self, person: str) -> int | None:
+        """Number of a person's body; None where the person is not in the scene."""
+        there = self.there
+        # Whoever is named is the only one there is.
+        if len(there) == len(self.labels.persons) == 1:
+            return 0
+        return there.index(person) if person in there else None
+
     def bodies(self, person: str) -> tuple[MeshSequence, ...]:
         """Bodies whose map a source is of; none where the person is not in the scene."""
-        there, bodies = self.recording.persons, self.everybody
-        # Whoever is named is the only one there is.
-        if not person or (len(bodies) == 1 and len(self.labels.persons) == 1):
-            return bodies
-        return (bodies[there.index(person)],) if bodies and person in there else ()
+        if not person:
+            return self.everybody
+        number = self.number(person)
+        return () if number is None else self.everybody[number : number + 1]
+
+    def body(self, person: str) -> MeshSequence:
+        """Body that inertial sensors are fixed to; Sd2Error where none is, or it is not told."""
+        bodies = self.bodies(person)
+        if not bodies:
+            raise Sd2Error(
+                f"{self.recording.folder} has no mesh" + (f" of {person}" if person else ""),
+                "one, to which inertial sensors can be fixed",
+                "Fit a mesh with `sd2 fit`, or export without them",
+            )
+        return replace(bodies[0], others=()) if person else bodies[0].body()
 
     def labels_of(self, person: str) -> Labels:
         """Labels that hold for the person."""
@@ -64,14 +90,45 @@ class People:
         )
         return (theirs > 0) & (theirs != own)
 
+    def known(
+        self, person: str, names: tuple[str, ...], maps: dict[MapKind, DopplerMap]
+    ) -> dict[MapKind, DopplerMap]:
+        """Maps of a source, a radar's with the frames in which it is not :meth:`unclear`.
+
+        Raises Sd2Error where there are none.
+        """
+        if not maps:
+            absent = person and self.number(person) is None
+            who = f" of {person}, who is not in its scene" if absent else ""
+            raise Sd2Error(
+                f"{self.recording.folder} has no map{who} that is wanted",
+                "a mesh of who is labelled, or a radar file",
+            )
+        if not person:
+            return maps
+        times_s = next(iter(maps.values())).times_s
+        clear = ~self.unclear(person, names, times_s)
+        return {
+            kind: one
+            if kind in FROM_A_MESH
+            else replace(one, present=Presence.of(one.present, len(times_s)).there & clear)
+            for kind, one in maps.items()
+        }
+
     def shown(self, person: str, kinds: Iterable[MapKind]) -> dict[str, Any]:
         """Who is in the scene, and which kinds of maps show them all, for provenance."""
-        there = self.recording.persons[: len(self.everybody)]
+        there = self.there if self.recording.mesh else ()
         scene = list(dict.fromkeys([*there, *self.labels.persons]))
         if not person or len(scene) < 2:
             return {}
         everybody = [kind for kind in kinds if kind not in FROM_A_MESH]
         return {"scene": scene, "person": person, "everybody": everybody}
+
+
+def map_of(person: str, body: MeshSequence, everybody: DopplerMap, start: int = 0) -> DopplerMap:
+    """Map of a person of a scene alone, from the split map of all from a frame of the body on."""
+    there = present_frames([body])[start : start + len(everybody.timebase)]
+    return replace(everybody.of_person(person), present=there)
 
 
 def present_frames(bodies: Iterable[MeshSequence]) -> NDArray[np.bool_]:

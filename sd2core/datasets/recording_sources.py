@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -14,19 +14,15 @@ from sd2core.accuracy.places import choose_for_places, spread
 from sd2core.accuracy.trial import synthesizer_for
 from sd2core.body.parts import known_parts, splits_everybody
 from sd2core.datasets.kept_maps import computed_maps, denoised
-from sd2core.datasets.people import People, present_frames, subject_of
+from sd2core.datasets.people import People, map_of, present_frames, subject_of
 from sd2core.datasets.simulating import Simulation, simulated_map
 from sd2core.datasets.source import (
-    BACKGROUND,
-    FROM_A_MESH,
     KINDS,
     LazySource,
     Outline,
     Source,
     SourceKey,
-    label_per_frame,
     labelled_spans,
-    plain_name,
 )
 from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL, default_name, find_model
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
@@ -38,9 +34,9 @@ from sd2core.imu.mounting import mounted
 from sd2core.imu.signals import InertialSignals
 from sd2core.imu.virtual import imu_at_frames
 from sd2core.io.stored_vertices import damaged_frames
+from sd2core.labels.per_frame import BACKGROUND, label_per_frame, plain_name
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
-from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.recording_pairs import on_clock
 from sd2core.placements.body_extent import BodyExtent
@@ -138,7 +134,7 @@ def recording_sources(
 def labels_and_classes(labels: Labels) -> tuple[tuple[str, ...], dict[str, str]]:
     """Return names of all labels, background first, and their classes."""
     known = [one.name for one in labels.label_set.labels]
-    used = sorted({span.label for span in labels.spans} - {*known})
+    used = sorted({span.label for span in labels.decided} - {*known})
     names = tuple(dict.fromkeys([BACKGROUND, *map(plain_name, [*known, *used])]))
     classes = {
         plain_name(one.name): plain_name(one.gesture_class)
@@ -165,16 +161,12 @@ def radar_map(
 
 
 def _lazy(shared: _Shared, recording: Recording, key: SourceKey, person: str) -> LazySource:
-    def load(progress: Progress) -> Source:
-        return shared.opened(recording).source(key, person, progress)
-
-    def outline() -> Outline:
-        return shared.opened(recording).outline(key.placement, person)
-
-    def fingerprint() -> str:
-        return _fingerprint(recording, key, person, shared.making)
-
-    return LazySource(key, load, fingerprint, outline)
+    return LazySource(
+        key,
+        lambda progress: shared.opened(recording).source(key, person, progress),
+        lambda: _fingerprint(recording, key, person, shared.making),
+        lambda: shared.opened(recording).outline(key.placement, person),
+    )
 
 
 class _Shared:
@@ -210,7 +202,7 @@ class _Opened:
         timebase, radar_kind = self._clock
         bodies, labels = self._people.bodies(person), self._people.labels_of(person)
         for place in self._making.imu:
-            mounted(self._body(person), place)  # or fail, as the source would
+            mounted(self._people.body(person), place)  # or fail, as the source would
         kinds: list[MapKind] = []
         if bodies:
             kinds += ["synthetic"]
@@ -232,7 +224,7 @@ class _Opened:
             present,
             label_per_frame(labels.spans, self._names, timebase.times_s),
             self._names,
-            labelled_spans(labels.spans, self._names),
+            labelled_spans(labels, self._names),
             self._damaged,
         )
 
@@ -257,7 +249,7 @@ class _Opened:
                 progress=part_of(progress, 0.0, counted_share),
             )
             if alone:
-                synthetic = replace(synthetic.of_person(person), present=present_frames(bodies))
+                synthetic = map_of(person, bodies[0], synthetic)
                 if model is not None:
                     made = denoised(synthetic, model, self._making.texture)
             maps["synthetic"] = synthetic
@@ -269,32 +261,11 @@ class _Opened:
             there = self._mesh.timebase if self._mesh is not None else radar.timebase
             maps[radar.kind] = on_clock(radar, there)
         if bodies and self._simulates:
-            mesh, simulation = self._mesh, self._making.simulation
-            assert mesh is not None
-            assert simulation is not None
-            maps["simulated"] = self._once(
-                key.placement,
-                lambda: simulated_map(
-                    mesh,
-                    sensor,
-                    simulation,
-                    self._making.synthesis.axis,
-                    progress=part_of(progress, counted_share, 1.0),
-                ),
-            )
+            rest = part_of(progress, counted_share, 1.0)
+            maps["simulated"] = self._simulated_map(key.placement, rest)
         maps = {kind: one for kind, one in maps.items() if kind in wanted}
-        if not maps:
-            who = "" if bodies or not person else f" of {person}, who is not in its scene"
-            raise Sd2Error(
-                f"{self.recording.folder} has no map{who} that is wanted",
-                f"one of {', '.join(wanted)}",
-            )
+        maps = self._people.known(person, self._names, maps)
         times_s = next(iter(maps.values())).times_s
-        if person:
-            unclear = self._people.unclear(person, self._names, times_s)
-            for kind in maps.keys() - {*FROM_A_MESH}:
-                known = Presence.of(maps[kind].present, len(times_s)).there & ~unclear
-                maps[kind] = replace(maps[kind], present=known)
         channel = self.recording.channel_in_words
         return Source(
             *key,
@@ -314,32 +285,27 @@ class _Opened:
                 **plan,
             },
             self._imu(person),
-            labelled_spans(labels.spans, self._names),
+            labelled_spans(labels, self._names),
         )
-
-    def _body(self, person: str) -> MeshSequence:
-        """Mesh that inertial sensors are fixed to."""
-        bodies = self._people.bodies(person)
-        if not bodies:
-            raise Sd2Error(
-                f"{self.recording.folder} has no mesh" + (f" of {person}" if person else ""),
-                "one, to which inertial sensors can be fixed",
-                "Fit a mesh with `sd2 fit`, or export without them",
-            )
-        return bodies[0]
 
     def _imu_of(self, person: str) -> dict[str, InertialSignals]:
         """Inertial sensors at the frames of the mesh, the same from every placement."""
-        return {place: imu_at_frames(self._body(person), place) for place in self._making.imu}
+        body = self._people.body
+        return {place: imu_at_frames(body(person), place) for place in self._making.imu}
 
     def _target_of(self, person: str) -> Vector | None:
         bodies = self._people.bodies(person)
         return BodyExtent.of(bodies[0]).target_m if bodies else None
 
-    def _once(self, placement: int, make: Callable[[], DopplerMap]) -> DopplerMap:
+    def _simulated_map(self, placement: int, progress: Progress) -> DopplerMap:
         """Map of everybody from a place, made for the first of its persons."""
+        mesh, simulation = self._mesh, self._making.simulation
+        assert mesh is not None
+        assert simulation is not None
         if placement not in self._simulated:
-            self._simulated = {placement: make()}
+            sensor, axis = self._sensor(placement), self._making.synthesis.axis
+            made = simulated_map(mesh, sensor, simulation, axis, progress=progress)
+            self._simulated = {placement: made}
         return self._simulated[placement]
 
     @cached_property
@@ -428,8 +394,7 @@ def _fingerprint(recording: Recording, key: SourceKey, person: str, making: Maki
         "mesh_reading": recording.mesh_reading.model_dump(mode="json"),
         "spans": [
             (span.track, span.start_s, span.end_s, span.label, *filter(None, [span.person]))
-            for span in recording.labelled.spans
-            if span.origin != "suggestion"
+            for span in recording.labelled.decided
         ],
         "synthesis": asdict(making.synthesis),
         "tolerance": making.tolerance,

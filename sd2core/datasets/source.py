@@ -13,15 +13,14 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.imu.signals import InertialSignals
+from sd2core.labels.per_frame import BACKGROUND, plain_name
+from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.mesh.presence import Presence
 from sd2core.options.exporting import KINDS as KINDS
 from sd2core.progress import Progress
 from sd2core.sensor import Vector, VirtualSensor, spherical_from_position
 from sd2core.timebase import Timebase
-
-BACKGROUND = "background"
-"""Label of frames in which nothing is labelled; always label 0."""
 
 FROM_A_MESH: tuple[MapKind, ...] = ("synthetic", "denoised")
 """Kinds that say nothing where there is no person; the others are of a radar."""
@@ -121,8 +120,8 @@ class Source:
                 raise Sd2Error(f"{title}: the {kind} map is of kind {doppler.kind}", kind)
             if doppler.axis != first.axis:
                 raise Sd2Error(
-                    f"{title}: the {kind} map has {_axis_words(doppler)}, the {first.kind} one"
-                    f" {_axis_words(first)}",
+                    f"{title}: the {kind} map has {doppler.axis.words}, the {first.kind} one"
+                    f" {first.axis.words}",
                     "one velocity axis",
                 )
             if not np.array_equal(doppler.times_s, first.times_s):
@@ -233,35 +232,11 @@ class LazySource:
     remarks: tuple[str, ...] = ()
 
 
-def plain_name(label: str) -> str:
-    """Return the label, or :data:`BACKGROUND` for other spellings of it (``Background``)."""
-    return BACKGROUND if label.casefold() == BACKGROUND else label
-
-
-def label_per_frame(
-    spans: Any, labels: tuple[str, ...], times_s: NDArray[np.float64]
-) -> NDArray[np.int16]:
-    """Return the label of every frame: that of the span at its time, 0 where there is none.
-
-    Later spans lie over earlier ones; suggestions are left out. The first of the labels is
-    :data:`BACKGROUND`.
-    """
-    label = np.zeros(len(times_s), np.int16)
-    for span in spans:
-        if span.origin == "suggestion":
-            continue
-        label[(times_s >= span.start_s) & (times_s < span.end_s)] = labels.index(
-            plain_name(span.label)
-        )
-    return label
-
-
-def labelled_spans(spans: Any, labels: tuple[str, ...]) -> tuple[LabelledSpan, ...]:
+def labelled_spans(labels: Labels, names: tuple[str, ...]) -> tuple[LabelledSpan, ...]:
     """Return all spans but suggestions, with their labels as indices."""
     return tuple(
-        LabelledSpan(span.start_s, span.end_s, labels.index(plain_name(span.label)))
-        for span in spans
-        if span.origin != "suggestion"
+        LabelledSpan(span.start_s, span.end_s, names.index(plain_name(span.label)))
+        for span in labels.decided
     )
 
 
@@ -293,10 +268,6 @@ def _check_labels(
         raise Sd2Error(
             f"{title}: labels from {label.min()} to {label.max()}", f"0 to {len(labels) - 1}"
         )
-
-
-def _axis_words(doppler: DopplerMap) -> str:
-    return f"{doppler.axis.bins} bins over ±{doppler.axis.v_max_mps:g} m/s"
 
 
 def _short(value: Any) -> Any:

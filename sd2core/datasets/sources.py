@@ -21,7 +21,6 @@ from sd2core.datasets.source import (
     Outline,
     Source,
     SourceKey,
-    label_per_frame,
     labelled_spans,
     runs_of,
 )
@@ -32,9 +31,10 @@ from sd2core.io.kinds import kind_of
 from sd2core.io.radar import holds_map, load_recorded_map
 from sd2core.labels.formats import read_label_file
 from sd2core.labels.label_set import GESTURES
+from sd2core.labels.per_frame import label_per_frame
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
-from sd2core.pairs.rows import lost_frames, read_around
+from sd2core.pairs.rows import UNKNOWN, lost_frames, read_around
 from sd2core.pairs.store import SPLIT, limbs_of, open_takes
 from sd2core.pairs.summary import TakeEntry
 from sd2core.progress import Progress, silent
@@ -155,7 +155,7 @@ def map_source(path: Path, subject: str, label_file: Path | None = None) -> Lazy
             classes,
             None,
             {"file": path.name, "labels": None if label_file is None else label_file.name},
-            spans=labelled_spans(labels.spans, names),
+            spans=labelled_spans(labels, names),
         )
 
     remarks = () if label_file is None else (_read_map(path, label_file)[2],)
@@ -247,6 +247,12 @@ class _PairStore:
             sums.update(np.ascontiguousarray(self._part(name, take)).data)
         return sums.hexdigest()
 
+    def _scene(self, take: TakeEntry) -> dict[str, Any]:
+        """Who is in the scene that all maps of a take show, for provenance."""
+        scenes = self.facts.provenance.get("scenes", {})
+        found = scenes.get(take.name.rpartition("-")[0])
+        return {"scene": found, "everybody": self._kinds} if found else {}
+
     @cached_property
     def _lost(self) -> NDArray[np.bool_]:
         return lost_frames(self._arrays, self.facts.frames)
@@ -265,14 +271,18 @@ class _PairStore:
         return np.asarray(regular_s + np.interp(frame, frame[kept], offset_s))
 
     def _outline(self, take: TakeEntry) -> Outline:
-        label, times_s = self._part("label", take), self._times_s(take)
-        runs, there = runs_of(label, times_s), ~self._lost[take.rows]
-        damaged = int(np.count_nonzero(~there))
+        (label, there), times_s = self._label(take), self._times_s(take)
+        runs, damaged = runs_of(label, times_s), int(self._lost[take.rows].sum())
         return Outline(self._kinds, times_s, there, label, self.facts.labels, runs, damaged)
+
+    def _label(self, take: TakeEntry) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
+        """Label of every frame, and where both are known."""
+        label = self._part("label", take).astype(np.int16)
+        return np.maximum(label, 0), (label != UNKNOWN) & ~self._lost[take.rows]
 
     def _source(self, key: SourceKey, take: TakeEntry) -> Source:
         lost = self._lost[take.rows]
-        clock = Timebase(self._times_s(take))
+        (label, there), clock = self._label(take), Timebase(self._times_s(take))
         sensor = VirtualSensor(take.sensor_position_m)
         meta = {"sensor": {"position_m": list(sensor.position_m)}}
 
@@ -304,14 +314,15 @@ class _PairStore:
         return Source(
             *key,
             sensor,
-            {kind: maps[kind] for kind in self._kinds},
-            self._part("label", take).astype(np.int16),
+            {kind: replace(maps[kind], present=there) for kind in self._kinds},
+            label,
             self.facts.labels,
             {name: known[name] for name in self.facts.labels if known.get(name)},
             None,
             {
                 "pairs": self.path.name,
                 "take": take.name,
+                **self._scene(take),
                 **({"damaged_frames": int(lost.sum())} if lost.any() else {}),
             },
         )

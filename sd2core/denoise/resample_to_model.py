@@ -100,8 +100,8 @@ def check_bins(doppler: DopplerMap, card: Card) -> None:
     model = f"the model {card.title or card.name}"
     if doppler.axis != card.axis:
         raise Sd2Error(
-            f"The map has {doppler.axis.bins} bins up to ±{doppler.axis.v_max_mps:g} m/s",
-            f"{card.axis.bins} bins up to ±{card.axis.v_max_mps:g} m/s, for {model}",
+            f"The map has {doppler.axis.words}",
+            f"{card.axis.words}, for {model}",
             f"Make it with `sd2 synth --bins {card.axis.bins} --v-max {card.axis.v_max_mps:g}`",
         )
     extra = sorted(set(doppler.null_bins) - set(card.null_bins))

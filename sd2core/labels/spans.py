@@ -193,10 +193,14 @@ class Labels:
         return max((span.id for span in self.spans), default=0) + 1
 
     @property
+    def decided(self) -> tuple[Span, ...]:
+        """All spans but suggestions, which are no labels until they are accepted."""
+        return tuple(span for span in self.spans if span.origin != "suggestion")
+
+    @property
     def persons(self) -> tuple[str, ...]:
         """Persons whom spans name; suggestions do not count."""
-        named = (span.person for span in self.spans if span.origin != "suggestion")
-        return tuple(dict.fromkeys(name for name in named if name))
+        return tuple(dict.fromkeys(span.person for span in self.decided if span.person))
 
     def of_person(self, person: str) -> Labels:
         """Return those of a person, and those that name nobody: these hold for everybody."""

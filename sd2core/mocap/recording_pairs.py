@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,10 @@ from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
 from sd2core.io.stored_vertices import damaged_frames
+from sd2core.labels.per_frame import BACKGROUND, label_per_frame, plain_name
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
+from sd2core.pairs.rows import agreed
 from sd2core.pairs.store import PairWriter, Take
 from sd2core.pairs.summary import TakeKey
 from sd2core.progress import Progress, part_of, silent
@@ -30,7 +32,6 @@ from sd2core.version import __version__
 TAKE_S = 15.0
 """Longer stretches are cut: takes can be kept apart even where there is one person."""
 
-BACKGROUND = "background"
 _SAME_RATE = 0.01
 
 
@@ -56,7 +57,8 @@ def make_recording_pairs(
     """Put recordings into a store of pairs; resume a store that was begun.
 
     Every recording is seen by its own sensor. The radar's frame that is nearest to a frame
-    of the mesh, by the recording's offset, is its target.
+    of the mesh, by the recording's offset, is its target. A radar shows everybody in a scene, and
+    so does the input; labels are those of :func:`frame_labels`.
 
     Parameters
     ----------
@@ -80,7 +82,7 @@ def make_recording_pairs(
     named = named_recordings(recordings, subjects)
     opened = [recording for recording, _ in named]
     check_there(opened, ("mesh", "radar"))
-    labels = (BACKGROUND, *sorted({span.label for one in opened for span in one.labelled.spans}))
+    labels = label_names(opened)
     channels = [one.channel_in_words for one in opened]
     writer: PairWriter | None = None
     first: tuple[Path, float, bool] | None = None
@@ -107,6 +109,7 @@ def make_recording_pairs(
                     "made_by": f"SD² Studio {__version__}",
                     "recordings": [one.folder.name for one in opened],
                     **({"radar_channels": channels} if any(channels) else {}),
+                    **scenes_of(opened),
                     "synthesis": asdict(synthesis),
                     "clutter": CLUTTER,
                 },
@@ -209,7 +212,7 @@ def _takes(
         seen &= synthetic.present
     target = there.values.T.copy()  # (frames, bins)
     target[:, list(synthetic.null_bins)] = 0.0
-    label = [labels.index(name) for name in frame_labels(recording, times_s)]
+    label = frame_labels(recording, labels, times_s)
     rate_hz = synthetic.timebase.frames_per_s
     takes: list[Take] = []
     kept = 0
@@ -222,7 +225,7 @@ def _takes(
                 synthetic=np.ascontiguousarray(synthetic.values.T[start:stop]),
                 radar=target[start:stop],
                 times_s=times_s[start:stop] - times_s[start],
-                label=np.array(label[start:stop], np.int8),
+                label=label[start:stop],
                 sensor_position_m=np.asarray(recording.sensor.position_m, np.float64),
                 limbs=synthetic.between(start, stop).limbs,
             )
@@ -244,13 +247,25 @@ def take_frames(seen: NDArray[np.bool_], rate_hz: float) -> Iterator[tuple[int, 
                 yield start, stop
 
 
-def frame_labels(recording: Recording, times_s: NDArray[np.float64]) -> list[str]:
-    """Label of a recording at some times; the background where it has none."""
-    labels = [BACKGROUND] * len(times_s)
-    for span in recording.labelled.spans:
-        for frame in np.flatnonzero((times_s >= span.start_s) & (times_s < span.end_s)):
-            labels[frame] = span.label
-    return labels
+def scenes_of(recordings: Iterable[Recording]) -> dict[str, Any]:
+    """Return who is in scenes of several, whom both maps of a pair show, for provenance."""
+    scenes = {one.folder.stem: list(one.persons) for one in recordings if one.bodies}
+    return {"scenes": scenes} if scenes else {}
+
+
+def label_names(recordings: Iterable[Recording]) -> tuple[str, ...]:
+    """Return all names of labels in recordings, the background first."""
+    used = {plain_name(span.label) for one in recordings for span in one.labelled.decided}
+    return (BACKGROUND, *sorted(used - {BACKGROUND}))
+
+
+def frame_labels(
+    recording: Recording, names: tuple[str, ...], times_s: NDArray[np.float64]
+) -> NDArray[np.int8]:
+    """Return the number of the label at some times; see :func:`~sd2core.pairs.rows.agreed`."""
+    labels = recording.labelled
+    of_person = [labels.of_person(person) for person in labels.persons] or [labels]
+    return agreed([label_per_frame(one.spans, names, times_s) for one in of_person])
 
 
 def on_clock(radar: DopplerMap, timebase: Timebase) -> DopplerMap:

@@ -120,6 +120,7 @@ class PairProvenance(_Record):
 
     made_by: str = ""
     protocol: _Protocol | None = None
+    scenes: dict[str, list[str]] = {}
     frames_lost: dict[str, _Rows] = {}
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.stores import open_group
 from sd2core.files.texts import read_text
+from sd2core.pairs.rows import agreed
 from sd2core.pairs.store import PairSet, open_takes
 
 _NEEDED = ("subject", "take", "label")
@@ -33,6 +34,7 @@ class TakeLabel:
     label: str
     start_s: float = 0.0
     end_s: float = math.inf  # Exclusive.
+    person: str = ""  # Who of several does it; empty: everybody.
 
     def __post_init__(self) -> None:
         if not self.label.strip() or not self.start_s < self.end_s:
@@ -87,7 +89,8 @@ def label_pairs(path: Path, rows: Sequence[TakeLabel]) -> dict[str, int]:
     """Put labels on a store of pairs in place of those there; return the frames of each.
 
     Later rows lie over earlier ones; frames without a label are background. All placements of a
-    take get the same. Raises Sd2Error, and changes nothing, if a row is of no take.
+    take get the same, of several persons that which :func:`~sd2core.pairs.rows.agreed` returns.
+    Raises Sd2Error, and changes nothing, if a row is of no take.
     """
     facts, arrays = open_takes(path)
     labels = _together(facts.labels, rows)
@@ -101,7 +104,7 @@ def label_pairs(path: Path, rows: Sequence[TakeLabel]) -> dict[str, int]:
     # First the names: no number is ever without one.
     group.attrs["labels"] = list(labels)
     group["label"][: len(values)] = values
-    counts = np.bincount(values, minlength=len(labels))
+    counts = np.bincount(values[values >= 0], minlength=len(labels))
     return {name: int(count) for name, count in zip(labels, counts, strict=True) if count}
 
 
@@ -133,13 +136,15 @@ def _numbers(
     used: set[int],
 ) -> NDArray[np.int8]:
     """Label of every frame of a take; rows that are of it are noted as used."""
-    values = np.zeros(len(times_s), np.int8)
+    persons = {row.person for row in rows if row.person} or {""}
+    each = {person: np.zeros(len(times_s), np.int8) for person in persons}
     for number, row in enumerate(rows):
         if _is(subject, row.subject) and _is(name, row.take):
             used.add(number)
             inside = (times_s >= row.start_s) & (times_s < row.end_s)
-            values[inside] = labels.index(row.label)
-    return values
+            for person in [row.person] if row.person else persons:
+                each[person][inside] = labels.index(row.label)
+    return agreed([*each.values()])
 
 
 def _is(name: str, wanted: str) -> bool:

@@ -13,6 +13,30 @@ from sd2core.files.stores import StoredArray
 from sd2core.mesh.vertex_parts import QUANTITIES
 from sd2core.pairs.summary import INDEX_NAME, REMAKE, TakeEntry
 
+UNKNOWN = -1
+"""Label of a frame that is neither learnt from nor judged, in place of a number of one."""
+
+
+def agreed(each: Sequence[NDArray[np.integer]]) -> NDArray[np.int8]:
+    """Return the label of every frame in which several persons are seen together.
+
+    Each has labels of their own. Where nothing is labelled of one, another's label holds; where two
+    are labelled differently, it is :data:`UNKNOWN`.
+    """
+    found = np.maximum.reduce(each)
+    differ = np.logical_or.reduce([(one > 0) & (one != found) for one in each])
+    return np.where(differ, UNKNOWN, found).astype(np.int8)
+
+
+def check_labels(label: NDArray[np.integer], count: int, title: str, remedy: str = "") -> None:
+    """Raise Sd2Error for labels of a take that are none of so many, nor :data:`UNKNOWN`."""
+    if not UNKNOWN <= label.min() <= label.max() < count:
+        raise Sd2Error(
+            f"{title} has labels from {label.min()} to {label.max()}",
+            f"0 to {count - 1}, or {UNKNOWN} where it is not known",
+            remedy,
+        )
+
 
 def check_array(array: StoredArray, frames: int, row: tuple[int, ...], kind: str) -> None:
     """Raise Sd2Error for an array that is not of this type, or has too few frames.

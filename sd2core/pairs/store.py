@@ -28,7 +28,7 @@ from sd2core.files.stores import (
 )
 from sd2core.files.texts import append_lines, drop_torn_line
 from sd2core.maps import LimbMaps, joints_of
-from sd2core.pairs.rows import check_array, kept_parts, read_rows, row_kinds
+from sd2core.pairs.rows import check_array, check_labels, kept_parts, read_rows, row_kinds
 from sd2core.pairs.summary import (
     FORMAT,
     INDEX_NAME,
@@ -61,7 +61,8 @@ class Take:
     synthetic: NDArray[np.float32]  # Input: share of vertices per bin, (frames, bins).
     radar: NDArray[np.float32]  # Target, on the same axis, (frames, bins).
     times_s: NDArray[np.float64]  # From the start of the take.
-    label: NDArray[np.int8]  # Index into :attr:`PairSet.labels` per frame; 0 is background.
+    # Index into :attr:`PairSet.labels` per frame: 0 is background, UNKNOWN what persons differ in.
+    label: NDArray[np.int8]
     sensor_position_m: NDArray[np.float64]  # (0, 0, 0) is at the camera.
     placement: int = 0  # 0: the take's own sensor; 1 and up: the same movement from elsewhere.
     limbs: LimbMaps | None = None  # The input split by the parts of the body.
@@ -250,11 +251,7 @@ class PairWriter:
                 f"Take {take.title} has {take.synthetic.shape[1]} bins",
                 f"{header['bins']}, as {self._path} has",
             )
-        if not 0 <= take.label.min() <= take.label.max() < len(header["labels"]):
-            raise Sd2Error(
-                f"Take {take.title} has labels from {take.label.min()} to {take.label.max()}",
-                f"0 to {len(header['labels']) - 1}",
-            )
+        check_labels(take.label, len(header["labels"]), f"Take {take.title}")
         parts = () if take.limbs is None else take.limbs.parts
         if list(parts) != header.get("parts", []):
             raise Sd2Error(
@@ -323,13 +320,7 @@ def read_pairs(path: Path) -> PairSet:
     except Sd2Error as error:
         raise Sd2Error(f"{path}: {error.found}", error.expected, REMAKE) from error
     for take in takes:
-        if not 0 <= take.label.min() <= take.label.max() < len(facts.labels):
-            raise Sd2Error(
-                f"{path}: take {take.title} has labels from {take.label.min()} to"
-                f" {take.label.max()}",
-                f"0 to {len(facts.labels) - 1}",
-                REMAKE,
-            )
+        check_labels(take.label, len(facts.labels), f"{path}: take {take.title}", REMAKE)
     return PairSet(
         kind=facts.kind,
         axis=VelocityAxis(facts.bins, facts.v_max_mps),

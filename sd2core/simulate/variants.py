@@ -7,7 +7,7 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,17 +16,20 @@ from sd2core.body.reshaping import coarser, reshaped
 from sd2core.body.shape import ShapeSpace
 from sd2core.doppler import SynthesisOptions, Synthesizer
 from sd2core.io.radar.mars import FRAMES_PER_S, MarsStretch, mars_parts, read_mars
+from sd2core.labels.per_frame import BACKGROUND
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.mocap.mars_pairs import driven_clips, takes_of
 from sd2core.mocap.recording_pairs import (
-    BACKGROUND,
     check_rates,
     check_there,
     frame_labels,
+    label_names,
     named_recordings,
+    scenes_of,
     take_frames,
 )
+from sd2core.pairs.rows import UNKNOWN
 from sd2core.pairs.store import PairSet, PairWriter, Take, read_pairs
 from sd2core.pairs.summary import TakeKey
 from sd2core.progress import Progress, silent
@@ -68,7 +71,7 @@ class _Movement:
     key: TakeKey
     mesh: MeshSequence
     position_m: tuple[float, float, float]
-    labels: Sequence[str]  # of its frames
+    labels: Sequence[str]  # of its frames; empty where it is UNKNOWN
 
 
 def vary_recordings(
@@ -105,26 +108,29 @@ def vary_recordings(
     meshes = [recording.load_mesh() for recording, _ in named]
     rates_hz = [mesh.timebase.frames_per_s for mesh in meshes]
     check_rates({one.folder: rate for (one, _), rate in zip(named, rates_hz, strict=True)})
-    labels = {span.label for recording, _ in named for span in recording.labelled.spans}
-    labels |= set(map(mirrored_label, labels))
-    sources = [recording.folder.name for recording, _ in named]
-    names = (BACKGROUND, *sorted(labels - {BACKGROUND}))
+    _, *labels = label_names(recording for recording, _ in named)
+    sources = {"sources": [one.folder.name for one, _ in named]}
+    sources |= scenes_of(recording for recording, _ in named)
+    names = (BACKGROUND, *sorted({*labels, *map(mirrored_label, labels)}))
     writer = _writer(out, options, round(rates_hz[0], 3), names, sources)
     for number, ((recording, subject), mesh) in enumerate(zip(named, meshes, strict=True)):
         progress(number, len(named))
-        _append(writer, options, names, _of_recording(recording, subject, mesh))
+        _append(writer, options, names, _of_recording(recording, names, subject, mesh))
     progress(len(named), len(named))
     return read_pairs(out)
 
 
-def _of_recording(recording: Recording, subject: str, mesh: MeshSequence) -> Iterator[_Movement]:
+def _of_recording(
+    recording: Recording, names: tuple[str, ...], subject: str, mesh: MeshSequence
+) -> Iterator[_Movement]:
+    labels = [*names, ""]  # the last is that of UNKNOWN
     stretches = take_frames(mesh.presence.there, mesh.timebase.frames_per_s)
     for number, (start, stop) in enumerate(stretches):
         yield _Movement(
             TakeKey(subject, f"{recording.folder.stem}-{number:03d}", 0),
             mesh.between(start, stop),
             recording.sensor.position_m,
-            frame_labels(recording, mesh.times_s[start:stop]),
+            [labels[one] for one in frame_labels(recording, names, mesh.times_s[start:stop])],
         )
 
 
@@ -148,7 +154,8 @@ def vary_mars(
     """
     parts = [read_mars(folder, name) for folder in folders for name in mars_parts(folder)]
     names = (BACKGROUND,)
-    writer = _writer(out, options, FRAMES_PER_S, names, [Path(one.source).name for one in parts])
+    sources = {"sources": [Path(one.source).name for one in parts]}
+    writer = _writer(out, options, FRAMES_PER_S, names, sources)
     people = dict.fromkeys(part.subject for part in parts)
     for number, person in enumerate(people):
         progress(number, len(people))
@@ -173,7 +180,7 @@ def _writer(
     options: VariantOptions,
     frame_rate_hz: float,
     labels: Sequence[str],
-    sources: Sequence[str],
+    sources: Mapping[str, Any],
 ) -> PairWriter:
     synthesis = options.synthesis
     return PairWriter(
@@ -186,7 +193,7 @@ def _writer(
         provenance={
             "made_by": f"SD² Studio {__version__}",
             **asdict(options),
-            "sources": list(sources),
+            **sources,
         },
         parts=PARTS if options.limbs else (),
     )
@@ -228,7 +235,7 @@ def _take(
         np.ascontiguousarray(found.values.T),
         radar,
         mesh.times_s - mesh.times_s[0],
-        np.array([labels.index(label) for label in movement.labels], np.int8),
+        np.array([labels.index(one) if one else UNKNOWN for one in movement.labels], np.int8),
         np.array(movement.position_m),
         0,
         found.limbs,

@@ -277,8 +277,6 @@ def _renumbered(found: ClipSet, classes: Sequence[str]) -> list[Clip]:
 def _check_alike(path: Path, more: ClipSet, seen: ClipSet) -> None:
     if more.axis != seen.axis or abs(more.frame_rate_hz / seen.frame_rate_hz - 1.0) > SAME_RATE:
         raise Sd2Error(
-            f"{path} has {more.axis.bins} bins up to ±{more.axis.v_max_mps:g} m/s at"
-            f" {more.frame_rate_hz:.4g} frames/s",
-            f"{seen.axis.bins} bins up to ±{seen.axis.v_max_mps:g} m/s at"
-            f" {seen.frame_rate_hz:.4g} frames/s, as the data have",
+            f"{path} has {more.axis.words} at {more.frame_rate_hz:.4g} frames/s",
+            f"{seen.axis.words} at {seen.frame_rate_hz:.4g} frames/s, as the data have",
         )

@@ -14,11 +14,11 @@ from typing import Literal
 
 import numpy as np
 
-from sd2core.classify.card import BACKGROUND
 from sd2core.classify.data import UNKNOWN, ClipSet
 from sd2core.classify.metrics import gesture_runs
 from sd2core.classify.splitting import dealt, rarest
 from sd2core.errors import Sd2Error
+from sd2core.labels.per_frame import BACKGROUND
 from sd2core.study.data import Movement
 
 Group = str

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.classify.card import BACKGROUND
 from sd2core.classify.data import Clip
 from sd2core.classify.metrics import Score, mean_recall, score
 from sd2core.denoise.files import load_model
 from sd2core.denoise.resample_to_model import SAME_RATE
 from sd2core.errors import Sd2Error
+from sd2core.labels.per_frame import BACKGROUND
 from sd2core.study.data import Movement, StudyData, study_data_of
 from sd2core.study.denoisers import added_map, denoiser_in
 from sd2core.study.folds import Fold, folds_of, groups_of, share_of

@@ -15,6 +15,7 @@ from sd2core.denoise.metrics import stands_out
 from sd2core.errors import Sd2Error
 from sd2core.maps import peak_velocity_mps
 from sd2core.options.training import DataConfig
+from sd2core.pairs.rows import UNKNOWN
 from sd2core.pairs.segments import cut, segment_starts
 from sd2core.pairs.store import PairSet, Take, read_pairs
 from sd2core.sensor import VelocityAxis
@@ -109,7 +110,7 @@ def read_mixed(paths: Sequence[Path]) -> PairSet:
         return first
     for path, other in zip(paths[1:], sets[1:], strict=True):
         for what, mine, theirs in (
-            ("velocity axis", _axis_words(first), _axis_words(other)),
+            ("velocity axis", first.axis.words, other.axis.words),
             ("frame rate", f"{first.frame_rate_hz:g} Hz", f"{other.frame_rate_hz:g} Hz"),
             ("null bins", str(list(first.null_bins)), str(list(other.null_bins))),
         ):
@@ -136,7 +137,7 @@ def read_mixed(paths: Sequence[Path]) -> PairSet:
         replace(
             take,
             subject=take.subject if names.count(take.subject) == 1 else f"{origin}:{take.subject}",
-            label=np.array([labels.index(name) for name in one.labels], np.int8)[take.label],
+            label=np.array([*map(labels.index, one.labels), UNKNOWN], np.int8)[take.label],
         )
         for origin, one in zip(origins, sets, strict=True)
         for take in one.takes
@@ -357,10 +358,6 @@ class Order:
     def part(self, step: int) -> slice:
         """Slice of :meth:`epoch` that is a batch."""
         return slice(step * self.batch_size, (step + 1) * self.batch_size)
-
-
-def _axis_words(pairs: PairSet) -> str:
-    return f"{pairs.axis.bins} bins over ±{pairs.axis.v_max_mps:g} m/s"
 
 
 def _by_take(takes: tuple[Take, ...]) -> tuple[tuple[Take, ...], tuple[Take, ...]]:

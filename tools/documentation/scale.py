@@ -234,7 +234,7 @@ def _costs_of_maps(plan: BatchPlan, folder: Path, title: str) -> tuple[Cost, Cos
 
     def make(count: int) -> None:
         # From another place each time: masks of a place are kept, and would cost nothing.
-        synthesise(mesh, next(places), section, (0, count), choosing, made(count))
+        synthesise(mesh, next(places), section, (0, count), choosing, [made(count)])
 
     def clean(count: int) -> None:
         denoise([made(count)], model, digest, [denoised(count)])

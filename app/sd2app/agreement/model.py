@@ -113,7 +113,8 @@ class AgreementModel(ReportingModel):
     def _compare(self) -> None:
         if not self.active:
             return
-        mine, theirs = _answers(self._labels.labels), _answers(self.other.labels)
+        both = self._labels.labels, self.other.labels
+        mine, theirs = (replace(labels, spans=labels.decided) for labels in both)
         base = self._playback.timebase
 
         def compare(emit: Emit) -> Compared:
@@ -125,9 +126,3 @@ class AgreementModel(ReportingModel):
     def _take(self, compared: Compared) -> None:
         self.found, self.disagreements = compared
         self.changed.emit()
-
-
-def _answers(labels: Labels) -> Labels:
-    return replace(
-        labels, spans=tuple(span for span in labels.spans if span.origin != "suggestion")
-    )

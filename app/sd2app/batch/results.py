@@ -91,12 +91,12 @@ class BatchResults(RecordTableModel[Result]):
 
 
 def _rows(file: Path) -> list[Result]:
-    rows: dict[tuple[str, int], Result] = {}
+    rows: dict[tuple[str, str, int], Result] = {}
     with open_regular(file) as stream:
         for line in whole_lines(stream):
             row = _row(line)
             if row is not None:
-                rows.setdefault((row.recording, row.placement or 0), row)
+                rows.setdefault((row.recording, row.subject, row.placement or 0), row)
             if len(rows) >= _MAX_ROWS:
                 break
     return list(rows.values())

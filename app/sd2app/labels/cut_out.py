@@ -184,14 +184,13 @@ def ask_about_others(parent: QWidget, model: CutOutModel, count: int, example: s
 
 def _groups(labels: Labels, selected: Sequence[Span]) -> list[SpanGroup]:
     """Choices of spans: the selection, all, or the spans of one label."""
-    decided = tuple(span for span in labels.spans if span.origin != "suggestion")
     chosen = tuple(span for span in selected if span.origin != "suggestion")
     by_label: dict[str, list[Span]] = {}
-    for span in decided:
+    for span in labels.decided:
         by_label.setdefault(span.label, []).append(span)
     found = [SpanGroup("the selected", chosen, None)] if chosen else []
     each = (SpanGroup(name, tuple(spans), (name,)) for name, spans in by_label.items())
-    return [*found, SpanGroup("all", decided), *each]
+    return [*found, SpanGroup("all", labels.decided), *each]
 
 
 class CutOutDialog(Dialog):

@@ -25,7 +25,7 @@ def tour_steps(
     playback, sensor = session.playback, session.sensor
 
     def labelled() -> int:
-        return sum(span.origin != "suggestion" for span in labels.labels.spans)
+        return len(labels.labels.decided)
 
     def rest_s() -> float | None:
         return None if playback.playing else playback.time_s

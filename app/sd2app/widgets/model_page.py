@@ -30,7 +30,7 @@ def map_and_file_rows(
     axis: VelocityAxis, frame_rate_hz: float, path: Path | None
 ) -> Iterator[tuple[str, str]]:
     """The maps that a model knows, and its file."""
-    shown = f"{axis.bins} bins over ±{axis.v_max_mps:g} m/s, {frame_rate_hz:g} frames/s"
+    shown = f"{axis.words}, {frame_rate_hz:g} frames/s"
     yield "Works on", shown
     if path is not None:
         try:

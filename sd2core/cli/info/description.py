@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from statistics import fmean
@@ -70,7 +71,7 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
         "walls": [asdict(wall) for wall in recording.walls],
         "denoiser": None if recording.denoiser is None else str(recording.denoiser),
         "bundled_denoiser": recording.bundled_denoiser,
-        "spans": [picked(span, *_SPAN) for span in recording.labelled.spans],
+        "spans": [picked(span, *_SPAN) for span in recording.labelled.decided],
         "missing": {role: str(path) for role, path in missing.items()},
     }
     data |= {part.data["kind"]: part.data for part in parts}
@@ -452,9 +453,7 @@ def _gaps(present: NDArray[np.bool_] | None, timebase: Timebase) -> str:
 
 
 def _labels(recording: Recording) -> str:
-    counts: dict[str, int] = {}
-    for span in recording.labelled.spans:
-        counts[span.label] = counts.get(span.label, 0) + 1
+    counts = Counter(span.label for span in recording.labelled.decided)
     return ", ".join(f"{count} x {label}" for label, count in counts.items())
 
 

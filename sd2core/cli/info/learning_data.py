@@ -53,7 +53,7 @@ def describe_pairs(path: Path, pairs: PairSet) -> Description:
     }
     labelled: Counter[str] = Counter()
     for take in pairs.takes:
-        counts = np.bincount(take.label, minlength=len(pairs.labels))
+        counts = np.bincount(take.label[take.label >= 0], minlength=len(pairs.labels))
         labelled.update(dict(zip(pairs.labels, counts.tolist(), strict=True)))
     ranges_m = [float(np.linalg.norm(take.sensor_position_m)) for take in pairs.takes]
     placements = len({take.placement for take in pairs.takes})

@@ -142,12 +142,12 @@ def _strongest(doppler: DopplerMap) -> float:
 
 
 def _nothing_to_cut(path: Path, labels: Labels, wanted: tuple[str, ...]) -> Sd2Error:
-    there = sorted({span.label for span in labels.spans if span.origin != "suggestion"})
+    there = sorted({span.label for span in labels.decided})
     if wanted and there:
         return Sd2Error(
             f"{path} has no span of {' or '.join(wanted)}", f"one of {', '.join(there)}"
         )
-    suggested = sum(span.origin == "suggestion" for span in labels.spans)
+    suggested = len(labels.spans) - len(labels.decided)
     return Sd2Error(
         f"{path} has no labelled spans"
         + (f", only {counted(suggested, 'suggestion')}" if suggested else ""),
@@ -177,11 +177,7 @@ def _cut(options: Cut) -> None:
     clock = recording_clock(recording)
     labels = labels_at(options.labels or options.recording, clock)
     wanted = options.label
-    spans = [
-        span
-        for span in labels.spans
-        if span.origin != "suggestion" and (not wanted or span.label in wanted)
-    ]
+    spans = [span for span in labels.decided if not wanted or span.label in wanted]
     if not spans:
         raise _nothing_to_cut(options.labels or options.recording, labels, wanted)
     source = _source(options, recording, clock)

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.batch.folder import BatchFolder
-from sd2core.batch.inputs import MeshInput, Origin
+from sd2core.batch.inputs import Inspection, MeshInput, Origin
 from sd2core.batch.plan import STEPS
 from sd2core.batch.plan_file import plan_from_text
 from sd2core.batch.task_graph import TaskGraph
@@ -80,7 +80,8 @@ def test_maps_that_are_asked_for_otherwise_have_other_keys(more: str, tmp_path: 
     def key(words: str) -> str:
         text = f'out = "made"\n[recordings]\nfiles = ["*.npz"]\n[synthesise]\n{words}\n'
         graph = TaskGraph(plan_from_text(text, tmp_path), BatchFolder(tmp_path), [])
-        (planned,) = graph.maps_of(Origin("anna.npz", "anna", "anna"), mesh, VirtualSensor())
+        found = Inspection(VirtualSensor(), mesh)
+        (planned,) = graph.maps_of(Origin("anna.npz", "anna", "anna"), found, mesh)
         return planned.synthesis[0].key
 
     assert key(more) != key("")

@@ -72,11 +72,11 @@ def test_maps_of_stretches_are_columns_of_the_whole_map(told: Synthesis, tmp_pat
     mesh = mesh_input_of(path, "name")
     sensor = VirtualSensor(position_m=(0.4, 0.0, 0.0))
     whole = tmp_path / "whole.npz"
-    synthesise(mesh, sensor, told, (0, 300), None, whole)
+    synthesise(mesh, sensor, told, (0, 300), None, [whole])
     parts = []
     for number, stretch in enumerate(stretches_of(300, 110)):
         out = tmp_path / f"{number}.npz"
-        synthesise(mesh, sensor, told, stretch, None, out)
+        synthesise(mesh, sensor, told, stretch, None, [out])
         parts.append(DopplerMap.load(out))
     expected, found = DopplerMap.load(whole), joined(parts)
     np.testing.assert_array_equal(found.times_s, expected.times_s)
@@ -91,7 +91,7 @@ def test_a_map_names_sensor_and_options(tmp_path: Path) -> None:
     save_mesh(swinging_sphere(20), tmp_path / "mesh.npz")
     sensor, told = VirtualSensor(position_m=(0.4, 0.0, 0.0)), Synthesis(bins=64)
     mesh = mesh_input_of(tmp_path / "mesh.npz", "name")
-    synthesise(mesh, sensor, told, (0, 20), None, tmp_path / "map.npz")
+    synthesise(mesh, sensor, told, (0, 20), None, [tmp_path / "map.npz"])
     made = DopplerMap.load(tmp_path / "map.npz")
     expected = Synthesizer(load_mesh(tmp_path / "mesh.npz"), chosen_options(told)).map(sensor)
     np.testing.assert_array_equal(made.values, expected.values)

@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from cli_outcome import Sd2
 
+from sd2core.datasets.recording_sources import Making
+from sd2core.datasets.sources import gather
+from sd2core.doppler import Synthesizer
+from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.imu.files import read_signals
+from sd2core.imu.virtual import virtual_imu
 from sd2core.io.mesh import load_mesh, save_mesh
+from sd2core.maps import DopplerMap
+from sd2core.mesh.bodies import Body
+from sd2core.progress import silent
 from sd2core.recording.recording import Recording
 
 
@@ -85,6 +94,45 @@ def test_a_recording_and_a_vertex(sd2: Sd2, body: Path, tmp_path: Path) -> None:
         assert said["samples"] - said["known_samples"] == 6
         found.append(read_signals(out).acceleration_mps2)
     np.testing.assert_array_equal(*found)
+
+
+def test_of_several_people_one_is_named(sd2: Sd2, body: Path, tmp_path: Path) -> None:
+    recording = Recording.create(tmp_path / "duo.sd2", mesh=body)
+    recording.subject = "anna"
+    recording.bodies = (Body(str(body), (0.8, 0.0, 0.5), turn_deg=90.0, person="bert"),)
+    recording.save()
+    out = tmp_path / "wrist.npz"
+    command = ("imu", recording.folder, "--at", "right-wrist", "--out", out, "--overwrite")
+    for named, said in (((), "shows anna and bert"), (("--person", "carl"), "bert, not carl")):
+        refused = sd2(*command, *named)
+        assert refused.code == 1
+        assert said in refused.err
+        assert not out.exists()
+    mesh, found = recording.load_mesh(), {}
+    for number, name in enumerate(("anna", "bert")):
+        assert sd2(*command, "--person", name).code == 0
+        found[name] = read_signals(out)
+        assert found[name].meta["person"] == name
+        alone = virtual_imu(replace(mesh.bodies[number], others=()), "right-wrist")
+        np.testing.assert_array_equal(found[name].acceleration_mps2, alone.acceleration_mps2)
+    # Turned by 90 degrees, the wrist feels the same along its own axes.
+    apart = found["anna"].turn_rate_radps - found["bert"].turn_rate_radps
+    assert np.nanmax(np.abs(apart)) < 0.05
+    with pytest.raises(Sd2Error, match="shows anna and bert"):
+        virtual_imu(mesh, "head")
+    # Labels that name nobody do not say whose sensors a data set holds.
+    with pytest.raises(Sd2Error, match="shows anna and bert"):
+        gather([recording.folder], Making(kinds=("synthetic",), imu=("head",)))[0].load(silent)
+
+
+def test_who_is_named_is_alone_on_a_map(sd2: Sd2, body: Path, tmp_path: Path) -> None:
+    recording = Recording.create(tmp_path / "duo.sd2", mesh=body)
+    recording.bodies = (Body(str(body), (0.8, 0.0, 0.5), person="bert"),)
+    recording.save()
+    out = tmp_path / "bert.npz"
+    assert sd2("synth", recording.folder, "--person", "bert", "--out", out).code == 0
+    alone = Synthesizer(recording.load_mesh().others[0]).map(recording.sensor)
+    np.testing.assert_array_equal(DopplerMap.load(out).values, alone.values)
 
 
 def test_a_file_of_something_else_is_not_replaced(sd2: Sd2, body: Path, tmp_path: Path) -> None:

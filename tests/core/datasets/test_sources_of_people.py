@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from swinging_recordings import recording
+from scenes_of_people import WHO, scene
 
 from sd2core.cli.classify.data import clips_of
 from sd2core.datasets.card import describe_dataset, limits
@@ -22,32 +22,11 @@ from sd2core.datasets.writing import write_dataset
 from sd2core.denoise.files import load_model
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
-from sd2core.labels.spans import Labels, LabelTrack, Span
-from sd2core.mesh.bodies import Body
 from sd2core.mesh.walls import Wall
 from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import PlacementGrid
 from sd2core.progress import silent
 from sd2core.recording.recording import Recording
-
-WHO = (("swing", 1.0, 2.0, "anna"), ("wave", 1.5, 2.5, "bert"), ("rest", 3.0, 3.5, ""))
-
-
-def scene(folder: Path, who: tuple[tuple[str, float, float, str], ...] = WHO) -> Recording:
-    """Anna, and behind her to the right Bert, who swings a second later."""
-    made = recording(folder)
-    assert made.mesh is not None
-    made.subject = "anna"
-    made.bodies = (Body(str(made.mesh), (1.0, 0.0, 0.5), start_s=1.0, person="bert"),)
-    made.labels = Labels(
-        (LabelTrack("all", "free"),),
-        tuple(
-            Span(number, "all", start_s, end_s, label, person=person)
-            for number, (label, start_s, end_s, person) in enumerate(who, start=1)
-        ),
-    )
-    made.save()
-    return made
 
 
 def made_of(one: Recording, **making: object) -> list[Source]:

@@ -8,14 +8,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes_of_people import scene
 from swinging_recordings import RATE_HZ, recording
 
+from sd2core.classify.data import clips_of_pairs
+from sd2core.cli.info.description import describe_recording
+from sd2core.cli.info.learning_data import describe_pairs
+from sd2core.datasets.recording_sources import Making, labels_and_classes
+from sd2core.datasets.sources import pair_sources
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
 from sd2core.mocap.recording_pairs import make_recording_pairs
+from sd2core.pairs.rows import UNKNOWN
 from sd2core.pairs.store import read_pairs
+from sd2core.progress import silent
 from sd2core.radar_config import CLUTTER
+from sd2core.train.data import read_mixed
 
 
 def test_input_and_target_are_the_maps_on_one_clock(tmp_path: Path) -> None:
@@ -79,6 +88,56 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
         make_recording_pairs([whole, whole], tmp_path / "e.zarr")
     with pytest.raises(Sd2Error, match="1 people are named"):
         make_recording_pairs([whole, tmp_path / "c.sd2"], tmp_path / "f.zarr", subjects=("x",))
+
+
+def test_both_maps_of_a_pair_show_everybody_and_a_label_is_of_whom_it_names(
+    tmp_path: Path,
+) -> None:
+    one, out = scene(tmp_path / "duo.sd2"), tmp_path / "pairs.zarr"
+    make_recording_pairs([one.folder], out)
+    pairs = read_pairs(out)
+    (take,) = pairs.takes
+    whole = Synthesizer(one.load_mesh(), PRESETS["paper"]).map(one.sensor)
+    np.testing.assert_array_equal(take.synthetic, whole.values.T)
+    assert pairs.labels == ("background", "rest", "swing", "wave")
+    expected = np.zeros(120, int)
+    expected[30:60], expected[45:75], expected[90:105] = 2, 3, 1
+    expected[45:60] = UNKNOWN  # Anna swings and Bert waves: the radar shows both
+    np.testing.assert_array_equal(take.label, expected)
+    assert pairs.provenance["scenes"] == {"duo": ["anna", "bert"]}
+    (clip,) = clips_of_pairs(pairs, "simulated").clips
+    np.testing.assert_array_equal(clip.label == UNKNOWN, expected == UNKNOWN)
+    mixed = read_mixed([out, out]).takes[0]
+    np.testing.assert_array_equal(mixed.label == UNKNOWN, expected == UNKNOWN)
+    assert sum(describe_pairs(out, pairs).data["frames_of_label"].values()) == 105
+
+
+def test_a_data_set_of_such_pairs_leaves_out_what_is_not_known(tmp_path: Path) -> None:
+    one, out = scene(tmp_path / "duo.sd2"), tmp_path / "pairs.zarr"
+    make_recording_pairs([one.folder], out)
+    (lazy,) = pair_sources([out], Making(kinds=("synthetic", "simulated")))
+    source = lazy.load(silent)
+    unknown = np.arange(120)[45:60].tolist()
+    assert lazy.outline is not None
+    for present in (source.present, lazy.outline().present):
+        assert np.flatnonzero(~present).tolist() == unknown
+    assert source.provenance["scene"] == ["anna", "bert"]
+    assert source.provenance["everybody"] == ("synthetic", "simulated")
+
+
+def test_suggestions_are_no_labels(tmp_path: Path) -> None:
+    one, out = scene(tmp_path / "duo.sd2"), tmp_path / "pairs.zarr"
+    assert one.labels is not None
+    one.labels = one.labels.with_spans(
+        replace(span, origin="suggestion") for span in one.labels.spans if span.label != "rest"
+    )
+    one.save()
+    make_recording_pairs([one.folder], out)
+    pairs = read_pairs(out)
+    assert pairs.labels == ("background", "rest")
+    assert np.flatnonzero(pairs.takes[0].label).tolist() == list(range(90, 105))
+    assert describe_recording(one, []).facts["spans"] == "1 x rest"
+    assert labels_and_classes(one.labels)[0][-1] == "rest"
 
 
 def test_from_the_command_line(tmp_path: Path, capsys) -> None:

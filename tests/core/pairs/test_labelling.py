@@ -43,6 +43,21 @@ def test_whole_takes_and_parts_of_them(pairs: Path) -> None:
     assert label_pairs(pairs, [TakeLabel("*", "*", "walk")]) == {"walk": before.frames}
 
 
+def test_what_two_persons_do_at_once_is_neither(pairs: Path) -> None:
+    rows = [
+        TakeLabel("*", "*", "walk", end_s=1.0, person="anna"),
+        TakeLabel("*", "*", "turn", start_s=0.5, end_s=1.5, person="ben"),
+        TakeLabel("*", "*", "stop", start_s=1.25),
+    ]
+    counts = label_pairs(pairs, rows)
+    after = read_pairs(pairs)
+    assert sum(counts.values()) == sum(int((take.label >= 0).sum()) for take in after.takes)
+    for take in after.takes:
+        named = np.array([*after.labels, "neither"])[take.label]
+        edges = np.searchsorted([0.5, 1.0, 1.25], take.times_s, side="right")
+        np.testing.assert_array_equal(named, np.array(["walk", "neither", "turn", "stop"])[edges])
+
+
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
 def test_a_table_is_read_with_its_gaps(tmp_path: Path, separator: str) -> None:
     table = tmp_path / "table.csv"

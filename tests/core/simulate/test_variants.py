@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes_of_people import scene
 from swinging_recordings import recording
 
 from sd2core.body.model import Body
@@ -14,6 +15,8 @@ from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import save_mesh
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mocap.recording_pairs import make_recording_pairs
+from sd2core.pairs.rows import UNKNOWN
 from sd2core.pairs.store import PairSet, read_pairs
 from sd2core.pairs.summary import TakeKey
 from sd2core.recording.recording import Recording, Span
@@ -72,6 +75,20 @@ def test_a_mirrored_movement_goes_the_other_way(tmp_path: Path) -> None:
     assert (own[fast] * other[fast] < 0.0).all()
     # The simulated radar sees the same.
     assert np.corrcoef(means(pairs, take.radar)[fast], other[fast])[0, 1] > 0.95
+
+
+def test_simulated_pairs_of_a_scene_have_the_labels_of_recorded_ones(tmp_path: Path) -> None:
+    one, out = scene(tmp_path / "duo.sd2"), tmp_path / "recorded.zarr"
+    assert one.labels is not None
+    suggested = replace(one.labels.spans[0], id=9, label="nod", origin="suggestion")
+    one.labels = one.labels.with_spans([suggested])
+    one.save()
+    make_recording_pairs([one.folder], out)
+    recorded, made = read_pairs(out), vary(one, tmp_path / "places.zarr", "places")
+    assert made.labels == recorded.labels
+    np.testing.assert_array_equal(made.takes[0].label, recorded.takes[0].label)
+    assert (made.takes[0].label == UNKNOWN).sum() == 15
+    assert made.provenance["scenes"] == recorded.provenance["scenes"]
 
 
 def test_places_and_shapes_are_drawn_and_drawn_alike_again(tmp_path: Path) -> None:
