@@ -34,9 +34,9 @@ from sd2core.labels.label_set import GESTURES
 from sd2core.labels.per_frame import label_per_frame
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
-from sd2core.pairs.rows import UNKNOWN, lost_frames, read_around
+from sd2core.pairs.rows import UNKNOWN, check_labels, lost_frames, read_around
 from sd2core.pairs.store import SPLIT, limbs_of, open_takes
-from sd2core.pairs.summary import TakeEntry
+from sd2core.pairs.summary import REMAKE, TakeEntry
 from sd2core.progress import Progress, silent
 from sd2core.recording.recording import SUFFIX, is_recording, open_recording
 from sd2core.sensor import VelocityAxis, VirtualSensor
@@ -278,6 +278,7 @@ class _PairStore:
     def _label(self, take: TakeEntry) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
         """Label of every frame, and where both are known."""
         label = self._part("label", take).astype(np.int16)
+        check_labels(label, len(self.facts.labels), f"{self.path}: take {take.key.title}", REMAKE)
         return np.maximum(label, 0), (label != UNKNOWN) & ~self._lost[take.rows]
 
     def _source(self, key: SourceKey, take: TakeEntry) -> Source:
