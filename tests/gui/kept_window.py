@@ -182,7 +182,6 @@ class KeptWindow:
         models.display.set_levels(**vars(HeatmapLevels()))
         models.display.set_mesh_colour("velocity")
         window.features.sensor.alignment.within_s = WITHIN_S
-        window.features.sensor.alignment.problem = ""
         window.features.scene.view.scene._followed = None
         QToolTip.hideText()
         models.pointer.leave()
