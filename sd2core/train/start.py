@@ -226,4 +226,5 @@ def _note_failure(folder: TrainingFolder, writer: ProgressWriter, error: BaseExc
     elif not isinstance(error, Sd2Error):
         found = f"This should not happen ({type(error).__name__}: {error})"
         error = Sd2Error(found, remedy=f"Please report it, with {folder.log.name}")
-    _say_end(folder, writer, "failed", {}, vars(error))
+    said = {name: getattr(error, name) for name in ("found", "expected", "remedy")}
+    _say_end(folder, writer, "failed", {}, said)
