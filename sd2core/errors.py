@@ -57,6 +57,11 @@ class Sd2Error(Exception):
         return error
 
     @property
+    def arguments(self) -> dict[str, str]:
+        """Arguments to make it anew in another process."""
+        return {"found": self.found, "expected": self.expected, "remedy": self.remedy}
+
+    @property
     def words(self) -> str:
         """The error without the option of a command line, for who has a button in its place."""
         return self._with(self.remedy)

@@ -10,7 +10,7 @@ from typing import Any
 
 from sd2core.batch.pool import Ending, Pool
 from sd2core.batch.task_graph import TaskGraph
-from sd2core.batch.tasks import Outcome, Task, deaths_during, error_fields, too_many_deaths
+from sd2core.batch.tasks import Outcome, Task, deaths_during, too_many_deaths
 from sd2core.errors import Sd2Error
 
 AHEAD = 4
@@ -231,7 +231,7 @@ class Driver:
         try:
             self._sources.append(self._graph.after(task))
         except Sd2Error as error:
-            self._fail(task, error_fields(error))
+            self._fail(task, error.arguments)
             return False
         return True
 

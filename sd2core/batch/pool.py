@@ -16,7 +16,7 @@ from typing import Any
 
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan import STEPS
-from sd2core.batch.tasks import BEGUN, Outcome, Task, error_fields, probe, run_tasks
+from sd2core.batch.tasks import BEGUN, Outcome, Task, probe, run_tasks
 from sd2core.errors import Sd2Error
 from sd2core.files.keys import all_code_digest
 from sd2core.processes import ONE_THREAD
@@ -122,7 +122,7 @@ class Pool:
         except Exception as failure:
             error = failure
         found = f"The worker cannot run it ({type(error).__name__}: {error})"
-        failed = Outcome(error=error_fields(Sd2Error(found)))
+        failed = Outcome(error=Sd2Error(found).arguments)
         return Ending(tasks, [failed] * len(tasks))
 
     def _look(self) -> None:

@@ -21,7 +21,7 @@ from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import plan_text
 from sd2core.batch.pool import Pool, local_pool, scheduler_pool
 from sd2core.batch.task_graph import TaskGraph
-from sd2core.batch.tasks import BEGUN, error_fields
+from sd2core.batch.tasks import BEGUN
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write, atomic_write_text
 from sd2core.files.paths import remove
@@ -269,7 +269,7 @@ class _Run:
     def _end(self, outcome: str, error: Sd2Error | None) -> dict[str, Any]:
         told = None
         if error is not None:
-            told = error_fields(error)
+            told = error.arguments
             self._log(str(error))
         export = self._graph.plan.export
         dataset = None if export is None else dataset_path(self._folder, export)

@@ -56,13 +56,8 @@ class Outcome:
     worker_died: bool = False  # True if the task is given up because of that
 
 
-def error_fields(error: Sd2Error) -> dict[str, str]:
-    """Return the parts of an error as JSON can hold them."""
-    return {"found": error.found, "expected": error.expected, "remedy": error.remedy}
-
-
 def _failed(found: str, expected: str = "", remedy: str = "", **more: Any) -> Outcome:
-    return Outcome(error={"found": found, "expected": expected, "remedy": remedy}, **more)
+    return Outcome(error=Sd2Error(found, expected, remedy).arguments, **more)
 
 
 def too_many_deaths(deaths: int) -> Outcome:
@@ -116,7 +111,7 @@ def _attempt(folder: BatchFolder, task: Task) -> Outcome:
         _compile_once()
         _do(task.step, folder, task.origin, task.arguments)
     except Sd2Error as error:
-        return Outcome(error=error_fields(error))
+        return Outcome(error=error.arguments)
     except MemoryError as error:
         return _failed(f"There is not enough memory for this ({error})")
     except OSError as error:

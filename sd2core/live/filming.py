@@ -201,8 +201,8 @@ def main() -> int:
 
 
 def _failed(error: Sd2Error | OSError) -> int:
-    told = vars(error) if isinstance(error, Sd2Error) else {"found": str(error)}
-    _tell("failed", **told)
+    told = error if isinstance(error, Sd2Error) else Sd2Error(str(error))
+    _tell("failed", **told.arguments)
     return 1
 
 

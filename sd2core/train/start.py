@@ -226,5 +226,4 @@ def _note_failure(folder: TrainingFolder, writer: ProgressWriter, error: BaseExc
     elif not isinstance(error, Sd2Error):
         found = f"This should not happen ({type(error).__name__}: {error})"
         error = Sd2Error(found, remedy=f"Please report it, with {folder.log.name}")
-    said = {name: getattr(error, name) for name in ("found", "expected", "remedy")}
-    _say_end(folder, writer, "failed", {}, said)
+    _say_end(folder, writer, "failed", {}, error.arguments)
