@@ -18,7 +18,6 @@ from sd2core.accuracy.trial import synthesizer_for
 from sd2core.doppler import PRESETS
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.progress import silent
 from sd2core.sensor import VirtualSensor
 
 PAPER = PRESETS["paper"]
@@ -124,7 +123,7 @@ def test_where_choosing_takes_longer_than_it_saves_nothing_is_chosen(
 
 @pytest.mark.parametrize("frames", [1, 3, 30])
 def test_costs_are_of_this_mesh(frames: int) -> None:
-    search = places.PlanSearch(swinging_sphere(frames), AROUND, 0.1, PAPER, silent)
+    search = places.PlanSearch(swinging_sphere(frames), AROUND, 0.1, PAPER)
     assert search.reference_s() > 0
     assert search.frame_s(TOP) > 0
     assert search.frame_s(search.plain) > 0
