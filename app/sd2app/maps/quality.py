@@ -40,7 +40,6 @@ AT_ONCE = 12_000_000
 _BUDGET_BYTES = 192 << 20
 """For prepared frames: more than a clip takes that is swept in one go; of a longer one, what is in
 view."""
-_EXACT_PARTS = 8
 _KEPT = 3
 """Number of kept synthesizers: for the rest, for dragging, and the one before."""
 
@@ -257,7 +256,7 @@ def refine(
     ``(done, total)`` frames, and raises to stop. ``only_view`` leaves the other frames for later.
     """
     rough_size = max(AT_ONCE // vertices, 64)
-    final_size = min(max(len(quality) // _EXACT_PARTS, 8), max(rough_size // 16, 8))
+    final_size = max(rough_size // 16, 8)
     done, total = 0, int((quality < FINAL).sum())
 
     def run(below: int, part: View, size: int, level: QualityLevel) -> None:
