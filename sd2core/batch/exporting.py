@@ -200,7 +200,7 @@ def _source(
         *key,
         VirtualSensor.from_dict(rows[0]["sensor"]),
         maps,
-        label_per_frame(own.spans, names, first.times_s),
+        label_per_frame(own, names, first.times_s),
         names,
         classes,
         tuple(rows[0]["target_m"]),

@@ -84,9 +84,10 @@ def mesh_and_its_sensor(options: MeshInput) -> tuple[MeshSequence, VirtualSensor
 
     sensor = VirtualSensor()
     if is_recording(options.mesh):
-        whom = options.person if open_recording(options.mesh).bodies else None
+        recording = open_recording(options.mesh)
+        whom = options.person if recording.bodies else None
         read = options if whom is None else replace(options, person=None)
-        recording = open_recording_from_options(options.mesh, read)
+        _read_mesh_as_told(recording, options.mesh, read)
         sensor = recording.sensor
         with progress_bar("Reading the mesh") as progress:
             mesh = recording.load_mesh(progress)
@@ -101,6 +102,11 @@ def open_recording_from_options(path: Path, options: MeshReading) -> Recording:
     from sd2core.recording.recording import open_recording
 
     recording = open_recording(path)
+    _read_mesh_as_told(recording, path, options)
+    return recording
+
+
+def _read_mesh_as_told(recording: Recording, path: Path, options: MeshReading) -> None:
     refuse_unused_mesh_options(options, path, recording.mesh)
     recording.mesh_reading = recording.mesh_reading.model_copy(
         update=mesh_reading(options).options()
@@ -109,7 +115,6 @@ def open_recording_from_options(path: Path, options: MeshReading) -> Recording:
         if not options.faces.exists():
             raise Sd2Error(f"The faces file {options.faces} does not exist", "a file of triangles")
         recording.faces = options.faces
-    return recording
 
 
 def refuse_unused_mesh_options(

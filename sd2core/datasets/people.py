@@ -83,10 +83,10 @@ class People:
         """Frames in which a radar sees somebody else do what a label of the person is not."""
         if not person:
             return np.zeros(len(times_s), bool)
-        others = [span for span in self.labels.spans if span.person not in ("", person)]
+        others = tuple(span for span in self.labels.spans if span.person not in ("", person))
         own, theirs = (
-            label_per_frame(spans, names, times_s)
-            for spans in (self.labels_of(person).spans, others)
+            label_per_frame(labels, names, times_s)
+            for labels in (self.labels_of(person), replace(self.labels, spans=others))
         )
         return (theirs > 0) & (theirs != own)
 

@@ -150,7 +150,7 @@ def map_source(path: Path, subject: str, label_file: Path | None = None) -> Lazy
             *key,
             _sensor(doppler.meta),
             {doppler.kind: doppler},
-            label_per_frame(labels.spans, names, doppler.times_s),
+            label_per_frame(labels, names, doppler.times_s),
             names,
             classes,
             None,

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.labels.spans import Span
+from sd2core.labels.spans import Labels
 
 BACKGROUND = "background"
 """Label of frames in which nothing is labelled; always label 0."""
@@ -19,16 +17,15 @@ def plain_name(label: str) -> str:
 
 
 def label_per_frame(
-    spans: Iterable[Span], labels: tuple[str, ...], times_s: NDArray[np.float64]
+    labels: Labels, names: tuple[str, ...], times_s: NDArray[np.float64]
 ) -> NDArray[np.int16]:
     """Return the label of every frame: that of the span at its time, 0 where there is none.
 
-    Later spans lie over earlier ones; suggestions are left out. The first of the labels is
+    Later spans lie over earlier ones; suggestions are left out. The first of the names is
     :data:`BACKGROUND`.
     """
     label = np.zeros(len(times_s), np.int16)
-    for span in spans:
-        if span.origin != "suggestion":
-            during = (times_s >= span.start_s) & (times_s < span.end_s)
-            label[during] = labels.index(plain_name(span.label))
+    for span in labels.decided:
+        during = (times_s >= span.start_s) & (times_s < span.end_s)
+        label[during] = names.index(plain_name(span.label))
     return label

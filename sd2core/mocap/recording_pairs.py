@@ -265,7 +265,7 @@ def frame_labels(
     """Return the number of the label at some times; see :func:`~sd2core.pairs.rows.agreed`."""
     labels = recording.labelled
     of_person = [labels.of_person(person) for person in labels.persons] or [labels]
-    return agreed([label_per_frame(one.spans, names, times_s) for one in of_person])
+    return agreed([label_per_frame(one, names, times_s) for one in of_person])
 
 
 def on_clock(radar: DopplerMap, timebase: Timebase) -> DopplerMap:
