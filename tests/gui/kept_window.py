@@ -12,7 +12,7 @@ import shutil
 import sys
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import is_dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -234,26 +234,27 @@ def remembered(window: MainWindow, recording: Path) -> dict[str, str]:
     rest: list[tuple[str, Any]] = [("", parts)]
     while rest:
         name, value = rest.pop()
-        if name.rstrip("]").endswith(_PASSING):
+        if _passes(name):
             continue
-        if isinstance(value, (*_PLAIN, np.generic)):
+        kind = _kind(type(value))
+        if kind == "plain":
             found[name] = repr(value).replace(str(recording), "<recording>")
-        elif isinstance(value, np.ndarray):
+        elif kind == "array":
             content = hash(value.tobytes()) if value.nbytes <= _HASHED_BYTES else ""
             found[name] = f"{value.dtype} {value.shape} {content}"
-        elif isinstance(value, QUndoStack):
+        elif kind == "history":
             found[name] = f"{value.count()} {value.index()} {value.isClean()}"
-        elif isinstance(value, (tuple, list)):
+        elif kind == "sequence":
             found[name] = f"{len(value)}"
             rest += [(f"{name}[{place}]", item) for place, item in enumerate(value)]
-        elif isinstance(value, (set, frozenset)):
+        elif kind == "set":
             found[name] = f"{sorted(map(repr, value))}" if _plain(value) else f"{len(value)}"
-        elif _is_value(value):
+        elif kind == "value":
             found[name] = type(value).__name__
-            rest += [(f"{name}.{key}", item) for key, item in _attributes(value).items()]
-        elif id(value) in seen or not (_is_ours(value) or isinstance(value, dict)):
+            rest += [(f"{name}.{key}", item) for key, item in _attributes(value)]
+        elif kind == "foreign" or id(value) in seen:
             continue
-        elif isinstance(value, dict):
+        elif kind == "dict":
             seen.add(id(value))
             found[name] = f"{len(value)}"
             rest += [
@@ -263,31 +264,51 @@ def remembered(window: MainWindow, recording: Path) -> dict[str, str]:
         else:
             seen.add(id(value))
             found[name] = type(value).__name__
-            rest += [(f"{name}.{key}", item) for key, item in sorted(_attributes(value).items())]
+            rest += [(f"{name}.{key}", item) for key, item in sorted(_attributes(value))]
     on_screen = Counter(_widgets(window, ""))
     return found | {f"on screen: {text}": f"{count}" for text, count in on_screen.items()}
+
+
+@cache
+def _passes(name: str) -> bool:
+    return name.rstrip("]").endswith(_PASSING)
+
+
+@cache
+def _kind(kind: type) -> str:
+    """How the objects of a type are looked at."""
+    if issubclass(kind, (*_PLAIN, np.generic)):
+        return "plain"
+    if issubclass(kind, np.ndarray):
+        return "array"
+    if issubclass(kind, QUndoStack):
+        return "history"
+    if issubclass(kind, (tuple, list)):
+        return "sequence"
+    if issubclass(kind, (set, frozenset)):
+        return "set"
+    parameters = getattr(kind, "__dataclass_params__", None)
+    # Equal to its copies, so that it does not matter who shares it.
+    if parameters is not None and parameters.frozen and parameters.eq:
+        return "value"
+    if issubclass(kind, dict):
+        return "dict"
+    ours = parameters is not None or kind.__module__.startswith(("sd2app", "fake_"))
+    return "ours" if ours else "foreign"
 
 
 def _plain(values: Any) -> bool:
     return all(isinstance(value, _PLAIN) for value in values)
 
 
-def _is_value(value: Any) -> bool:
-    """True for what is equal to its copies, so that it does not matter who shares it."""
-    parameters = getattr(type(value), "__dataclass_params__", None)
-    return parameters is not None and parameters.frozen and parameters.eq
+def _attributes(value: Any) -> list[tuple[str, Any]]:
+    slots = [(name, getattr(value, name)) for name in _slots(type(value)) if hasattr(value, name)]
+    return [*getattr(value, "__dict__", {}).items(), *slots]
 
 
-def _is_ours(value: Any) -> bool:
-    known = is_dataclass(value) and not isinstance(value, type)
-    return known or type(value).__module__.startswith(("sd2app", "fake_"))
-
-
-def _attributes(value: Any) -> dict[str, Any]:
-    slots = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
-    return getattr(value, "__dict__", {}) | {
-        name: getattr(value, name) for name in slots if hasattr(value, name)
-    }
+@cache
+def _slots(kind: type) -> list[str]:
+    return [name for base in kind.__mro__ for name in getattr(base, "__slots__", ())]
 
 
 def _widgets(widget: QWidget, place: str) -> list[str]:
