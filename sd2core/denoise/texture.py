@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit, gammaincinv, ndtr
 
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
@@ -83,6 +82,8 @@ class Texture:
 
         It depends on the seed and on the number of each frame, not on where a stretch begins.
         """
+        from scipy.special import expit, gammaincinv, ndtr
+
         mean = energies.astype(np.float64)
         with np.errstate(divide="ignore"):
             shown = expit(self.slope * (np.log(mean) - np.log(self.half)))
@@ -160,6 +161,8 @@ def _fluctuations(
 
 def _logistic(levels: NDArray[np.float64], shows: NDArray[np.bool_]) -> tuple[float, float]:
     """Level at which half shows, as an energy, and slope: maximum likelihood, by Newton's steps."""
+    from scipy.special import expit
+
     middle, spread = levels.mean(), levels.std() + 1e-9
     rows = np.stack([np.ones_like(levels), (levels - middle) / spread])
     weights = np.zeros(2)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import erf
 
 from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.progress import Progress, silent
@@ -44,6 +43,8 @@ def body_error(
     progress : Progress
         Counts the stretches; may raise Cancelled.
     """
+    from scipy.special import erf
+
     if all(body.uncertainty is None for body in maker.mesh.bodies):
         return None
     start, stop = frames or (0, maker.mesh.frame_count)

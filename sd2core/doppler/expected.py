@@ -14,7 +14,6 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from sd2core.doppler import histogram
 from sd2core.doppler.histogram import (
@@ -161,6 +160,8 @@ def spread_over_bins(
     counting : Counting
         Axis, and what happens beyond it.
     """
+    from scipy.special import ndtr
+
     known, bins = sigma == 0, counting.bins
     number, _ = place_in_bins(place[known], counting)
     shares = np.bincount(number, weight[known], bins + 1)[:bins].astype(np.float64)

@@ -5,8 +5,9 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from scipy.special import ndtr
 
 from sd2core.doppler.kernels import (
     ALL,
@@ -38,7 +39,8 @@ SPREAD_AT_ONCE = 0.05
 _STEPS = 256
 """Entries of the table of that distribution per standard deviation; right to 1e-6 in between."""
 
-_TABLE = ndtr(np.linspace(-REACH, REACH, 2 * REACH * _STEPS + 1))
+_AT = np.linspace(-REACH, REACH, 2 * REACH * _STEPS + 1) / math.sqrt(2)
+_TABLE = np.array([math.erf(at) for at in _AT.tolist()])
 _TABLE = (_TABLE - _TABLE[0]) / (_TABLE[-1] - _TABLE[0])
 
 

@@ -92,11 +92,9 @@ def close_window(window: MainWindow) -> None:
         models_of(window).document.undo_stack.clear()
         window.features.live.model.close()
     window.close()
-    # Styling the next window would style all that are still there, and each part of the next
-    # again whenever it is put into another.
+    # Styling the next window would style all that are still there.
     window.deleteLater()
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-    QApplication.instance().setStyleSheet("")
 
 
 def opened(window: MainWindow, qtbot: Any, recording: Path) -> MainWindow:

@@ -36,7 +36,7 @@ from sd2app.widgets.inputs import claims
 from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.notices import Notice, NoticeStack
 from sd2app.widgets.panel import fill, panel, replace_content, sentence, splitter
-from sd2app.widgets.theme import apply_theme, is_dark
+from sd2app.widgets.theme import apply_theme, is_dark, leave_unstyled
 from sd2core.processes import return_free_memory
 
 if TYPE_CHECKING:
@@ -127,6 +127,7 @@ class MainWindow(QMainWindow):
         """Load what takes time to import, and fill the skeleton."""
         # Nearly all that is made now stays: looking for what does not would take a tenth of it.
         gc.disable()
+        leave_unstyled(_application())
         # Imported here so that the skeleton is on screen before NumPy, PyAV,
         # numba and VTK are loaded.
         from sd2app.playback.views import TransportBar
@@ -337,9 +338,7 @@ class MainWindow(QMainWindow):
             self._soon.start()
 
     def _restyle(self) -> None:
-        application = QApplication.instance()
-        assert isinstance(application, QApplication)
-        apply_theme(application, self.session.display.dark)
+        apply_theme(_application(), self.session.display.dark)
         self._menus.restyle()
 
     # --- what features use ----------------------------------------------------------------
@@ -458,3 +457,9 @@ class MainWindow(QMainWindow):
         self.session.playback.pause()
         features.close()
         event.accept()
+
+
+def _application() -> QApplication:
+    application = QApplication.instance()
+    assert isinstance(application, QApplication)
+    return application

@@ -42,10 +42,22 @@ _OF_A_FRAME = 140
 def apply_theme(application: QApplication, dark: bool) -> None:
     """Give every widget the light or the dark theme, unless the application has it already."""
     colours = palette_for(dark)
+    _set_palette(application, colours)
     sheet = _style_sheet(colours)
     # Setting a sheet, be it the same, styles every widget again.
-    if application.styleSheet() == sheet:
-        return
+    if application.styleSheet() != sheet:
+        application.setStyleSheet(sheet)
+
+
+def leave_unstyled(application: QApplication) -> None:
+    """Take the sheet away until the theme is applied again, while many widgets are made.
+
+    With a sheet, each is styled anew whenever it, or what it is in, is put into another.
+    """
+    application.setStyleSheet("")
+
+
+def _set_palette(application: QApplication, colours: Palette) -> None:
     palette = QPalette()
     for role, name in _ROLES.items():
         palette.setColor(role, QColor(getattr(colours, name)))
@@ -55,6 +67,8 @@ def apply_theme(application: QApplication, dark: bool) -> None:
         QPalette.ColorRole.ButtonText,
     ):
         palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(colours.disabled))
+    if application.palette() == palette:
+        return
     application.setStyle("Fusion")
     application.setPalette(palette)
     # Fusion frames these by a darker shade of their window, which is not seen on a dark one.
@@ -65,7 +79,6 @@ def apply_theme(application: QApplication, dark: bool) -> None:
         fainter = QColor(colours.disabled).lighter(_OF_A_FRAME)
         palette.setColor(QPalette.ColorGroup.Disabled, QPalette.ColorRole.Window, fainter)
         application.setPalette(palette, kind)  # type: ignore[arg-type]  # not bytes
-    application.setStyleSheet(sheet)
 
 
 def _style_sheet(c: Palette) -> str:
