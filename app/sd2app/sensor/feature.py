@@ -19,7 +19,7 @@ from sd2app.sensor.placements_page import PlacementsPage
 from sd2app.sensor.things_page import ThingsPage
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import accepted
-from sd2app.widgets.panel import InnerPage, paged_panel
+from sd2app.widgets.panel import InnerPage, LatePage, paged_panel
 
 
 class SensorFeature(Feature):
@@ -114,9 +114,11 @@ class SensorFeature(Feature):
         sensor = SensorPanel(
             self._session, self._synthesis, radar, to_camera, aim, align, shell.warn
         )
-        placements = PlacementsPage(self.placements, self._accuracy, shell, self._make_batch)
-        things = ThingsPage(self._session, self._synthesis, shell.warn)
-        bodies = BodiesPage(self._session, shell.warn)
+        placements = LatePage(
+            lambda: PlacementsPage(self.placements, self._accuracy, shell, self._make_batch)
+        )
+        things = LatePage(lambda: ThingsPage(self._session, self._synthesis, shell.warn))
+        bodies = LatePage(lambda: BodiesPage(self._session, shell.warn))
         return {
             "Sensor": paged_panel(
                 InnerPage("Sensor", "Where the sensor is and what it sees", sensor),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Protocol, runtime_checkable
 
-from PySide6.QtCore import QPoint, QRect, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QAction, QColor, QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QFrame, QScrollArea, QStackedWidget, QToolButton, QWidget
 
@@ -54,7 +54,7 @@ class SidePanel(QFrame):
         for place, (icon, page) in enumerate(zip(self._icons, pages.values(), strict=True)):
             icon.clicked.connect(partial(self._click, place))
             icon.stepped.connect(self._step)
-            self._stack.addWidget(_scrolled(page))
+            self._stack.addWidget(_Scrolled(page))
         # Elsewhere in the window its key opens the first page.
         guide = help_button(self._topic, self, key="")
         self._floating = floating = action_button(over, "Over maps")
@@ -222,12 +222,24 @@ class RailButton(QToolButton):
             draw_panel_icon(painter, self.name, colour)
 
 
-def _scrolled(widget: QWidget) -> QScrollArea:
-    scroll = QScrollArea()
-    scroll.setWidget(widget)
-    scroll.setWidgetResizable(True)
-    scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    bar = scroll.verticalScrollBar().sizeHint().width()
-    scroll.setMinimumWidth(widget.minimumSizeHint().width() + bar)
-    return scroll
+class _Scrolled(QScrollArea):
+    """Scrolls a page where it is high, and is as wide as it needs."""
+
+    def __init__(self, page: QWidget) -> None:
+        super().__init__()
+        self._page = page
+        self.setWidget(page)
+        self.setWidgetResizable(True)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._give_room()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Follow what the page needs."""
+        if event.type() == QEvent.Type.LayoutRequest:
+            self._give_room()
+        return super().eventFilter(watched, event)
+
+    def _give_room(self) -> None:
+        bar_px = self.verticalScrollBar().sizeHint().width()
+        self.setMinimumWidth(self._page.minimumSizeHint().width() + bar_px)

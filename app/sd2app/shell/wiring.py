@@ -44,7 +44,7 @@ from sd2app.video.feature import VideoFeature
 from sd2app.welcome.feature import WelcomeFeature
 from sd2app.welcome.steps import tour_steps
 from sd2app.widgets.layouts import pane
-from sd2app.widgets.panel import InnerPage, paged_panel
+from sd2app.widgets.panel import InnerPage, LatePage, paged_panel
 from sd2core.cli import build_parser
 from sd2core.files.paths import user_cache
 from sd2core.labels.recovery import recovery_folder
@@ -200,11 +200,13 @@ def _attach(session: Session, features: Features) -> None:
 
 def side_pages(features: Features, views: Mapping[str, QWidget]) -> dict[str, QWidget]:
     """Pages of the panel at the side, by their titles."""
-    denoisers, classifiers = features.training.panel(), features.classify.panel()
+    denoisers, classifiers, studies = (
+        LatePage(one.panel) for one in (features.training, features.classify, features.study)
+    )
     train = paged_panel(
         InnerPage("Denoiser", "Train what makes synthetic maps a radar's", denoisers),
         InnerPage("Classifier", "Train what tells gestures apart", classifiers),
-        InnerPage("Study", "Find out whether synthetic data help", features.study.panel()),
+        InnerPage("Study", "Find out whether synthetic data help", studies),
     )
     pages = {**views, "Train": train}
     return {name: pages[name] for name in ("Sensor", "Accuracy", "Train", "Labels", "Agreement")}

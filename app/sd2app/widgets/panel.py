@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Literal, NamedTuple
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtGui import QPainter, QPaintEvent, QShowEvent
 from PySide6.QtWidgets import (
     QApplication,
     QButtonGroup,
@@ -306,6 +306,22 @@ class ProgressBar(QProgressBar):
             self.show_count(0, 0)
         else:
             self.show_count(round(share * _PARTS), _PARTS)
+
+
+class LatePage(QFrame):
+    """Page that is made when it is first shown."""
+
+    def __init__(self, make: Callable[[], QWidget]) -> None:
+        super().__init__()
+        self._make: Callable[[], QWidget] | None = make
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Make the page."""
+        if self._make is not None:
+            page, self._make = self._make(), None
+            self.setLayout(column_of(page, spacing_px=0, margins_px=0))
+            page.show()
+        super().showEvent(event)
 
 
 class InnerPage(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import replace
+from math import ceil
 
 import fake_class_command
 import numpy as np
@@ -105,7 +106,7 @@ def test_the_readout_follows_keys_and_clicks(classified, qtbot):
         key(classified, "Right")
     for frame in (8, 40):
         if frame != 8:
-            x = round(plot.scale.x_of(c.playback.timebase.time_of(frame)))
+            x = ceil(plot.scale.x_of(c.playback.timebase.time_of(frame)))
             qtbot.mouseClick(plot, LEFT, pos=QPoint(x, 10))
         assert c.playback.frame == frame
         best = int(shares[frame].argmax())
