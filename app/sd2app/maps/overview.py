@@ -24,7 +24,7 @@ class Overview(MapWidget):
 
     def __init__(self, session: Session, overlays: Sequence[Overlay] = ()) -> None:
         super().__init__(session.maps.synthetic, session, overlays)
-        self.setFixedHeight(28)
+        self.setFixedHeight(20)
         self.follow(self._span.changed)
 
     def set_track(self, track: MapModel) -> None:

@@ -44,7 +44,7 @@ class TransportBar(QWidget):
         parts: tuple[Part, ...] = (
             *steps, self._stretch, 8, self._time, self._frame, *speed,
         )  # fmt: skip
-        self.setLayout(row_of(*parts, spacing_px=4, margins_px=(0, 4, 0, 4)))
+        self.setLayout(row_of(*parts, spacing_px=4, margins_px=(0, 2, 0, 2)))
         playback.frame_changed.connect(self._refresh)
         playback.speed_changed.connect(self._refresh)
         looped.changed.connect(self._show_stretch)
@@ -86,7 +86,7 @@ class TimeRuler(SeekingPlot):
 
     def __init__(self, session: Session) -> None:
         super().__init__(session)
-        self.setFixedHeight(24)
+        self.setFixedHeight(20)
         self.follow(self._span.changed, self._playback.stretch_changed)
 
     def paint(self, painter: QPainter) -> None:

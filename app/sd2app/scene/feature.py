@@ -42,7 +42,7 @@ _VIEWS: tuple[tuple[str, Preset, str, str], ...] = (
 )
 
 _SHORT = {
-    "velocity": "radial velocity",
+    "velocity": "velocity",
     "range": "range",
     "visibility": "visibility",
     "plain": "plain",

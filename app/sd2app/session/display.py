@@ -101,10 +101,10 @@ class Layout(NamedTuple):
 LAYOUTS = {
     "Look": Layout(
         "Video, scene and maps: move the sensor, and see what follows",
-        ("video", "scene", "over"), 384, "Sensor", True,
+        ("video", "scene", "over"), 320, "Sensor", True,
     ),
     "Label": Layout(
-        "Video and maps over the spans: mark what happens", ("video", "over"), 384, "Labels", True
+        "Video and maps over the spans: mark what happens", ("video", "over"), 320, "Labels", True
     ),
     "Learn": Layout(
         "Maps beside the panel that trains denoisers and classifiers", (), 384, "Train", False

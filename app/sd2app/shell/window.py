@@ -33,7 +33,7 @@ from sd2app.shell.side_panel import SidePanel
 from sd2app.shell.window_size import place_on_screen
 from sd2app.widgets.dialogs import accepted, tab_to
 from sd2app.widgets.inputs import claims
-from sd2app.widgets.layouts import column_of, row_of
+from sd2app.widgets.layouts import column_of, pane, row_of
 from sd2app.widgets.notices import Notice, NoticeStack
 from sd2app.widgets.panel import fill, panel, replace_content, sentence, splitter
 from sd2app.widgets.theme import apply_theme, is_dark, leave_unstyled
@@ -105,10 +105,11 @@ class MainWindow(QMainWindow):
         )
         # Of the room of a larger window, maps take most.
         parts = [self._views, panels["tracks"], panels["spectrum"]]
-        self._main = splitter(across, parts, (384, 640, 200))
+        self._main = splitter(across, parts, (320, 640, 200))
         for place, share in enumerate((0, 1, 0)):
             self._main.setStretchFactor(place, share)
-        self._column = column_of((self._main, 1), spacing_px=4, margins_px=0)
+        self._panes = pane((self._main, 1), spacing_px=2)
+        self._column = column_of((self._panes, 1), spacing_px=4, margins_px=0)
         beside = QWidget(self)
         beside.setLayout(self._column)
         # The side panel has the window's full height, from the menus to the last line; it lies
@@ -177,14 +178,14 @@ class MainWindow(QMainWindow):
             self._lines.insertWidget(0, tabs)
         else:
             self.menuBar().setCornerWidget(tabs)
-        self._column.insertWidget(self._column.indexOf(self._main), self.start, 1)
+        self._column.insertWidget(self._column.indexOf(self._panes), self.start, 1)
         self.start.hide()
-        self._of_recording = (tabs, self._main, self._room, self._panels["side"], transport)
+        self._of_recording = (tabs, self._panes, self._room, self._panels["side"], transport)
         label_set = self.features.labels.model
         self.tour = self.features.welcome.callout(
             self, lambda: label_set.labels.label_set.labels[0].key
         )
-        shown = self.start, *self._panels.values(), transport, status, self.tour
+        shown = self.start, *self._panels.values(), self._suggestions, transport, status, self.tour
         self._regions = (tabs, *notices, *bars, *shown)
         self._soon = delayed(self._follow_actions, 0, self)
         # Once it is known if something is being opened, and before anything is painted.
@@ -220,7 +221,8 @@ class MainWindow(QMainWindow):
             self._panels["side"], self._across, self.side, {"Labels": _LABELS_PX}, self._settings,
             self.session.layouts,
         )  # fmt: skip
-        self._suggestions = views["suggestions"]
+        self._suggestions = views["suggestions"]  # as wide as all panes, which is one row
+        self._panes.layout().addWidget(self._suggestions)
         stack, self.maps = track_stack(self.session, self.features, views)
         fill(self._panels["tracks"], stack)
         self._scene_comes = sentence("Loading the 3D view…")

@@ -223,6 +223,6 @@ def track_stack(
     maps.set_under_way(lambda: fit.under_way, fit.changed)
     inertial = features.imu.track((labels.over_maps,))
     labels.let_drag_on((*maps.views, inertial))
-    below = [views[name] for name in ("classes", "suggestions", "labels", "other labels")]
+    below = [views[name] for name in ("classes", "labels", "other labels")]
     ruler = TimeRuler(session)
     return pane((maps, 1), inertial, *below, ruler, maps.overview), maps

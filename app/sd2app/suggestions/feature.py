@@ -96,7 +96,7 @@ class SuggestionBar(QWidget):
         if not model.active:
             return
         self._text.setText(model.text)
-        self._as.setText(f"accepted as {model.accepted_as}" if model.accepted_as else "")
+        self._as.setText(f"taken as {model.accepted_as}" if model.accepted_as else "")
         self._as.setToolTip(
             "The label that was used last; the key of another label accepts as that"
         )
@@ -186,7 +186,7 @@ class SuggestionsFeature(Feature):
         return bool(self.model.pending)
 
     def panels(self) -> Mapping[str, QWidget]:
-        """The bar below the maps."""
+        """The bar below all panes."""
         return {"suggestions": SuggestionBar(self.model, self._shell.action)}
 
     def attach(self) -> None:

@@ -16,6 +16,7 @@ from sd2app.settings import Settings
 from sd2app.shell.layout_tabs import LayoutTabs
 from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
+from sd2app.suggestions.feature import SuggestionBar
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -73,14 +74,20 @@ def share_of_maps(window: MainWindow) -> float:
 
 @pytest.mark.parametrize(("size", "least"), [((1280, 720), 0.45), ((1600, 1000), 0.55)])
 def test_maps_have_most_of_the_window_to_look_and_to_label(
-    windows, size, least, small_recording
+    windows, qtbot, size, least, small_recording
 ) -> None:
     window = windows(*size, recording=small_recording)
     assert (window.width(), window.height()) == size
     for name in ("Look", "Label"):
         choose(window, name)
         assert len(window.maps.shown) >= 2
-        assert share_of_maps(window) >= least, name
+        for asked in ("", "with suggestions to decide on"):
+            if asked:
+                window.action("suggest").trigger()
+                qtbot.waitUntil(window.findChild(SuggestionBar).isVisible)
+            QApplication.processEvents()
+            assert share_of_maps(window) >= least, (name, asked)
+        models_of(window).suggestions.stop()
     assert not panel_of(window, "tracks").findChildren(QSlider), "time is scrubbed at one place"
 
 
