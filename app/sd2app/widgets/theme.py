@@ -28,13 +28,16 @@ _ROLES = {
 }
 
 _FRAMES = {
-    "QAbstractSpinBox": "frame",
-    "QComboBox": "frame",
-    "QLineEdit": "frame",
-    "QPushButton": "frame",
-    "QCheckBox": "muted",
+    "QAbstractSpinBox": ("frame", 100),
+    "QComboBox": ("frame", 115),
+    "QLineEdit": ("frame", 100),
+    "QPushButton": ("frame", 115),
+    "QCheckBox": ("muted", 100),
 }
-"""Colours of frames of what is typed, chosen or ticked; the last are drawn lighter."""
+"""Colours of frames of what is typed, chosen or ticked; the last are drawn lighter.
+
+With each, to which percentage Fusion brightens it where it is disabled, be that seen more or less.
+"""
 _OF_A_FRAME = 140
 """By which percentage Fusion divides the brightness of a window for frames on it."""
 
@@ -72,12 +75,11 @@ def _set_palette(application: QApplication, colours: Palette) -> None:
     application.setStyle("Fusion")
     application.setPalette(palette)
     # Fusion frames these by a darker shade of their window, which is not seen on a dark one.
-    for kind, name in _FRAMES.items():
+    for kind, (name, brightened) in _FRAMES.items():
         window = QColor(getattr(colours, name)).lighter(_OF_A_FRAME)
         palette.setColor(QPalette.ColorRole.Window, window)
-        # What is disabled it draws fainter.
-        fainter = QColor(colours.disabled).lighter(_OF_A_FRAME)
-        palette.setColor(QPalette.ColorGroup.Disabled, QPalette.ColorRole.Window, fainter)
+        disabled = window.darker(brightened)
+        palette.setColor(QPalette.ColorGroup.Disabled, QPalette.ColorRole.Window, disabled)
         application.setPalette(palette, kind)  # type: ignore[arg-type]  # not bytes
 
 
@@ -138,8 +140,20 @@ def _style_sheet(c: Palette) -> str:
     QTabBar#layouts::tab:selected {{ color: {c.text}; border-bottom-color: {c.accent}; }}
     QTabBar#layouts::tab:hover {{ background: {c.well}; }}
     QTabBar#layouts:focus {{ border: 1px solid {c.accent}; border-radius: 4px; }}
-    QTableView {{ border: 1px solid {c.frame}; border-radius: 4px; }}
-    QTableView:focus {{ border-color: {c.accent}; }}
+    QTableView, QListWidget, QTreeWidget[frameShape="6"], QPlainTextEdit {{
+        border: 1px solid {c.frame}; border-radius: 4px;
+    }}
+    QTableView:focus, QListWidget:focus, QTreeWidget[frameShape="6"]:focus, QPlainTextEdit:focus {{
+        border-color: {c.accent};
+    }}
+    QSlider::groove {{ background: {c.frame}; height: 4px; border-radius: 2px; }}
+    QSlider::sub-page {{ background: {c.accent}; border-radius: 2px; }}
+    QSlider::sub-page:disabled {{ background: {c.frame}; }}
+    QSlider::handle {{
+        background: {c.panel}; border: 1px solid {c.frame}; border-radius: 4px;
+        width: 12px; margin: -5px 0;
+    }}
+    QSlider::handle:focus {{ border-color: {c.accent}; background: {c.accent}; }}
     QHeaderView::section {{
         background: {c.panel}; color: {c.muted}; border: none; border-bottom: 1px solid {c.border};
         padding: 4px 4px 2px 4px;

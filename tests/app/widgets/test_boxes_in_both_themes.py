@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import QPointF, QRectF
+from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPalette
 from PySide6.QtWidgets import (
     QApplication,
@@ -11,8 +11,12 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDoubleSpinBox,
     QLineEdit,
+    QListWidget,
+    QPlainTextEdit,
     QPushButton,
+    QSlider,
     QToolButton,
+    QTreeWidget,
     QWidget,
 )
 
@@ -67,18 +71,20 @@ def pressed_button() -> QToolButton:
     return button
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [
-        *(QCheckBox, ticked_box, QComboBox, QDoubleSpinBox, QLineEdit, QPushButton),
-        *(outlined_button, pressed_button),
-    ],
-)
-@pytest.mark.parametrize("ground", ["window", "panel"])
-@pytest.mark.parametrize("enabled", [True, False])
-def test_its_frame_is_seen(qtbot, theme, kind, ground, enabled) -> None:
+def slider() -> QSlider:
+    return QSlider(Qt.Orientation.Horizontal)
+
+
+KINDS = [
+    *(QCheckBox, ticked_box, QComboBox, QDoubleSpinBox, QLineEdit, QPushButton),
+    *(outlined_button, pressed_button, slider, QListWidget, QTreeWidget, QPlainTextEdit),
+]
+
+
+def contrast_of_frame(qtbot, kind, ground: str, enabled: bool) -> float:
+    """Contrast of the frame of a new control with what it stands on."""
     place = QWidget()
-    place.setStyleSheet(f"QWidget#place {{ background: {getattr(theme, ground)}; }}")
+    place.setStyleSheet(f"QWidget#place {{ background: {ground}; }}")
     place.setObjectName("place")
     qtbot.addWidget(place)
     box = kind()
@@ -92,8 +98,22 @@ def test_its_frame_is_seen(qtbot, theme, kind, ground, enabled) -> None:
     rows = range(10, middle - 5) if isinstance(box, QCheckBox) else range(10, 13)
     column = [picture.pixelColor(16, y) for y in rows]
     stands_on = picture.pixelColor(2, 2)
-    assert stands_on == QColor(getattr(theme, ground))
-    assert max(contrast(one, stands_on) for one in column) >= 3.0  # WCAG 2, 1.4.11
+    assert stands_on == QColor(ground)
+    return max(contrast(one, stands_on) for one in column)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("ground", ["window", "panel"])
+@pytest.mark.parametrize("enabled", [True, False])
+def test_its_frame_is_seen(qtbot, theme, kind, ground, enabled) -> None:
+    seen = contrast_of_frame(qtbot, kind, getattr(theme, ground), enabled)
+    assert seen >= 3.0  # WCAG 2, 1.4.11
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_disabled_stands_out_no_more_than_what_is_not(qtbot, theme, kind) -> None:
+    enabled, disabled = (contrast_of_frame(qtbot, kind, theme.panel, on) for on in (True, False))
+    assert disabled <= enabled * 1.02  # rounded colours
 
 
 GROUPS = [QPalette.ColorGroup.Active, QPalette.ColorGroup.Inactive, QPalette.ColorGroup.Disabled]
