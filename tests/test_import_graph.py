@@ -28,11 +28,20 @@ def name_of(file: Path, root: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
+def statements(node: ast.AST) -> Iterator[ast.AST]:
+    """Statements in a module at any depth; no import is within an expression."""
+    for part in ("body", "orelse", "finalbody", "handlers", "cases"):
+        inner = getattr(node, part, None)
+        for each in inner if isinstance(inner, list) else ():
+            yield each
+            yield from statements(each)
+
+
 @cache
 def imported_by(file: Path) -> tuple[str, ...]:
     """Names of modules, or of things in modules, that a file imports anywhere."""
     found: list[str] = []
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in statements(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             found += (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
