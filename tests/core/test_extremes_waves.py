@@ -38,7 +38,7 @@ FLAT = 1e-7
 """Spans below 1e-3 rad are taken as none, 1e-6 / 36; from there on rounding, some 10 units,
 is divided by a span squared."""
 SPEEDS_MPS = (1e-9, 0.1, 2.0, 300.0)
-COUNTS = ((2, 2), (2, 1024), (1024, 2), (64, 32), (1024, 1024))
+COUNTS = ((2, 2), (2, 1024), (1024, 2), (64, 32), (256, 1024))
 
 
 def radar(wavelength_m: float, chirps: int = 64, samples: int = 32) -> RadarConfig:

@@ -32,26 +32,33 @@ OTHERS = {
 }
 
 
+@pytest.fixture(scope="module")
+def mesh() -> MeshSequence:
+    """Frames of the sample in which the hand moves; :data:`PART` has others on both sides."""
+    return open_recording(resource_path("swipes.sd2")).load_mesh().between(54, 76)
+
+
+PART = (6, 16)
+
+
 @pytest.mark.parametrize("name", OTHERS)
-def test_a_shared_block_changes_no_map(name: str) -> None:
-    mesh = open_recording(resource_path("swipes.sd2")).load_mesh()
+def test_a_shared_block_changes_no_map(mesh: MeshSequence, name: str) -> None:
     first, sensor = Synthesizer(mesh, BASE), VirtualSensor()
-    first.stretch(sensor, 60, 70)
+    first.stretch(sensor, *PART)
     options: SynthesisOptions = OTHERS[name]
     shared = Synthesizer(mesh, options, blocks_of=first)
     assert shared.prepared.budget is first.prepared.budget
     alone = Synthesizer(mesh, options)
     np.testing.assert_array_equal(
-        shared.stretch(sensor, 60, 70).values, alone.stretch(sensor, 60, 70).values
+        shared.stretch(sensor, *PART).values, alone.stretch(sensor, *PART).values
     )
     # Nor has the other's visibility changed the first one's.
     np.testing.assert_array_equal(
-        first.stretch(sensor, 60, 70).values, Synthesizer(mesh, BASE).stretch(sensor, 60, 70).values
+        first.stretch(sensor, *PART).values, Synthesizer(mesh, BASE).stretch(sensor, *PART).values
     )
 
 
-def test_other_knots_are_not_shared() -> None:
-    mesh = open_recording(resource_path("swipes.sd2")).load_mesh()
+def test_other_knots_are_not_shared(mesh: MeshSequence) -> None:
     first = Synthesizer(mesh, BASE)
     other = Synthesizer(mesh, replace(BASE, oversampling=3), blocks_of=first)
     assert other.prepared.budget is not first.prepared.budget
@@ -69,25 +76,25 @@ def test_other_knots_are_not_shared() -> None:
     ],
     ids=["weight", "range law", "pixels of another test", "nulled bins", "beyond", "stride"],
 )
-def test_masks_are_shared_by_what_they_depend_on(other: SynthesisOptions, shared: bool) -> None:
-    mesh = open_recording(resource_path("swipes.sd2")).load_mesh()
+def test_masks_are_shared_by_what_they_depend_on(
+    mesh: MeshSequence, other: SynthesisOptions, shared: bool
+) -> None:
     first, sensor = Synthesizer(mesh, BASE), VirtualSensor()
-    first.stretch(sensor, 60, 70)
+    first.stretch(sensor, *PART)
     second = Synthesizer(mesh, other, blocks_of=first)
-    assert (cached_mask(second, sensor, (60, 70)) is not None) == shared
-    again = second.stretch(sensor, 60, 70)
+    assert (cached_mask(second, sensor, PART) is not None) == shared
+    again = second.stretch(sensor, *PART)
     np.testing.assert_array_equal(
-        again.values, Synthesizer(mesh, other).stretch(sensor, 60, 70).values
+        again.values, Synthesizer(mesh, other).stretch(sensor, *PART).values
     )
 
 
-def test_depth_masks_of_another_resolution_are_not_shared() -> None:
-    mesh = open_recording(resource_path("swipes.sd2")).load_mesh()
+def test_depth_masks_of_another_resolution_are_not_shared(mesh: MeshSequence) -> None:
     coarse = Synthesizer(mesh, OTHERS["depth 128"])
-    coarse.stretch(VirtualSensor(), 60, 70)
+    coarse.stretch(VirtualSensor(), *PART)
     fine = Synthesizer(mesh, OTHERS["depth 256"], blocks_of=coarse)
-    assert cached_mask(coarse, VirtualSensor(), (60, 70), "depth") is not None
-    assert cached_mask(fine, VirtualSensor(), (60, 70), "depth") is None
+    assert cached_mask(coarse, VirtualSensor(), PART, "depth") is not None
+    assert cached_mask(fine, VirtualSensor(), PART, "depth") is None
 
 
 SWAYING, BREATHING = wobbling(20), wobbling(20, seed=3)

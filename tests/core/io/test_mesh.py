@@ -97,7 +97,7 @@ def test_before_the_first_known_pose_stands_that_one(tmp_path: Path) -> None:
 
 
 @given(
-    frames=st.integers(1, 40),
+    frames=st.integers(1, 12),
     vertices=st.integers(1, 30),
     doubles=st.booleans(),
     has_faces=st.booleans(),

@@ -46,9 +46,9 @@ def look_plainly(
 
 BALL = sphere(1.0, 3, 0.4)
 SCENES: dict[str, Mesh] = {
-    "sphere": BALL,
-    "nested spheres": together(sphere(1.0, 2, 0.3), sphere(0.5, 2, 0.9), sphere(0.25, 1, 1.7)),
-    "thin plates": together(plate(1.0, 16, 0.0), plate(0.9, 15, 0.001), plate(0.5, 9, -0.3)),
+    "sphere": sphere(1.0, 2, 0.4),
+    "nested spheres": together(sphere(1.0, 2, 0.3), sphere(0.5, 1, 0.9), sphere(0.25, 1, 1.7)),
+    "thin plates": together(plate(1.0, 10, 0.0), plate(0.9, 9, 0.001), plate(0.5, 5, -0.3)),
 }
 NEAR_AND_FAR = [
     (0.013, 0.027, -1.2),
