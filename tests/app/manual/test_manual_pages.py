@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -23,8 +24,12 @@ CODE = re.compile(r"^( *)```.*?^\1``` *$|`[^`]+`", re.MULTILINE | re.DOTALL)
 each_page = pytest.mark.parametrize("name", MANUAL.titles)
 
 
+@cache
 def prose_of(name: str) -> str:
     return CODE.sub("", MANUAL.text(name))
+
+
+sections_of = cache(MANUAL.sections)
 
 
 @each_page
@@ -46,13 +51,13 @@ def test_links_lead_to_pages_headings_and_pictures_that_are_there(name: str) -> 
             assert (MANUAL.folder / place).is_file(), target
         else:
             assert place in MANUAL.titles, target
-            anchors = {one.anchor for one in MANUAL.sections(place)}
+            anchors = {one.anchor for one in sections_of(place)}
             assert not anchor or anchor in anchors, target
 
 
 @each_page
 def test_anchors_differ_and_the_first_heading_is_the_title(name: str) -> None:
-    sections = MANUAL.sections(name)
+    sections = sections_of(name)
     assert len({one.anchor for one in sections}) == len(sections)
     if name not in {entry.name for entry in MANUAL.contents.below}:  # these may be named shorter
         assert sections[0].heading == MANUAL.titles[name]
@@ -77,7 +82,7 @@ def test_contents_are_for_users_and_complete() -> None:
 @pytest.mark.parametrize("place", sorted(set(HELP.values())))
 def test_help_leads_to_headings_that_are_there(place: str) -> None:
     name, _, anchor = place.partition("#")
-    assert not anchor or anchor in {one.anchor for one in MANUAL.sections(name)}
+    assert not anchor or anchor in {one.anchor for one in sections_of(name)}
 
 
 # --- search -------------------------------------------------------------------------------
