@@ -25,7 +25,7 @@ class _PerfectLandmarker:
     on_both_sides = on_crop
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def takes() -> list[Take]:
     maker = TakeMaker(_PerfectLandmarker(), Motion(seed=7))  # type: ignore[arg-type]
     return [maker.make(number, frames=24) for number in range(4)]
