@@ -70,6 +70,7 @@ def libraries_named(word: str) -> set[str]:
     return set().union(*(found()[one] for one in parts))
 
 
+@pytest.mark.slow
 def test_every_library_of_the_environment_is_named_with_its_licence() -> None:
     named = set().union(*found().values())
     assert {licences.place(path) for _, path in carried()} <= named
@@ -77,6 +78,7 @@ def test_every_library_of_the_environment_is_named_with_its_licence() -> None:
     licences.judge(found())
 
 
+@pytest.mark.slow
 @on_linux
 def test_libraries_in_packages_have_their_own_licence() -> None:
     named = {
@@ -182,6 +184,7 @@ def test_only_opencv_uses_the_old_openssl_and_only_pyav_x264() -> None:
     assert libraries_named("OpenSSL 1.1")
 
 
+@pytest.mark.slow
 @on_linux
 def test_the_texts_are_found_each_once() -> None:
     texts = licences.texts(found())

@@ -150,6 +150,7 @@ def test_commands_that_are_not_there_are_not_listed() -> None:
     assert "--screenshot" not in sd2_alone("demo", "--help").stdout
 
 
+@pytest.mark.slow
 def test_a_copy_of_the_sample_is_made_and_described_without_the_window(tmp_path: Path) -> None:
     done = sd2_alone("demo", "--out", tmp_path / "mine.sd2")
     assert (done.returncode, done.stdout) == (0, f"Wrote {tmp_path / 'mine.sd2'}\n"), done.stderr

@@ -56,6 +56,7 @@ def scenes(tmp_path: Path) -> Path:
     return tmp_path / "scenes"
 
 
+@pytest.mark.slow
 def test_the_data_set_is_that_of_the_command(tmp_path: Path, scenes: Path) -> None:
     one = scene(scenes / "duo.sd2", (*WHO, ("wave", 3.5, 3.9, "carl")))
     end, pool = run(tmp_path, PLAN + EXPORT)

@@ -29,6 +29,7 @@ def people(tmp_path: Path) -> Path:
     return tmp_path / "people"
 
 
+@pytest.mark.slow
 def test_a_folder_of_recordings_becomes_a_data_set_with_card_and_sheet(
     sd2: Sd2, people: Path, tmp_path: Path
 ) -> None:

@@ -44,6 +44,7 @@ def test_what_cannot_be_is_refused(words: list[str], message: str, sd2: Sd2) -> 
     assert message in outcome.err
 
 
+@pytest.mark.slow
 def test_each_gets_a_mesh(video: Path, sd2: Sd2, tmp_path: Path) -> None:
     words = ["fit", video, "--people", "all", "--resolution", "low"]
     words += ["--landmark-model", "full", "--out", tmp_path / "two.npz"]

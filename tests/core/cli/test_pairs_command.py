@@ -6,11 +6,13 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 from cli_outcome import Sd2
 
 from sd2core.pairs.store import read_pairs
 
 
+@pytest.mark.slow
 def test_a_real_recording_in_part(sd2: Sd2, shared_data: Path, tmp_path: Path) -> None:
     """Fifty rows of a real recording, so that it takes a second."""
     source = shared_data / "paired" / "mars_subject4"

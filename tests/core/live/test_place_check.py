@@ -262,6 +262,7 @@ def test_what_was_found_is_told_as_it_comes_and_q_ends_it() -> None:
     assert told[-1]["left_s"] == 0
 
 
+@pytest.mark.slow
 def test_the_command_in_front_of_a_still_picture(tmp_path: Path) -> None:
     from sd2core.io.video_writing import VideoEncoder
 
