@@ -6,6 +6,7 @@ import gc
 import os
 import shutil
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -41,22 +42,24 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
-@pytest.fixture(autouse=True)
-def no_known_pace(
-    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Forget what this machine has measured before."""
-    path = tmp_path_factory.getbasetemp() / "pace.json"
-    path.unlink(missing_ok=True)
-    monkeypatch.setattr(pace, "_path", lambda: path)
+@pytest.fixture(scope="session")
+def kept_apart(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Path]]:
+    """Where the pace of this machine and maps that were computed before are kept, for once."""
+    folder = tmp_path_factory.getbasetemp()
+    pace_path, maps = folder / "pace.json", folder / "kept"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pace, "_path", lambda: pace_path)
+        patch.setattr(kept_maps, "user_cache", lambda name: maps / name)
+        yield pace_path, maps
 
 
 @pytest.fixture(autouse=True)
-def no_kept_maps(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Forget the maps that were computed before."""
-    folder = tmp_path_factory.getbasetemp() / "kept"
-    shutil.rmtree(folder, ignore_errors=True)
-    monkeypatch.setattr(kept_maps, "user_cache", lambda name: folder / name)
+def nothing_known(kept_apart: tuple[Path, Path]) -> None:
+    """Forget what this machine has measured and computed before."""
+    pace_path, maps = kept_apart
+    pace_path.unlink(missing_ok=True)
+    if maps.exists():
+        shutil.rmtree(maps, ignore_errors=True)
 
 
 @pytest.fixture(scope="session")

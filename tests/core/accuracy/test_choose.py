@@ -98,7 +98,9 @@ def test_a_body_at_rest_needs_nothing() -> None:
 
 @pytest.mark.parametrize("frames", [1, 2, 7, 39])
 def test_short_clips(frames: int) -> None:
-    choice = choose(ball(swinging((0, 0, 3), 1.5, 0.8), frames=frames), CAMERA, tolerance=0.1)
+    choice = choose(
+        ball(swinging((0, 0, 3), 1.5, 0.8), fineness=1, frames=frames), CAMERA, tolerance=0.1
+    )
     assert choice.errors.frames >= 1
 
 

@@ -27,8 +27,14 @@ def known() -> ClipSet:
     return clip_set(4, 4)
 
 
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("kind", ["peak", "columns"])
+@pytest.mark.parametrize(
+    ("model", "kind"),
+    [
+        *((model, "columns") for model in MODELS),
+        *(pytest.param(model, "peak", marks=pytest.mark.slow) for model in MODELS[1:]),
+        (MODELS[0], "peak"),
+    ],
+)
 def test_classes_that_can_be_told_are_learnt(known: ClipSet, model: str, kind: str) -> None:
     made = train(
         known.clips[:8], known.clips[8:12], known, replace(SHORT, model=model, features=kind)

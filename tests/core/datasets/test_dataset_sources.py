@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -346,21 +347,30 @@ def test_frames_of_damaged_chunks_are_in_no_segment_and_told(tmp_path: Path) -> 
     assert sum(len(take.times_s) for take in takes) == FRAMES - 20
 
 
+BOTH = Making(kinds=("synthetic", "simulated"))
+FIFTIES = DatasetOptions(kinds=BOTH.kinds, length=50, overlap=0)
+
+
+@pytest.fixture(scope="module")
+def long_pairs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of pairs in two chunks (of 2250: s2 from frame 750 on), and of a data set of them."""
+    folder = tmp_path_factory.mktemp("long")
+    pairs = write_pairs(folder / "pairs.zarr", takes=1, frames=1500, limbs=True)
+    write_dataset(folder / "whole.zarr", gather([pairs], BOTH), FIFTIES)
+    return folder
+
+
 @pytest.mark.parametrize("chunk", ["radar/c/1/0", "times_s/c/1", "limbs/c/1/0/0"])
 def test_frames_of_pairs_in_damaged_chunks_are_in_no_segment_and_counted(
-    tmp_path: Path, chunk: str
+    tmp_path: Path, long_pairs: Path, chunk: str
 ) -> None:
     path = tmp_path / "pairs.zarr"
-    write_pairs(path, takes=1, frames=1500, limbs=True)  # chunks of 2250: s2 from frame 750 on
-    whole = tmp_path / "whole.zarr"
-    making = Making(kinds=("synthetic", "simulated"))
-    options = DatasetOptions(kinds=making.kinds, length=50, overlap=0)
-    write_dataset(whole, gather([path], making), options)
+    shutil.copytree(long_pairs / "pairs.zarr", path)
     lose(path / chunk)
-    out, sources = tmp_path / "set.zarr", gather([path], making)
-    forecast = Counting.of(sources).forecast(options, 32)
-    write_dataset(out, sources, options)
-    with open_dataset(out) as opened, open_dataset(whole) as before:
+    out, sources = tmp_path / "set.zarr", gather([path], BOTH)
+    forecast = Counting.of(sources).forecast(FIFTIES, 32)
+    write_dataset(out, sources, FIFTIES)
+    with open_dataset(out) as opened, open_dataset(long_pairs / "whole.zarr") as before:
         card = describe_dataset(opened)
         assert len(opened) == forecast.segments == len(before) - 45  # 750 frames, and all of s3
         np.testing.assert_array_equal(opened["simulated"][:], before["simulated"][: len(opened)])

@@ -35,7 +35,7 @@ from sd2core.scattering.visibility import (
 
 SINGLE, DOUBLE = 2.0**-24, 2.0**-53
 
-Look = Callable[[NDArray[np.float32], NDArray[np.int32], NDArray[np.float64]], NDArray[np.bool_]]
+Look = Callable[..., NDArray[np.bool_]]
 
 
 def exact(
@@ -53,19 +53,25 @@ def exact_plainly(
 
 
 def depth(
-    points: NDArray[np.float32], faces: NDArray[np.int32], sensor: NDArray[np.float64]
+    points: NDArray[np.float32],
+    faces: NDArray[np.int32],
+    sensor: NDArray[np.float64],
+    resolution: int = 64,
 ) -> NDArray[np.bool_]:
     visible = np.full((1, points.shape[2]), 7, np.uint8)
     needed, closed = np.ones_like(visible), encloses(faces)
-    depth_visibility_kernel(points, faces, closed, sensor, 256, needed, 0, 1, visible)
+    depth_visibility_kernel(points, faces, closed, sensor, resolution, needed, 0, 1, visible)
     return visible[0] == 1
 
 
 def depth_plainly(
-    points: NDArray[np.float32], faces: NDArray[np.int32], sensor: NDArray[np.float64]
+    points: NDArray[np.float32],
+    faces: NDArray[np.int32],
+    sensor: NDArray[np.float64],
+    resolution: int = 64,
 ) -> NDArray[np.bool_]:
     needed = np.ones(points.shape[2], bool)
-    return depth_visibility(points[0], faces, encloses(faces), sensor, 256, needed)
+    return depth_visibility(points[0], faces, encloses(faces), sensor, resolution, needed)
 
 
 def facing(
@@ -201,7 +207,8 @@ def test_a_ball_shows_the_cap_within_its_horizon(
     vertices, faces = sphere(1.0, 3, 0.4)
     points = columns(vertices * size_m)
     sensor = (size_m + distance_m) * DIRECTION
-    seen = LOOKS[form](points, faces, sensor)
+    finely = {"resolution": 256} if form.startswith("depth") else {}
+    seen = LOOKS[form](points, faces, sensor, **finely)
     exactly = LOOKS["exact"](points, faces, sensor)
     cosine = vertices @ DIRECTION
     horizon = size_m / (size_m + distance_m)
