@@ -132,6 +132,7 @@ def test_limbs_err_along_the_line_of_sight_and_across() -> None:
     np.testing.assert_allclose(across[:2], [0.0, 0.2 / np.sqrt(2.0)], atol=1e-3)
 
 
+@pytest.mark.slow
 def test_frames_and_bins_of_ones_own(tmp_path: Path) -> None:
     asked = replace(SHORT, radar=radar_at(60.0, 64), synthesis=chosen_options(Synthesis(bins=64)))
     assert asked.radar.chirps_per_frame == 42  # as many as fit

@@ -267,6 +267,7 @@ def test_a_plan_that_cannot_be_names_the_line(tmp_path: Path, text: str, said: s
         read_study(tmp_path / "s.toml")
 
 
+@pytest.mark.slow
 def test_a_data_set_gives_what_the_radar_saw_with_its_synthetic_maps(
     store: Path, tmp_path: Path
 ) -> None:

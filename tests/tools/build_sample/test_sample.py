@@ -73,6 +73,7 @@ def test_progress_rises_to_its_total(short: Path, steps: list[tuple[int, int]]) 
     assert steps[-1] == (12, 12)
 
 
+@pytest.mark.slow
 def test_the_suffix_is_appended(short: Path) -> None:
     assert short.name == "short.sd2"
 
@@ -125,6 +126,7 @@ def test_the_command_does_not_replace_a_sample(tmp_path: Path) -> None:
     assert [path.name for path in (tmp_path / "a.sd2").iterdir()] == ["precious"]
 
 
+@pytest.mark.slow
 def test_gestures_that_do_not_fit_are_left_out(short: Path) -> None:
     assert open_recording(short).spans == ()
 

@@ -42,6 +42,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out / "still-hand-up"
 
 
+@pytest.mark.slow
 def test_a_clip_is_complete_and_on_one_clock(made: Path) -> None:
     truth = read_truth(made)
     mesh = truth.mesh()

@@ -15,6 +15,7 @@ from tools.train_lifter.pairs import Pairs, make_pairs
 from tools.train_lifter.takes import Take
 
 
+@pytest.mark.slow
 def test_a_take_gives_two_pairs_once(takes: list[Take], tmp_path: Path) -> None:
     folder, out = tmp_path / "people", tmp_path / "fits.zarr"
     folder.mkdir()

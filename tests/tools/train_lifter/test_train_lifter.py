@@ -134,6 +134,7 @@ def test_emulated_people_look_like_the_takes(takes: list[Take]) -> None:
     assert np.isfinite(batch([drawn]).told).all()
 
 
+@pytest.mark.slow
 def test_training_learns_and_repeats(takes: list[Take], tmp_path: Path) -> None:
     pytest.importorskip("torch")
     from tools.train_lifter.training import Recipe, TrainingArrays, save_lifter, train
