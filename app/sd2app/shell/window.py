@@ -108,7 +108,8 @@ class MainWindow(QMainWindow):
         self._main = splitter(across, parts, (320, 640, 200))
         for place, share in enumerate((0, 1, 0)):
             self._main.setStretchFactor(place, share)
-        self._panes = pane((self._main, 1), spacing_px=2)
+        self._below = column_of(margins_px=0)
+        self._panes = pane((self._main, 1), self._below, spacing_px=2)
         self._column = column_of((self._panes, 1), spacing_px=4, margins_px=0)
         beside = QWidget(self)
         beside.setLayout(self._column)
@@ -222,7 +223,7 @@ class MainWindow(QMainWindow):
             self.session.layouts,
         )  # fmt: skip
         self._suggestions = views["suggestions"]  # as wide as all panes, which is one row
-        self._panes.layout().addWidget(self._suggestions)
+        self._below.addWidget(self._suggestions)
         stack, self.maps = track_stack(self.session, self.features, views)
         fill(self._panels["tracks"], stack)
         self._scene_comes = sentence("Loading the 3D view…")
