@@ -10,6 +10,7 @@ from PySide6.QtGui import QAction, QFocusEvent, QKeyEvent, QValidator, QWheelEve
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
+    QDialog,
     QDoubleSpinBox,
     QLabel,
     QLineEdit,
@@ -277,7 +278,7 @@ def claims(event: QEvent, keys: Collection[Qt.Key] | None = None) -> bool:
 
 
 class SearchLine(QLineEdit):
-    """Search field; Escape empties it, then gives the keyboard back to the window."""
+    """Search field; Escape empties it, then closes its dialog or gives the keyboard back."""
 
     def __init__(self, hint: str, parent: QWidget) -> None:
         super().__init__(parent)
@@ -296,6 +297,8 @@ class SearchLine(QLineEdit):
             super().keyPressEvent(event)
         elif self.text():
             self.clear()
+        elif isinstance(self.window(), QDialog):
+            event.ignore()
         else:
             self.clearFocus()
 

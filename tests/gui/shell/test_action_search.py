@@ -65,6 +65,17 @@ def test_beginnings_go_before_what_is_within_and_that_before_tips(window_with_me
     assert found(entries, "open zebra") == []
 
 
+def test_escape_empties_the_line_then_closes_the_dialog(window_with_menus, qtbot):
+    search = ActionSearch(window_with_menus)
+    qtbot.addWidget(search)
+    search.open()
+    qtbot.keyClicks(line_of(search), "open")
+    qtbot.keyClick(line_of(search), Qt.Key.Key_Escape)
+    assert (search.isVisible(), line_of(search).text()) == (True, "")
+    qtbot.keyClick(line_of(search), Qt.Key.Key_Escape)
+    assert not search.isVisible()
+
+
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.lists(
