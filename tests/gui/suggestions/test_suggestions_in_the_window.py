@@ -15,7 +15,7 @@ from finding import button_of
 from kept_window import opened
 from PySide6.QtCore import QPoint, QRect, QRectF, Qt
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QComboBox, QInputDialog, QToolButton, QWidget
+from PySide6.QtWidgets import QApplication, QComboBox, QInputDialog, QToolButton, QWidget
 from window_models import models_of
 
 from sd2app.background.quoting import quoted
@@ -130,6 +130,18 @@ def test_the_bar_does_the_same(moving, qtbot) -> None:
     assert bar.findChildren(QToolButton)[-1].accessibleName() == "Close the suggestions"
     qtbot.mouseClick(buttons["✕"], Qt.MouseButton.LeftButton)
     assert not bar.isVisible()
+
+
+def test_closed_with_space_it_leaves_the_keyboard_to_the_window(moving, qtbot) -> None:
+    asked(moving, qtbot)
+    bar, playback = moving.findChild(SuggestionBar), models_of(moving).playback
+    while QApplication.focusWidget() is not bar.findChildren(QToolButton)[-1]:
+        key(QApplication.focusWidget() or moving, qtbot, "Tab")
+    key(QApplication.focusWidget(), qtbot, "Space")
+    assert not bar.isVisible()
+    key(QApplication.focusWidget() or moving, qtbot, "Space")
+    assert playback.playing
+    playback.pause()
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (1600, 1000), (2560, 1440)])
