@@ -27,7 +27,7 @@ def plan(tmp_path: Path) -> Path:
     path = tmp_path / "study.toml"
     path.write_text(
         'title = "Small"\nout = "made"\ndata = ["pairs.zarr"]\nshares = [0.2, 1.0]\nseeds = 1\n'
-        'added = ["synthetic", "radar"]\n[[classifiers]]\nwindow_s = 1.0\n'
+        'added = ["synthetic", "radar"]\n[[classifiers]]\nwindow_s = 0.4\n'
     )
     return path
 
