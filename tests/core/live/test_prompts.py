@@ -213,19 +213,21 @@ def test_what_cannot_be_is_refused_before_anything_is_made(tmp_path: Path, capsy
     assert not (tmp_path / "some").exists()
 
 
-def test_a_session_that_goes_on_elsewhere_is_not_joined(tmp_path: Path) -> None:
+def test_a_session_that_goes_on_elsewhere_is_not_joined(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     protocol, folder = tmp_path / "try.toml", tmp_path / "session"
     protocol.write_text(PROTOCOL, encoding="utf-8")
     folder.mkdir()
     held = FileLock(folder / ".session.lock")
     assert held.take()
     words = ["record", "--camera", "test", "--radar", "test", "--out", str(folder)]
-    command = [*SD2, *words, "--protocol", str(protocol)]
-    refused = subprocess.run(command, capture_output=True, text=True, check=False, input="q")
-    assert refused.returncode == 1
-    assert f"A session goes on in {folder} already" in refused.stderr
+    words += ["--protocol", str(protocol)]
+    assert run(build_parser(typed=words)[0], words) == 1
+    assert f"A session goes on in {folder} already" in " ".join(capsys.readouterr().err.split())
     held.release()
-    assert subprocess.run(command, capture_output=True, check=False, input=b"q").returncode == 0
+    begun = subprocess.run([*SD2, *words], capture_output=True, check=False, input=b"q")
+    assert begun.returncode == 0
     assert [*folder.iterdir()] == []
 
 
