@@ -208,7 +208,7 @@ def test_rows_and_what_points_at_them_follow_any_edits(table, column: str) -> No
     model.sort(AT[column], FALLING)
     rng = random.Random(7)
     table.labels.open(imported(timebase, 7, 20))
-    for _ in range(80):
+    for _ in range(50):
         held = [(span.id, QPersistentModelIndex(model.index(row, 2)))
                 for row, span in enumerate(model.spans)]  # fmt: skip
         edit = random_edit(table.labels.labels, timebase, rng)
