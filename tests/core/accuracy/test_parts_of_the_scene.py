@@ -87,6 +87,7 @@ def test_a_plan_leaves_out_what_it_says() -> None:
             np.testing.assert_array_equal(found, expected)
 
 
+@pytest.mark.slow
 def test_the_table_of_plans_has_each_part_left_out() -> None:
     plain = ball(swinging((0, 0, 2), 1.0, 0.7), fineness=2, frames=20)
     scene = with_walls(with_things(plain, [BOX]), [Wall.named("right", 1.0)])

@@ -191,6 +191,7 @@ def test_where_all_is_too_short_to_be_smoothed_nothing_is_promised() -> None:
         refined(cloud(paths[:1]))
 
 
+@pytest.mark.slow
 def test_a_long_clip_is_smoothed_in_parts_without_seams(monkeypatch: pytest.MonkeyPatch) -> None:
     paths = wobbling(900, 4)
     whole = refined(cloud(paths)).read(0, 900)
