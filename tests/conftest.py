@@ -25,7 +25,7 @@ with plain_imports():
     import PySide6.QtCore  # noqa: F401
 
 # A busy machine is no failure: no test asserts a time. `make test-slow` draws all examples.
-settings.register_profile("quick", deadline=None, max_examples=20)
+settings.register_profile("quick", deadline=None, max_examples=30)
 settings.register_profile("thorough", deadline=None, max_examples=200)
 settings.load_profile(os.environ.get("SD2_EXAMPLES", "quick"))
 
