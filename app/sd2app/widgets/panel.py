@@ -319,8 +319,10 @@ class LatePage(QFrame):
         """Make the page."""
         if self._make is not None:
             page, self._make = self._make(), None
-            self.setLayout(column_of(page, spacing_px=0, margins_px=0))
+            layout = column_of(page, spacing_px=0, margins_px=0)
+            self.setLayout(layout)
             page.show()
+            layout.activate()  # which showing this has done before
         super().showEvent(event)
 
 

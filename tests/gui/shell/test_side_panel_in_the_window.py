@@ -8,7 +8,15 @@ from kept_window import close_window, opened
 from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtGui import QFontMetrics
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel, QSplitter, QSplitterHandle, QWidget
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QLabel,
+    QScrollArea,
+    QSplitter,
+    QSplitterHandle,
+    QWidget,
+)
 
 from sd2app.maps.arrangement import HEADER_PX
 from sd2app.settings import Settings
@@ -16,6 +24,7 @@ from sd2app.shell.parts import Parts
 from sd2app.shell.side_panel import _WORD_PX
 from sd2app.shell.status_bar import StatusLine
 from sd2app.shell.window import MainWindow
+from sd2app.widgets.panel import InnerPages
 
 LEFT = Qt.MouseButton.LeftButton
 NAMES = ("Sensor", "Accuracy", "Train", "Labels", "Agreement")
@@ -53,6 +62,32 @@ def sized(window):
     yield make
     window.side.set_mark("Train", "")
     make(1280, 800)
+
+
+@pytest.mark.parametrize("width_px", [1000, 1280])
+def test_nothing_of_a_page_is_cut_at_the_right(sized, qtbot, width_px) -> None:
+    """Also of pages that are made when they are first shown."""
+    window = sized(width_px)
+    for name in NAMES:
+        window.bring_up(name)
+        shown = [one for one in window.side.findChildren(InnerPages) if one.isVisible()]
+        for page in shown[0].names if shown else [""]:
+            if page:
+                (button,) = (
+                    one
+                    for one in shown[0].findChildren(QAbstractButton)
+                    if one.accessibleName() == page
+                )
+                qtbot.mouseClick(button, LEFT)
+            QApplication.processEvents()
+            scroll = next(one for one in window.side.findChildren(QScrollArea) if one.isVisible())
+            right_px = place_of(scroll.viewport()).right()
+            cut = [
+                one
+                for one in scroll.widget().findChildren(QWidget)
+                if one.isVisible() and place_of(one).right() > right_px
+            ]
+            assert not cut, (name, page)
 
 
 @pytest.fixture
