@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.stores import StoredArray
+from sd2core.mesh.presence import runs
 from sd2core.mesh.vertex_parts import QUANTITIES
 from sd2core.pairs.summary import INDEX_NAME, REMAKE, TakeEntry
 
@@ -111,7 +112,7 @@ def lost_frames(arrays: Mapping[str, StoredArray], frames: int) -> NDArray[np.bo
 def read_around(array: StoredArray, rows: slice, lost: NDArray[np.bool_]) -> NDArray[Any]:
     """Some rows of an array, with zeros in frames that are lost."""
     values = np.zeros((rows.stop - rows.start, *array.shape[1:]), array.dtype)
-    for start, stop in _runs(~lost[rows]):
+    for start, stop in runs(~lost[rows]):
         values[start:stop] = array[rows.start + start : rows.start + stop]
     return values
 
@@ -120,11 +121,5 @@ def kept_parts(take: TakeEntry, lost: NDArray[np.bool_]) -> list[TakeEntry]:
     """Uninterrupted parts of a take between frames that are lost, under its name."""
     return [
         take.model_copy(update={"start": take.start + start, "stop": take.start + stop})
-        for start, stop in _runs(~lost[take.rows])
+        for start, stop in runs(~lost[take.rows])
     ]
-
-
-def _runs(there: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First frame, and the one after the last, of runs that are there."""
-    edges = np.flatnonzero(np.diff(there.astype(np.int8), prepend=0, append=0)).tolist()
-    return list(zip(edges[::2], edges[1::2], strict=True))
