@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.output import progress_bar
+from sd2core.cli.output import print_rows, progress_bar
 from sd2core.errors import Sd2Error
+from sd2core.files.limits import size_bytes
+from sd2core.files.paths import remove, user_cache, user_data
 from sd2core.options.records import OptionError, OptionRecord, Place
 from sd2core.options.shared import Json
 
@@ -83,8 +86,6 @@ def do_job(options: Doctor) -> bool:
     elif options.fetch_models:
         _fetch(options.source, if_missing=options.if_missing)
     elif options.clean:
-        from sd2core.cli.caches import remove_caches
-
         remove_caches(ask=not options.yes)
     else:
         return False
@@ -151,3 +152,42 @@ def _fetch(source: Path | None, *, if_missing: bool) -> None:
     with progress_bar("Fetching the landmark models", unit="B") as progress:
         folder = fetch_models(progress, source=source)
     print(f"Fetched the landmark models into {folder}")
+
+
+def caches() -> list[Path]:
+    """Everything in the user's cache folder, and machine code elsewhere."""
+    from sd2core.numerics.compiled import kernel_folders
+
+    folder = user_cache("")
+    # Someone may have given caches and data, such as edits to recover, one place.
+    its_own = folder.is_dir() and not user_data("").is_relative_to(folder)
+    return sorted({*(folder.iterdir() if its_own else ()), *kernel_folders()})
+
+
+def remove_caches(*, ask: bool) -> None:
+    """List the caches and remove them.
+
+    Raises Sd2Error where there is nobody to ask, or one of them stays.
+    """
+    from sd2core.cli.batch import bytes_words
+
+    found = caches()
+    if not found:
+        print("There are no caches")
+        return
+    print_rows([("size", "cache"), *((bytes_words(size_bytes(one)), str(one)) for one in found)])
+    if ask and not sys.stdin.isatty():
+        raise Sd2Error("Nothing was removed: there is no terminal to ask on", remedy="Add --yes")
+    if ask and input("Remove them? They are made again when needed. [y/N] ").lower() != "y":
+        print("Nothing was removed")
+        return
+    for path in found:
+        remove(path)
+    if left := [str(path) for path in found if path.exists()]:
+        raise Sd2Error(
+            f"{', '.join(left)} could not be removed",
+            remedy="Close the program, and do it with the rights of who installed it",
+        )
+    with suppress(OSError):
+        user_cache("").rmdir()
+    print("Removed")

@@ -97,7 +97,7 @@ def test_edits_to_recover_stay_where_caches_and_data_have_one_place(
 def test_what_cannot_be_removed_is_named(
     sd2: Sd2, places: list[Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sd2core.cli.caches.remove", lambda path: None)
+    monkeypatch.setattr("sd2core.cli.preparing.remove", lambda path: None)
     outcome = sd2("doctor", "--clean", "--yes")
     assert outcome.code == 1
     assert f"{places[-1]} could not be removed" in outcome.err
