@@ -115,19 +115,20 @@ def _placements(options: Placing) -> int:
     if options.out is not None:
         write_placements(options.out, placements)
     radar = _radar(recording)
+    listed = _listed(placements, sensors, coverage, radar)
     if options.json:
         print_json(
             {
                 "placements": placements.as_dict(),
                 "target_m": body.target_m,
                 "radar": picked(radar, "name", "range_max_m", "v_max_mps"),
-                "places": _listed(placements, sensors, coverage, radar),
+                "places": listed,
                 "cost": picked(cost, "maps", "frames", "frame_ms", "total_s", "total_bytes"),
                 "choice": choice.to_json(),
             }
         )
     else:
-        _print(options.mesh, placements, sensors, coverage, radar, cost, choice)
+        _print(options.mesh, listed, radar, cost, choice)
     return 0
 
 
@@ -207,21 +208,18 @@ def _listed(
 
 def _print(
     path: Path,
-    placements: Placements,
-    sensors: tuple[VirtualSensor, ...],
-    coverage: SensorCoverage,
+    listed: list[dict[str, Any]],
     radar: RadarConfig,
     cost: PlacementCost,
     choice: Choice,
 ) -> None:
     from sd2core.radar_config import range_in_words
 
-    listed = _listed(placements, sensors, coverage, radar)
     numbers = {name: sum(one[name] for one in listed) for name, _ in _LIMITS}
     beyond = [f"{numbers[name]} {words}" for name, words in _LIMITS if numbers[name]]
     limits = f"{range_in_words(radar.range_max_m)}, ±{radar.v_max_mps:.2f} m/s"
     print_facts(
-        f"{counted(len(sensors), 'placement')} around the body of {path}",
+        f"{counted(len(listed), 'placement')} around the body of {path}",
         {
             "radar": f"{radar.name}: {limits}",
             "beyond it": ", ".join(beyond) or "none",
@@ -234,14 +232,7 @@ def _print(
     rows: list[tuple[str, ...]] = [heading]
     for one in listed:
         lengths = (*one["position_m"], one["farthest_m"], one["fastest_mps"])
+        angles = (f"{one[name]:.1f}" for name in ("azimuth_deg", "elevation_deg"))
         why = ", ".join(words for name, words in _LIMITS if one[name])
-        rows.append(
-            (
-                f"{one['range_m']:.2f}",
-                f"{one['azimuth_deg']:.1f}",
-                f"{one['elevation_deg']:.1f}",
-                *(f"{length:.2f}" for length in lengths),
-                why,
-            )
-        )
+        rows.append((f"{one['range_m']:.2f}", *angles, *(f"{m:.2f}" for m in lengths), why))
     print_rows(rows, right=range(8))
