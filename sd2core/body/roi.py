@@ -69,23 +69,18 @@ class Roi:
 
     def cut(self, picture: Pixels, crop_px: int = CROP_PX) -> Pixels:
         """Crop (crop_px, crop_px, 3) of the square; black outside the picture."""
-        return _sampled(picture, self.matrix(crop_px), crop_px)
+        import cv2
 
-
-def _sampled(picture: Pixels, matrix: Floats, crop_px: int) -> Pixels:
-    """Crop whose pixel coordinates ``matrix`` takes to the picture's."""
-    import cv2
-
-    # OpenCV counts from the centre of the first pixel, we from its corner.
-    centred = matrix.copy()
-    centred[:, 2] += matrix[:, :2] @ [0.5, 0.5] - 0.5
-    return cv2.warpAffine(
-        picture,
-        centred,
-        (crop_px, crop_px),
-        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-        borderMode=cv2.BORDER_CONSTANT,
-    )
+        # OpenCV counts from the centre of the first pixel, we from its corner.
+        centred = self.matrix(crop_px)
+        centred[:, 2] += centred[:, :2] @ [0.5, 0.5] - 0.5
+        return cv2.warpAffine(
+            picture,
+            centred,
+            (crop_px, crop_px),
+            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+            borderMode=cv2.BORDER_CONSTANT,
+        )
 
 
 PLACES = ("left of the person", "right of the person", "without the person", "like the person")
