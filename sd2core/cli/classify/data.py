@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -16,7 +16,8 @@ from sd2core.options.records import ARGUMENTS, OptionRecord
 if TYPE_CHECKING:
     from sd2core.classify.data import ClipSet
     from sd2core.denoise.live import TrainedDenoiser
-    from sd2core.maps import MapKind
+    from sd2core.labels.spans import Labels
+    from sd2core.maps import DopplerMap, MapKind
     from sd2core.pairs.store import PairSet
     from sd2core.recording.recording import Recording
 
@@ -163,53 +164,41 @@ def _single(
 
     recording, labels = open_recording(one.path), labels_at(one.path)
     labels_given(labels, one.path)
+    names = tuple(maps or usual_maps(recording))
+    maps_and_labels: Iterable[tuple[str, DopplerMap, Labels]]
     if labels.persons:
-        return _of_persons(recording, one, maps, frame_rate_hz)
-    # Beside maps of a mesh the radar's is on their axis, so that they can be mixed.
-    axis = None if recording.mesh is None else PRESETS["paper"].axis
+        maps_and_labels = _of_persons(recording, one, names)
+    else:
+        # Beside maps of a mesh the radar's is on their axis, so that they can be mixed.
+        axis = None if recording.mesh is None else PRESETS["paper"].axis
+        subject = one.subject or recording.person
+        made = maps_of(recording, names, axis=axis)
+        maps_and_labels = [(subject, doppler, labels) for doppler in made.values()]
     found: list[ClipSet] = []
-    for doppler in maps_of(recording, tuple(maps or usual_maps(recording)), axis=axis).values():
+    for subject, doppler, own in maps_and_labels:
+        rate_hz = found[0].frame_rate_hz if found else frame_rate_hz
         found.append(
             clips_of_map(
-                doppler,
-                labels,
-                subject=one.subject or recording.person,
-                movement=one.path.stem,
-                frame_rate_hz=found[0].frame_rate_hz if found else frame_rate_hz,
+                doppler, own, subject=subject, movement=one.path.stem, frame_rate_hz=rate_hz
             )
         )
     return found
 
 
 def _of_persons(
-    recording: Recording,
-    one: LabelledSource,
-    maps: Sequence[MapName] | None,
-    frame_rate_hz: float | None,
-) -> list[ClipSet]:
-    """Return the clips of each person whom a recording's labels name."""
-    from sd2core.classify.data import clips_of_map
+    recording: Recording, one: LabelledSource, wanted: Sequence[MapName]
+) -> Iterator[tuple[str, DopplerMap, Labels]]:
+    """Yield subject, maps and labels of each person whom a recording's labels name."""
     from sd2core.datasets.recording_sources import Making, recording_sources
     from sd2core.options.exporting import KINDS
 
-    wanted = {*(maps or usual_maps(recording))}
     kinds = tuple(
         kind for kind in KINDS if kind in wanted or (kind in _RADARS and "radar" in wanted)
     )
     labels, making = recording.effective_labels(), Making(kinds)
-    found: list[ClipSet] = []
     sources = recording_sources([one.path], [one.subject or recording.person], making)
     for person, lazy in zip(labels.persons, sources, strict=True):
         with progress_bar("Synthesising") as progress:
             source = lazy.load(progress)
         for doppler in source.maps.values():
-            found.append(
-                clips_of_map(
-                    doppler,
-                    labels.of_person(person),
-                    subject=source.subject,
-                    movement=one.path.stem,
-                    frame_rate_hz=found[0].frame_rate_hz if found else frame_rate_hz,
-                )
-            )
-    return found
+            yield source.subject, doppler, labels.of_person(person)
