@@ -170,7 +170,7 @@ def make_mars_pairs(
         provenance=_provenance(parts, choices),
         parts=PARTS if choices.limbs else (),
     )
-    total = sum(_frames(part) for part in parts)
+    total = sum(stretch.frame_count for part in parts for stretch in part.stretches)
     done = 0
     made = MadePairs({}, {}, {}, {})
     for person in dict.fromkeys(part.subject for part in parts):
@@ -265,10 +265,6 @@ def takes_of(part: MarsPart) -> list[tuple[TakeKey, MarsStretch]]:
         (TakeKey(part.subject, f"{part.name}-stretch-{number:02d}", 0), stretch)
         for number, stretch in enumerate(part.stretches, start=1)
     ]
-
-
-def _frames(part: MarsPart) -> int:
-    return sum(stretch.frame_count for stretch in part.stretches)
 
 
 def _refuse_twice(parts: Sequence[MarsPart]) -> None:
