@@ -322,7 +322,7 @@ class LatePage(QFrame):
             layout = column_of(page, spacing_px=0, margins_px=0)
             self.setLayout(layout)
             page.show()
-            layout.activate()  # which showing this has done before
+            layout.activate()  # Qt does so just before it comes here
         super().showEvent(event)
 
 

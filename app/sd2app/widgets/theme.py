@@ -61,6 +61,7 @@ def leave_unstyled(application: QApplication) -> None:
 
 
 def _set_palette(application: QApplication, colours: Palette) -> None:
+    """Draw in Fusion with these colours, unless the application does."""
     palette = QPalette()
     for role, name in _ROLES.items():
         palette.setColor(role, QColor(getattr(colours, name)))
