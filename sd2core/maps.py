@@ -408,7 +408,7 @@ class DopplerMap:
         return self.timebase.times_s
 
     @property
-    def there(self) -> NDArray[np.bool_]:
+    def present_mask(self) -> NDArray[np.bool_]:
         """Frames with a person, shape (frames,)."""
         return np.ones(len(self.timebase), bool) if self.present is None else self.present
 
@@ -632,7 +632,7 @@ def joined(maps: Sequence[DopplerMap]) -> DopplerMap:
     """Concatenate maps of one axis in time; metadata are those of the first."""
     if len(maps) == 1:
         return maps[0]
-    present = [Presence.of(one.present, len(one.timebase)).there for one in maps]
+    present = [Presence.of(one.present, len(one.timebase)).present for one in maps]
     limbs = [one.limbs for one in maps if one.limbs is not None]
     alike = len(limbs) == len(maps) and len({one.parts for one in limbs}) == 1
     return replace(

@@ -91,7 +91,7 @@ def scatterers_at(scene: MeshScene, time_s: float) -> Scatterers:
 
     None where there is no person.
     """
-    if not scene.there(time_s):
+    if not scene.is_present(time_s):
         nothing = np.zeros((0, 3))
         return Scatterers(nothing, nothing, np.zeros(0, np.complex128))
     assert scene.mesh.faces is not None

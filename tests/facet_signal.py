@@ -71,7 +71,7 @@ def simulate_capture(
         partial(scatterers_at, scene),
         times_s,
         config,
-        there=np.array([scene.there(time_s) for time_s in times_s.tolist()]),
+        there=np.array([scene.is_present(time_s) for time_s in times_s.tolist()]),
         sensor=sensor,
         options=options,
         source=mesh.source,

@@ -26,7 +26,7 @@ def facet_visibility(
     visible = np.zeros((mesh.frame_count, len(faces)), dtype=np.bool_)
 
     def fill(frame: int) -> None:
-        if mesh.presence.there[frame]:
+        if mesh.presence.present[frame]:
             visible[frame] = visible_facets(mesh.frame(frame), faces, sensor.position_m)
 
     for done, _ in enumerate(workers().map(fill, range(mesh.frame_count))):

@@ -74,7 +74,7 @@ class Sample:
             mesh,
             vertices=np.concatenate(stretches),
             timebase=Timebase(mesh.times_s[self.frames]),
-            present=mesh.presence.there[self.frames],
+            present=mesh.presence.present[self.frames],
             uncertainty=None
             if mesh.uncertainty is None
             else mesh.uncertainty.of_frames(self.frames),
@@ -100,7 +100,7 @@ def take_sample(mesh: MeshSequence, options: SynthesisOptions, runs: int = 6) ->
     if frames < 2 * length:
         return _whole(frames)
     starts = np.unique(np.linspace(0, frames - length, _CANDIDATES).astype(int) // every * every)
-    there = mesh.presence.there
+    there = mesh.presence.present
     with_person = [bool(there[start : start + length].all()) for start in starts.tolist()]
     peopled = _apart(starts[with_person], length)
     starts = peopled if len(peopled) >= _MIN_STARTS else _apart(starts, length)
@@ -145,7 +145,7 @@ def _apart(starts: NDArray[np.intp], length: int) -> NDArray[np.intp]:
 
 def _speed(mesh: MeshSequence, frame: int) -> float:
     """Mean squared speed of some vertices, in (m/s)²; 0 without a person."""
-    if not mesh.presence.there[frame : frame + 2].all():
+    if not mesh.presence.present[frame : frame + 2].all():
         return 0.0
     two = mesh.read(frame, frame + 2).astype(np.float64)
     refuse_missing(two, frame, mesh.source)

@@ -58,7 +58,7 @@ def _denoise_long(
 
     files, rate_hz = _Files(maps, trained.card.parts), trained.card.frame_rate_hz
     check_map(files.part(0), trained.card)
-    runs = clips(files.times_s, files.there, rate_hz)
+    runs = clips(files.times_s, files.present_mask, rate_hz)
     regular = all(is_regular(files.times_s[start:stop], rate_hz) for start, stop in runs)
     writer = _Writer(trained, files, outs, resampled=not regular, texture=texture)
     denoise_long(trained, runs, files.times_s, files.read, writer.take)
@@ -75,9 +75,9 @@ class _Files:
         for number in range(len(maps)):
             part = self.part(number)
             times_s.append(part.times_s)
-            there.append(Presence.of(part.present, len(part.timebase)).there)
+            there.append(Presence.of(part.present, len(part.timebase)).present)
         self.times_s = np.concatenate(times_s)
-        self.there = np.concatenate(there)
+        self.present_mask = np.concatenate(there)
         self.edges = np.cumsum([0, *map(len, times_s)])
 
     def part(self, number: int) -> DopplerMap:

@@ -324,7 +324,7 @@ def mesh_input_of(
     mesh = open_mesh(path, faces, reading or {})
     x, y, z = (round(value, 6) for value in BodyExtent.of(mesh).target_m)
     # Who comes in too late is nowhere.
-    there = (body if body.presence.there.any() else mesh for body in mesh.others)
+    there = (body if body.presence.present.any() else mesh for body in mesh.others)
     others_m = tuple(BodyExtent.of(body).target_m for body in there)
     rate = mesh.timebase.frames_per_s
     shape = mesh.frame_count, mesh.vertex_count

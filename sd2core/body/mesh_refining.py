@@ -92,7 +92,7 @@ def refined(mesh: MeshSequence, progress: Progress = silent) -> MeshSequence:
             "One of `sd2 fit` or `sd2 refine` is smooth already",
         )
     presence = mesh.presence
-    lasts = np.where(presence.there, presence.last - presence.first + 1, 0)  # frames in a row
+    lasts = np.where(presence.present, presence.last - presence.first + 1, 0)  # frames in a row
     if lasts.max() < _MIN_FRAMES:
         raise Sd2Error(
             f"In {mesh.source or 'the mesh'} the longest time that somebody is there, in frames, is"
@@ -113,14 +113,14 @@ def refined(mesh: MeshSequence, progress: Progress = silent) -> MeshSequence:
         taken_m += float(np.square(removed).sum())
     progress(mesh.frame_count, mesh.frame_count)
     # Shorter stretches stay as they were: their velocities are no better known than any other.
-    short = presence.there & (lasts < _MIN_FRAMES)
+    short = presence.present & (lasts < _MIN_FRAMES)
     for known in (along, across):
         known[short] = known[lasts >= _MIN_FRAMES].max(axis=0)
-    frames = max(int(presence.there.sum()), 1)
+    frames = max(int(presence.present.sum()), 1)
     taken_m = (taken_m / (frames * len(sampled.columns))) ** 0.5
     note = (
         f"Made smooth in time: {1000 * taken_m:.1f} mm (RMS) of every vertex were taken for jitter."
-        f" Velocities are known to ±{np.median(along[presence.there]):.2f} m/s (median)."
+        f" Velocities are known to ±{np.median(along[presence.present]):.2f} m/s (median)."
     )
     uncertainty = VelocityUncertainty(limbs, which, along, across)
     return replace(mesh, vertices=vertices, uncertainty=uncertainty, notes=(*mesh.notes, note))
@@ -174,7 +174,7 @@ class RefinedVertices(MadeVertices):
         spread = np.zeros_like(smooth)
         calm, calm_spread = middle.copy(), np.zeros_like(middle)
         presence = self._mesh.presence.between(first, last)
-        for begin in np.unique(presence.first[presence.there]):
+        for begin in np.unique(presence.first[presence.present]):
             stretch = slice(int(begin), int(presence.last[begin]) + 1)
             times_s = self._mesh.times_s[first:last][stretch]
             calm[stretch], calm_spread[stretch] = smooth_paths(times_s, middle[stretch])

@@ -94,7 +94,7 @@ def _find_parts(mesh: MeshSequence) -> VertexParts | None:
         return VertexParts(PARTS, _own_parts(resolution))
     if mesh.faces is None:
         return None
-    first = int(np.argmax(mesh.presence.there))
+    first = int(np.argmax(mesh.presence.present))
     found = parts_by_shape(mesh.frame(first).astype(np.float64), mesh.faces)
     return None if found is None else VertexParts(PARTS, found)
 

@@ -49,7 +49,7 @@ def _refine(options: Refine) -> None:
     with progress_bar("Writing the mesh") as progress:
         save_mesh(smooth, options.out, progress)
     assert smooth.uncertainty is not None
-    there = smooth.presence.there
+    there = smooth.presence.present
     known = {
         "along_mps": float(np.median(smooth.uncertainty.along_mps[there])),
         "across_mps": float(np.median(smooth.uncertainty.across_mps[there])),

@@ -85,7 +85,7 @@ def jitter(positions_m: NDArray[Any], times_s: Floats, presence: Presence | None
     """
     third = np.diff(positions_m, 3, axis=0) / np.median(np.diff(times_s)) ** 3
     if presence is not None:
-        third = third[(presence.first[3:] == presence.first[:-3]) & presence.there[3:]]
+        third = third[(presence.first[3:] == presence.first[:-3]) & presence.present[3:]]
     if not len(third):
         return np.zeros(positions_m.shape[1])
     return np.asarray(np.sqrt((third**2).sum(axis=-1).mean(axis=0)))

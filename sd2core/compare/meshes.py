@@ -149,11 +149,11 @@ def compare_meshes(
         one.positions(np.asarray(mesh.vertices)) for one, mesh in zip(patches, placed, strict=True)
     )
     presence = Presence.of(
-        np.logical_and.reduce([mesh.presence.there for mesh in placed]), len(times_s)
+        np.logical_and.reduce([mesh.presence.present for mesh in placed]), len(times_s)
     )
     measured = presence.measured
     if not presence.whole:
-        placed = [replace(mesh, present=presence.there) for mesh in placed]
+        placed = [replace(mesh, present=presence.present) for mesh in placed]
         notes.append(
             f"{int((~measured).sum())} of {len(times_s)} frames are left out: not every mesh has a"
             " person there."

@@ -111,7 +111,7 @@ class People:
         return {
             kind: one
             if kind in FROM_A_MESH
-            else replace(one, present=Presence.of(one.present, len(times_s)).there & clear)
+            else replace(one, present=Presence.of(one.present, len(times_s)).present & clear)
             for kind, one in maps.items()
         }
 

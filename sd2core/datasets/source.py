@@ -152,7 +152,7 @@ class Source:
     def known(self) -> dict[MapKind, NDArray[np.bool_]]:
         """Frames that each map covers, (frames,)."""
         frames = len(self.times_s)
-        return {kind: Presence.of(one.present, frames).there for kind, one in self.maps.items()}
+        return {kind: Presence.of(one.present, frames).present for kind, one in self.maps.items()}
 
     @property
     def present(self) -> NDArray[np.bool_]:

@@ -312,7 +312,7 @@ class LiveDenoiser:
             return _summed(
                 live.advance(one, present) for live, one in zip(self._live(each), each, strict=True)
             )
-        there = Presence.of(present, len(energies)).there
+        there = Presence.of(present, len(energies)).present
         answers = np.zeros((len(energies), self._trained.card.axis.bins), np.float32)
         if self._causal is None:
             for frame, values in enumerate(energies):

@@ -128,7 +128,7 @@ def stretches(doppler: DopplerMap, frame_rate_hz: float) -> list[tuple[int, int]
 
     ``frame_rate_hz`` is the rate of the model.
     """
-    there = Presence.of(doppler.present, len(doppler.timebase)).there
+    there = Presence.of(doppler.present, len(doppler.timebase)).present
     return clips(doppler.times_s, there, frame_rate_hz)
 
 

@@ -125,7 +125,7 @@ def _joints_of(mesh: MeshSequence, parts: VertexParts) -> _Joints:
     """Joints of a mesh, found once."""
     joints = _JOINTS_OF.get(mesh)
     if joints is None or joints.numbers is not parts.numbers:
-        first = mesh.frame(int(np.argmax(mesh.presence.there))).astype(np.float64)
+        first = mesh.frame(int(np.argmax(mesh.presence.present))).astype(np.float64)
         rows = joint_vertices(first, mesh.faces, parts)
         places_m = np.zeros((mesh.frame_count, len(rows), 3))
         blocks = -(-mesh.frame_count // _BLOCK_FRAMES)

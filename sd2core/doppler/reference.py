@@ -64,7 +64,7 @@ def _on_path(
     middles = [_middle(body) for body in mesh.bodies]
     things = mesh.surroundings
     for column, moving in enumerate(zip(*walks, strict=True)):
-        there = [bool(body.presence.there[start + column]) for body in mesh.bodies]
+        there = [bool(body.presence.present[start + column]) for body in mesh.bodies]
         for number, (body, (velocities, points)) in enumerate(
             zip(mesh.bodies, moving, strict=True)
         ):

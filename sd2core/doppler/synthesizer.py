@@ -533,7 +533,7 @@ class Synthesizer:
             moves = kinematics(self.mesh, parts, sensor, frames)
             limbs = LimbMaps(parts.names, split, moves)
         inside = slice(start - first, stop - first)
-        nobody = ~self.mesh.presence.there[first:last]
+        nobody = ~self.mesh.presence.present[first:last]
         counts.visible[nobody] = counts.beyond[nobody] = 0
         visible, beyond = counts.visible[inside], counts.beyond[inside]
         return Stretch(
@@ -573,7 +573,7 @@ class Synthesizer:
                 frames.duration_s[local, low : high + 1].sum(),
             )
         visible, quality = self._frames.masks.for_frame(block, local, sensor.position_m, chosen)
-        if not self.mesh.presence.there[index]:
+        if not self.mesh.presence.present[index]:
             visible = np.zeros_like(visible)
         return FrameScattering(
             velocity.astype(np.float32),

@@ -98,7 +98,7 @@ def _cut(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) -> Beat
 
 def _cut_body(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) -> BeatSignal:
     """That of one body alone."""
-    if not scene.scene.there(time_s):
+    if not scene.scene.is_present(time_s):
         return scene.silence()
     seen = scene.scene.seen(time_s)
     rows = []

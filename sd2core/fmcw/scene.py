@@ -82,7 +82,7 @@ class MeshScene:
         """Times of the radar frames that fit into the mesh, from its first frame on."""
         return radar_times_s(self.mesh.timebase, self.config)
 
-    def there(self, time_s: float) -> bool:
+    def is_present(self, time_s: float) -> bool:
         """True if there is a person in the mesh frames on both sides of an instant."""
         presence = self.mesh.presence
         return presence.whole or bool(presence.measured[list(self._around(time_s))].all())
@@ -128,7 +128,7 @@ class MeshScene:
     ) -> NDArray[np.bool_] | None:
         """What of that which the sensor sees its image behind a wall sees, too."""
         around = self.mesh.surroundings
-        others = [other.surface(time_s) for other in self.others if other.there(time_s)]
+        others = [other.surface(time_s) for other in self.others if other.is_present(time_s)]
         if around is None or (direct is None and not others):
             return direct
         seen = np.ones(len(self._faces), np.bool_) if direct is None else direct
@@ -146,7 +146,7 @@ class MeshScene:
         place_m = np.asarray(self.sensor.position_m, np.float64)
         own, found = None, []
         for other in self.others:
-            if other.there(time_s):
+            if other.is_present(time_s):
                 own = _box(self.surface(time_s)) if own is None else own
                 surface = other.surface(time_s)
                 if may_hide(_box(surface), own, place_m):
@@ -161,7 +161,7 @@ class MeshScene:
         """Points (n, 3) that this body or another hides at an instant, (n,)."""
         hidden = np.zeros(len(points_m), np.bool_)
         for body in (self, *self.others):
-            if body.there(time_s):
+            if body.is_present(time_s):
                 hidden |= points_behind(*body.surface(time_s), self.sensor.position_m, points_m)
         return hidden
 

@@ -87,7 +87,7 @@ def simulate_radar(
     # by a 2^9th of a count of 16 bits.
     real = config.sampling == "real"
     signal = store(shape, np.float32 if real else np.complex64, memory_bytes)
-    there = np.array([scene.there(time_s) for time_s in times_s.tolist()])
+    there = np.array([scene.is_present(time_s) for time_s in times_s.tolist()])
     power, peak = _fill(scene, times_s, scene.static(options.reflectors), signal, progress)
     samples = store(shape, np.uint16 if real else np.complex64, memory_bytes)
     mean_power = float(power[there].mean()) if there.any() else 0.0

@@ -105,9 +105,9 @@ class WaveScene:
         for one in scenes if len(scenes) > 1 else ():
             one.others = tuple(other for other in scenes if other is not one)
 
-    def there(self, time_s: float) -> bool:
+    def is_present(self, time_s: float) -> bool:
         """True if anybody is there in the mesh frames on both sides of an instant."""
-        return any(one.scene.there(time_s) for one in self.bodies)
+        return any(one.scene.is_present(time_s) for one in self.bodies)
 
     def frame(self, time_s: float, go_on: GoOn | None = None) -> BeatSignal:
         """Beat signal of the frame around a time, (receivers, chirps, samples).
@@ -121,7 +121,7 @@ class WaveScene:
 
     def _own_frame(self, time_s: float, go_on: GoOn | None) -> BeatSignal:
         """Beat signal of this body alone, among the others."""
-        if not self.scene.there(time_s):
+        if not self.scene.is_present(time_s):
             return self.silence()
         seen = self.scene.seen(time_s)
         rows = [

@@ -114,7 +114,7 @@ class Mounting:
         """
         centre = self.weights @ self.vertices_m
         rest, arm = self.vertices_m - centre, self.position_m - centre
-        there = mesh.presence.there
+        there = mesh.presence.present
         position_m = np.empty((mesh.frame_count, 3))
         rotation = np.empty((mesh.frame_count, 3, 3))
         for start in range(0, mesh.frame_count, _READ_FRAMES):
@@ -162,10 +162,10 @@ def mounted(mesh: MeshSequence, at: str | int, up: Vector = UP) -> Mounting:
     >>> mounted(mesh, "left-wrist").axes
     'x along the bone, away from the trunk or up it; z out of the body; y right-handed'
     """
-    if not mesh.presence.there.any():
+    if not mesh.presence.present.any():
         raise Sd2Error(f"{_source(mesh)} has no frame with a body", "one at least")
     name = str(at).strip()
-    first = int(np.argmax(mesh.presence.there))
+    first = int(np.argmax(mesh.presence.present))
     points_m = mesh.frame(first).astype(np.float64)  # (V, 3)
     refuse_missing(points_m[None], first, mesh.source)
     if name.isdecimal() and name.isascii() and len(name) < 10:

@@ -164,7 +164,7 @@ def _turned(mesh: MeshSequence, own: MeshSequence, turn_deg: float) -> MeshSeque
     if not turn_deg:
         return mesh
     turn = turn_matrix(turn_deg)
-    points = own.frame(int(np.argmax(own.presence.there))).astype(np.float64)
+    points = own.frame(int(np.argmax(own.presence.present))).astype(np.float64)
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     by_m = middle - turn @ middle
     x, y, z = by_m.tolist()

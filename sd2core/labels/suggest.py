@@ -60,7 +60,7 @@ def motion_energy_db(doppler: DopplerMap) -> NDArray[np.float64]:
             f"The Doppler map holds {values[bin_, frame]} in bin {bin_} of frame {frame}",
             "finite values from 0 on",
         )
-    there = Presence.of(doppler.present, values.shape[1]).there
+    there = Presence.of(doppler.present, values.shape[1]).present
     energy_db = np.where(there, 0.0, np.nan)
     seen = _smoothed(values, doppler.timebase, there)[:, there]
     told = np.asarray(seen.any(axis=1))  # (bins,)

@@ -111,7 +111,7 @@ def head_circles(mesh: MeshSequence, camera: PinholeCamera) -> NDArray[np.float6
         )
     head = np.flatnonzero(vertex_limbs(Body.load(resolution)) == LIMBS.index("head"))
     circles_px = np.full((mesh.frame_count, 3), np.inf)
-    for frame in np.flatnonzero(mesh.presence.there):
+    for frame in np.flatnonzero(mesh.presence.present):
         points_m = mesh.frame(int(frame))[head].astype(np.float64)
         if not (points_m[:, 2] > 0.0).all():
             continue

@@ -20,14 +20,14 @@ class Presence:
     no velocity is measured and nothing is smoothed from one to another (docs/decisions/0021).
     """
 
-    there: NDArray[np.bool_]  # (T,) frames with a person
+    present: NDArray[np.bool_]  # (T,) frames with a person
     first: NDArray[np.int64]  # (T,) first frame of the stretch; itself without a person
     last: NDArray[np.int64]  # (T,) last frame of that stretch
 
     @classmethod
-    def of(cls, there: ArrayLike | None, frames: int) -> Presence:
+    def of(cls, present: ArrayLike | None, frames: int) -> Presence:
         """Presence by a mask (frames,); None means everywhere."""
-        mask = np.ones(frames, bool) if there is None else checked(there, frames)
+        mask = np.ones(frames, bool) if present is None else checked(present, frames)
         numbers = np.arange(frames)
         # A stretch begins at every frame that does not go on from the one before.
         begins = np.ones(frames, bool)
@@ -39,12 +39,12 @@ class Presence:
         return cls(mask, first, last)
 
     def __len__(self) -> int:
-        return len(self.there)
+        return len(self.present)
 
     @cached_property
     def whole(self) -> bool:
         """True if the person is there in every frame."""
-        return bool(self.there.all())
+        return bool(self.present.all())
 
     @cached_property
     def measured(self) -> NDArray[np.bool_]:
@@ -52,11 +52,11 @@ class Presence:
 
         In a clip without gaps all of them, be it one frame long.
         """
-        return self.there if self.whole else self.there & (self.last > self.first)
+        return self.present if self.whole else self.present & (self.last > self.first)
 
     def between(self, start: int, stop: int) -> Presence:
         """Frames ``start`` to ``stop`` as a clip of their own."""
-        return Presence.of(self.there[start:stop], stop - start)
+        return Presence.of(self.present[start:stop], stop - start)
 
 
 def runs(mask: NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
@@ -65,9 +65,9 @@ def runs(mask: NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
     return tuple(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def checked(there: ArrayLike, frames: int) -> NDArray[np.bool_]:
+def checked(present: ArrayLike, frames: int) -> NDArray[np.bool_]:
     """Mask as a bool array of its own; Sd2Error without one truth value (or 0 and 1) per frame."""
-    mask = np.array(there)
+    mask = np.array(present)
     if mask.shape != (frames,) or not (
         mask.dtype.kind == "b" or (mask.dtype.kind in "iu" and np.isin(mask, (0, 1)).all())
     ):

@@ -247,7 +247,7 @@ class MeshSequence:
         if not self.timebase.covers(time_s):
             return None
         frame = self.timebase.frame_at(time_s)
-        return frame if self.presence.there[frame] else None
+        return frame if self.presence.present[frame] else None
 
 
 def refuse_missing(vertices: NDArray[Any], first_frame: int, source: str) -> None:

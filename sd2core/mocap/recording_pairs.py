@@ -207,7 +207,7 @@ def _takes(
     """Stretches with a person and a radar frame, cut into takes; and the time left out."""
     times_s = synthetic.timebase.times_s
     there = on_clock(radar.shifted(recording.radar_offset_s), synthetic.timebase)
-    seen = Presence.of(there.present, len(times_s)).there
+    seen = Presence.of(there.present, len(times_s)).present
     if synthetic.present is not None:
         seen &= synthetic.present
     target = there.values.T.copy()  # (frames, bins)

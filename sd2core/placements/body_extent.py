@@ -60,7 +60,7 @@ class BodyExtent:
 
         Raises Sd2Error if no frame has a person.
         """
-        there = np.flatnonzero(mesh.presence.there)
+        there = np.flatnonzero(mesh.presence.present)
         if not len(there):
             raise Sd2Error(
                 f"{mesh.source or 'The mesh'} has a person in no frame",

@@ -43,7 +43,7 @@ class BodyPoints:
     points_m : float64 array, shape (K, N, 3)
         The same vertices in each, in the camera's frame.
     times_s : float64 array, shape (K,)
-    there : bool array, shape (K,)
+    present : bool array, shape (K,)
         False in frames without a person.
     extent_m : float64 array, shape (K, 3)
         Size of the body along x, y and z.
@@ -52,12 +52,12 @@ class BodyPoints:
     frames: NDArray[np.int64]
     points_m: NDArray[np.float64]
     times_s: NDArray[np.float64]
-    there: NDArray[np.bool_]
+    present: NDArray[np.bool_]
     extent_m: NDArray[np.float64]
 
     def neighbours(self, step: int) -> NDArray[np.int64]:
         """Places k whose frames ``k`` to ``k + step`` follow each other, all with a person."""
-        follows = (np.diff(self.frames) == 1) & self.there[1:] & self.there[:-1]
+        follows = (np.diff(self.frames) == 1) & self.present[1:] & self.present[:-1]
         if len(follows) < step:
             return np.zeros(0, np.int64)
         windows = np.lib.stride_tricks.sliding_window_view(follows, step)
@@ -90,11 +90,11 @@ def judge_size(extent_m: float) -> Finding | None:
 
 def judge_place(body: BodyPoints) -> list[Finding]:
     """Findings on where a body is in the camera's frame, and which way up."""
-    there = body.there if body.there.any() else np.ones_like(body.there)
-    points_m = body.points_m[there]
+    present = body.present if body.present.any() else np.ones_like(body.present)
+    points_m = body.points_m[present]
     depth_m = float(points_m[..., 2].mean())
     far_m = float(np.linalg.norm(points_m.mean(axis=1), axis=1).max())
-    extent_m = np.median(body.extent_m[there], axis=0)
+    extent_m = np.median(body.extent_m[present], axis=0)
     low, high = _LYING_M
     if depth_m <= 0:
         return [_behind(depth_m, bool((points_m[..., 2] < 0).all()), far_m < AT_ROOT_M)]

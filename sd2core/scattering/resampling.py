@@ -33,7 +33,7 @@ def resample_mesh(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[Mes
     frames = np.searchsorted(own, times_s, side="right").clip(1, max(len(own) - 1, 1)) - 1
     following = (frames + 1).clip(max=len(own) - 1)
     # Between two frames there is a person where both of them have one.
-    there = presence.there[frames] & presence.there[following] & within
+    there = presence.present[frames] & presence.present[following] & within
 
     def made(rows: NDArray[np.intp]) -> NDArray[Any]:
         ends = frames[rows]
@@ -62,7 +62,7 @@ def resample_mesh(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[Mes
             shape, mesh.vertices.dtype, lambda rows: read_frames(mesh, nearest[rows])
         ),
         timebase=Timebase(times_s),
-        present=there if interpolated else presence.there[nearest] & within,
+        present=there if interpolated else presence.present[nearest] & within,
         uncertainty=known,
         others=(),
     ), interpolated

@@ -124,7 +124,7 @@ def _of_recording(
     recording: Recording, names: tuple[str, ...], subject: str, mesh: MeshSequence
 ) -> Iterator[_Movement]:
     labels = [*names, ""]  # the last is that of UNKNOWN
-    stretches = take_frames(mesh.presence.there, mesh.timebase.frames_per_s)
+    stretches = take_frames(mesh.presence.present, mesh.timebase.frames_per_s)
     for number, (start, stop) in enumerate(stretches):
         yield _Movement(
             TakeKey(subject, f"{recording.folder.stem}-{number:03d}", 0),

@@ -118,7 +118,7 @@ def _judged(models: Sequence[TrainedDenoiser], pairs: PairSet, takes: Sequence[T
 
 def _take(name: str, mesh: MeshSequence, sensor: VirtualSensor, radar: np.ndarray) -> Take:
     found = synthetic_map(Synthesizer(mesh, OPTIONS), sensor, limbs=True)
-    there = np.flatnonzero(mesh.presence.there)
+    there = np.flatnonzero(mesh.presence.present)
     frames = slice(int(there[0]), min(int(there[-1]) + 1, len(radar)))
     whole = Take(
         name,

@@ -169,7 +169,7 @@ def score_clip(
     presence = pair[1].presence
     if not presence.measured.any():
         raise Sd2Error(f"{truth.name}: the fitted mesh has no person", "the person of the clip")
-    pair = [replace(mesh, present=presence.there) for mesh in pair]
+    pair = [replace(mesh, present=presence.present) for mesh in pair]
     patches = [_patches(mesh, truth.name) for mesh in pair]
     joints = [
         one.positions(np.asarray(mesh.vertices)) for one, mesh in zip(patches, pair, strict=True)
@@ -270,7 +270,7 @@ def _overlap(true: MeshSequence, fitted: MeshSequence, truth: Truth) -> float:
             silhouette(true.frame(frame), true.faces, truth.camera, _MASK),
             silhouette(fitted.frame(frame), fitted.faces, truth.camera, _MASK),
         )
-        for frame in np.flatnonzero(fitted.presence.there)[::_MASK_STEP]
+        for frame in np.flatnonzero(fitted.presence.present)[::_MASK_STEP]
     ]
     return float(np.nanmean(found))
 

@@ -179,7 +179,7 @@ def _measured(meeting: Meeting, clothes: str, folder: Path) -> Outcome:
         _film(alone, [mine])
         fit_video(alone, folder / "alone.npz", known, _SILENT)
         fits = [load_mesh(each) for each in (mesh, folder / "alone.npz")]
-        there = np.logical_and.reduce([fit.presence.there for fit in fits])
+        there = np.logical_and.reduce([fit.presence.present for fit in fits])
         for number, fit in enumerate(fits):
             off_m = np.asarray(fit.read(0, fit.frame_count)) - mine.vertices_m
             places[number].append(float(np.linalg.norm(off_m[there], axis=2).mean()))

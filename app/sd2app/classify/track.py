@@ -135,7 +135,7 @@ class ClassTrack(BackgroundModel):
             self.card.classes,
             tuple(map(float, shares)),
             bool(self.done[frame]) and self.current,
-            not self._given.there[frame],
+            not self._given.present_mask[frame],
             float(times_s[asked] - times_s[frame]) if self.card.delay_frames else 0.0,
         )
 
@@ -240,7 +240,7 @@ class ClassTrack(BackgroundModel):
             # What is read meanwhile is before it, or of no interest any more.
             values[:, first:stop] = doppler.values[:, first:stop]
         self._given, self._known = replace(doppler, values=values), known.copy()
-        nobody = known & ~doppler.there
+        nobody = known & ~doppler.present_mask
         self.shares[nobody] = self.card.no_person()
         self.done[nobody] = True
         self.changed.emit()
@@ -268,7 +268,7 @@ class ClassTrack(BackgroundModel):
         self.done = np.append(self.done, np.zeros(more, bool))
         self.shares = np.pad(self.shares, ((0, more), (0, 0)), constant_values=np.nan)
         values = np.pad(before.values, ((0, 0), (0, more)))
-        there = np.append(before.there, np.ones(more, bool))
+        there = np.append(before.present_mask, np.ones(more, bool))
         return replace(before, values=values, timebase=timebase, present=there)
 
     def _differs(
@@ -277,7 +277,7 @@ class ClassTrack(BackgroundModel):
         """Mask of the frames of a part that differ from before."""
         differs = (before.values[:, part] != doppler.values[:, part]).any(axis=0)
         differs |= self._known[part] != known[part]
-        differs |= before.there[part] != doppler.there[part]
+        differs |= before.present_mask[part] != doppler.present_mask[part]
         return np.asarray(differs)
 
     # --- classifying ----------------------------------------------------------------------
@@ -295,7 +295,7 @@ class ClassTrack(BackgroundModel):
         is_growing = self.source is not None and self.source.growing
 
         def work(emit: Emit) -> None:
-            there = replace(doppler, present=doppler.there & known)
+            there = replace(doppler, present=doppler.present_mask & known)
             for start, stop in stretches(there, rate_hz):
                 if not waiting[start:stop].any():
                     continue

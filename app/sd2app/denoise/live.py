@@ -117,7 +117,7 @@ class LiveDenoiseModel(QObject):
         if stop <= start or (covered is not None and not covered[start:stop].all()):
             return
         energies, session = input_of(source.between(start, stop), denoiser.parts), self._session
-        present = source.there[start:stop]
+        present = source.present_mask[start:stop]
 
         def work(emit: object) -> _Stepped:
             live = session or denoiser.live()

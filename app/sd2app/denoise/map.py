@@ -347,7 +347,7 @@ class DenoisedMap(BackgroundModel):
         start = order.next
         stop = min(start + AT_ONCE, frames)
         energies = input_of(source.between(start, stop), denoiser.parts).copy()
-        present = source.there[start:stop]
+        present = source.present_mask[start:stop]
 
         def work(emit: object) -> _Answer:
             live = order.session or denoiser.live()

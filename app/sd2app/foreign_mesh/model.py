@@ -86,7 +86,7 @@ class MeshPreview(VideoFrames):
         middle, mesh, reader = super().first_frame(), self.mesh, self.reader
         if mesh is None or reader is None:
             return middle
-        there = np.flatnonzero(mesh.presence.there)
+        there = np.flatnonzero(mesh.presence.present)
         if not there.size or mesh.person_at(reader.timebase.time_of(middle)) is not None:
             return middle
         return reader.timebase.nearest_frame(float(mesh.times_s[there[len(there) // 2]]))

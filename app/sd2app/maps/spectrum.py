@@ -44,7 +44,7 @@ class _Curve:
     @property
     def nobody(self) -> bool:
         """True in a frame without a person."""
-        return self.frame is not None and not self.map.there[self.frame]
+        return self.frame is not None and not self.map.present_mask[self.frame]
 
 
 class SpectrumView(Canvas):

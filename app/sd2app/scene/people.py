@@ -54,7 +54,7 @@ class People(Movables):
 
     def show_frame(self, frame: int, shown: bool = True) -> None:
         """Move all to another frame; nobody is drawn unless ``shown``."""
-        self._there = [shown and bool(mesh.presence.there[frame]) for mesh in self.meshes]
+        self._there = [shown and bool(mesh.presence.present[frame]) for mesh in self.meshes]
         for mesh, shape, there in zip(self.meshes, self._shapes, self._there, strict=True):
             shape.show(there)
             if there and frame != self._frame:

@@ -347,9 +347,9 @@ class SceneView(QWidget):
     def _fetch(self, mesh: MeshSequence) -> None:
         time_s = self._session.playback.time_s
         frame = mesh.timebase.frame_at(time_s)
-        covered, someone = mesh.timebase.covers(time_s), bool(mesh.presence.there[frame])
+        covered, someone = mesh.timebase.covers(time_s), bool(mesh.presence.present[frame])
         self.scene.show_mesh(covered and someone)
-        anybody = any(bool(body.presence.there[frame]) for body in mesh.bodies)
+        anybody = any(bool(body.presence.present[frame]) for body in mesh.bodies)
         why = "No person at this time" if covered else "No mesh at this time"
         self.overlay.message = "" if covered and anybody else why
         if frame != self._frame:

@@ -267,7 +267,7 @@ class MapModel(QObject):
             return None
         value = self.values[index, frame]
         note = ""
-        if not self.map.there[frame]:
+        if not self.map.present_mask[frame]:
             note = "no person"
         elif index in self.map.null_bins:
             note = "nulled bin"

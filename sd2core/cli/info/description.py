@@ -424,7 +424,7 @@ def _known_to(mesh: MeshSequence) -> str:
     known = mesh.uncertainty
     if known is None:
         return ""
-    typical = (known.along_mps[mesh.presence.there] ** 2).mean(axis=0) ** 0.5
+    typical = (known.along_mps[mesh.presence.present] ** 2).mean(axis=0) ** 0.5
     best, worst = int(typical.argmin()), int(typical.argmax())
     words = "along the camera's line of sight known to"
     if typical[best] == typical[worst]:

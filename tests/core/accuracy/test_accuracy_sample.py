@@ -92,7 +92,7 @@ def test_runs_lie_where_somebody_is_and_keep_the_gaps() -> None:
     for run in sample.runs:
         assert present[run.frames.start : run.frames.stop].all()
     small = sample.of(gone)
-    np.testing.assert_array_equal(small.presence.there, present[sample.frames])
+    np.testing.assert_array_equal(small.presence.present, present[sample.frames])
 
 
 def test_a_short_clip_with_a_gap_is_sampled_whole_with_its_gap() -> None:

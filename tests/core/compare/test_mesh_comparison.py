@@ -128,7 +128,7 @@ def test_frames_without_a_person_do_not_count(mesh: MeshSequence) -> None:
     assert np.abs(found.maps[0].values[:, 11:13]).max() == 0.0
     assert any("4 of 24 frames are left out" in note for note in found.notes)
     moved, _ = resample_mesh(gap, np.array([0.1, 0.3167, 0.40, 0.45, 0.5]))
-    assert moved.presence.there.tolist() == [True, False, False, False, True]
+    assert moved.presence.present.tolist() == [True, False, False, False, True]
 
 
 def test_frames_at_the_same_times_are_not_touched(mesh: MeshSequence) -> None:

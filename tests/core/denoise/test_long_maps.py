@@ -67,7 +67,7 @@ def test_blocks_give_what_the_whole_map_gives(
         following = first + len(energies)
         found[first:following] = energies
 
-    there = Presence.of(doppler.present, FRAMES).there
+    there = Presence.of(doppler.present, FRAMES).present
     runs = clips(doppler.times_s, there, denoiser.card.frame_rate_hz)
     live.denoise_long(denoiser, runs, doppler.times_s, read, write)
     np.testing.assert_array_equal(np.isnan(found).all(axis=1), ~there)

@@ -80,9 +80,9 @@ def test_at_the_border_of_a_gap_the_velocity_is_one_sided(holed: MeshSequence, m
 def test_between_a_frame_with_and_one_without_there_is_nobody(holed: MeshSequence) -> None:
     scene = WaveScene(holed, CONFIG, VirtualSensor())
     between = 0.5 * (holed.times_s[4] + holed.times_s[5])
-    assert not scene.scene.there(float(between))
+    assert not scene.scene.is_present(float(between))
     assert not scene.frame(float(between)).any()
-    assert scene.scene.there(float(between) - 1.0 / 30.0)
+    assert scene.scene.is_present(float(between) - 1.0 / 30.0)
     assert not converged_frame(scene, float(between), most_cuts=1).signal.any()
 
 

@@ -60,7 +60,7 @@ def test_who_stays_is_the_same_and_who_moves_is_not_read_again(
     np.testing.assert_allclose(again.others[0].frame(3) - scene.others[0].frame(3), [[2, 0, 0]] * 4)
     # A file that was written over is read again.
     save_mesh(walker(21), path)
-    np.testing.assert_array_equal(with_bodies(walker(21), [anna]).others[0].presence.there, True)
+    np.testing.assert_array_equal(with_bodies(walker(21), [anna]).others[0].presence.present, True)
 
 
 def test_placed_and_turned_about_its_own_middle(path: str) -> None:
@@ -82,7 +82,7 @@ def test_another_clock_is_interpolated_and_nobody_is_there_outside(tmp_path: Pat
     (other,) = with_bodies(walker(60), [Body(str(tmp_path / "later.npz"), start_s=0.5)]).others
     times_s = other.times_s - 0.5
     inside = (times_s >= -1e-6) & (times_s <= 1.6 + 1e-6)
-    np.testing.assert_array_equal(other.presence.there, inside)
+    np.testing.assert_array_equal(other.presence.present, inside)
     expected = CORNERS + np.stack([times_s**2, 0 * times_s, 0 * times_s], axis=1)[:, None]
     found = other.read(0, 60)
     # Tangents at the two ends are of lines.

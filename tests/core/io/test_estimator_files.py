@@ -48,7 +48,7 @@ def sam_3d_body(frame: int) -> dict[str, Any]:
 
 def check(mesh: MeshSequence, depth: float = 1.0) -> None:
     """The person stands where the camera sees them, in frames that keep their place."""
-    there = mesh.presence.there
+    there = mesh.presence.present
     np.testing.assert_allclose(mesh.times_s[there] * 30 + 3, FRAMES, atol=1e-6)
     for row, frame in zip(np.flatnonzero(there), FRAMES, strict=True):
         expected = at_root(frame) + place(frame) * [1.0, 1.0, depth]
@@ -169,7 +169,7 @@ def test_tram_with_tensors_in_an_npy(tmp_path: Path, amass_twin: Any) -> None:
     np.save(path, results)  # type: ignore[arg-type]
     assert kind_of(path) == "mesh"
     mesh = read(path, body_model=write_model(tmp_path / "SMPL.npz"))
-    there = mesh.presence.there
+    there = mesh.presence.present
     np.testing.assert_allclose(mesh.times_s[there] * 30 + 3, FRAMES, atol=1e-6)
     np.testing.assert_allclose(mesh.read(0, 5)[there], amass_twin(known), atol=1e-5)
 
@@ -217,7 +217,7 @@ def test_prompthmr_with_people_one_level_down(tmp_path: Path, amass_twin: Any) -
     joblib.dump(content, tmp_path / "results.pkl")
     model = write_model(tmp_path / "SMPLX.npz", 55)
     mesh = read(tmp_path / "results.pkl", body_model=model)
-    there = mesh.presence.there
+    there = mesh.presence.present
     np.testing.assert_allclose(mesh.times_s[there] * 30 + 3, FRAMES, atol=1e-6)
     np.testing.assert_allclose(mesh.read(0, 5)[there], amass_twin(known, 55), atol=1e-5)
     assert load_mesh(tmp_path / "results.pkl", person=2, body_model=model).frame_count == 1
@@ -257,7 +257,7 @@ def test_phalp_with_a_frame_for_each_picture(tmp_path: Path, amass_twin: Any) ->
     joblib.dump(content, tmp_path / "demo_phalp.pkl")
     model = write_model(tmp_path / "SMPL.npz")
     mesh = read(tmp_path / "demo_phalp.pkl", body_model=model, focal_px=1000.0)
-    there = mesh.presence.there
+    there = mesh.presence.present
     np.testing.assert_allclose(mesh.times_s[there] * 30 + 3, FRAMES, atol=1e-6)
     np.testing.assert_allclose(mesh.read(0, 5)[there], amass_twin(known), atol=1e-5)
     guessed = read(tmp_path / "demo_phalp.pkl", body_model=model)

@@ -80,7 +80,7 @@ def test_what_a_file_says_of_empty_frames_may_be_numbers_but_must_fit(tmp_path: 
     given: dict[str, Any] = {"vertices": vertices, "faces": faces, "times_s": times(6)}
     path = write(tmp_path / "m.npz", **given, present=np.array([1, 0, 1, 1, 1, 1]))
     mesh = load_mesh(path)
-    assert runs(~mesh.presence.there) == ((1, 2),)
+    assert runs(~mesh.presence.present) == ((1, 2),)
     assert mesh.notes == ()
     np.testing.assert_array_equal(mesh.frame(1), vertices[0])
     write(path, **given, present=np.ones(5, bool))
@@ -92,7 +92,7 @@ def test_before_the_first_known_pose_stands_that_one(tmp_path: Path) -> None:
     vertices, faces = body()
     vertices[:2] = np.nan
     mesh = load_mesh(write(tmp_path / "m.npz", vertices=vertices, faces=faces, times_s=times(6)))
-    assert runs(~mesh.presence.there) == ((0, 2),)
+    assert runs(~mesh.presence.present) == ((0, 2),)
     np.testing.assert_array_equal(mesh.read(0, 3), vertices[[2, 2, 2]])
 
 

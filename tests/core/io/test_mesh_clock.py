@@ -121,7 +121,7 @@ def test_missing_frame_ids_are_time_without_a_person(tmp_path: Path, kind: str) 
     assert "20 video frames hold no mesh" in " ".join(mesh.notes)
     # No velocity is measured from before the gap to after it.
     before, after = np.searchsorted(mesh.times_s, [4 / 25, 25 / 25 - 1e-9])
-    assert not mesh.presence.there[before : after + 1].all()
+    assert not mesh.presence.present[before : after + 1].all()
     assert mesh.findings == ()
 
 
@@ -145,7 +145,7 @@ def test_frames_in_one_point_are_without_a_person(tmp_path: Path, kind: str) -> 
     if kind == ".zarr":
         unpack_npz(path, path := tmp_path / "m.zarr")
     mesh = load_mesh(path)
-    np.testing.assert_array_equal(np.flatnonzero(~mesh.presence.there), [4, 9])
+    np.testing.assert_array_equal(np.flatnonzero(~mesh.presence.present), [4, 9])
     assert "2 frames hold no body" in " ".join(mesh.notes)
     assert mesh.findings == ()
 

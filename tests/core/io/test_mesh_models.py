@@ -123,8 +123,8 @@ def test_frames_keep_their_place_in_the_video(tmp_path: Path) -> None:
     mesh = load_mesh(tmp_path / "w.pkl", frames_per_s=30)
     # One frame without a person stands for all that are missing.
     np.testing.assert_allclose(mesh.times_s * 30, [10, 11, 12, 13, 20, 21, 22])
-    assert runs(~mesh.presence.there) == ((3, 4),)
-    there = mesh.presence.there
+    assert runs(~mesh.presence.present) == ((3, 4),)
+    there = mesh.presence.present
     np.testing.assert_array_equal(mesh.read(0, 7)[there], person["verts"])
     np.testing.assert_array_equal(mesh.frame(3), person["verts"][2])
     assert any("7 video frames hold no mesh, the first after frame 12" in n for n in mesh.notes)

@@ -43,7 +43,7 @@ def test_everyone_who_is_listed_can_be_read_with_that_many_frames(make, tmp_path
     assert listed == {"2": 5, "11": 3}
     for name, frames in listed.items():
         mesh = load_mesh(path, person=name)
-        assert int(mesh.presence.there.sum()) == frames
+        assert int(mesh.presence.present.sum()) == frames
         assert any(f"Person {name} is read" in note for note in mesh.notes)
 
 

@@ -23,12 +23,12 @@ def test_stretches_are_the_runs_of_frames_with_a_person(there: list[bool]) -> No
         assert all(there[first : last + 1])
         assert first == 0 or not there[first - 1]
         assert last == len(there) - 1 or not there[last + 1]
-    assert runs(presence.there) == tuple(
+    assert runs(presence.present) == tuple(
         (int(k), int(presence.last[k]) + 1)
         for k in range(len(there))
         if there[k] and presence.first[k] == k
     )
-    assert sum(b - a for a, b in runs(~presence.there)) == there.count(False)
+    assert sum(b - a for a, b in runs(~presence.present)) == there.count(False)
 
 
 def test_a_frame_alone_has_no_motion_but_a_clip_of_one_frame_is_no_gap() -> None:
@@ -51,7 +51,7 @@ def mesh(**given: object) -> MeshSequence:
 def test_a_mesh_says_in_one_way_only_that_someone_is_there_throughout() -> None:
     assert mesh().present is None
     assert mesh(present=np.ones(4, bool)).present is None
-    assert runs(~mesh(present=[1, 0, 0, 1]).presence.there) == ((1, 3),)
+    assert runs(~mesh(present=[1, 0, 0, 1]).presence.present) == ((1, 3),)
 
 
 def test_the_mask_is_the_mesh_s_own() -> None:
