@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt
 from PySide6.QtGui import QAction, QResizeEvent
-from PySide6.QtWidgets import QApplication, QBoxLayout, QInputDialog, QWidget
+from PySide6.QtWidgets import QBoxLayout, QInputDialog, QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.actions import editing
@@ -92,9 +92,6 @@ class SuggestionBar(QWidget):
 
     def _refresh(self) -> None:
         model = self._model
-        focus = QApplication.focusWidget()
-        if not model.active and focus is not None and self.isAncestorOf(focus):
-            focus.clearFocus()  # or what comes next would have it, and Space press that
         self.setVisible(model.active)
         if not model.active:
             return

@@ -25,7 +25,14 @@ def controls_of(regions: Sequence[QWidget]) -> list[QWidget]:
 
 
 def tab_to(regions: Sequence[QWidget], focus: QWidget | None, forward: bool) -> QWidget | None:
-    """Give the keyboard to the control after the one that has it, or before; None without any."""
+    """Give the keyboard to the control after the one that has it, or before; None without any.
+
+    Qt asks too when what has it is hidden or disabled. Then nothing has it: had the next control
+    it, a second Space would press that.
+    """
+    if focus is not None and not (focus.isVisible() and focus.isEnabled()):
+        focus.clearFocus()
+        return None
     controls, step = controls_of(regions), 1 if forward else -1
     if not controls:
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
@@ -114,3 +115,16 @@ def test_space_presses_the_button_that_tab_has_reached_and_plays_elsewhere(windo
     QTest.keyClick(window, Qt.Key.Key_Space)
     assert playback.playing
     playback.pause()
+
+
+@pytest.mark.parametrize("take_away", ["setHidden", "setDisabled"])
+def test_nobody_has_the_keyboard_after_what_had_it_is_gone(window, qtbot, take_away) -> None:
+    walk(window, qtbot)
+    named = {one.toolTip().split(" (")[0]: one for one in window.findChildren(QToolButton)}
+    button = named["One frame on"]
+    button.setFocus()
+    getattr(button, take_away)(True)
+    try:
+        assert QApplication.focusWidget() is None
+    finally:
+        getattr(button, take_away)(False)
