@@ -6,6 +6,7 @@ import gc
 import os
 import shutil
 import time
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -34,6 +35,19 @@ settings.load_profile(os.environ.get("SD2_EXAMPLES", "quick"))
 gc.disable()
 
 REPOSITORY = Path(__file__).resolve().parent.parent
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark all but every n-th of the parameters of a test that is ``one_in(n)`` as slow."""
+    places: Counter[str] = Counter()
+    for item in items:
+        mark = item.get_closest_marker("one_in")
+        if mark is not None:
+            name = item.nodeid.partition("[")[0]
+            if places[name] % mark.args[0]:
+                item.add_marker(pytest.mark.slow)
+            places[name] += 1
 
 
 def pytest_collection_finish() -> None:

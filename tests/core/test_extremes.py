@@ -47,6 +47,7 @@ def largest(*arrays: Any) -> float:
     return float(max(np.abs(array).max() for array in arrays))
 
 
+@pytest.mark.one_in(7)
 @EVERY_SCENE
 def test_radial_velocity_in_double_precision(scene: Scene) -> None:
     before, after = ends(scene)
@@ -59,6 +60,7 @@ def test_radial_velocity_in_double_precision(scene: Scene) -> None:
     assert np.isfinite(found).all()
 
 
+@pytest.mark.one_in(7)
 @EVERY_SCENE
 def test_single_precision_is_as_good_as_predicted(scene: Scene) -> None:
     before, after = ends(scene)
@@ -162,11 +164,13 @@ def assert_scene_counted(scene: Scene) -> None:
         assert np.abs(shown - velocity).max() <= slack + 2.0**-23 * scene.speed_mps
 
 
+@pytest.mark.one_in(7)
 @EVERY_SCENE
 def test_every_vertex_is_counted_in_its_bin(scene: Scene) -> None:
     assert_scene_counted(scene)
 
 
+@pytest.mark.one_in(7)
 @EVERY_SCENE
 def test_numpy_counts_every_vertex_in_its_bin(
     scene: Scene, monkeypatch: pytest.MonkeyPatch

@@ -63,6 +63,7 @@ def at(*place_m: float) -> VirtualSensor:
     return VirtualSensor((place_m[0], place_m[1], place_m[2]))
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("scene", every_scene(), ids=str)
 @pytest.mark.parametrize("exponent", [4.0, 2.5])
 def test_what_the_range_law_lets_through(scene: Scene, exponent: float) -> None:
@@ -123,6 +124,7 @@ def damaged(kind: str) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     return vertices, np.concatenate([faces, fins]).astype(np.int32)
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("weight", ["count", "area", "projected"])
 @pytest.mark.parametrize("visibility", ["none", "facing", "depth", "exact"])
 @pytest.mark.parametrize(
@@ -166,6 +168,7 @@ def test_a_map_of_rounded_coordinates_says_so(offset_m: float, dtype: Any, said:
     assert len([note for note in notes if "single precision" in note]) == said
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("visibility", ["none", "facing", "depth", "exact"])
 @pytest.mark.parametrize("weight", ["count", "area", "projected"])
 @pytest.mark.parametrize("factor", [2.0**-10, 2.0**10])
@@ -219,6 +222,7 @@ def test_ten_kilometres_down_the_road_nothing_has_changed(
     assert (apart > 1e-6).sum() <= 6
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("weight", ["count", "projected"])
 @pytest.mark.parametrize("visibility", ["facing", "depth", "exact"])
 @pytest.mark.parametrize("away_m", [0.0, 1e4])
@@ -242,6 +246,7 @@ def test_numpy_makes_the_same_maps(
     assert apart.max() <= 2 * 8.3 * heaviest(vertices, faces, weight)
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("oversampling", [1, 8])
 @pytest.mark.parametrize("weight", ["count", "area", "projected"])
 @pytest.mark.parametrize(

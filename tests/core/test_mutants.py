@@ -39,6 +39,7 @@ def _copies(name: str, folder: Path) -> Iterator[Path]:
             yield copy
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("name", TEXTS)
 def test_some_mutants_of_texts(tmp_path: Path, name: str) -> None:
     for seed, path in zip(range(6), _copies(name, tmp_path), strict=False):
@@ -65,6 +66,7 @@ _IN_FOLDERS = {
 }
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("name", TEXTS)
 @pytest.mark.parametrize("spoil", [_pipe, _huge])
 def test_pipes_and_huge_texts_are_refused_unread(

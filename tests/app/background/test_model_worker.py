@@ -125,6 +125,7 @@ def test_what_is_closed_stays_closed(folder):
         process.load(folder / "gru.safetensors")
 
 
+@pytest.mark.slow
 def test_a_process_that_ends_at_once_is_an_error_in_words(folder):
     process = ModelProcess([sys.executable, "-c", "pass"])
     with pytest.raises(Sd2Error, match="has ended"):

@@ -200,6 +200,7 @@ def test_nothing_is_made_while_nobody_looks(table) -> None:
     assert table.model.rowCount() == 10
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("column", ["start", "label", "duration"])
 def test_rows_and_what_points_at_them_follow_any_edits(table, column: str) -> None:
     """Also under Qt's own test of models, which watches every signal."""

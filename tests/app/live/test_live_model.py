@@ -83,6 +83,7 @@ def assert_shows(session: Session, folder: Path) -> None:
     np.testing.assert_array_equal(session.playback.timebase.times_s, whole.times_s)
 
 
+@pytest.mark.slow
 def test_the_map_on_screen_is_that_of_the_recording_stopped_and_continued(
     session, endless, tmp_path, qtbot
 ):
@@ -274,6 +275,7 @@ def test_a_set_up_says_what_is_missing_and_remembers(tmp_path, qtbot):
     assert again.folder == tmp_path / "live-2.sd2"
 
 
+@pytest.mark.slow
 def test_what_is_filmed_is_shown_as_it_comes_and_then_with_its_video(session, tmp_path, qtbot):
     request = ListenRequest(tmp_path / "take.sd2", radar="test", camera="test")
     model = heard(session, request, qtbot, 20)

@@ -102,6 +102,7 @@ def contrast_of_frame(qtbot, kind, ground: str, enabled: bool) -> float:
     return max(contrast(one, stands_on) for one in column)
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("ground", ["window", "panel"])
 @pytest.mark.parametrize("enabled", [True, False])

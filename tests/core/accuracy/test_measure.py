@@ -42,6 +42,7 @@ def error(table: Measurement, plan: AccuracyPlan) -> float:
     return result.errors.l1
 
 
+@pytest.mark.slow
 def test_every_plan_is_there_once(table: Measurement) -> None:
     plans = [result.plan for result in table.results]
     assert len(set(plans)) == len(plans)

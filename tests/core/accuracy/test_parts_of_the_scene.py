@@ -35,6 +35,7 @@ def reason(choice: Choice, setting: str) -> Reason:
     return next(one for one in choice.reasons if one.setting == setting)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("loss_db", "modelled"), [(25.0, False), (0.0, True)])
 def test_walls_are_modelled_where_they_matter(loss_db: float, modelled: bool) -> None:
     scene = with_walls(body(), [Wall.named("right", 1.0, loss_db)])
@@ -55,6 +56,7 @@ def test_walls_are_modelled_where_they_matter(loss_db: float, modelled: bool) ->
     assert ("walls" in made.meta) == modelled
 
 
+@pytest.mark.slow
 def test_each_part_and_other_people_have_their_sentence() -> None:
     other = ball(swinging((0.6, 0, 2.4), 1.5, 0.9), fineness=3)
     scene = with_walls(with_things(replace(body(), others=(other,)), [BOX]), [Wall(3.0, 20.0)])

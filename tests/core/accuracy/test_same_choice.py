@@ -75,6 +75,7 @@ def test_a_survey_from_elsewhere_before_changes_nothing(
 
 
 # Each example tries plans; the scene is small.
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.floats(-3, -0.3).map(lambda power: 10**power))
 def test_no_sentence_is_against_the_tolerance(

@@ -53,6 +53,7 @@ def _mesh(frames: int = 300) -> MeshSequence:
     return replace(mesh, timebase=Timebase(times_s), present=present)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     "told",
     [

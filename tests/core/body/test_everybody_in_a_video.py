@@ -226,6 +226,7 @@ def people(
 
 
 class TestFinding:
+    @pytest.mark.slow
     def test_two_who_cross_are_two_and_go_on(self, people: tuple[Path, list[SeenPerson]]) -> None:
         _, found = people
         assert [each.number for each in found] == [1, 2]

@@ -148,6 +148,7 @@ def test_line_of_sight_velocity_of_the_swiping_hand(scene: Scene, fitted: BodyFi
         assert np.sqrt(((true - found)[ends] ** 2).mean()) < 0.05
 
 
+@pytest.mark.slow
 def test_feet_that_stand_do_not_slide() -> None:
     scene = Scene(30, distance_m=4.5)
     lifted, times_s = scene.lift.lifted, scene.track.timebase.times_s
@@ -225,6 +226,7 @@ def test_empty_frames_hold_the_last_known_pose_and_are_marked(scene: Scene) -> N
     assert away[track.present].mean() < 0.03
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("frames", [1, 2, 3])
 def test_the_shortest_clips(frames: int) -> None:
     scene = Scene(frames)

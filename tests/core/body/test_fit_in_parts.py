@@ -170,6 +170,7 @@ class TestMending:
         arrays = {name: getattr(known, name).copy() for name in names}
         return RawTrack(times_s=known.timebase.times_s, **arrays)
 
+    @pytest.mark.slow
     @settings(max_examples=4)
     @given(
         st.lists(st.tuples(st.integers(0, 140), st.integers(1, 9)), max_size=4),
@@ -212,6 +213,7 @@ class TestMending:
         np.testing.assert_array_equal(parts.image_px, whole.image_px)
         np.testing.assert_array_equal(whole.image_px, self.both(true)[0][0].image_px)
 
+    @pytest.mark.one_in(2)
     @pytest.mark.parametrize("start", [48, 60])
     def test_a_long_gap_is_bridged_across_parts(self, start: int) -> None:
         known = without(swiping(self.FRAMES), (start, start + 45))
@@ -222,6 +224,7 @@ class TestMending:
 
 
 class TestTrack:
+    @pytest.mark.one_in(2)
     @pytest.mark.usefixtures("short_parts")
     @pytest.mark.parametrize("on_disk", [True, False])
     def test_any_part_is_that_of_the_whole(self, tmp_path: Path, on_disk: bool) -> None:

@@ -215,6 +215,7 @@ class TestPictures:
         off = np.hypot(*np.moveaxis(track.image_px - (swiping()[1] - [60, 0]), -1, 0))
         assert np.median(off) < 0.02 * PERSON_PX
 
+    @pytest.mark.one_in(2)
     @pytest.mark.parametrize("turn", [1, 2])
     def test_a_rotated_video(self, models: LandmarkModels, tmp_path: Path, turn: int) -> None:
         """Stored lying or upside down, with the file's word how to turn it upright."""

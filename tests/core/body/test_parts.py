@@ -63,6 +63,7 @@ def test_any_surface_of_a_body_takes_them_over(
     assert (found == known(body)[order]).mean() > 0.97
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("frame", [0, 100, 250, 400])
 def test_a_moving_body_keeps_them_also_when_decimated(frame: int) -> None:
     mesh = load_mesh(resource_path("swipes.sd2") / "mesh.zarr")

@@ -73,6 +73,7 @@ def test_gain_changes_nothing(kind: str, gain: float, seed: int) -> None:
     np.testing.assert_allclose(other, one, atol=1e-5)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=25, deadline=None)
 @given(cuts=st.lists(st.integers(0, 400), max_size=5))

@@ -39,6 +39,7 @@ def test_frame_by_frame_equals_the_whole_map(model: str, kind: str, delay: int) 
     assert whole.shape == (130, len(CLASSES))
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("model", MODELS)
 @settings(max_examples=8, deadline=None)
 @given(

@@ -36,6 +36,7 @@ def plan(plate: Path, tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_plan_is_done_on_processes_of_its_own(sd2: Sd2, plan: Path, tmp_path: Path) -> None:
     (tmp_path / "meshes" / "broken.npz").write_bytes(b"nothing")
     made = sd2("batch", plan, "--workers", 1, "--progress-json")

@@ -87,6 +87,7 @@ def lines(
 
 
 class TestLines:
+    @pytest.mark.slow
     def test_the_start(self, lines: list[dict[str, Any]], clip: Path) -> None:
         start = next(line for line in lines if line["event"] == "start")
         assert start["format"] == "sd2-fit-progress"

@@ -20,6 +20,7 @@ def video(models: LandmarkModels, tmp_path_factory: pytest.TempPathFactory) -> P
     return film(folder / "two.mp4", crossing(), frames_per_s=10)
 
 
+@pytest.mark.slow
 def test_a_list_needs_no_output(video: Path, sd2: Sd2) -> None:
     told = json.loads(sd2("fit", video, "--people", "list", "--json").out)["people"]
     assert [each["number"] for each in told] == [1, 2]

@@ -166,6 +166,7 @@ def _frames(out: Path) -> int:
     return open_recording(out).load_capture().frame_count if there else 0
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
 def test_killed_continued_and_interrupted(tmp_path: Path) -> None:
     out = tmp_path / "walk.sd2"

@@ -93,6 +93,7 @@ def test_a_batch_makes_its_folder_with_those_above(tmp_path: Path) -> None:
         BatchFolder(tmp_path / "notes" / "today").prepare()
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize(
     "words",
     [

@@ -42,6 +42,7 @@ def felt_by(one: Source, places: tuple[str, ...] = PLACES) -> Source:
     return replace(one, imu=imu)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("ending", [".zarr", ".h5", ".npz"])
 def test_channels_are_written_and_read(tmp_path: Path, ending: str) -> None:
     out = tmp_path / f"set{ending}"

@@ -360,6 +360,7 @@ def long_pairs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("chunk", ["radar/c/1/0", "times_s/c/1", "limbs/c/1/0/0"])
 def test_frames_of_pairs_in_damaged_chunks_are_in_no_segment_and_counted(
     tmp_path: Path, long_pairs: Path, chunk: str

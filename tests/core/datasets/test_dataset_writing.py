@@ -120,6 +120,7 @@ def test_the_three_formats_hold_the_same(whole: Callable[[str], Path]) -> None:
             assert np.array_equal(values, found[0][name])
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_writing_again_adds_only_what_is_new(
     tmp_path: Path, whole: Callable[[str], Path], ending: str

@@ -85,6 +85,7 @@ def test_windowed_models_have_no_state(name: str) -> None:
         model.initial_state()
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("name", SMALL)
 @pytest.mark.parametrize(("frames", "bins"), [(72, 20), (7, 32), (1, 5)])
 def test_any_length_and_any_number_of_bins(name: str, frames: int, bins: int) -> None:

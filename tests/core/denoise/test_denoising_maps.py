@@ -45,6 +45,7 @@ def test_what_is_weaker_than_the_floor_is_empty(name: str) -> None:
     assert not ((live_frames > 0) & (live_frames < floor)).any()
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("name", SMALL)
 def test_where_nothing_moves_there_is_nothing(name: str) -> None:
     values = energies(90)
@@ -85,6 +86,7 @@ def test_without_denoising_levels_are_brought_together() -> None:
     np.testing.assert_array_equal(denoiser.denoise_values(values), expected)
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("name", CAUSAL)
 @pytest.mark.parametrize("frames", [1, 15, 32, 33, 64, 65, 100])
 def test_chunks_of_long_maps_change_nothing(name: str, frames: int, short_chunks: None) -> None:
@@ -100,6 +102,7 @@ def test_chunks_of_long_maps_change_nothing(name: str, frames: int, short_chunks
     )
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", CAUSAL)
 def test_live_equals_batch(name: str, short_chunks: None) -> None:
     denoiser, values = trained(name), energies(70)
@@ -141,6 +144,7 @@ def test_live_windows_answer_for_the_newest_frame(name: str) -> None:
         np.testing.assert_allclose(frames[last], batch[-1], rtol=1e-3, atol=1e-5 * batch.max())
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("name", [*CAUSAL, *WINDOWED])
 def test_live_forgets_where_nobody_is(name: str) -> None:
     denoiser, values = trained(name), energies(30)

@@ -38,6 +38,7 @@ def columns(doppler: DopplerMap) -> NDArray[np.float32]:
     return doppler.limbs.inputs(PARTS)
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("name", NETWORKS)
 @pytest.mark.parametrize(("frames", "bins"), [(72, 32), (7, 20)])
 def test_all_of_the_parts_count(name: str, frames: int, bins: int) -> None:

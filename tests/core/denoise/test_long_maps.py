@@ -42,6 +42,7 @@ _TIMES = {
 }
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("times_s", _TIMES.values(), ids=_TIMES.keys())
 @pytest.mark.parametrize("model", ["s4", "unet"])
 def test_blocks_give_what_the_whole_map_gives(

@@ -156,6 +156,7 @@ def test_no_step_is_too_small_or_too_large(precision: torch.dtype, length: int) 
         assert values.isfinite().all()
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("length", [1, 2, 9, 40])
 def test_derivatives_of_the_low_rank_kernel(length: int) -> None:
     pairs = 3

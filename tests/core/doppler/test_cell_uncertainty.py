@@ -70,6 +70,7 @@ def by_chance(
     return maps.mean(axis=0), maps.std(axis=0)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     "options",
     [

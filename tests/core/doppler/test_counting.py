@@ -63,6 +63,7 @@ def restated(mesh: MeshSequence, chosen: SynthesisOptions, sensor: VirtualSensor
     return values
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize(
     "changes",
     [
@@ -96,6 +97,7 @@ def test_against_numpy(changes: dict[str, Any]) -> None:
     assert (difference > 1e-5 * expected.max()).mean() < 0.01
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("visibility", ["none", "facing", "exact"])
 @pytest.mark.parametrize(
     "changes",

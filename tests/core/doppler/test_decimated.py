@@ -67,6 +67,7 @@ def test_each_vertex_counts_for_those_it_stands_for(beyond: Any, velocity: Any) 
     np.testing.assert_array_equal(stretch.visible_share, 1.0)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("visibility", ["none", "facing", "exact"])
 @pytest.mark.parametrize(
     "changes", [{}, {"range_exponent": 4.0}, {"range_exponent": 4.0, "range_law": "frame"}], ids=str

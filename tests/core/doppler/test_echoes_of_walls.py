@@ -47,6 +47,7 @@ def dot(velocity_mps: tuple[float, float, float], at_m: tuple[float, float, floa
     return moving(np.zeros((1, 3)), None, path, TIMES_S)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("compiled", [True, False])
 @pytest.mark.parametrize("beam", [None, Beam(70.0, 50.0)])
 def test_each_vertex_comes_as_its_segments_say(

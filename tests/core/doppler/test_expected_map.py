@@ -83,6 +83,7 @@ def test_one_vertex_is_a_normal_distribution(
         assert found.sum() == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("sigma_bins", [0.02, 0.1, 0.3, 0.5, 0.7, 1.0, 3.0])
 @pytest.mark.parametrize("beyond", ["drop", "wrap", "clip"])
 def test_it_is_what_spreading_each_vertex_gives(sigma_bins: float, beyond: Any) -> None:
@@ -91,6 +92,7 @@ def test_it_is_what_spreading_each_vertex_gives(sigma_bins: float, beyond: Any) 
     assert off(raw_of(mesh, options), reference_stretch(mesh, ASIDE, options, 0, FRAMES)) < 2e-3
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     "changes",
     [
@@ -121,6 +123,7 @@ def test_a_vertex_that_stands_for_several_counts_as_many() -> None:
     assert off(found.raw, reference_stretch(mesh, ASIDE, options, 0, FRAMES)) < 2e-3
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("beyond", ["drop", "wrap", "clip"])
 @pytest.mark.parametrize("visibility", ["none", "facing", "depth", "exact"])
 def test_what_is_known_is_the_plain_map(visibility: Any, beyond: Any) -> None:

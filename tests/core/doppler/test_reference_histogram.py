@@ -153,6 +153,7 @@ def most_each(
     return most
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("beyond", ["drop", "wrap", "clip"])
 @pytest.mark.parametrize(
     "changes",

@@ -59,6 +59,7 @@ def test_those_apart_add_up_to_the_last_bit(visibility: Any) -> None:
     np.testing.assert_array_equal(raw(together(one, other), visibility), alone[0] + alone[1])
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("compiled", [True, False])
 @OCCLUSION
 def test_who_stands_behind_somebody_is_not_seen(

@@ -41,6 +41,7 @@ def mesh() -> MeshSequence:
 PART = (6, 16)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", OTHERS)
 def test_a_shared_block_changes_no_map(mesh: MeshSequence, name: str) -> None:
     first, sensor = Synthesizer(mesh, BASE), VirtualSensor()
@@ -64,6 +65,7 @@ def test_other_knots_are_not_shared(mesh: MeshSequence) -> None:
     assert other.prepared.budget is not first.prepared.budget
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("other", "shared"),
     [
@@ -106,6 +108,7 @@ def scene(by_m: Vector, other: MeshSequence = BREATHING) -> MeshSequence:
     return decimate(replace(SWAYING, others=(shifted(other, by_m),)), 0.5)
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("visibility", ["none", "facing", "depth", "exact"])
 @pytest.mark.parametrize("changes", [{}, {"mask_stride": 3}, {"count": "expected"}], ids=str)
 def test_a_body_that_is_put_elsewhere_takes_its_blocks_along(

@@ -42,6 +42,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> tuple[MeshSequence, M
     return mesh, MeshSequence(stored, mesh.faces, mesh.timebase, "zarr")
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize(
     "changes",
     [

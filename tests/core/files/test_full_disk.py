@@ -99,6 +99,7 @@ WRITERS: dict[str, Callable[[Path], object]] = {
 }  # fmt: skip
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("name", WRITERS)
 def test_names_the_file_and_what_to_do(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
@@ -112,6 +113,7 @@ def test_names_the_file_and_what_to_do(name: str, tmp_path: Path) -> None:
     assert path.exists()
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize(
     "name", [name for name in WRITERS if name.startswith(("l", "map", "m.npz", "m.zarr.zip", "f."))]
 )

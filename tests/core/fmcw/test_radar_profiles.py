@@ -43,6 +43,7 @@ def plate(velocity_mps: float, range_m: float = 2.0, seconds: float = 0.7) -> Me
     return MeshSequence(vertices.astype(np.float32), faces, Timebase(times_s))
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("name", RADARS)
 @pytest.mark.parametrize("velocity_mps", [0.9, -0.9])
 def test_a_known_motion_is_shown_at_its_velocity(name: str, velocity_mps: float) -> None:

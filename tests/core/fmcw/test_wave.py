@@ -231,6 +231,7 @@ def test_bends_are_followed_to_first_order() -> None:
     assert even[2] < 0.3 * even[1]
 
 
+@pytest.mark.slow
 def test_a_facet_that_bends_much_is_cut() -> None:
     phase, weight, bend = (3.0, 0.0, 7.0), (0.9, 1.0, 1.1), (1.5, 0.8, 2.0)
     wanted = cut_mean(phase, weight, bend)

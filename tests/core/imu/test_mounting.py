@@ -94,6 +94,7 @@ def test_the_right_side_mirrors_the_left(body: Body) -> None:
             np.testing.assert_allclose(right.rotation, expected, atol=0.02)
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("place", PLACES)
 def test_a_sensor_turns_and_moves_with_the_whole_body(body: Body, place: str) -> None:
     rotations = at_rest(body, FRAMES)

@@ -126,6 +126,7 @@ def test_one_file_per_frame(tmp_path: Path, value: float) -> None:
         load_mesh(tmp_path)
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("suffix", [".npz", ".zarr"])
 @pytest.mark.parametrize(
     ("dtype", "kept"),

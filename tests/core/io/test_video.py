@@ -53,6 +53,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("videos")
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("name", FILES)
 def test_random_access_is_frame_exact(folder: Path, name: str, listing: str) -> None:
     frames, how = FILES[name]
@@ -494,6 +495,7 @@ def test_listing_can_be_cancelled(tmp_path: Path) -> None:
         open_video(path, progress=stop)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("name", "frames", "notes"),
     [

@@ -151,6 +151,7 @@ def test_a_station_films_and_receives_take_after_take(tmp_path: Path) -> None:
     assert starts_s[1] - starts_s[0] > 0.6
 
 
+@pytest.mark.slow
 def test_a_replayed_radar_and_a_played_video_begin_anew_with_each_take(tmp_path: Path) -> None:
     capture = fast_swipes(20, 100.0)
     film = tmp_path / "film.mp4"

@@ -181,6 +181,7 @@ def test_somebody_at_the_end_of_the_range(walked: tuple[list[Seen], list[Moved]]
     assert "Step closer" in failures(beyond, walked[1])["range"]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("centre", [0.25, 0.5, 0.7])
 def test_a_radar_beside_the_camera_is_found_there(
     walked: tuple[list[Seen], list[Moved]], centre: float
@@ -242,6 +243,7 @@ def test_the_command_with_test_sources_records_nothing(tmp_path: Path) -> None:
     assert abs(told["place"]["azimuth_deg"]) < 3.0
 
 
+@pytest.mark.slow
 def test_what_was_found_is_told_as_it_comes_and_q_ends_it() -> None:
     words = ["--camera", "test", "--radar", "test", "--seconds", "300", "--json", "--previews"]
     command = [sys.executable, "-m", "sd2core.cli", "record", "--check", *words]

@@ -213,6 +213,7 @@ def test_what_cannot_be_is_refused_before_anything_is_made(tmp_path: Path, capsy
     assert not (tmp_path / "some").exists()
 
 
+@pytest.mark.slow
 def test_a_session_that_goes_on_elsewhere_is_not_joined(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -208,6 +208,7 @@ def test_what_was_recorded_is_not_recorded_over(tmp_path: Path, capsys) -> None:
     assert "take.sd2 exists. Expected: a new folder." in refused(out, "test", capsys)
 
 
+@pytest.mark.slow
 def test_a_radar_that_is_silent_leaves_the_video(tmp_path: Path) -> None:
     out, setup = tmp_path / "take.sd2", tmp_path / "walk.cfg"
     setup.write_text(cfg_of(TiRecording()), encoding="utf-8")

@@ -90,6 +90,7 @@ def _mean_mps(values: np.ndarray) -> np.ndarray:
     return (values @ AXIS.centres_mps)[total > 0] / total[total > 0]
 
 
+@pytest.mark.slow
 def test_pairs_say_what_they_are(pairs: PairSet) -> None:
     assert pairs.kind == "real"
     assert pairs.subjects == ("7", "8")

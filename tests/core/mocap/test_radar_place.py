@@ -34,6 +34,7 @@ def seen(position_m: tuple[float, float], offset_s: float, noise_mps: float = 0.
     return Seen(times_s, points_m(times_s), velocity_mps)
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(x=st.floats(-0.4, 0.4), y=st.floats(-0.5, 1.0), offset_s=st.floats(-0.12, 0.12))
 def test_place_and_clock_are_found(x: float, y: float, offset_s: float) -> None:

@@ -58,6 +58,7 @@ def put(value: Any) -> Any:
     return change
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("column", "value"),
     [("subject", 700_000_000), ("subject", -1), ("segment_label", 30_000), ("label", -1),

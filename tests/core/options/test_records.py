@@ -105,6 +105,7 @@ def records(draw: st.DrawFn, kind: type[OptionRecord]) -> OptionRecord:
             values.pop(optional[-1])
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("command", RECORDS)
 @given(data=st.data())
 @hypothesis_settings(max_examples=15)

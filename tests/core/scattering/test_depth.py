@@ -74,6 +74,7 @@ def walker(shared_data: Path) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         return data["vertices"][[5, 40]], np.ascontiguousarray(data["faces"])
 
 
+@pytest.mark.one_in(5)
 @FORMS
 @pytest.mark.parametrize("sensor", OUTSIDE)
 @pytest.mark.parametrize("resolution", [128, 256])

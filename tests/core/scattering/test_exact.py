@@ -67,6 +67,7 @@ def walker(shared_data: Path) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         return data["vertices"][[5, 40]], np.ascontiguousarray(data["faces"])
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("sensor", NEAR_AND_FAR + INSIDE)
 @pytest.mark.parametrize("name", SCENES)
 def test_every_certain_vertex_is_right(name: str, sensor: tuple[float, ...]) -> None:
@@ -114,6 +115,7 @@ BODY_PLACES = [
 ]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("sensor", BODY_PLACES)
 def test_walker_against_embree(
     walker: tuple[NDArray[np.float32], NDArray[np.int32]], sensor: tuple[float, ...]

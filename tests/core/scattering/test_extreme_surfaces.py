@@ -144,6 +144,7 @@ def places(size_m: float, points: NDArray[np.float32]) -> dict[str, NDArray[np.f
     return found
 
 
+@pytest.mark.one_in(5)
 @ANY_SIZE
 @ANY_SURFACE
 def test_exact_visibility_is_right_wherever_it_is_certain(name: str, size_m: float) -> None:
@@ -172,6 +173,7 @@ def test_exact_visibility_is_right_wherever_it_is_certain(name: str, size_m: flo
     assert certainties > len(some)
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("form", LOOKS)
 @ANY_SURFACE
 def test_a_scene_a_thousand_times_as_large_looks_the_same(name: str, form: str) -> None:
@@ -185,6 +187,7 @@ def test_a_scene_a_thousand_times_as_large_looks_the_same(name: str, form: str) 
             np.testing.assert_array_equal(scaled, usual, err_msg=place)
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("form", ["exact", "depth", "facing"])
 @ANY_SIZE
 @ANY_SURFACE
@@ -198,6 +201,7 @@ def test_compiled_and_plain_agree(name: str, size_m: float, form: str) -> None:
         assert (compiled != plain).sum() <= 2, place
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("size_m", SIZES_M)
 @pytest.mark.parametrize("distance_m", DISTANCES_M)
 @pytest.mark.parametrize("form", ["depth", "depth plainly", "facing", "facing plainly"])

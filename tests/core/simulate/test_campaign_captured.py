@@ -90,6 +90,7 @@ def test_a_subject_moves_as_one_of_the_people(motions: Path, number: int, person
     assert longest <= 30.0 * SECONDS[person] * 1.25
 
 
+@pytest.mark.slow
 def test_takes_repeat_are_turned_and_keep_away(motions: Path) -> None:
     maker = TakeMaker(campaign(motions))
     made = [maker.make(0, number)[0] for number in range(6)]

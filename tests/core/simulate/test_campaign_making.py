@@ -51,6 +51,7 @@ def same(one: PairSet, other: PairSet) -> bool:
     )
 
 
+@pytest.mark.slow
 def test_takes_are_of_everybody_in_turn(whole: Path) -> None:
     pairs = read_pairs(whole)
     assert pairs.kind == "simulated"

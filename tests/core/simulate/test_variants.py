@@ -91,6 +91,7 @@ def test_simulated_pairs_of_a_scene_have_the_labels_of_recorded_ones(tmp_path: P
     assert made.provenance["scenes"] == recorded.provenance["scenes"]
 
 
+@pytest.mark.slow
 def test_places_and_shapes_are_drawn_and_drawn_alike_again(tmp_path: Path) -> None:
     one = swaying(tmp_path / "anna.sd2", frames=40)
     (own,) = vary(one, tmp_path / "places.zarr", "places").takes

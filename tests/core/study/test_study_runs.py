@@ -55,6 +55,7 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return made
 
 
+@pytest.mark.slow
 def test_a_study_is_whole_and_goes_on(plan: Path, in_this_process: list[int]) -> None:
     chosen = read_study(plan).model_copy(update={"shares": (1.0,)})
     steps: list[tuple[int, int]] = []

@@ -100,6 +100,7 @@ def test_a_click_chooses_a_model_and_the_track_appears(window, qtbot):
     assert not tracks.denoised.isVisible()
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("fits", [True, False])
 def test_a_map_that_comes_later_moves_nothing(
     empty_window, fake_models, qtbot, small_recording, fits

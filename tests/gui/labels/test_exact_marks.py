@@ -73,6 +73,7 @@ def turn_to(window, qtbot, time_s: float) -> None:
     qtbot.waitUntil(lambda: playback.time_s >= time_s, timeout=5000)
 
 
+@pytest.mark.one_in(2)
 @RATES
 def test_a_mark_has_the_time_of_the_frame_that_is_shown(
     empty_window, qtbot, tmp_path, rate: str

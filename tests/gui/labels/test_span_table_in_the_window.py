@@ -267,6 +267,7 @@ def test_statistics_are_counted_and_copied(labelled) -> None:
     assert QGuiApplication.clipboard().text().splitlines()[0].startswith("label\tspans\t")
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("size", [(1280, 720), (1600, 1000), (2560, 1440)])
 def test_statistics_need_no_scrolling(labelled, size) -> None:
     labelled.resize(*size)
@@ -298,6 +299,7 @@ def test_the_panel_is_as_wide_as_its_table_needs_and_others_are_as_before(labell
     assert labelled.side.width() == chosen
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("size", [(1000, 640), (1280, 720), (1600, 1000), (2560, 1440)])
 def test_the_usual_columns_need_no_scrolling(labelled, size) -> None:
     labelled.resize(*size)

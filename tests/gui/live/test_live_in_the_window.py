@@ -65,6 +65,7 @@ def button(window, text: str) -> QToolButton:
     return found
 
 
+@pytest.mark.slow
 def test_a_radar_is_listened_to_labelled_stopped_and_continued(
     empty_window, qtbot, monkeypatch, capture, tmp_path
 ):

@@ -62,6 +62,7 @@ def test_what_cannot_be_recorded_cannot_be_copied_as_a_command(parent, tmp_path)
     assert not copy.isEnabled()
 
 
+@pytest.mark.slow
 def test_the_place_that_is_found_goes_with_what_is_recorded(parent, qtbot) -> None:
     setup = ListenSetup(Settings.forgetful(), parent)
     setup.choose("way", "test")

@@ -67,6 +67,7 @@ def button(manual: ManualWindow, name: str) -> QToolButton:
     return next(one for one in manual.findChildren(QToolButton) if one.accessibleName() == name)
 
 
+@pytest.mark.one_in(11)
 @pytest.mark.parametrize("name", MANUAL.titles)
 def test_every_page_is_shown_with_its_headings_in_the_column(manual, name: str) -> None:
     show(manual, name)

@@ -333,6 +333,7 @@ def test_hiding_the_view_ends_a_drag(stage: Stage) -> None:
     assert stage.log == ["begin", "end"]
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("mode", ["velocity", "range"])
 @pytest.mark.parametrize(
     ("vertices", "sensor"),

@@ -49,6 +49,7 @@ def active(window, qtbot):
     return window
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("text", "metres"),
     [("250cm", 2.5), ("2500 mm", 2.5), ("2,5", 2.5), ("1.75 m", 1.75), ("3", 3.0), ("0.2", 0.2)],
@@ -63,6 +64,7 @@ def test_a_range_is_understood(active, text: str, metres: float) -> None:
     models_of(active).document.undo_stack.undo()
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -7,6 +7,7 @@ from answering import once_asked
 from PySide6.QtWidgets import QDialog, QPushButton
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("action", "title", "primary"),
     [

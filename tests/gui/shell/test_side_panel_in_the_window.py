@@ -120,6 +120,7 @@ def windows(qtbot, compiled_kernels, fake, fake_models, fake_classes, small_reco
     close_window(made[-1])
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("size", [(960, 640), (1280, 720), (2560, 1440)])
 def test_it_stands_beside_scene_and_maps_and_shows_every_icon(sized, size) -> None:
     window = sized(*size)

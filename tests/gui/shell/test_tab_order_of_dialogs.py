@@ -131,6 +131,7 @@ def in_dialog(window: QWidget, action: str, look: Callable[[QWidget], object]) -
         raise errors[0]
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize(
     "action",
     [
@@ -145,6 +146,7 @@ def test_tab_goes_through_a_dialog(window, action) -> None:
     assert found == []
 
 
+@pytest.mark.slow
 def test_tab_goes_through_every_page_at_the_side(window, qtbot) -> None:
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow, timeout=5000)

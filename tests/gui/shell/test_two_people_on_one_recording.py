@@ -97,6 +97,7 @@ def saved_by_another(path, span=THEIRS, without=(), **settings) -> None:
 
 
 class TestTheLockBesideTheRecording:
+    @pytest.mark.slow
     def test_one_with_another_home_sees_who_edits_and_only_looks(
         self, on, other_window, qtbot, recording_copy, small_recording
     ) -> None:

@@ -57,6 +57,7 @@ def test_begun_by_clicks_and_its_conclusion_read(window, page, qtbot):
     assert "--same-people" in runs.run.about["arguments"]
 
 
+@pytest.mark.slow
 def test_a_result_is_opened_and_looked_at(window, page, tmp_path, qtbot, monkeypatch):
     path = tmp_path / "study.json"
     write_report(some_results(tmp_path), tmp_path)

@@ -56,6 +56,7 @@ def test_two_of_each_gesture_apart_and_in_order() -> None:
     assert SPANS[-1].end_s < DURATION_S
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("span", SPANS)
 def test_the_hand_goes_where_the_label_says(
     span: GestureSpan, hand: np.ndarray, times_s: np.ndarray

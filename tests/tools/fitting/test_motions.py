@@ -87,6 +87,7 @@ def test_who_stands_still_does_not_move_at_all(space: ShapeSpace) -> None:
         assert np.ptp(known.transforms, axis=0).max() == 0.0
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", ["walk", "walk-aside", "turn", "turn-other"])
 def test_feet_stand_on_the_floor_and_do_not_slide(
     name: str, space: ShapeSpace, keypoint_space: KeypointSpace

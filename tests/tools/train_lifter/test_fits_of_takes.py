@@ -13,6 +13,7 @@ from tools.train_lifter.fits import fit_law, fitted_takes, repaired
 from tools.train_lifter.takes import Take
 
 
+@pytest.mark.slow
 def test_what_is_right_stays_and_what_jumps_away_comes_back(takes: list[Take]) -> None:
     take = takes[0]
     np.testing.assert_allclose(repaired(take).image_px, take.image_px, atol=1e-3)

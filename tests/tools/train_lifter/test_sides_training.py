@@ -23,6 +23,7 @@ def right(takes: list[Take]) -> list[Take]:
     ]
 
 
+@pytest.mark.slow
 def test_what_is_mirrored_is_known_by_the_truth(right: list[Take]) -> None:
     for number, members in enumerate(SIDED_PARTS.values()):
         rows = list(members)

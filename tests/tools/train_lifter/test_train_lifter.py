@@ -85,6 +85,7 @@ def test_what_is_drawn_lies_where_it_is_seen() -> None:
     np.testing.assert_allclose(area, (0.4 * 250.0) * (0.6 * 250.0), rtol=0.01)
 
 
+@pytest.mark.slow
 def test_takes_come_back_from_disk(takes: list[Take], tmp_path: Path) -> None:
     takes[0].save(tmp_path / "take.npz")
     back = Take.load(tmp_path / "take.npz")
