@@ -120,6 +120,7 @@ def test_a_source_that_ends_ends_it(session, tmp_path, qtbot):
     assert_shows(session, tmp_path / "walk.sd2")
 
 
+@pytest.mark.slow
 def test_edits_while_listening_stay_and_can_be_taken_back(session, endless, tmp_path, qtbot):
     request = ListenRequest(tmp_path / "walk.sd2", replay=endless)
     model = heard(session, request, qtbot, 3)

@@ -67,6 +67,7 @@ def test_a_fast_hand_requires_wrapping() -> None:
     assert share == pytest.approx(expected, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_slow_hand_does_not_require_wrapping() -> None:
     found = reason(chosen(ball(swinging((0, 0, 2), 1.5, 0.7))), "aliasing")
     assert not found.modelled
@@ -103,6 +104,7 @@ def test_a_long_body_near_the_sensor_requires_the_range_law() -> None:
     assert choice.plan.range_law == "vertex"
 
 
+@pytest.mark.slow
 def test_a_small_body_far_away_does_not_require_the_range_law() -> None:
     scene = ball(APPROACHING, radius_m=0.005)
     survey = survey_scene(scene, CAMERA, PAPER)

@@ -110,6 +110,7 @@ def test_stretches_of_a_person_are_joined(
             np.testing.assert_allclose(dataset[name][:], values, rtol=1e-5, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_whom_else_labels_name_is_denoised_alone(tmp_path: Path, scenes: Path) -> None:
     one = scene(scenes / "duo.sd2", WHO[:1])
     run(tmp_path, PLAN + EXPORT)

@@ -235,6 +235,7 @@ def test_the_shortest_clips(frames: int) -> None:
     assert away.mean() < 0.04
 
 
+@pytest.mark.slow
 def test_windows_join_without_a_step(fitted: BodyFit, fitted_in_windows: BodyFit) -> None:
     found = fitted_in_windows
     away = np.linalg.norm(found.keypoints_m - fitted.keypoints_m, axis=-1)

@@ -58,6 +58,7 @@ def test_every_command_makes_the_same_map(
     _made_elsewhere(sd2, fitted, tmp_path, made, count)
 
 
+@pytest.mark.slow
 def test_everywhere_the_same_things_stand_before_it(sd2: Sd2, fitted: Path, tmp_path: Path) -> None:
     """A screen from x = 0.1 m on hides a corner of the octahedron."""
     assert sd2("synth", fitted, "--out", tmp_path / "free.npz").code == 0
@@ -77,6 +78,7 @@ def test_everywhere_the_same_things_stand_before_it(sd2: Sd2, fitted: Path, tmp_
     _made_by_a_batch(sd2, tmp_path, narrow)
 
 
+@pytest.mark.slow
 def test_everywhere_the_same_people_are_in_it(sd2: Sd2, fitted: Path, tmp_path: Path) -> None:
     """Somebody beside who does the same counts as much, but for the law of range."""
     assert sd2("synth", fitted, "--out", tmp_path / "alone.npz").code == 0

@@ -45,6 +45,7 @@ def test_other_things_are_not_written_over(sd2: Sd2, tmp_path: Path) -> None:
     assert "holds no pairs" in outcome.err
 
 
+@pytest.mark.slow
 def test_info_says_the_protocol_and_no_other_goes_on(sd2: Sd2, tmp_path: Path) -> None:
     out = tmp_path / "one.zarr"
     made = sd2("simulate", "campaign", "--out", out, *SHORT, "--protocol", "paper", "--json")

@@ -45,6 +45,7 @@ def test_segments_are_put_together_again(
         np.testing.assert_array_equal(clip.label, one.label)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("rate_hz", [29.52, 29.97, 30.4])
 def test_a_camera_that_is_not_quite_on_time_gives_whole_clips(
     tmp_path: Path, rate_hz: float

@@ -103,6 +103,7 @@ def test_a_data_set_without_its_list_of_sources_is_not_written_over(tmp_path: Pa
     assert tree(out) == before
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("damage", [cut, change, lose])
 def test_segments_of_a_damaged_chunk_are_named_and_the_others_are_read(
     tmp_path: Path, damage: Callable[[Path], None]

@@ -156,6 +156,7 @@ def test_a_recording_that_is_shown_without_a_denoiser_has_no_denoised_map(tmp_pa
     assert lazily.outline().kinds == ("synthetic",)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("kind", ["simulated", "real"])
 def test_pairs_are_taken_take_by_take(tmp_path: Path, kind: str) -> None:
     path = write_pairs(tmp_path / "p.zarr", ("s1", "s2"), kind=kind, placements=2)

@@ -86,6 +86,7 @@ def test_a_folder_is_what_it_holds(tmp_path: Path) -> None:
     assert people_of([labelled_facts(one) for one in found]) == ("anna",)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("ending", [".zarr", ".h5", ".npz"])
 def test_a_data_set_says_who_does_what(tmp_path: Path, ending: str) -> None:
     facts = labelled_facts(LabelledSource(a_set(tmp_path / f"s{ending}", "a", "b", placements=2)))

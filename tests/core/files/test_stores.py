@@ -348,6 +348,7 @@ def change_text(path: Path, before: str, after: str) -> None:
     path.write_text(text.replace(before, after, 1))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("how", ["reading", "writing"])
 def test_the_end_of_a_process_waits_for_zarr_on_a_busy_machine(tmp_path: Path, how: str) -> None:
     path = store(tmp_path / "a.zarr")

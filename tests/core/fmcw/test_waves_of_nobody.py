@@ -44,6 +44,7 @@ def holed(whole: MeshSequence) -> MeshSequence:
     return replace(whole, vertices=np.asarray(whole.vertices)[held], present=THERE)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("motion", ["constant", "interpolated"])
 def test_nobody_sends_nothing_back_and_the_others_what_they_did(
     whole: MeshSequence, holed: MeshSequence, motion: str

@@ -209,6 +209,7 @@ def test_no_place_is_found_where_range_or_view_is_in_doubt(
     assert found_place(check_place(wave, walked[0], walked[1])) is None
 
 
+@pytest.mark.slow
 def test_movements_that_have_nothing_to_do_with_each_other_rarely_agree() -> None:
     rng = np.random.default_rng(3)
     times_s = np.arange(0.0, LENGTH_S, 0.05)

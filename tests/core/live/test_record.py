@@ -167,6 +167,7 @@ def _children(pid: int) -> list[int]:
     return [one.pid for one in psutil.Process(pid).children()]
 
 
+@pytest.mark.slow
 def test_a_video_that_is_deleted_is_put_back(tmp_path: Path) -> None:
     folder = tmp_path / "take"
     folder.mkdir()

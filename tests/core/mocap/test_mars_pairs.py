@@ -122,6 +122,7 @@ def test_limb_maps_add_up(pairs: PairSet) -> None:
         np.testing.assert_allclose(total, take.synthetic, rtol=1e-4, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_given_place_is_used(folders: list[Path], tmp_path: Path) -> None:
     """From below, who approaches is slower along the line of sight."""
     place = RadarPlace((0.0, 1.5, 0.0), 0.1)

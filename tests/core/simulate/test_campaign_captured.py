@@ -63,6 +63,7 @@ def speeds(take: Take) -> np.ndarray:
     return found
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("number", "person"), [(0, "ann"), (1, "bob"), (2, "ann")])
 def test_a_subject_moves_as_one_of_the_people(motions: Path, number: int, person: str) -> None:
     captured = CapturedMotions(motions, "learn", SPACE)

@@ -80,6 +80,7 @@ def test_another_look_and_a_perfect_fit_are_of_the_same_motion(whole: Path) -> N
     assert 0.5 < one.radar.sum() / other.radar.sum() < 2.0
 
 
+@pytest.mark.slow
 def test_errors_of_fits_of_another_size(whole: Path) -> None:
     """None at 0, as measured at 1; the radar's maps and the motion are the same at any size."""
     bundled = FitErrors.load()

@@ -62,6 +62,7 @@ def test_what_approaches_is_positive(approach_mps: float, options: TargetOptions
     np.testing.assert_allclose(peak, approach_mps, atol=AXIS.bin_width_mps)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("approach_mps", [0.9, -0.6])
 def test_i_and_q_show_what_real_samples_do(approach_mps: float) -> None:
     both = replace(PAPER_RADAR, sampling="complex")
@@ -95,6 +96,7 @@ def test_nulled_bins_are_empty_and_noise_alone_leaves_nothing() -> None:
     assert np.mean(np.delete(noisy, NULLED, axis=1) != 0.0) > 0.9
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("clutter", "shown"), [("mean", True), (CLUTTER, False)])
 def test_a_trunk_that_sways_leaves_no_ridge_beside_the_nulled_bins(
     monkeypatch: pytest.MonkeyPatch, clutter: Clutter, shown: bool

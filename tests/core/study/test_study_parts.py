@@ -98,6 +98,7 @@ def test_more_video_is_of_its_people_or_of_others(store: Path, tmp_path: Path) -
     assert len(found.real) == 12  # What is filmed only is never judged.
 
 
+@pytest.mark.slow
 def test_frames_in_damaged_chunks_are_left_out_and_told(tmp_path: Path) -> None:
     damaged = write_pairs(tmp_path / "pairs.zarr", takes=6)
     lose(damaged / "radar" / "c" / "1" / "0")  # frames 2250 to 2699, the last ones of s3

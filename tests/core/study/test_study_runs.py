@@ -109,6 +109,7 @@ def test_the_page_says_what_was_found_and_what_was_not_tried(
     assert any("mirrored" in one for one in untried(results))
 
 
+@pytest.mark.slow
 def test_a_denoiser_that_cannot_learn_is_said(
     plan: Path, in_this_process: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:

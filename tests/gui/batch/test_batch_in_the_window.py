@@ -173,6 +173,7 @@ def test_a_batch_is_set_up_started_and_its_results_opened(
     assert button(dialog, "Start")
 
 
+@pytest.mark.slow
 def test_delete_takes_a_recording_from_the_list_and_says_what_is_missing(opened, qtbot):
     window = opened()
     dialog = begin(window)
@@ -209,6 +210,7 @@ def test_failures_and_their_reasons_are_shown_and_a_batch_is_stopped(opened, qtb
     assert not button(dialog, "Stop").isEnabled()
 
 
+@pytest.mark.slow
 def test_placements_of_the_recording_or_of_a_file_are_taken(opened, qtbot, tmp_path, monkeypatch):
     window = opened()
     context = models_of(window)

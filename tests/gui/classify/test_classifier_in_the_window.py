@@ -114,6 +114,7 @@ def test_the_readout_follows_keys_and_clicks(classified, qtbot):
     classified.grab()  # all of it can be painted
 
 
+@pytest.mark.slow
 def test_what_belongs_to_another_sensor_is_not_shown_as_current(classified, fake_classes, qtbot):
     c, readout = models_of(classified), classified.findChild(ClassReadout)
     before = readout.text
@@ -213,6 +214,7 @@ def test_an_edge_is_dragged_before_it_is_accepted(classified, qtbot):
     assert (shorter.origin, shorter.confidence) == ("suggestion", span.confidence)
 
 
+@pytest.mark.slow
 def test_how_sure_it_must_be_is_typed(classified, qtbot):
     c, bar = models_of(classified), classified.findChild(SuggestionBar)
     found(classified, qtbot)
@@ -306,6 +308,7 @@ def test_trained_by_clicks_watched_and_used(trainable, fake_classes, qtbot):
     assert training.run is None
 
 
+@pytest.mark.slow
 def test_a_person_is_typed_and_who_does_what_is_said(trainable, tmp_path, qtbot):
     training, panel = models_of(trainable).class_training, trainable.findChild(ClassPanel)
     setup = training.setup

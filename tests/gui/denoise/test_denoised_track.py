@@ -242,6 +242,7 @@ def test_the_model_before_stands_below_this_one(denoised, qtbot):
     assert not tracks.before.isVisible()
 
 
+@pytest.mark.slow
 def test_the_spectrum_has_a_curve_of_it(denoised, qtbot):
     view, c = denoised.findChild(SpectrumView), models_of(denoised)
 

@@ -273,6 +273,7 @@ def image_format():
     return QImage.Format.Format_RGB32
 
 
+@pytest.mark.slow
 def test_a_failure_is_shown_and_put_away(made, qtbot, video) -> None:
     window = made("--refuse", "There is nobody in walk.mp4. Film a person.")
     show(window, qtbot, video)
@@ -374,6 +375,7 @@ def test_the_key_asks_for_a_video(made, qtbot, monkeypatch) -> None:
     assert not models_of(window).fit.busy
 
 
+@pytest.mark.slow
 def test_no_offer_where_there_is_a_mesh_or_it_was_declined(made, qtbot, video, small_recording):
     window = made()
     offer = window.findChild(FitOffer)

@@ -244,6 +244,7 @@ def test_taken_in_the_window_it_is_made_smooth_and_undone(labelled, qtbot, files
     assert not c.document.modified
 
 
+@pytest.mark.slow
 def test_files_that_were_open_lately_are_read_as_then_and_nobody_is_asked(
     empty_window, qtbot, files
 ):
@@ -272,6 +273,7 @@ def test_files_that_were_open_lately_are_read_as_then_and_nobody_is_asked(
     qtbot.waitUntil(lambda: window.settled, timeout=30_000)
 
 
+@pytest.mark.slow
 def test_the_camera_of_the_video_is_still_known_with_another_mesh(
     labelled, qtbot, tmp_path, monkeypatch
 ):

@@ -79,6 +79,7 @@ def test_what_is_not_known_has_no_colour_until_a_key_gives_it(fitted, qtbot, tmp
     assert c.pointer.reading.deviation is None
 
 
+@pytest.mark.slow
 def test_it_follows_the_sensor_and_is_remembered(fitted, qtbot):
     c, view = models_of(fitted), fitted.findChildren(HeatmapView)[0]
     button = next(
@@ -117,6 +118,7 @@ def test_without_knowledge_the_action_says_why(window, qtbot):
     assert models_of(window).synthetic.uncertainty is None
 
 
+@pytest.mark.slow
 def test_closing_while_it_is_found_is_safe(fitted, qtbot):
     for _ in range(2):  # off, and on again
         qtbot.keyClick(fitted, Qt.Key.Key_U)

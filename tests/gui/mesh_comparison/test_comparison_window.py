@@ -124,6 +124,7 @@ def test_the_keys_of_the_main_window_work_here(compared, empty_window, qtbot):
     assert playback.frame == before + 1
 
 
+@pytest.mark.slow
 def test_the_other_one_can_be_the_reference(compared, qtbot):
     choice = compared.findChild(QComboBox)
     qtbot.keyClick(choice, Qt.Key.Key_Down)
@@ -165,6 +166,7 @@ def test_the_figure_is_written(compared, qtbot, tmp_path, monkeypatch):
     assert "<svg" in path.read_text()[:600]
 
 
+@pytest.mark.slow
 def test_another_recording_closes_it(compared, empty_window, meshes, qtbot):
     with qtbot.waitSignal(compared.closed, timeout=20_000):
         empty_window.open_paths([meshes[1]])

@@ -116,6 +116,7 @@ def test_the_offset_is_found_shown_applied_and_taken_back(window, qtbot, motion)
     assert models.document.recording.radar_offset_s == 0.0
 
 
+@pytest.mark.slow
 def test_cancel_changes_nothing(window, qtbot, motion):
     models = models_of(window)
     motion(1.5, 60.0)

@@ -125,6 +125,7 @@ def test_help_in_a_dialog_that_waits_can_be_read(window, manual) -> None:
     dialog.deleteLater()
 
 
+@pytest.mark.slow
 def test_it_closes_with_the_window(empty_window) -> None:
     QTest.keyClick(empty_window, Qt.Key.Key_F1)
     shown = empty_window.features.program.manual.window

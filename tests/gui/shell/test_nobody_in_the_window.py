@@ -103,6 +103,7 @@ def test_nothing_shows_the_pose_that_was_held(window, qtbot):
     assert not window.action("aim_sensor").isEnabled()
 
 
+@pytest.mark.slow
 def test_another_place_has_the_same_gap(window, qtbot):
     before = models_of(window).synthetic.map
     models_of(window).sensor.set_sensor(

@@ -182,6 +182,7 @@ def test_every_way_of_opening_takes_up_a_stopped_fit(empty_window, qtbot, begun_
     assert (begun_fit.folder,) in empty_window.session.settings.recent
 
 
+@pytest.mark.slow
 def test_a_recording_whose_fit_was_stopped_is_opened_itself(empty_window, qtbot, recording_copy):
     c = models_of(empty_window)
     FitRequest(recording_copy / "video.mp4", recording_copy).save()
@@ -222,6 +223,7 @@ def test_hovering_says_what_a_drop_would_do(empty_window, qtbot, small_recording
     assert c.document.capture is not None
 
 
+@pytest.mark.slow
 def test_a_file_of_the_sensor_before_the_a121_is_called_what_it_is(window, qtbot, tmp_path) -> None:
     file = tmp_path / "hand.h5"
     with h5py.File(file, "w") as made:

@@ -121,6 +121,7 @@ class TestTheLockBesideTheRecording:
         save(second, qtbot)
         assert on_disk(recording_copy) == [THEIRS, THERE, MINE, BACK]
 
+    @pytest.mark.slow
     def test_where_the_folder_cannot_be_written_labels_are_edited_all_the_same(
         self, on, qtbot, recording_copy
     ) -> None:
@@ -236,6 +237,7 @@ class TestSavedMeanwhile:
         said = "Both had changed the offset of the radar: yours is kept."
         assert said in window.messages.text
 
+    @pytest.mark.slow
     def test_only_looking_the_labels_of_the_other_are_no_question(
         self, on, other_window, qtbot, recording_copy
     ) -> None:

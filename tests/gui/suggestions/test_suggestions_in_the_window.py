@@ -144,6 +144,7 @@ def test_closed_with_space_it_leaves_the_keyboard_to_the_window(moving, qtbot) -
     playback.pause()
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("size", [(1280, 720), (1600, 1000), (2560, 1440)])
 def test_no_word_of_the_bar_is_cut_short(moving, qtbot, size) -> None:
     moving.resize(*size)
@@ -169,6 +170,7 @@ def test_no_word_of_the_bar_is_cut_short(moving, qtbot, size) -> None:
     moving.resize(1280, 800)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("panel", ["Sensor", "Labels"])
 def test_a_panel_over_the_maps_leaves_the_bar_free(moving, qtbot, panel) -> None:
     moving.resize(1000, 640)
