@@ -83,16 +83,16 @@ def with_bodies(
         raise Sd2Error(f"There are {len(named)} more bodies", f"up to {MAX_BODIES}")
     if mesh.faces is None:
         raise _no_surface(mesh.source or "The mesh")
-    return replace(first, others=tuple(_there(body, mesh) or _placed(body, mesh) for body in named))
+    return replace(first, others=tuple(_known(body, mesh) or _placed(body, mesh) for body in named))
 
 
-def _there(body: Body, scene: MeshSequence) -> MeshSequence | None:
+def _known(body: Body, scene: MeshSequence) -> MeshSequence | None:
     """Body that is in the scene already, moved to its new place; None if its file is to be read."""
-    there = [(other.placed, other) for other in scene.others if other.placed is not None]
-    for placed, other in there:
+    others = [(other.placed, other) for other in scene.others if other.placed is not None]
+    for placed, other in others:
         if placed == body:
             return other
-    for placed, other in there:
+    for placed, other in others:
         if replace(placed, moved_m=body.moved_m, person=body.person) == body:
             return _named(shifted(unshifted(other)[0], body.moved_m), body)
     return None
@@ -133,7 +133,7 @@ def _placed(body: Body, first: MeshSequence) -> MeshSequence:
 
 def at_hand(body: Body, scene: MeshSequence) -> bool:
     """True if a body can be put into a scene without reading its file."""
-    return _there(body, scene) is not None or _file_of(body) in _FILES
+    return _known(body, scene) is not None or _file_of(body) in _FILES
 
 
 def _read(body: Body) -> MeshSequence:

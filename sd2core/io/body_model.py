@@ -139,13 +139,13 @@ def fitted_to(model: BodyModel, turns: Floats) -> Floats:
     count = turns.shape[1]
     if count == model.joint_count:
         return turns
-    there = np.tile(np.eye(3), (len(turns), model.joint_count, 1, 1))
+    rotations = np.tile(np.eye(3), (len(turns), model.joint_count, 1, 1))
     body = min(BODY_JOINTS, count, model.joint_count)
-    there[:, :body] = turns[:, :body]
+    rotations[:, :body] = turns[:, :body]
     fingers = {52: slice(BODY_JOINTS, 52), 55: _HANDS_OF_SMPLX}
     if count in fingers and model.joint_count in fingers:
-        there[:, fingers[model.joint_count]] = turns[:, fingers[count]]
-    return there
+        rotations[:, fingers[model.joint_count]] = turns[:, fingers[count]]
+    return rotations
 
 
 def read_body_model(path: Path) -> BodyModel:

@@ -50,10 +50,10 @@ def people_in(
     Without people, the second is what the file holds instead.
     """
     if path.is_dir():
-        found = numbered_frames(files_of_people(path, notes), person, str(path))
-        notes += found.notes
-        frames = range(len(found.files)) if found.numbers is None else found.numbers.tolist()
-        rows = [_content(file) for file in found.files]
+        listing = numbered_frames(files_of_people(path, notes), person, str(path))
+        notes += listing.notes
+        frames = range(len(listing.files)) if listing.numbers is None else listing.numbers.tolist()
+        rows = [_content(file) for file in listing.files]
         whom = 0 if person is None else person
         numbered = ((frame, whom, row) for frame, row in zip(frames, rows, strict=True))
         return _gathered(numbered), _shared(rows[0])

@@ -79,24 +79,24 @@ def numbered_frames(files: Sequence[Path], person: int | str | None, source: str
     """
     numbers = _numbers_in(files, source)
     if numbers is None or len(numbers) < 2:
-        found = FrameFiles(list(files))
+        listing = FrameFiles(list(files))
         if numbers is None:
-            found.notes.append(
+            listing.notes.append(
                 "The names do not tell frame and person: the files are taken as consecutive frames"
                 " of one person."
             )
         elif numbers:
-            _count(found, numbers[0], numbers[0])
-        return _without_persons(found, person, source)
+            _count(listing, numbers[0], numbers[0])
+        return _without_persons(listing, person, source)
     frames, persons = numbers
     counts = _counted(persons)
     notes: list[str] = []
     own = persons == chosen_person(counts, person, source, notes)
-    found = FrameFiles([file for file, its in zip(files, own, strict=True) if its], notes=notes)
+    listing = FrameFiles([file for file, its in zip(files, own, strict=True) if its], notes=notes)
     order = np.argsort(frames[own], kind="stable")
-    found.files = [found.files[place] for place in order]
-    _count(found, frames[own][order], frames)
-    return found
+    listing.files = [listing.files[place] for place in order]
+    _count(listing, frames[own][order], frames)
+    return listing
 
 
 def persons_among(files: Sequence[Path], source: str) -> dict[int, int]:
@@ -160,7 +160,7 @@ def chosen_person(
     return key
 
 
-def _count(found: FrameFiles, frames: NDArray[np.int64], all_frames: NDArray[np.int64]) -> None:
+def _count(listing: FrameFiles, frames: NDArray[np.int64], all_frames: NDArray[np.int64]) -> None:
     """Number the frames of a person, where their numbers count frames; ``all_frames`` of all."""
     every = np.unique(all_frames)
     steps = np.diff(every)
@@ -168,7 +168,7 @@ def _count(found: FrameFiles, frames: NDArray[np.int64], all_frames: NDArray[np.
         return
     step = int(np.gcd.reduce(steps))
     if int(np.median(steps)) != step:
-        found.notes.append(
+        listing.notes.append(
             f"The numbers in the names go up by {np.median(steps):g} typically and do not count"
             " frames: the files are taken as consecutive ones."
         )
@@ -176,14 +176,14 @@ def _count(found: FrameFiles, frames: NDArray[np.int64], all_frames: NDArray[np.
     # Counted from 0 or from 1, the first picture is where the video begins.
     first = int(every[0])
     start = first // step if first > 1 else 0
-    found.numbers = (frames - first) // step + start
+    listing.numbers = (frames - first) // step + start
     if step > 1:
-        found.notes.append(
+        listing.notes.append(
             f"The names count in steps of {step}: the files are taken as consecutive frames, whose"
             " rate is to be given (--fps)."
         )
     if start:
-        found.notes.append(f"The first frame is number {first:,}: time before it is empty.")
+        listing.notes.append(f"The first frame is number {first:,}: time before it is empty.")
 
 
 def _person_is_first(
@@ -216,13 +216,13 @@ def _refuse_two_kinds(files: Sequence[Path], kinds: list[list[int]], source: str
         )
 
 
-def _without_persons(found: FrameFiles, person: int | str | None, source: str) -> FrameFiles:
+def _without_persons(listing: FrameFiles, person: int | str | None, source: str) -> FrameFiles:
     if person is not None:
         raise Sd2Error(
             f"Person {person} is asked for, and the names in {source} tell no persons",
             "names such as 000012_0.obj, of frame 12 and person 0",
         )
-    return found
+    return listing
 
 
 def _named(files: Sequence[Path]) -> str:

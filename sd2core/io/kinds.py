@@ -69,7 +69,7 @@ def kind_of(path: Path) -> Kind:
 
     if looks_like_points(path):
         return "radar"
-    kind, said = _kind_by_plug_ins(path)
+    kind, faults = _kind_by_plug_ins(path)
     if kind is not None:
         return kind
     if suffix in MOTION_SUFFIXES:
@@ -89,7 +89,7 @@ def kind_of(path: Path) -> Kind:
         " DCA1000, or samples with a description: .npy, .h5, .mat,"
         " .sigmf-meta; or a table of points, .csv) or samples of an inertial"
         " sensor (.csv, .sto)",
-        said,
+        faults,
     )
 
 
@@ -130,13 +130,13 @@ def _kind_of_folder(folder: Path) -> Kind:
         return "mesh"
     if ".bin" in suffixes and suffixes & {".cfg", ".json"}:
         return "radar"
-    kind, said = _kind_by_plug_ins(folder)
+    kind, faults = _kind_by_plug_ins(folder)
     if kind is not None:
         return kind
     raise Sd2Error(
         f"The folder {folder} holds nothing that is known",
         "recording.json, zarr.json, radar.npy, or .obj/.ply/.glb files",
-        said,
+        faults,
     )
 
 
@@ -145,10 +145,10 @@ def _kind_by_plug_ins(path: Path) -> tuple[Kind | None, str]:
     faults = []
     groups: tuple[tuple[Kind, Group[Any]], ...] = (("mesh", MESH_FILES), ("radar", RADAR_FILES))
     for kind, group in groups[path.is_dir() :]:  # a folder is no mesh of theirs
-        plug_in, said = plug_in_for(path, group)
+        plug_in, fault = plug_in_for(path, group)
         if plug_in is not None:
             return kind, ""
-        faults.append(said)
+        faults.append(fault)
     return None, " ".join(filter(None, faults))
 
 

@@ -203,12 +203,12 @@ def _read(path: Path, hints: MeshHints) -> RawMesh:
     for reader in _READERS:
         if reader.fits(path):
             return reader.read(path, hints)
-    plug_in, said = plug_in_for(path, MESH_FILES)
+    plug_in, faults = plug_in_for(path, MESH_FILES)
     if plug_in is not None:
         return plug_in.use(lambda reader: reader.read(path, hints), RawMesh)
     if path.suffix.lower() in MOTION_SUFFIXES:
         refuse_motion(path)
-    raise Sd2Error(f"{path} is not a mesh of a kind that is known", f"a mesh: {_KNOWN}", said)
+    raise Sd2Error(f"{path} is not a mesh of a kind that is known", f"a mesh: {_KNOWN}", faults)
 
 
 def _is_zarr(path: Path) -> bool:
@@ -223,10 +223,10 @@ def _read_surfaces(path: Path, hints: MeshHints) -> RawMesh:
 
 
 _READERS: tuple[FileReader[RawMesh], ...] = (
-    FileReader(_read_surfaces, looks=is_pattern),
-    FileReader(lambda path, hints: read_zarr(path), looks=_is_zarr),
-    FileReader(read_model_output, looks=is_estimate),
-    FileReader(_read_surfaces, looks=Path.is_dir),
+    FileReader(_read_surfaces, recognises=is_pattern),
+    FileReader(lambda path, hints: read_zarr(path), recognises=_is_zarr),
+    FileReader(read_model_output, recognises=is_estimate),
+    FileReader(_read_surfaces, recognises=Path.is_dir),
     FileReader(lambda path, hints: read_npz(path), (".npz",)),
     FileReader(_read_surfaces, SURFACE_SUFFIXES),
 )

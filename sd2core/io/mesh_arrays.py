@@ -192,9 +192,9 @@ def _leave_out(raw: RawMesh, damaged: tuple[Damage, ...], path: Path) -> None:
         raise unreadable(path, damaged)
     if len(present) == frames:
         raw.present = present & ~lost
-    said = "; ".join(map(str, damaged))
+    where = "; ".join(map(str, damaged))
     raw.notes.append(
-        f"{path.name} is damaged: {said}. These frames are left out, as if nobody had been there. "
+        f"{path.name} is damaged: {where}. These frames are left out, as if nobody had been there. "
         f"{COPY_AGAIN}."
     )
 

@@ -61,9 +61,9 @@ def mark_empty_frames(raw: RawMesh, source: str) -> None:
     whole = finite.all(axis=1)
     if whole.all():
         return
-    there = np.ones(frames, bool) if raw.present is None else raw.present
+    present = np.ones(frames, bool) if raw.present is None else raw.present
     # In frames without a person by the file, vertices say nothing.
-    empty = ~finite.any(axis=1) | (~there & ~whole)
+    empty = ~finite.any(axis=1) | (~present & ~whole)
     if not whole.any() and empty.all():
         raise Sd2Error(
             f"{source}: no frame holds a finite vertex (all NaN or infinite)",
@@ -83,10 +83,10 @@ def mark_empty_frames(raw: RawMesh, source: str) -> None:
         )
     known = np.maximum.accumulate(np.where(empty, -1, np.arange(frames)))
     raw.vertices = vertices[np.where(known < 0, np.argmin(empty), known)]
-    unsaid = np.flatnonzero(empty & there)
+    unsaid = np.flatnonzero(empty & present)
     if unsaid.size:
         raw.notes.append(_no_body(unsaid, "all NaN, or all vertices in one point"))
-    raw.present = there & ~empty
+    raw.present = present & ~empty
 
 
 def _no_body(frames: NDArray[np.int64], why: str) -> str:
@@ -112,15 +112,15 @@ def mark_gaps(raw: RawMesh) -> None:
         f"{missing:,} video frames hold no mesh, the first after frame {numbers[gaps[0]]}; they are"
         " taken as time without a person."
     )
-    there = np.ones(len(numbers), bool) if raw.present is None else np.array(raw.present, bool)
+    present = np.ones(len(numbers), bool) if raw.present is None else np.array(raw.present, bool)
     if isinstance(raw.vertices, StoredVertices):
-        there[gaps] = False
-        raw.present = there
+        present[gaps] = False
+        raw.present = present
         return
     held = np.insert(np.arange(len(numbers)), gaps + 1, gaps)
     raw.vertices = np.asarray(raw.vertices)[held]
     raw.frame_numbers = np.insert(numbers, gaps + 1, numbers[gaps] + 1)
-    raw.present = np.insert(there, gaps + 1, False)
+    raw.present = np.insert(present, gaps + 1, False)
 
 
 def uncertainty_of(raw: RawMesh, source: str) -> VelocityUncertainty | None:
@@ -180,7 +180,7 @@ def judge_body(raw: RawMesh, times_s: NDArray[np.float64]) -> None:
     Frames there whose vertices all lie in one point become frames without a person.
     """
     frames = int(raw.vertices.shape[0])
-    there = np.ones(frames, bool) if raw.present is None else np.array(raw.present, bool)
+    present = np.ones(frames, bool) if raw.present is None else np.array(raw.present, bool)
     seen = []
     for start, stop in _stretches(raw.vertices):
         with suppress(Sd2Error):  # vertices that are not finite: said when these frames are used
@@ -189,14 +189,14 @@ def judge_body(raw: RawMesh, times_s: NDArray[np.float64]) -> None:
         return
     numbers, points_m, extent_m = (np.concatenate(part) for part in zip(*seen, strict=True))
     if points_m.shape[1] > _MIN_VERTICES:
-        empty = numbers[~extent_m.any(axis=1) & there[numbers]]
-        if 0 < len(empty) < int(there[numbers].sum()):
-            there[empty] = False
-            raw.present = there
+        empty = numbers[~extent_m.any(axis=1) & present[numbers]]
+        if 0 < len(empty) < int(present[numbers].sum()):
+            present[empty] = False
+            raw.present = present
             raw.notes.append(_no_body(empty, "all vertices in one point"))
-    raw.findings += judge_clock(times_s, there, of_a_mesh=True)
+    raw.findings += judge_clock(times_s, present, of_a_mesh=True)
     if points_m.shape[1] > _MIN_VERTICES:
-        body = BodyPoints(numbers, points_m, times_s[numbers], there[numbers], extent_m)
+        body = BodyPoints(numbers, points_m, times_s[numbers], present[numbers], extent_m)
         raw.findings += [*judge_place(body), *judge_motion(body)]
 
 

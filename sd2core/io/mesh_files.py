@@ -50,8 +50,8 @@ def read_mesh_files(
     Of several persons, whose numbers are in the names, one is read.
     """
     notes: list[str] = []
-    found = numbered_frames(surface_files(path, notes), person, str(path))
-    files = found.files
+    listing = numbered_frames(surface_files(path, notes), person, str(path))
+    files = listing.files
     frames: list[NDArray[np.float32]] = []
     faces: NDArray[Any] | None = None
     for number, file in enumerate(files):
@@ -76,7 +76,7 @@ def read_mesh_files(
         frames.append(vertices.astype(np.float32))
     progress(len(files), len(files))
     return RawMesh(
-        np.stack(frames), faces, notes=[*notes, *found.notes], frame_numbers=found.numbers
+        np.stack(frames), faces, notes=[*notes, *listing.notes], frame_numbers=listing.numbers
     )
 
 
@@ -189,9 +189,9 @@ def surface_files(path: Path, notes: list[str]) -> list[Path]:
     if path.is_file():
         return [path]
     if path.is_dir():
-        found = [file for file in path.iterdir() if file.suffix.lower() in SURFACE_SUFFIXES]
-        found = frames_among(found, notes)
-        kinds = sorted({file.suffix.lower() for file in found})
+        files = [file for file in path.iterdir() if file.suffix.lower() in SURFACE_SUFFIXES]
+        files = frames_among(files, notes)
+        kinds = sorted({file.suffix.lower() for file in files})
         if len(kinds) > 1:
             raise Sd2Error(
                 f"{path} holds meshes of several kinds ({', '.join(kinds)})",
@@ -199,16 +199,16 @@ def surface_files(path: Path, notes: list[str]) -> list[Path]:
                 f"Name those that are meant, for example '{path.name}/*{kinds[0]}'",
             )
     else:
-        found = files_of_pattern(path)
-        found = [file for file in found if file.suffix.lower() in SURFACE_SUFFIXES]
-        found = frames_among(found, notes)
-    if not found:
+        files = files_of_pattern(path)
+        files = [file for file in files if file.suffix.lower() in SURFACE_SUFFIXES]
+        files = frames_among(files, notes)
+    if not files:
         raise Sd2Error(
             f"{path} matches no mesh file",
             "one .obj, .ply or .glb file per frame",
             "Check the folder or the pattern",
         )
-    return found
+    return files
 
 
 def _same_faces(first: NDArray[Any] | None, second: NDArray[Any] | None) -> bool:

@@ -209,9 +209,9 @@ def _numbers(
     """
     for place in (entry, content):
         for name in names:
-            found = place.get(name)
-            if isinstance(found, np.ndarray | int | float | str | bytes):
-                return _as_numbers(np.asarray(found), name, path)
+            value = place.get(name)
+            if isinstance(value, np.ndarray | int | float | str | bytes):
+                return _as_numbers(np.asarray(value), name, path)
     return None
 
 
@@ -285,10 +285,10 @@ def _with_focal(
     placed = shift_m.copy()
     if wanted is not None and taken is not None:
         placed[:, 2] *= wanted / taken
-    found = np.isfinite(shift_m[:, 2])
-    said = "" if wanted is None else f", focal length {wanted:.0f} px ({how})"
+    finite = np.isfinite(shift_m[:, 2])
+    length = "" if wanted is None else f", focal length {wanted:.0f} px ({how})"
     raw.notes.append(
-        f"The body is placed by the file's camera{said}, at {np.median(placed[found, 2]):.2f} m."
+        f"The body is placed by the file's camera{length}, at {np.median(placed[finite, 2]):.2f} m."
         " Its depth follows the size in the picture and jitters: `sd2 refine` makes it smooth."
     )
     return placed

@@ -111,10 +111,10 @@ def _loaded(path: Path) -> Any:
             check_size(path, sum(one.file_size for one in texts), size)
             if not any("/code/" in one.filename for one in texts):
                 raise Sd2Error(f"{path} is no program of torch", _EXPECTED, _REMEDY)
-            found = [_REACHES_OUT.search(archive.read(one).decode()) for one in texts]
+            matches = [_REACHES_OUT.search(archive.read(one).decode()) for one in texts]
     except (OSError, ValueError, zipfile.BadZipFile) as error:
         raise Sd2Error(f"{path} is no model of MHR ({error})", _EXPECTED, _REMEDY) from error
-    calls = sorted({one[0] for one in found if one is not None})
+    calls = sorted({one[0] for one in matches if one is not None})
     if calls:
         raise Sd2Error(
             f"{path} is a program that does more than compute ({', '.join(calls)})",

@@ -30,25 +30,25 @@ class FileReader(Generic[Content]):
         :class:`~sd2core.io.mesh_arrays.RawMesh`.
     suffixes : tuple of str
         How the names of such files end, in lower case.
-    looks : callable, optional
+    recognises : callable, optional
         Takes the path and tells, at little cost, if it is such a file.
     """
 
     read: Callable[..., Content]
     suffixes: tuple[str, ...] = ()
-    looks: Callable[[Path], bool] | None = None
+    recognises: Callable[[Path], bool] | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.suffixes, tuple):
             raise Sd2Error(f"The suffixes are {self.suffixes!r}", 'a tuple, such as (".abc",)')
-        if not (self.suffixes or self.looks):
-            raise Sd2Error("A reader is for no files", "suffixes, or looks")
+        if not (self.suffixes or self.recognises):
+            raise Sd2Error("A reader is for no files", "suffixes, or recognises")
 
     def fits(self, path: Path) -> bool:
         """True if a file is to be read by it."""
         if self.suffixes and not path.name.lower().endswith(self.suffixes):
             return False
-        return self.looks is None or self.looks(path)
+        return self.recognises is None or self.recognises(path)
 
 
 @dataclass(frozen=True)

@@ -37,14 +37,14 @@ def with_things(mesh: MeshSequence, things: Iterable[Thing]) -> MeshSequence:
     >>> float(sd2.Synthesizer(sd2.with_things(mesh, [screen])).map().values.sum())
     0.0
     """
-    standing = tuple(things)
-    if len(standing) > MAX_THINGS:
-        raise Sd2Error(f"There are {len(standing)} things", f"up to {MAX_THINGS}")
+    all_things = tuple(things)
+    if len(all_things) > MAX_THINGS:
+        raise Sd2Error(f"There are {len(all_things)} things", f"up to {MAX_THINGS}")
     surfaces = tuple(
-        one.placed(_read(Path(one.shape)) if one.is_file else None) for one in standing
+        one.placed(_read(Path(one.shape)) if one.is_file else None) for one in all_things
     )
     walls = () if mesh.surroundings is None else mesh.surroundings.walls
-    return replace(mesh, surroundings=Surroundings.of(standing, surfaces, walls))
+    return replace(mesh, surroundings=Surroundings.of(all_things, surfaces, walls))
 
 
 def with_walls(mesh: MeshSequence, walls: Iterable[Wall]) -> MeshSequence:
@@ -59,12 +59,12 @@ def with_walls(mesh: MeshSequence, walls: Iterable[Wall]) -> MeshSequence:
     >>> sd2.with_walls(mesh, [sd2.Wall(1.0, azimuth_deg=90)]).surroundings.walls[0].words
     'wall right at 1 m, 8.2 dB'
     """
-    standing = tuple(walls)
-    if len(standing) > MAX_WALLS:
-        raise Sd2Error(f"There are {len(standing)} walls", f"up to {MAX_WALLS}")
+    all_walls = tuple(walls)
+    if len(all_walls) > MAX_WALLS:
+        raise Sd2Error(f"There are {len(all_walls)} walls", f"up to {MAX_WALLS}")
     around = mesh.surroundings
     things = ((), ()) if around is None else (around.things, around.surfaces)
-    return replace(mesh, surroundings=Surroundings.of(*things, standing))
+    return replace(mesh, surroundings=Surroundings.of(*things, all_walls))
 
 
 def _read(path: Path) -> Surface:

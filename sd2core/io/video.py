@@ -52,8 +52,8 @@ class Upright:
         A stored place (x, y) is shown at (a x + c y, b x + d y), with a, b and c, d in the first
         two rows of the matrix.
         """
-        found = frame.side_data.get("DISPLAYMATRIX")
-        numbers = np.frombuffer(b"" if found is None else bytes(found), np.int32)
+        matrix = frame.side_data.get("DISPLAYMATRIX")
+        numbers = np.frombuffer(b"" if matrix is None else bytes(matrix), np.int32)
         if numbers.size < _MATRIX_NUMBERS:
             return cls()
         (a, b), (c, d) = numbers[:_MATRIX_NUMBERS].reshape(3, 3)[:2, :2].astype(float).tolist()
@@ -207,9 +207,9 @@ class VideoReader:
             self._begin(entry)
         back = 1
         while True:
-            found = self._decode_to(frame)
-            if found is not None:
-                return found
+            picture = self._decode_to(frame)
+            if picture is not None:
+                return picture
             # The file may lead to a later place than asked, or the decoder need
             # earlier pictures than the file admits: begin further back. When
             # that gives the frames around this one again and not this one, it

@@ -108,30 +108,30 @@ def load_capture(path: Path | str) -> RadarCapture:
             # Of what is simulated and of what it recorded itself the program knows enough.
             own = capture.simulated or reader.read is load_growing
             return capture if own else judged(capture)
-    plug_in, said = plug_in_for(path, RADAR_FILES)
+    plug_in, faults = plug_in_for(path, RADAR_FILES)
     if plug_in is not None:
         return plug_in.use(lambda reader: reader.read(path), RadarCapture)
     holds = sorted(entry.name for entry in path.iterdir())[:6] if path.is_dir() else []
-    found = f"; it holds {', '.join(holds) or 'nothing'}" if path.is_dir() else ""
-    raise Sd2Error(f"{path} is not a radar recording that can be read{found}", SUPPORTED, said)
+    content = f"; it holds {', '.join(holds) or 'nothing'}" if path.is_dir() else ""
+    raise Sd2Error(f"{path} is not a radar recording that can be read{content}", SUPPORTED, faults)
 
 
 def companions(path: Path) -> list[Path]:
     """Other files that belong to a radar file and lie beside it, as far as they are there."""
-    found: list[Path] = []
+    files: list[Path] = []
     if path.is_dir():
-        return found
+        return files
     if is_described(path) or has_columns_told(path):
-        found.append(description_of(path))
+        files.append(description_of(path))
     if path.suffix.lower() in (META, DATA):
-        found += [path.with_suffix(suffix) for suffix in (META, DATA)]
+        files += [path.with_suffix(suffix) for suffix in (META, DATA)]
     elif path.suffix.lower() == dca1000.SUFFIX:
         with suppress(Sd2Error):
-            found += dca1000.parts_of(path)
-            found.append(dca1000.setup_of(path))
-    elif path.suffix == ".npy" and not found:
-        found += [path.with_name(name) for name in INFINEON_FILES]
-    return [one for one in dict.fromkeys(found) if one != path and one.is_file()]
+            files += dca1000.parts_of(path)
+            files.append(dca1000.setup_of(path))
+    elif path.suffix == ".npy" and not files:
+        files += [path.with_name(name) for name in INFINEON_FILES]
+    return [one for one in dict.fromkeys(files) if one != path and one.is_file()]
 
 
 def without_companions(paths: Sequence[Path]) -> list[Path]:
@@ -213,19 +213,19 @@ def _ask_columns(path: Path) -> RadarCapture:
 
 
 _READERS: tuple[FileReader[RadarCapture], ...] = (
-    FileReader(load_growing, looks=is_growing),
-    FileReader(load_described, looks=is_described),
+    FileReader(load_growing, recognises=is_growing),
+    FileReader(load_described, recognises=is_described),
     FileReader(
         lambda path: load_described(path / DATA_NAME),
-        looks=lambda path: is_described(path / DATA_NAME),
+        recognises=lambda path: is_described(path / DATA_NAME),
     ),
-    FileReader(load_acconeer, looks=lambda path: _maker_of(path) == "acconeer"),
-    FileReader(refuse_a111, looks=lambda path: _maker_of(path) == "a111"),
-    FileReader(_refuse_map, looks=holds_map),
+    FileReader(load_acconeer, recognises=lambda path: _maker_of(path) == "acconeer"),
+    FileReader(refuse_a111, recognises=lambda path: _maker_of(path) == "a111"),
+    FileReader(_refuse_map, recognises=holds_map),
     FileReader(dca1000.load_dca1000, (dca1000.SUFFIX,)),
-    FileReader(_load_infineon, looks=lambda path: find_recording(path) is not None),
-    FileReader(dca1000.load_dca1000, looks=_holds_dca1000),
-    FileReader(_ask_description, looks=lambda path: path.is_file() and is_describable(path)),
+    FileReader(_load_infineon, recognises=lambda path: find_recording(path) is not None),
+    FileReader(dca1000.load_dca1000, recognises=_holds_dca1000),
+    FileReader(_ask_description, recognises=lambda path: path.is_file() and is_describable(path)),
     FileReader(_ask_columns, TEXT_SUFFIXES),
 )
 """Readers of captures; the first that fits is taken, and those of plug-ins after all of them."""
@@ -242,8 +242,8 @@ def load_recorded_map(path: Path | str, axis: VelocityAxis | None = None) -> Rec
     of_points = looks_like_points(path)
     recorded = load_points_map(path, axis) if of_points else load_kkt(path)
     # Without points a frame of such a map is empty.
-    found = judge_map(recorded.doppler.values, recorded.timebase.times_s, measured=not of_points)
-    return replace(recorded, notes=(*recorded.notes, *map(str, found)))
+    findings = judge_map(recorded.doppler.values, recorded.timebase.times_s, measured=not of_points)
+    return replace(recorded, notes=(*recorded.notes, *map(str, findings)))
 
 
 def named_radar(name: str) -> RadarConfig:

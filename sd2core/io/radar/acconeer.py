@@ -174,7 +174,7 @@ def _read(file: h5py.File, path: Path) -> RadarCapture:
     group, groups = _first(file, path, session, "group_")
     entry, entries = _first(file, path, group, "entry_")
     planned = _parsed(_Session, file, path, f"{session}/session_config")
-    found = _parsed(_Metadata, file, path, f"{entry}/metadata")
+    metadata = _parsed(_Metadata, file, path, f"{entry}/metadata")
     sensor_id = str(int(_array(file, path, f"{entry}/sensor_id", "iu", 0)[()]))
     if sensor_id not in planned.groups[0]:
         raise Sd2Error(
@@ -195,7 +195,7 @@ def _read(file: h5py.File, path: Path) -> RadarCapture:
                 for one in sensor.subsweeps
             ]
         )
-        * found.base_step_length_m
+        * metadata.base_step_length_m
     )
     shape = (len(frames), 1, sensor.sweeps_per_frame, len(ranges_m))
     if frames.shape != (shape[0], *shape[2:]):
@@ -218,7 +218,7 @@ def _read(file: h5py.File, path: Path) -> RadarCapture:
         joined = min(_JOINED, len(frames))
         sweep_s = 0.0
     else:
-        sweep_s = _sweep_s(sensor, found, path, notes)
+        sweep_s = _sweep_s(sensor, metadata, path, notes)
     timebase, frame_s = _clock(file, path, entry, sensor, sweep_s, shape[0], notes)
     saturated = _flags(file, path, f"{entry}/result/data_saturated", shape[0])
     if saturated:
@@ -256,17 +256,17 @@ def _read(file: h5py.File, path: Path) -> RadarCapture:
     )
 
 
-def _sweep_s(sensor: _Sensor, found: _Metadata, path: Path, notes: list[str]) -> float:
+def _sweep_s(sensor: _Sensor, metadata: _Metadata, path: Path, notes: list[str]) -> float:
     """Time between sweeps."""
     if sensor.sweep_rate is not None:
         return 1.0 / sensor.sweep_rate
-    if found.max_sweep_rate is None:
+    if metadata.max_sweep_rate is None:
         raise Sd2Error(f"{path} states no sweep rate", "sweep_rate, or max_sweep_rate")
     notes.append(
         "No sweep rate is set; sweeps are taken to follow at the highest of the configuration,"
-        f" {found.max_sweep_rate:.1f} Hz, as the sensor does then."
+        f" {metadata.max_sweep_rate:.1f} Hz, as the sensor does then."
     )
-    return 1.0 / found.max_sweep_rate
+    return 1.0 / metadata.max_sweep_rate
 
 
 def _clock(
@@ -318,23 +318,23 @@ def _first(file: h5py.File, path: Path, place: str, prefix: str) -> tuple[str, i
 def _array(file: h5py.File, path: Path, place: str, kinds: str, dimensions: int) -> h5py.Dataset:
     import h5py
 
-    found = member_of(file, path, place)
-    if not isinstance(found, h5py.Dataset) or found.shape is None:
+    member = member_of(file, path, place)
+    if not isinstance(member, h5py.Dataset) or member.shape is None:
         raise Sd2Error(f"{path} has no array {place}", _EXPECTED)
-    if found.dtype.kind not in kinds or len(found.shape) != dimensions:
+    if member.dtype.kind not in kinds or len(member.shape) != dimensions:
         raise Sd2Error(
-            f"{path}: {place} is {found.dtype} of shape {found.shape}",
+            f"{path}: {place} is {member.dtype} of shape {member.shape}",
             f"an array of {dimensions} dimensions",
         )
-    return found
+    return member
 
 
 def _flags(file: h5py.File, path: Path, place: str, frames: int) -> int:
     """Number of frames that are flagged; 0 where the file does not say."""
-    found = member_of(file, path, place)
-    if found is None or getattr(found, "shape", None) != (frames,):
+    flags = member_of(file, path, place)
+    if flags is None or getattr(flags, "shape", None) != (frames,):
         return 0
-    return int(np.count_nonzero(found[...]))
+    return int(np.count_nonzero(flags[...]))
 
 
 def _text(file: h5py.File, path: Path, place: str) -> str:

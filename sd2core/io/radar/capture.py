@@ -134,8 +134,8 @@ class RadarCapture:
     def __repr__(self) -> str:
         radar = self.config.name or "a radar without a name"
         kind = "simulated" if self.simulated else "real"
-        said = [f"{kind}, {radar}", self.words, *([self.source] if self.source else [])]
-        return f"<RadarCapture {' · '.join(said)}>"
+        parts = [f"{kind}, {radar}", self.words, *([self.source] if self.source else [])]
+        return f"<RadarCapture {' · '.join(parts)}>"
 
     @property
     def frame_count(self) -> int:
@@ -153,8 +153,8 @@ class RadarCapture:
     @property
     def present(self) -> NDArray[np.bool_] | None:
         """Presence of a person per frame, (frames,), in simulations that state it; else None."""
-        found = self.meta.get("simulation")
-        gaps = found.get("without_person") if self.simulated and isinstance(found, dict) else None
+        simulation = self.meta.get("simulation") if self.simulated else None
+        gaps = simulation.get("without_person") if isinstance(simulation, dict) else None
         if not isinstance(gaps, list):
             return None
         present = np.ones(self.frame_count, bool)
@@ -179,17 +179,17 @@ class RadarCapture:
             return self
         config = self.config
         parts = []
-        for name, number, there in (
+        for name, number, count in (
             ("transmitter", transmitter, config.transmitters),
             ("receiver", receiver, config.receivers),
         ):
-            if number is not None and not 1 <= number <= there:
+            if number is not None and not 1 <= number <= count:
                 raise Sd2Error(
                     f"{name.capitalize()} {number} of {self.source or 'a capture'} is asked for",
-                    f"1 to {there}" if there > 1 else f"1: there is one {name}",
+                    f"1 to {count}" if count > 1 else f"1: there is one {name}",
                     "Choose another one, or all",
                 )
-            parts.append(np.arange(there) if number is None else np.array([number - 1]))
+            parts.append(np.arange(count) if number is None else np.array([number - 1]))
         kept = (parts[0][:, None] * config.receivers + parts[1]).ravel()
         samples = self.samples
         shape = (samples.shape[0], len(kept), *samples.shape[2:])

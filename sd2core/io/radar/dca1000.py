@@ -112,27 +112,27 @@ def parts_of(path: Path) -> list[Path]:
         inside = sorted(one for one in path.iterdir() if one.suffix.lower() == SUFFIX)
         bases = {_base(one) for one in inside}
         if len(bases) != 1:
-            told = ", ".join(sorted(bases)[:6]) or "none"
+            names = ", ".join(sorted(bases)[:6]) or "none"
             raise Sd2Error(
-                f"{path} holds {len(bases)} recordings of a DCA1000 ({told})",
+                f"{path} holds {len(bases)} recordings of a DCA1000 ({names})",
                 "one recording",
                 "Name the file of the one to open",
             )
         path = inside[0]
     check_regular(path)
-    found = _PART.fullmatch(path.stem)
-    if found is None:
+    match = _PART.fullmatch(path.stem)
+    if match is None:
         return [path]
     numbered = {}
     for one in path.parent.iterdir():
         other = _PART.fullmatch(one.stem)
-        if other and other["base"] == found["base"] and one.suffix.lower() == SUFFIX:
+        if other and other["base"] == match["base"] and one.suffix.lower() == SUFFIX:
             check_regular(one)
             numbered[int(other["number"])] = one
     missing = sorted(set(range(max(numbered) + 1)) - numbered.keys())
     if missing:
         raise Sd2Error(
-            f"{path.parent} has no {found['base']}_Raw_{missing[0]}{SUFFIX}",
+            f"{path.parent} has no {match['base']}_Raw_{missing[0]}{SUFFIX}",
             f"all parts up to {max(numbered)}",
             "Copy all parts of the recording",
         )
@@ -146,22 +146,22 @@ def setup_of(path: Path) -> Path:
             if (beside := path.with_name(base + suffix)).is_file():
                 return beside
     others = sorted(path.parent.iterdir())
-    found = [one for one in others if one.suffix.lower() == ".cfg"]
-    found += [one for one in others if one.suffix.lower() == ".json" and is_studio_json(one)]
-    if len(found) != 1:
-        told = f": {', '.join(one.name for one in found[:6])}" if found else ""
+    setups = [one for one in others if one.suffix.lower() == ".cfg"]
+    setups += [one for one in others if one.suffix.lower() == ".json" and is_studio_json(one)]
+    if len(setups) != 1:
+        names = f": {', '.join(one.name for one in setups[:6])}" if setups else ""
         raise Sd2Error(
-            f"{path} has {len(found)} configurations beside it{told}",
+            f"{path} has {len(setups)} configurations beside it{names}",
             "the .cfg of the mmWave SDK or the .mmwave.json of mmWave Studio that it was recorded"
             " with, of the same name where there are several",
             "Copy it there; the samples alone do not say their shape",
         )
-    return found[0]
+    return setups[0]
 
 
 def _base(path: Path) -> str:
-    found = _PART.fullmatch(path.stem)
-    return found["base"] if found else path.stem
+    match = _PART.fullmatch(path.stem)
+    return match["base"] if match else path.stem
 
 
 class _Words:
@@ -179,10 +179,10 @@ class _Words:
             if low < high:
                 skipped = (low - int(first)) * _WORD.itemsize
                 pieces.append(np.fromfile(part, _WORD, high - low, offset=skipped))
-        found = np.concatenate(pieces)
-        if len(found) != stop - start:
+        words = np.concatenate(pieces)
+        if len(words) != stop - start:
             raise Sd2Error(f"{self._parts[0]} has become shorter", _EXPECTED, "Open it again")
-        return found.astype(np.int16, copy=False)
+        return words.astype(np.int16, copy=False)
 
 
 def _refuse_firmware(path: Path) -> None:
@@ -209,7 +209,7 @@ def _frame_count(
     length = _frame_words(setup) * _WORD.itemsize
     frames, left = divmod(total, length)
     turns = f"{config.transmitters} transmitters x " if config.transmitters > 1 else ""
-    told = (
+    expected = (
         f"frames of {length:,} bytes ({turns}{config.chirps_per_frame} chirps x"
         f" {config.receivers} receivers x {config.samples_per_chirp} {config.sampling} samples),"
         f" as {setup_path.name} says"
@@ -217,12 +217,12 @@ def _frame_count(
     remedy = "Use the configuration that it was recorded with, and all parts of the recording"
     _check_lanes(setup, str(setup_path))
     if any(size % _WORD.itemsize for size in sizes):
-        raise Sd2Error(f"{parts[0]} has {total:,} bytes", f"whole words and {told}", remedy)
+        raise Sd2Error(f"{parts[0]} has {total:,} bytes", f"whole words and {expected}", remedy)
     if not 0 < frames < _MAX_FRAMES or (left and setup.frames):
-        raise Sd2Error(f"{parts[0]} has {total:,} bytes in {len(parts)} parts", told, remedy)
+        raise Sd2Error(f"{parts[0]} has {total:,} bytes in {len(parts)} parts", expected, remedy)
     if setup.frames and frames > setup.frames:
         raise Sd2Error(
-            f"{parts[0]} has {total:,} bytes, {frames} frames", f"{setup.frames} {told}", remedy
+            f"{parts[0]} has {total:,} bytes, {frames} frames", f"{setup.frames} {expected}", remedy
         )
     if left:
         notes.append(f"The last {left:,} bytes are no whole frame, and are left out.")

@@ -121,8 +121,8 @@ def write_description(description: RadarDescription | PointsDescription, data: P
                 "a name that is free",
                 "Move it away",
             ) from error
-    told = description.model_dump(exclude_defaults=True)
-    content = {"format": description.format, "version": description.version, **told}
+    fields = description.model_dump(exclude_defaults=True)
+    content = {"format": description.format, "version": description.version, **fields}
     atomic_write_text(path, "\n".join(toml_lines(content, path.parent)) + "\n")
     return path
 
@@ -340,32 +340,32 @@ def _sizes(stored: StoredArray, description: RadarDescription) -> dict[str, int]
 
 
 def _config(
-    stored: StoredArray, description: RadarDescription, sizes: dict[str, int]
+    stored: StoredArray, radar: RadarDescription, sizes: dict[str, int]
 ) -> tuple[RadarConfig, bool]:
     """Configuration, and True if the samples of a chirp are averaged to one."""
-    samples, told = sizes["sample"], description
+    samples = sizes["sample"]
     if stored.dtype.kind not in "iufc":
         raise Sd2Error(f"The array is of {stored.dtype}", "numbers")
-    is_complex = stored.dtype.kind == "c" or "iq" in told.axes
-    if (told.bandwidth_hz is None) == (told.slope_hz_per_s is None):
+    is_complex = stored.dtype.kind == "c" or "iq" in radar.axes
+    if (radar.bandwidth_hz is None) == (radar.slope_hz_per_s is None):
         raise Sd2Error(
-            f"bandwidth_hz is {told.bandwidth_hz}, slope_hz_per_s {told.slope_hz_per_s}",
+            f"bandwidth_hz is {radar.bandwidth_hz}, slope_hz_per_s {radar.slope_hz_per_s}",
             "one of the two",
         )
-    if (told.range_start_m is None) != (told.range_step_m is None):
+    if (radar.range_start_m is None) != (radar.range_step_m is None):
         raise Sd2Error("One of range_start_m and range_step_m is missing", "both, or none")
-    if told.range_step_m is not None and not is_complex:
+    if radar.range_step_m is not None and not is_complex:
         raise Sd2Error(
             f"The samples are real ({stored.dtype}), at distances",
             "complex samples (I and Q): real ones do not tell approaching from receding",
             "Record I and Q, with the axis iq where they are apart",
         )
     rate_hz, chirp_s, frame_s = (
-        told.sample_rate_hz,
-        told.chirp_repetition_s,
-        told.frame_repetition_s,
+        radar.sample_rate_hz,
+        radar.chirp_repetition_s,
+        radar.frame_repetition_s,
     )
-    if "stream" in told.axes:
+    if "stream" in radar.axes:
         if rate_hz is None or chirp_s is not None or frame_s is not None:
             raise Sd2Error(
                 "Chirps and frames of a stream follow one another",
@@ -373,19 +373,19 @@ def _config(
             )
         chirp_s = samples / rate_hz
         frame_s = chirp_s * sizes["chirp"]
-    elif "frame" not in told.axes and chirp_s is not None:
+    elif "frame" not in radar.axes and chirp_s is not None:
         if frame_s is not None:
             raise Sd2Error("Chirps without gaps follow one another", "no frame_repetition_s")
         frame_s = chirp_s * sizes["chirp"]
     if chirp_s is None or frame_s is None:
         raise Sd2Error("It states no times", "chirp_repetition_s and frame_repetition_s")
     for name, value, such in (
-        ("carrier_hz", told.carrier_hz, "60 GHz is 60e9"),
-        ("bandwidth_hz", told.bandwidth_hz or math.inf, "1 GHz is 1e9; 0 for a continuous wave"),
+        ("carrier_hz", radar.carrier_hz, "60 GHz is 60e9"),
+        ("bandwidth_hz", radar.bandwidth_hz or math.inf, "1 GHz is 1e9; 0 for a continuous wave"),
     ):
         if value < _LOWEST_HZ:
             raise Sd2Error(f"{name} is {value:g}", f"Hz: {such}")
-    has_beat = told.bandwidth_hz != 0 and told.range_step_m is None
+    has_beat = radar.bandwidth_hz != 0 and radar.range_step_m is None
     if rate_hz is None:
         if has_beat:
             raise Sd2Error("It states no sample_rate_hz", "samples per second within a chirp")
@@ -395,22 +395,22 @@ def _config(
             f"{samples} samples at {rate_hz:g} Hz last longer than a chirp of {chirp_s:g} s",
             "sample_rate_hz in Hz, chirp_repetition_s in seconds",
         )
-    bandwidth_hz = told.bandwidth_hz
+    bandwidth_hz = radar.bandwidth_hz
     if bandwidth_hz is None:
-        assert told.slope_hz_per_s is not None
-        bandwidth_hz = abs(told.slope_hz_per_s) * samples / rate_hz
+        assert radar.slope_hz_per_s is not None
+        bandwidth_hz = abs(radar.slope_hz_per_s) * samples / rate_hz
     averaged = bandwidth_hz == 0 and samples > 1
     if averaged:
         samples, rate_hz = 1, 1.0 / chirp_s
     ranges_m: tuple[float, ...] = ()
-    if told.range_start_m is not None and told.range_step_m is not None:
-        ranges_m = tuple((told.range_start_m + told.range_step_m * np.arange(samples)).tolist())
+    if radar.range_start_m is not None and radar.range_step_m is not None:
+        ranges_m = tuple((radar.range_start_m + radar.range_step_m * np.arange(samples)).tolist())
     bits = 24
-    if told.full_scale is not None and stored.dtype.kind in "iu":
-        bits = max(1, round(math.log2(told.full_scale)) + 1)
+    if radar.full_scale is not None and stored.dtype.kind in "iu":
+        bits = max(1, round(math.log2(radar.full_scale)) + 1)
     config = RadarConfig(
-        start_frequency_hz=told.carrier_hz - 0.5 * bandwidth_hz,
-        end_frequency_hz=told.carrier_hz + 0.5 * bandwidth_hz,
+        start_frequency_hz=radar.carrier_hz - 0.5 * bandwidth_hz,
+        end_frequency_hz=radar.carrier_hz + 0.5 * bandwidth_hz,
         samples_per_chirp=samples,
         chirps_per_frame=sizes["chirp"],
         chirp_repetition_s=chirp_s,
@@ -418,7 +418,7 @@ def _config(
         sample_rate_hz=rate_hz,
         receivers=sizes["receiver"],
         adc_bits=bits,
-        name=told.name or f"{told.carrier_hz / 1e9:.4g} GHz radar",
+        name=radar.name or f"{radar.carrier_hz / 1e9:.4g} GHz radar",
         sampling="complex" if is_complex else "real",
         transmitters=sizes["transmitter"],
         ranges_m=ranges_m,

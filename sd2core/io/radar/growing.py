@@ -192,12 +192,12 @@ def load_growing(path: Path) -> RadarCapture:
 
     def read(some: slice) -> NDArray[Any]:
         start, stop, _ = some.indices(frames)
-        found = np.fromfile(
+        values = np.fromfile(
             samples, head.word_type, (stop - start) * words, offset=start * head.frame_bytes
         )
-        if len(found) != (stop - start) * words:
+        if len(values) != (stop - start) * words:
             raise Sd2Error(f"{samples} has become shorter", _EXPECTED, "Open it again")
-        return head.as_samples(found)
+        return head.as_samples(values)
 
     shape = (frames, *head.frame_shape[:3])
     return RadarCapture(

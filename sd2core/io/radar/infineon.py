@@ -100,7 +100,7 @@ def load_infineon(folder: Path) -> RadarCapture:
     """
     meta = _read_meta(folder / _META)
     config = _read_config(folder / _CONFIG, meta)
-    _check_there(folder / _DATA)
+    _check_exists(folder / _DATA)
     expected = "the whole radar.npy as recorded, uint16 (frames, receivers, chirps, samples)"
     counts = open_npy_file(folder / _DATA, expected, "It may be cut off: copy it again")
     samples, config, about_turns = _in_turns(counts, config, folder)
@@ -205,7 +205,7 @@ def check_replaceable(folder: Path) -> None:
         )
 
 
-def _check_there(path: Path) -> None:
+def _check_exists(path: Path) -> None:
     if not path.exists():
         raise Sd2Error(
             f"{path} is missing",
@@ -215,7 +215,7 @@ def _check_there(path: Path) -> None:
 
 
 def _validated(model: type[Model], path: Path) -> Model:
-    _check_there(path)
+    _check_exists(path)
     expected = "the configuration that Infineon's recorder writes (device_config.fmcw_single_shape)"
     with faults_in(path, expected, "Use the file that was recorded with this radar.npy"):
         return model.model_validate(read_json(path, "a JSON text"))
@@ -363,5 +363,5 @@ def _parse_times(path: Path) -> NDArray[np.float64]:
                     "one unix time in seconds per line",
                     "Remove the file to place frames by the frame repetition time",
                 ) from error
-    found = np.array(times, dtype=np.float64)
-    return np.where(np.abs(found) < _LARGEST_TIME_S, found, np.nan)
+    times_s = np.array(times, dtype=np.float64)
+    return np.where(np.abs(times_s) < _LARGEST_TIME_S, times_s, np.nan)

@@ -69,9 +69,9 @@ def _empty(signal: Signal, capture: RadarCapture) -> list[str]:
     notes = []
     channels = np.flatnonzero(empty.reshape(*empty.shape[:2], -1).all(axis=(0, 2)))
     if len(channels):
-        told = ", ".join(str(one + 1) for one in channels)
+        numbers = ", ".join(str(one + 1) for one in channels)
         notes.append(
-            f"Nothing was recorded in channel {told} of {empty.shape[1]}: the configuration"
+            f"Nothing was recorded in channel {numbers} of {empty.shape[1]}: the configuration"
             " probably enables more antennas than were there."
         )
     share = float(np.delete(empty, channels, axis=1).mean())

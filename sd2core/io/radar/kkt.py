@@ -216,17 +216,17 @@ def _dataset(file: h5py.File, path: Path, name: str) -> h5py.Dataset:
     """An array that must be there."""
     import h5py
 
-    found = member_of(file, path, name)
-    if found is None:
+    member = member_of(file, path, name)
+    if member is None:
         holds = ", ".join(sorted(map(str, file.keys()))[:6]) or "nothing"
         raise Sd2Error(
             f"{path} has no {name}; it holds {holds}",
             _EXPECTED,
             f"Samples of your own need a description: sd2 radar describe {path.name}",
         )
-    if not isinstance(found, h5py.Dataset) or found.shape is None:
+    if not isinstance(member, h5py.Dataset) or member.shape is None:
         raise Sd2Error(f"{name} of {path} is no array", _EXPECTED)
-    return found
+    return member
 
 
 def _attributes(file: h5py.File, path: Path) -> dict[str, str]:

@@ -107,17 +107,16 @@ def mars_parts(folder: Path | str) -> tuple[str, ...]:
     wanted = f"a folder with {_KINECT.format('PART')} and {_RADAR.format('PART')}"
     if not folder.is_dir():
         raise Sd2Error(f"There is no folder {folder}", wanted, "Check the path")
-    found = [
+    kinect, radar = (
         {path.name[len(start) : -len(".csv")] for path in folder.glob(f"{start}*.csv")}
         for start in (_KINECT.partition("{")[0], _RADAR.partition("{")[0])
-    ]
-    kinect, radar = found
+    )
     if not kinect and not radar:
         raise Sd2Error(f"{folder} holds no MARS recording", wanted)
     for name in sorted(kinect ^ radar):
-        there, missing = (_KINECT, _RADAR) if name in kinect else (_RADAR, _KINECT)
+        present, missing = (_KINECT, _RADAR) if name in kinect else (_RADAR, _KINECT)
         raise Sd2Error(
-            f"{folder} holds {there.format(name)} and no {missing.format(name)}", "both files"
+            f"{folder} holds {present.format(name)} and no {missing.format(name)}", "both files"
         )
     return tuple(sorted(kinect))
 
@@ -192,18 +191,18 @@ def _joints(path: Path) -> NDArray[np.float64]:
 
 def _columns(path: Path, names: tuple[str, ...] | list[str]) -> NDArray[np.float64]:
     """Some columns of a file of numbers under a heading, (n, len(names))."""
-    found = TextTable(path)
-    missing = [name for name in names if name not in found.names]
+    table = TextTable(path)
+    missing = [name for name in names if name not in table.names]
     if missing:
         more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
         raise Sd2Error(
             f"{path} has no column {', '.join(missing[:3])}{more}",
             "the columns of the MARS recordings",
         )
-    table = np.stack(found.read(tuple(map(found.names.index, names))), axis=1)
-    if not np.isfinite(table).all():
-        row, column = np.argwhere(~np.isfinite(table))[0]
+    values = np.stack(table.read(tuple(map(table.names.index, names))), axis=1)
+    if not np.isfinite(values).all():
+        row, column = np.argwhere(~np.isfinite(values))[0]
         raise Sd2Error(
-            f"{path}: {names[column]} of row {row + 1} is {table[row, column]}", "a finite number"
+            f"{path}: {names[column]} of row {row + 1} is {values[row, column]}", "a finite number"
         )
-    return table
+    return values

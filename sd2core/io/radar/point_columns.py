@@ -34,19 +34,19 @@ IGNORED = "-"
 def named_columns(titles: Sequence[str], *, framed: bool = False) -> tuple[str, ...] | None:
     """Columns by their titles, the first of several for the same."""
     plain = [_plain(title) for title in titles]
-    found: dict[int, str] = {}
+    columns: dict[int, str] = {}
     for name, aliases in _NAMES.items():
         place = next((plain.index(one) for one in aliases if one in plain), None)
         if place is not None:
             if plain.count(plain[place]) > 1 and name in ("frame", "doppler"):
                 return None  # which of them is meant?
-            found[place] = name
-    has = set(found.values())
+            columns[place] = name
+    has = set(columns.values())
     if "doppler" not in has or not (framed or has & {"frame", "time"}):
         return None
     if not has & {"x", "y", "range", "intensity"}:
         return None
-    return tuple(found.get(place, IGNORED) for place in range(len(titles)))
+    return tuple(columns.get(place, IGNORED) for place in range(len(titles)))
 
 
 def _plain(title: str) -> str:

@@ -60,8 +60,8 @@ def velocity_histogram(
             np.add.at(values, columns[some], weight[some, None] * spread)
     else:
         bins = np.floor((velocity_mps + axis.v_max_mps) / axis.bin_width_mps)
-        there = (bins >= 0) & (bins < axis.bins)
-        np.add.at(values, (columns[there], bins[there].astype(int)), weight[there])
+        within = (bins >= 0) & (bins < axis.bins)
+        np.add.at(values, (columns[within], bins[within].astype(int)), weight[within])
     return values.T.astype(np.float32)
 
 
@@ -75,8 +75,8 @@ def load_points_map(path: Path, axis: VelocityAxis | None = None) -> RecordedMap
     are none. Raises Sd2Error if the table cannot be read.
     """
     axis = axis or VelocityAxis()
-    told = points_description(path)
-    points = read_points(path, told)
+    description = points_description(path)
+    points = read_points(path, description)
     notes: list[str] = []
     if points.guessed:
         notes.append(
@@ -84,10 +84,10 @@ def load_points_map(path: Path, axis: VelocityAxis | None = None) -> RecordedMap
             f" `sd2 radar describe {path.name} --columns LIST` says otherwise."
         )
     numbers, rows = np.unique(points.frame, return_inverse=True)
-    stated_s = None if told is None else told.frame_repetition_s
+    stated_s = None if description is None else description.frame_repetition_s
     columns, times_s = _clock(numbers, rows, points, stated_s, path, notes)
     weight = _weights(points, notes)
-    sign = _sign(points, rows, None if told is None else told.sign, path, notes)
+    sign = _sign(points, rows, None if description is None else description.sign, path, notes)
     velocity_mps = -sign * points.doppler  # positive when approaching
     step_mps = doppler_step(points.doppler)
     values = velocity_histogram(columns[rows], velocity_mps, weight, len(times_s), axis, step_mps)
@@ -136,9 +136,9 @@ def _clock(
         moments_s, frame_s = _in_seconds(first, steps, points.time_unit_s, notes)
     if frame_s is None:
         frame_s = USUAL_FRAME_S
-        told = "The table tells no times" if points.time is None else "Its times tell no frame rate"
+        why = "The table tells no times" if points.time is None else "Its times tell no frame rate"
         notes.append(
-            f"{told}: a frame is taken every {1e3 * frame_s:g} ms."
+            f"{why}: a frame is taken every {1e3 * frame_s:g} ms."
             f" `sd2 radar describe {path.name} --frame-repetition-s S` says otherwise."
         )
     if moments_s is not None and (np.diff(moments_s) > 0).all():

@@ -116,10 +116,10 @@ class _Array(Table):
         if values.dtype.names:
             values = np.stack([values[name].astype(np.float64) for name in values.dtype.names], -1)
         values = values.astype(np.float64)
-        there = np.ones(len(values), bool)
+        filled = np.ones(len(values), bool)
         if self._by_frame:
-            there = np.asarray(values.any(axis=-1))
-        return values[there], there
+            filled = np.asarray(values.any(axis=-1))
+        return values[filled], filled
 
     def _frames(self) -> NDArray[np.float64]:
         return np.nonzero(self._whole[1])[0].astype(np.float64)
@@ -136,15 +136,15 @@ class _Vectors(Table):
         self._path, self.names, self.width = path, tuple(names), len(names)
 
     def read(self, places: tuple[int, ...], most: int | None = None) -> list[NDArray[np.float64]]:
-        found = []
+        columns = []
         for place in places:
             stored = open_stored(self._path, self.names[place])
             whole = np.asarray(stored.read(tuple(slice(None) for _ in stored.shape)))
-            found.append(whole.ravel().astype(np.float64)[:most])
-        if len({len(one) for one in found}) > 1:
-            told = ", ".join(str(len(one)) for one in found)
-            raise Sd2Error(f"{self._path} has columns of {told} entries", "as many in each")
-        return found
+            columns.append(whole.ravel().astype(np.float64)[:most])
+        if len({len(one) for one in columns}) > 1:
+            lengths = ", ".join(str(len(one)) for one in columns)
+            raise Sd2Error(f"{self._path} has columns of {lengths} entries", "as many in each")
+        return columns
 
 
 def open_table(path: Path, dataset: str | None) -> Table:

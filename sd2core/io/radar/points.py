@@ -77,14 +77,14 @@ class RadarPoints:
 
 def points_description(path: Path) -> PointsDescription | None:
     """Description of a table that lies beside it, if there is one; Sd2Error if it is damaged."""
-    told = _told_beside(path)
-    return described_points(path.with_suffix(".toml"), told) if "columns" in told else None
+    content = _description_beside(path)
+    return described_points(path.with_suffix(".toml"), content) if "columns" in content else None
 
 
-def described_points(place: Path, told: Mapping[str, Any]) -> PointsDescription:
+def described_points(place: Path, content: Mapping[str, Any]) -> PointsDescription:
     """Description of a table by what is told of it; Sd2Error where that is not possible."""
     with faults_in(place, "the description of a table of points"):
-        description = PointsDescription.model_validate(dict(told))
+        description = PointsDescription.model_validate(dict(content))
     columns = description.columns
     named = [one for one in columns if one != IGNORED]
     if not set(named) <= set(COLUMNS) or len(set(named)) < len(named) or "doppler" not in named:
@@ -99,16 +99,16 @@ def looks_like_points(path: Path) -> bool:
     """True if a file is a table of points, by its description, names or numbers."""
     if path.suffix.lower() not in SUFFIXES or not path.is_file():
         return False
-    told = _told_beside(path)
+    content = _description_beside(path)
     try:
-        return bool("columns" in told or (not told and _recognised(open_table(path, None))))
+        return bool("columns" in content or (not content and _recognised(open_table(path, None))))
     except Sd2Error:
         return False
 
 
 def holds_unnamed_columns(path: Path) -> bool:
     """True if a file is a table of numbers whose columns nothing names, perhaps of points."""
-    if path.suffix.lower() not in SUFFIXES or _told_beside(path):
+    if path.suffix.lower() not in SUFFIXES or _description_beside(path):
         return False
     try:
         table = open_table(path, None)
@@ -121,10 +121,10 @@ def holds_unnamed_columns(path: Path) -> bool:
 
 def has_columns_told(path: Path) -> bool:
     """True if the description beside a file, right or wrong, is of a table of points."""
-    return "columns" in _told_beside(path)
+    return "columns" in _description_beside(path)
 
 
-def _told_beside(path: Path) -> dict[str, Any]:
+def _description_beside(path: Path) -> dict[str, Any]:
     """Content of the description of radar data beside a file; empty where there is none."""
     beside = path.with_suffix(".toml")
     if path.suffix.lower() not in SUFFIXES or not beside.is_file():
@@ -142,10 +142,10 @@ def read_points(path: Path, description: PointsDescription | None = None) -> Rad
     Raises Sd2Error if its columns are not known, or it holds what is no finite number.
     """
     table = open_table(path, description.dataset if description else None)
-    found = _recognised(table) if description is None else (description.columns, False)
-    if found is None:
+    recognised = _recognised(table) if description is None else (description.columns, False)
+    if recognised is None:
         raise _unknown(path, table)
-    columns, guessed = found
+    columns, guessed = recognised
     if len(columns) != table.width:
         raise Sd2Error(
             f"{path} has {table.width} columns, its description {len(columns)}", "as many"
@@ -184,10 +184,10 @@ def _with_dates(table: TextTable, places: dict[str, int]) -> dict[str, NDArray[n
 def column_names(path: Path, dataset: str | None = None) -> tuple[str, ...]:
     """Columns of a table as far as they are known; Sd2Error where they are not, or it is none."""
     table = open_table(path, dataset)
-    found = _recognised(table)
-    if found is None:
+    recognised = _recognised(table)
+    if recognised is None:
         raise _unknown(path, table)
-    return found[0]
+    return recognised[0]
 
 
 def _unknown(path: Path, table: Table) -> Sd2Error:
@@ -260,26 +260,26 @@ def _by_numbers(table: Table) -> tuple[str, ...] | None:
         return None
     if not columns or len(columns[0]) < 20 or not all(np.isfinite(one).all() for one in columns):
         return None
-    found: dict[int, str] = {}
+    names: dict[int, str] = {}
     if table.frame is None:
         frames = [place for place, one in enumerate(columns) if _is_frame(one)]
         if len(frames) != 1:
             return None
-        found[frames[0]] = "frame"
+        names[frames[0]] = "frame"
     moving = [
-        place for place, one in enumerate(columns) if place not in found and doppler_step(one) > 0
+        place for place, one in enumerate(columns) if place not in names and doppler_step(one) > 0
     ]
     if len(moving) != 1:
         return None
-    found[moving[0]] = "doppler"
+    names[moving[0]] = "doppler"
     strong = [
         place
         for place, one in enumerate(columns)
-        if place not in found and (one >= 0).all() and one.max() > _FASTEST_MPS
+        if place not in names and (one >= 0).all() and one.max() > _FASTEST_MPS
     ]
     if len(strong) == 1:
-        found[strong[0]] = "intensity"
-    return tuple(found.get(place, IGNORED) for place in range(table.width))
+        names[strong[0]] = "intensity"
+    return tuple(names.get(place, IGNORED) for place in range(table.width))
 
 
 def _is_frame(values: NDArray[np.float64]) -> bool:
@@ -290,14 +290,14 @@ def _is_frame(values: NDArray[np.float64]) -> bool:
 
 def doppler_step(velocities: NDArray[np.float64]) -> float:
     """Resolution of a radar of which velocities are multiples; 0 where they are not."""
-    found = np.unique(np.round(velocities[:_LOOKED_AT], 3))
-    if not (3 <= len(found) <= 257 and found[0] < 0 < found[-1]):
+    distinct = np.unique(np.round(velocities[:_LOOKED_AT], 3))
+    if not (3 <= len(distinct) <= 257 and distinct[0] < 0 < distinct[-1]):
         return 0.0
-    if len(found) > 0.3 * len(velocities) or np.abs(found).max() > _FASTEST_MPS:
+    if len(distinct) > 0.3 * len(velocities) or np.abs(distinct).max() > _FASTEST_MPS:
         return 0.0
-    step = float(np.diff(found).min())
+    step = float(np.diff(distinct).min())
     # Rounding of the file adds up over many steps: the largest multiple tells the step.
-    step = float(np.abs(found).max() / round(np.abs(found).max() / step)) if step > 0 else 0.0
-    if step < 0.01 or (np.abs(found / step - np.round(found / step)) > 0.1).any():
+    step = float(np.abs(distinct).max() / round(np.abs(distinct).max() / step)) if step > 0 else 0.0
+    if step < 0.01 or (np.abs(distinct / step - np.round(distinct / step)) > 0.1).any():
         return 0.0
     return round(step, 6)

@@ -48,7 +48,7 @@ class _Capture(BaseModel):
 
 
 class _Meta(BaseModel):
-    told: _Global = Field(alias="global")
+    global_: _Global = Field(alias="global")
     captures: list[_Capture] = Field(default_factory=list)
 
 
@@ -57,9 +57,9 @@ def read_sigmf_meta(path: Path) -> SigmfMeta:
     path = path.with_suffix(META)
     with faults_in(path, _EXPECTED):
         meta = _Meta.model_validate(read_json(path, _EXPECTED))
-    kind = meta.told.datatype
-    found = re.fullmatch(r"([cr])([fiu])(8|16|32|64)(?:_([lb])e)?", kind)
-    if found is None or (found[2] == "f" and found[3] in ("8", "16")):
+    kind = meta.global_.datatype
+    match = re.fullmatch(r"([cr])([fiu])(8|16|32|64)(?:_([lb])e)?", kind)
+    if match is None or (match[2] == "f" and match[3] in ("8", "16")):
         raise Sd2Error(
             f"{path}: core:datatype is {kind!r:.40}", "a type such as ci16_le or cf32_le"
         )
@@ -68,11 +68,11 @@ def read_sigmf_meta(path: Path) -> SigmfMeta:
             f"{path} has {len(meta.captures)} captures, or headers between its samples",
             "one capture, of samples alone",
         )
-    order = ">" if found[4] == "b" else "<"
+    order = ">" if match[4] == "b" else "<"
     return SigmfMeta(
-        np.dtype(f"{order}{_KINDS[found[2]]}{int(found[3]) // 8}"),
-        found[1] == "c",
-        meta.told.num_channels,
-        meta.told.sample_rate,
+        np.dtype(f"{order}{_KINDS[match[2]]}{int(match[3]) // 8}"),
+        match[1] == "c",
+        meta.global_.num_channels,
+        meta.global_.sample_rate,
         meta.captures[0].frequency if meta.captures else None,
     )

@@ -77,10 +77,10 @@ def _hdf5_names(path: Path) -> list[str]:
     import h5py
 
     with open_hdf5_file(path, _HDF5) as file, refusing_damage(path, _HDF5):
-        found = {name: member_of(file, path, name) for name in file}
+        members = {name: member_of(file, path, name) for name in file}
         return [
             name
-            for name, one in found.items()
+            for name, one in members.items()
             if isinstance(one, h5py.Dataset) and one.shape and one.dtype.kind in "iufcV"
         ]
 
@@ -99,10 +99,10 @@ def _hdf5(path: Path, dataset: str | None, *, by_column: bool = False) -> Stored
 
     name = _one_of(path, _hdf5_names(path)) if dataset is None else dataset
     with open_hdf5_file(path, _HDF5) as file, refusing_damage(path, _HDF5):
-        found = member_of(file, path, name)
-        if not isinstance(found, h5py.Dataset) or found.shape is None:
+        member = member_of(file, path, name)
+        if not isinstance(member, h5py.Dataset) or member.shape is None:
             raise Sd2Error(f"{path} has no dataset {name!r}", "the name of one, as dataset")
-        shape, dtype = found.shape, found.dtype
+        shape, dtype = member.shape, member.dtype
     if dtype.fields is not None and set(dtype.fields) == {"real", "imag"}:
         if any(dtype[part].kind not in "iuf" for part in ("real", "imag")):
             raise Sd2Error(f"{name} of {path} is of {dtype}", "numbers")

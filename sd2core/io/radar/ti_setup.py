@@ -126,8 +126,8 @@ class _Code(_Part):
 
     def phases(self) -> tuple[str, ...]:
         """Phases by name; those that are not 0."""
-        told = (self.model_extra or {}).items()
-        return tuple(f"{name} {value}" for name, value in told if _number(value) != 0)
+        extra = (self.model_extra or {}).items()
+        return tuple(f"{name} {value}" for name, value in extra if _number(value) != 0)
 
 
 class _Frame(_Part):
@@ -277,13 +277,13 @@ def _buffer(numbers: list[float]) -> tuple[int, int]:
     ``[<subFrameIdx>] <adcOutputFmt> <SampleSwap> <ChanInterleave> <ChirpThreshold>``: four values
     on xWR14xx and in the first SDK, which knew no subframes, five since.
     """
-    told = numbers if len(numbers) == 4 else numbers[1:]
-    if any(one not in (0, 1) for one in told[:3]):
+    values = numbers if len(numbers) == 4 else numbers[1:]
+    if any(one not in (0, 1) for one in values[:3]):
         raise Sd2Error(
             f"adcbufCfg is {' '.join(f'{one:g}' for one in numbers)}",
             "format, swap and interleave of 0 or 1, before them -1 where there are five values",
         )
-    return int(told[1]), int(told[2])
+    return int(values[1]), int(values[2])
 
 
 def _numbers(commands: dict[str, list[list[str]]], name: str, least: int) -> list[float]:
@@ -295,7 +295,7 @@ def _all_numbers(
 ) -> list[list[float]]:
     if needed and name not in commands:
         raise Sd2Error(f"There is no {name}", f"{_CFG} as it was sent to the radar")
-    found = []
+    rows = []
     for words in commands.get(name, ()):
         try:
             numbers = [float(word) for word in words]
@@ -306,8 +306,8 @@ def _all_numbers(
                 f"{name} is {' '.join(words)[:80]!r}",
                 f"{least} numbers or more, in the units of the SDK (GHz, µs, ms)",
             )
-        found.append(numbers)
-    return found
+        rows.append(numbers)
+    return rows
 
 
 def _whole(number: float) -> int:
@@ -368,9 +368,9 @@ def _setup(device: _Device, lanes: int, notes: list[str]) -> TiSetup:
         and not same
         and (len(set(masks)) < len(masks) or any(one.bit_count() != 1 for one in masks))
     ):
-        told = ", ".join(map(hex, masks))
+        hex_masks = ", ".join(map(hex, masks))
         raise Sd2Error(
-            f"Chirps of a loop are sent by the transmitters {told}",
+            f"Chirps of a loop are sent by the transmitters {hex_masks}",
             "one transmitter each, in turns, or the same ones for all",
             "Record with transmitters that take turns (TDM)",
         )
@@ -431,26 +431,26 @@ def _turns(chirps: list[_Chirp], first: int, last: int) -> list[_Chirp]:
     """Chirps of one loop, each by itself; Sd2Error if one is missing, or of another profile."""
     if not 0 <= first <= last < 512:
         raise Sd2Error(f"A loop goes from chirp {first} to {last}", "numbers from 0 to 511")
-    found = []
+    turns = []
     for number in range(first, last + 1):
         fitting = [one for one in chirps if one.chirpStartIdx <= number <= one.chirpEndIdx]
         if not fitting:
             raise Sd2Error(f"Chirp {number} of a loop is not configured", "every chirp of it")
-        found.append(fitting[-1])
-    if len({(one.profileId, one.idleTimeVar_usec) for one in found}) > 1:
+        turns.append(fitting[-1])
+    if len({(one.profileId, one.idleTimeVar_usec) for one in turns}) > 1:
         raise Sd2Error("Chirps of a loop differ in profile or idle time", "chirps of one kind")
-    return found
+    return turns
 
 
 def _refuse_codes(device: _Device, first: int, last: int) -> None:
     """Raise Sd2Error if phases of the transmitters differ between chirps of a loop."""
     for name, entries in (("rlBpmChirps", device.signs), ("rlRfPhaseShiftCfgs", device.shifts)):
         codes = [code for entry in entries for code in entry.values()]
-        told = set()
+        phases = set()
         for number in range(first, last + 1):
             fitting = [one for one in codes if one.chirpStartIdx <= number <= one.chirpEndIdx]
-            told.add(fitting[-1].phases() if fitting else ())
-        if len(told) > 1:
+            phases.add(fitting[-1].phases() if fitting else ())
+        if len(phases) > 1:
             raise _coded(f"{name} gives transmitters other phases from chirp to chirp")
 
 
