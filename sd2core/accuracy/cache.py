@@ -136,6 +136,6 @@ def _place(mesh: MeshSequence, family: Family) -> Path:
 def _from_json(text: str) -> Measurement:
     from pydantic import TypeAdapter
 
-    if (found := json.loads(text)["format"]) != _FORMAT:
-        raise ValueError(f"format {found}")
+    if (stored_format := json.loads(text)["format"]) != _FORMAT:
+        raise ValueError(f"format {stored_format}")
     return TypeAdapter(Measurement).validate_json(text, strict=True)

@@ -156,14 +156,14 @@ def _cheapest(
     safe = [plan for plan in plans if forecast[plan] <= tolerance]
     # What must hold if anything does.
     safe.append(min(plans, key=lambda plan: (forecast[plan], survey.settings_changed(plan))))
-    found = next(filter(holds, (*safe[: _MAX_TRIALS - 1], safe[-1])), None)
-    if found is None:
+    safe_plan = next(filter(holds, (*safe[: _MAX_TRIALS - 1], safe[-1])), None)
+    if safe_plan is None:
         return min(tried, key=lambda plan: tried[plan].l1)
     # Changes do not quite add up: some of the cheaper plans may hold as well.
-    cheaper = plans[: plans.index(found)]
+    cheaper = plans[: plans.index(safe_plan)]
     near = [plan for plan in cheaper if tolerance < forecast[plan] <= _SLACK * tolerance]
     near = sorted(near, key=forecast.__getitem__)[:_MORE_TRIALS]
-    return min((found, *filter(holds, near)), key=plans.index)
+    return min((safe_plan, *filter(holds, near)), key=plans.index)
 
 
 def _most_accurate(
@@ -197,8 +197,8 @@ def _reach_m(survey: Survey, progress: Progress) -> float | None:
         plan = replace(base, mask_reuse_m=reach_m)
         if plan not in survey.change:
             against = against or trial.columns(base, runs, progress=progress).twice()
-            found = trial.columns(plan, runs, progress=progress)
-            survey.change[plan] = relative_l1(found.smooth, against.smooth)
+            columns = trial.columns(plan, runs, progress=progress)
+            survey.change[plan] = relative_l1(columns.smooth, against.smooth)
         if survey.change[plan] < survey.change[replace(base, visibility="facing")]:
             return reach_m
     return None

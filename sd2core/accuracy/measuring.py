@@ -215,18 +215,18 @@ class _Waves:
         scene = WaveScene(self._mesh, PAPER_RADAR, self._sensor, "exact", wave)
         signals = []
         for time_s in self._mesh.times_s[list(self.frames)].tolist():
-            found = converged_frame(scene, time_s, most_cuts=_MAX_CUTS, go_on=go_on)
-            signals.append(found.signal)
-            for pieces, change in zip(found.pieces[1:], found.changes, strict=True):
+            frame = converged_frame(scene, time_s, most_cuts=_MAX_CUTS, go_on=go_on)
+            signals.append(frame.signal)
+            for pieces, change in zip(frame.pieces[1:], frame.changes, strict=True):
                 self.convergence[pieces] = max(self.convergence.get(pieces, 0.0), change)
         power = signal_spectra(np.stack(signals), PAPER_RADAR, axis=self._axis)
         self._reference = shares(power.astype(np.float64))  # (bins, n)
 
     def errors(self, plan: AccuracyPlan) -> Errors:
         """Errors against the reference."""
-        found, reference = self._columns(plan), self._reference
-        smooth, truth = self._smoothing @ found, self._smoothing @ reference
-        return compute_errors(found, reference, smooth, truth, self._axis)
+        columns, reference = self._columns(plan), self._reference
+        smooth, truth = self._smoothing @ columns, self._smoothing @ reference
+        return compute_errors(columns, reference, smooth, truth, self._axis)
 
     def begun(self, plan: AccuracyPlan, memory: bool) -> tuple[int | None, float]:
         """Most bytes allocated at once, and seconds that decimating the mesh took."""

@@ -172,9 +172,9 @@ class PlanSearch:
                 return None
             # What wrapping costs is nothing, and from another place more may be beyond.
             plan = replace(choice.plan, beyond="wrap")
-            found = self.checked(plan, tuple(reason.text for reason in choice.reasons))
-            if found is not None:
-                return found
+            placed = self.checked(plan, tuple(reason.text for reason in choice.reasons))
+            if placed is not None:
+                return placed
         return None
 
     def reference_s(self) -> float:

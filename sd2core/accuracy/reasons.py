@@ -36,13 +36,13 @@ def reasons_for(
         Relative L1 after smoothing; None where a budget decided.
     """
     base, facts, change = survey.base, survey.facts, survey.change
-    found: list[Reason] = []
+    reasons: list[Reason] = []
 
     def add(setting: str, modelled: bool, value: float, text: str, **lowered: Any) -> None:
         """Add a reason; ``lowered`` are the settings without what it is about."""
         if lowered and tolerance is not None and modelled == (value <= tolerance):
             text += _because(survey, plan, tried, tolerance, replace(plan, **lowered), modelled)
-        found.append(Reason(setting, modelled, value, text))
+        reasons.append(Reason(setting, modelled, value, text))
 
     def alone(**setting: Any) -> float:
         return change[replace(base, **setting)]
@@ -118,7 +118,7 @@ def reasons_for(
         add(part, modelled, off, use, left_out=(*plan.left_out, part))
     if (off_alone := survey.others_change) is not None:
         people = f"other people change this map by {percent(off_alone)}: modelled"
-        found.append(Reason("people", True, off_alone, people))
+        reasons.append(Reason("people", True, off_alone, people))
     edge_mps = survey.trial.options.axis.v_max_mps
     if facts.beyond_share <= 0:
         add(
@@ -142,7 +142,7 @@ def reasons_for(
         f" map by {percent(off)}: {use}"
     )
     add("motion", factor > 1, off, motion, frame_rate_factor=1)
-    return tuple(found)
+    return tuple(reasons)
 
 
 def _because(

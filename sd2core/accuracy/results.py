@@ -125,8 +125,8 @@ class Measurement:
     def of(self, plan: AccuracyPlan) -> PlanResult | None:
         """Result of a plan, else of the same plan with velocities wrapped, or None."""
         wrapped = replace(plan, beyond="wrap")
-        found = {result.plan: result for result in self.results}
-        return found.get(plan) or found.get(wrapped)
+        by_plan = {result.plan: result for result in self.results}
+        return by_plan.get(plan) or by_plan.get(wrapped)
 
 
 @dataclass(frozen=True)
@@ -166,10 +166,10 @@ class Choice:
         if self.holds:
             return f"{self.plan}: off by {percent(self.errors.l1)}, {cost}"
         # However little that is: the tolerance may be less.
-        found = f"{self.plan}: off by {100 * self.errors.l1:.2g} %, {cost}"
+        best = f"{self.plan}: off by {100 * self.errors.l1:.2g} %, {cost}"
         if self.tolerance is not None:
-            return f"No plan holds {100 * self.tolerance:g} %; the best is {found}"
-        return f"No plan keeps within {self.budget_ms:g} ms per frame; the fastest is {found}"
+            return f"No plan holds {100 * self.tolerance:g} %; the best is {best}"
+        return f"No plan keeps within {self.budget_ms:g} ms per frame; the fastest is {best}"
 
     def to_json(self) -> dict[str, Any]:
         """Content for JSON, with the plan also in words."""

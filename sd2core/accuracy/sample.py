@@ -100,8 +100,8 @@ def take_sample(mesh: MeshSequence, options: SynthesisOptions, runs: int = 6) ->
     if frames < 2 * length:
         return _whole(frames)
     starts = np.unique(np.linspace(0, frames - length, _CANDIDATES).astype(int) // every * every)
-    there = mesh.presence.present
-    with_person = [bool(there[start : start + length].all()) for start in starts.tolist()]
+    present = mesh.presence.present
+    with_person = [bool(present[start : start + length].all()) for start in starts.tolist()]
     peopled = _apart(starts[with_person], length)
     starts = peopled if len(peopled) >= _MIN_STARTS else _apart(starts, length)
     speed = np.array([_speed(mesh, int(start) + length // 2) for start in starts])

@@ -181,20 +181,20 @@ def survey_scene(
     quick_ms = survey.count_ms[base]
     survey.mask_ms[base] = max(against.milliseconds - quick_ms, 0.0)
     for plan in single:
-        found = trial.columns(plan, runs, progress=within)
-        survey.change[plan] = relative_l1(found.smooth, against.smooth)
-        survey.mask_ms[plan] = max(found.milliseconds - quick_ms, 0.0)
+        columns = trial.columns(plan, runs, progress=within)
+        survey.change[plan] = relative_l1(columns.smooth, against.smooth)
+        survey.mask_ms[plan] = max(columns.milliseconds - quick_ms, 0.0)
         if plan.vertices_kept < 1:
             # The first time prepares what only this mesh needs.
             again = trial.columns(plan, runs, progress=within)
-            spent_ms = min(found.milliseconds, again.milliseconds)
+            spent_ms = min(columns.milliseconds, again.milliseconds)
             share = spent_ms / against.milliseconds if against.milliseconds > 0 else 1.0
             survey.cost_share[plan.vertices_kept] = min(max(share, plan.vertices_kept), 1.0)
         step()
     if mesh.others:
         alone = Trial(replace(mesh, others=()), sensor, options, trial.sample)
-        found = alone.columns(base, runs, progress=within)
-        survey.others_change = relative_l1(found.smooth, against.smooth)
+        columns = alone.columns(base, runs, progress=within)
+        survey.others_change = relative_l1(columns.smooth, against.smooth)
         step()
     return survey
 

@@ -130,12 +130,12 @@ class Trial:
     def scene_parts(self) -> tuple[ScenePart, ...]:
         """Parts of the scene that a plan may leave out."""
         around = self.mesh.surroundings
-        there: dict[ScenePart, bool] = {
+        in_scene: dict[ScenePart, bool] = {
             "beam": self.sensor.beam is not None,
             "things": around is not None and bool(around.things) and self.mesh.faces is not None,
             "walls": around is not None and bool(around.walls),
         }
-        return tuple(part for part, is_there in there.items() if is_there)
+        return tuple(part for part, is_there in in_scene.items() if is_there)
 
     def at(self, sensor: VirtualSensor) -> Trial:
         """Trial from another place, sharing what does not depend on it."""
@@ -190,11 +190,11 @@ class Trial:
     ) -> Errors:
         """Errors of a plan against the reference on some runs."""
         reference = self.reference(runs, progress=progress)
-        found = self.columns(plan, runs, progress=progress)
+        columns = self.columns(plan, runs, progress=progress)
         if plan.mask_reuse_m:
             reference = reference.twice()
         axis = self.options.axis
-        return compute_errors(found.raw, reference.raw, found.smooth, reference.smooth, axis)
+        return compute_errors(columns.raw, reference.raw, columns.smooth, reference.smooth, axis)
 
     def milliseconds(
         self,
