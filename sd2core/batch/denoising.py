@@ -71,13 +71,13 @@ class _Files:
     def __init__(self, maps: Sequence[Path], parts: Sequence[str]) -> None:
         self._maps, self._parts = maps, parts
         self._loaded: dict[int, DopplerMap] = {}
-        times_s, there = [], []
+        times_s, present = [], []
         for number in range(len(maps)):
             part = self.part(number)
             times_s.append(part.times_s)
-            there.append(Presence.of(part.present, len(part.timebase)).present)
+            present.append(Presence.of(part.present, len(part.timebase)).present)
         self.times_s = np.concatenate(times_s)
-        self.present_mask = np.concatenate(there)
+        self.present_mask = np.concatenate(present)
         self.edges = np.cumsum([0, *map(len, times_s)])
 
     def part(self, number: int) -> DopplerMap:

@@ -29,9 +29,9 @@ _REMEMBERED_HOMES = 1000
 
 @dataclass
 class Counts:
-    """Counts per step: tasks that were there, done, failed, or waiting for failed ones."""
+    """Counts per step: tasks made before, done, failed, or waiting for failed ones."""
 
-    there: Counter[str] = field(default_factory=Counter)
+    made_before: Counter[str] = field(default_factory=Counter)
     done: Counter[str] = field(default_factory=Counter)
     failed: Counter[str] = field(default_factory=Counter)
     waiting: Counter[str] = field(default_factory=Counter)
@@ -41,7 +41,7 @@ class Counts:
 
     def settled(self, step: str) -> int:
         """Number of tasks of a step that need no more work."""
-        return self.there[step] + self.done[step] + self.failed[step] + self.waiting[step]
+        return self.made_before[step] + self.done[step] + self.failed[step] + self.waiting[step]
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Driver:
         self._graph, self._open_pool = graph, open_pool
         self._pool: Pool | None = None
         self._on_failure, self._on_note, self._tick = on_failure, on_note, tick
-        self.tally = Counts()
+        self.counts = Counts()
         self.last: Task | None = None
         # Tasks in flight by key, each with others that have the same content.
         self.running: dict[str, list[Task]] = {}
@@ -134,10 +134,10 @@ class Driver:
         return tuple(bundle)
 
     def _most_in_bundle(self, task: Task) -> int:
-        done = self.tally.done[task.step]
+        done = self.counts.done[task.step]
         if not done or self._resubmissions[task.key]:
             return 1
-        each_s = max(self.tally.seconds[task.step] / done, 1e-3)
+        each_s = max(self.counts.seconds[task.step] / done, 1e-3)
         return min(max(int(_BUNDLE_S / each_s), 1), _LARGEST_BUNDLE)
 
     def _next(self) -> Task | None:
@@ -150,8 +150,8 @@ class Driver:
                 # The same content in another recording: it follows when that is done.
                 self.running[task.key].append(task)
             elif self._graph.is_done(task):
-                self._found(task)
-                if self.tally.there[task.step] % 256 == 0:
+                self._count_made_before(task)
+                if self.counts.made_before[task.step] % 256 == 0:
                     self._tick()
             else:
                 return task
@@ -199,7 +199,7 @@ class Driver:
             elif outcome.error is None:
                 self._done(task, outcome.seconds)
                 for other in alike:
-                    self._found(other)
+                    self._count_made_before(other)
             elif outcome.fatal:
                 raise Sd2Error(**outcome.error)
             else:
@@ -217,14 +217,14 @@ class Driver:
 
     def _done(self, task: Task, seconds: float) -> None:
         if self._follow(task):
-            self.tally.done[task.step] += 1
-            self.tally.seconds[task.step] += seconds
-            self.tally.work[task.step] += task.work
+            self.counts.done[task.step] += 1
+            self.counts.seconds[task.step] += seconds
+            self.counts.work[task.step] += task.work
             self.last = task
 
-    def _found(self, task: Task) -> None:
+    def _count_made_before(self, task: Task) -> None:
         if self._follow(task):
-            self.tally.there[task.step] += 1
+            self.counts.made_before[task.step] += 1
 
     def _follow(self, task: Task) -> bool:
         """Queue the tasks after this one; False where its result is unusable (a failure)."""
@@ -236,20 +236,20 @@ class Driver:
         return True
 
     def _fail(self, task: Task, error: dict[str, str], worker_died: bool = False) -> None:
-        self.tally.failed[task.step] += 1
-        self.tally.waiting += Counter(self._graph.lost_with(task))
+        self.counts.failed[task.step] += 1
+        self.counts.waiting += Counter(self._graph.lost_with(task))
         self._on_failure(Failure(task, error, worker_died))
 
     def left_s(self) -> float | None:
         """Estimated seconds to the end; None while a step has not been timed."""
         seconds, workers = 0.0, self.workers
         for step, total in self._graph.total.items():
-            left = total - self.tally.settled(step)
+            left = total - self.counts.settled(step)
             if left <= 0 or step == "export":
                 continue
-            if not self.tally.done[step]:
+            if not self.counts.done[step]:
                 return None
-            seconds += left * self.tally.seconds[step] / self.tally.done[step]
+            seconds += left * self.counts.seconds[step] / self.counts.done[step]
         return seconds / workers if workers else None
 
 

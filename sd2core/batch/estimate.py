@@ -96,16 +96,16 @@ def estimate(plan: BatchPlan, workers: int, progress: Progress = silent) -> Batc
     new = []
     for number, origin in enumerate(origins):
         progress(number, len(origins))
-        found = known_inspection(folder, origin)
-        if found is None:
+        inspection = known_inspection(folder, origin)
+        if inspection is None:
             new.append(origin)
         else:
             steps["inspect"].there += 1
-            _count(graph, steps, origin, found, 1.0)
+            _count(graph, steps, origin, inspection, 1.0)
     glanced = _glances(new, made, progress)
     weight = len(new) / max(len(glanced) + len(made.unusable), 1)
-    for origin, found in glanced:
-        _count(graph, steps, origin, found, weight)
+    for origin, inspection in glanced:
+        _count(graph, steps, origin, inspection, weight)
     steps["inspect"].to_do = steps["inspect"].work = len(new)
     made.looked_at = steps["inspect"].there + len(glanced) + len(made.unusable)
     if plan.export is not None:
@@ -133,31 +133,31 @@ def _glances(
     new: Sequence[Origin], made: BatchEstimate, progress: Progress
 ) -> list[tuple[Origin, Inspection]]:
     """Inspect some recordings without hashing them."""
-    found = []
+    glanced = []
     chosen = np.unique(np.linspace(0, len(new) - 1, min(_INSPECTED, len(new))).astype(int))
     for number, index in enumerate(chosen):
         progress(number, len(chosen))
         try:
-            found.append((new[index], glance(new[index])))
+            glanced.append((new[index], glance(new[index])))
         except (Sd2Error, OSError) as error:
             made.unusable.append(f"{new[index].name}: {error}")
-    return found
+    return glanced
 
 
 def _count(
     graph: TaskGraph,
     steps: dict[str, StepEstimate],
     origin: Origin,
-    found: Inspection,
+    inspection: Inspection,
     weight: float,
 ) -> None:
     """Count the tasks of a recording that stands for ``weight`` recordings."""
-    mesh, fit = found.mesh, graph.plan.fit
+    mesh, fit = inspection.mesh, graph.plan.fit
     if mesh is None:
-        assert found.video is not None
+        assert inspection.video is not None
         if fit is None:
             return
-        video, task = found.video, graph.fit_task(origin, found.video)
+        video, task = inspection.video, graph.fit_task(origin, inspection.video)
         mesh = fitted(Path(task.out)) if video.identity else None
         steps["fit"].count(task, mesh is not None, weight)
         if mesh is None:
@@ -165,7 +165,7 @@ def _count(
             mesh = MeshInput("", "", video.frames, vertices, video.frames_per_s, nowhere)
     if graph.plan.synthesise is None:
         return
-    for planned in graph.maps_of(origin, found, mesh):
+    for planned in graph.maps_of(origin, inspection, mesh):
         for task in planned.tasks:
             steps[task.step].count(task, bool(mesh.identity) and graph.is_done(task), weight)
 

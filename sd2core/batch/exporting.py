@@ -49,7 +49,7 @@ def dataset_path(folder: BatchFolder, export: Exporting) -> Path:
 
 def dataset_key(folder: BatchFolder, export: Exporting) -> str:
     """Return the hash of all that the data set depends on; ``results.jsonl`` must exist."""
-    content = {"results": file_digest(folder.results), "export": _said(export)}
+    content = {"results": file_digest(folder.results), "export": _settings_of(export)}
     return key_of("export", content)
 
 
@@ -72,7 +72,7 @@ def export_dataset(folder: BatchFolder, export: Exporting) -> None:
     out = dataset_path(folder, export)
     note = folder.path / _NOTE
     options = dataset_options(export, export.spans)
-    settings = key_of("export", {"settings": _said(export)})
+    settings = key_of("export", {"settings": _settings_of(export)})
     if _noted(folder).get("settings") != settings or _is_stale(out, folder, export):
         for path in (*folder.path.glob("dataset.*"),):
             remove(path)
@@ -88,7 +88,7 @@ def export_dataset(folder: BatchFolder, export: Exporting) -> None:
     atomic_write_text(note, json.dumps(content) + "\n")
 
 
-def _said(export: Exporting) -> dict[str, Any]:
+def _settings_of(export: Exporting) -> dict[str, Any]:
     """What a plan says of its data set; what is new in plans only where one says it."""
     unsaid = {*_NEW} - {*changed(export)}
     return {name: value for name, value in asdict(export).items() if name not in unsaid}
@@ -156,8 +156,8 @@ def _sources(folder: BatchFolder, export: Exporting) -> Iterator[LazySource]:
                 name = f"{name} part {number + 1} of {len(parts)}"
             key = SourceKey(rows[0]["subject"], name, rows[0]["placement"])
             load = partial(_source, folder, rows, key, (start, stop), opened, export.imu)
-            told = json.dumps([rows, start, stop], sort_keys=True)
-            fingerprint = hashlib.sha256(told.encode()).hexdigest()[:32]
+            content = json.dumps([rows, start, stop], sort_keys=True)
+            fingerprint = hashlib.sha256(content.encode()).hexdigest()[:32]
             yield LazySource(key, load, partial(str, fingerprint))
 
 
@@ -188,11 +188,11 @@ def _source(
     for kind in kinds:
         if all(row[kind] is not None for row in rows):
             maps[kind] = _stretch_of(folder, rows, kind, part)
-    there, person = opened(rows[0]["source"], rows[0]["mesh"]), rows[0].get("person", "")
-    recording, people = there.recording, there.people
+    scene, person = opened(rows[0]["source"], rows[0]["mesh"]), rows[0].get("person", "")
+    recording, people = scene.recording, scene.people
     first = _stretch_of(folder, rows, "clock" if "clock" in rows[0] else "synthetic", part)
     if recording.radar is not None and key.placement == 0:
-        radar = on_clock(there.radar_of(first.axis), first.timebase)
+        radar = on_clock(scene.radar_of(first.axis), first.timebase)
         maps.setdefault(radar.kind, radar)
     names, classes = labels_and_classes(people.labels)
     maps, own = people.known(person, names, maps), people.labels_of(person)
@@ -209,7 +209,7 @@ def _source(
             "simulated": recording.simulated,
             **people.shown(person, maps),
         },
-        {place: there.imu_of(place, person).between(*part) for place in imu},
+        {place: scene.imu_of(place, person).between(*part) for place in imu},
         labelled_spans(own, names),
     )
 

@@ -98,7 +98,7 @@ def find_origins(recordings: Recordings, apart_from: Path) -> list[Origin]:
     What lies inside of a recording or of a Zarr store that is found belongs to it. The
     batch's own folder, ``apart_from``, is not searched.
     """
-    found: set[str] = set()
+    matched: set[str] = set()
     for pattern in recordings.files:
         matches = [pattern] if os.path.exists(pattern) else glob.glob(pattern, recursive=True)
         matches = [path for path in matches if not Path(path).is_relative_to(apart_from)]
@@ -108,8 +108,8 @@ def find_origins(recordings: Recordings, apart_from: Path) -> list[Origin]:
                 "recordings (.sd2), videos or meshes",
                 "Check `files` of [recordings] in the plan",
             )
-        found.update(matches)
-    paths = [Path(path) for path in sorted(found)]
+        matched.update(matches)
+    paths = [Path(path) for path in sorted(matched)]
     paths = [path for path in paths if not {".sd2", ".zarr"} & {at.suffix for at in path.parents}]
     root = Path(os.path.commonpath([path.parent for path in paths]))
     return [
@@ -138,9 +138,9 @@ def known_inspection(folder: BatchFolder, origin: Origin) -> Inspection | None:
     record = _record(folder, origin)
     if record is None or signature(entry[0] for entry in record["files"]) != record["files"]:
         return None
-    found = _INSPECTION.validate_python(record["inspection"])
+    inspection = _INSPECTION.validate_python(record["inspection"])
     # A mesh of ours may have been deleted.
-    return found if found.mesh is None or is_there(Path(found.mesh.path)) else None
+    return inspection if inspection.mesh is None or is_there(Path(inspection.mesh.path)) else None
 
 
 def inspect(folder: BatchFolder, origin: Origin) -> Inspection:
@@ -150,17 +150,17 @@ def inspect(folder: BatchFolder, origin: Origin) -> Inspection:
     """
     before = _record(folder, origin) or {"files": [], "digests": {}}
     digests = Digests(before["files"], before["digests"])
-    found = _Look(folder, digests).at(Path(origin.path))
+    inspection = _Look(folder, digests).at(Path(origin.path))
     content = {
         "code": code_digest("inspect"),
         "files": digests.files,
         "digests": digests.digests,
-        "inspection": asdict(found),
+        "inspection": asdict(inspection),
     }
     path = _record_path(folder, origin)
     path.parent.mkdir(parents=True, exist_ok=True)
     atomic_write_text(path, json.dumps(content) + "\n")
-    return found
+    return inspection
 
 
 def glance(origin: Origin) -> Inspection:
@@ -284,13 +284,13 @@ def open_mesh(path: Path, faces: str | None, reading: Mapping[str, Any]) -> Mesh
             "Save it as .zarr: sd2core.io.mesh.save_mesh(sd2core.load_mesh(PATH), 'mesh.zarr')",
         )
     # JSON knows no tuples.
-    told: dict[str, Any] = {
+    settings: dict[str, Any] = {
         key: tuple(one) if isinstance(one, list) else one for key, one in reading.items()
     }
-    things = (one if isinstance(one, Thing) else Thing(**one) for one in told.pop("things", ()))
-    bodies = (one if isinstance(one, Body) else Body(**one) for one in told.pop("bodies", ()))
-    walls = (one if isinstance(one, Wall) else Wall(**one) for one in told.pop("walls", ()))
-    return load_scene(path, bodies=bodies, faces=faces, things=things, walls=walls, **told)
+    things = (one if isinstance(one, Thing) else Thing(**one) for one in settings.pop("things", ()))
+    bodies = (one if isinstance(one, Body) else Body(**one) for one in settings.pop("bodies", ()))
+    walls = (one if isinstance(one, Wall) else Wall(**one) for one in settings.pop("walls", ()))
+    return load_scene(path, bodies=bodies, faces=faces, things=things, walls=walls, **settings)
 
 
 def _bytes_in_memory(path: Path) -> int:
@@ -324,8 +324,8 @@ def mesh_input_of(
     mesh = open_mesh(path, faces, reading or {})
     x, y, z = (round(value, 6) for value in BodyExtent.of(mesh).target_m)
     # Who comes in too late is nowhere.
-    there = (body if body.presence.present.any() else mesh for body in mesh.others)
-    others_m = tuple(BodyExtent.of(body).target_m for body in there)
+    bodies = (body if body.presence.present.any() else mesh for body in mesh.others)
+    others_m = tuple(BodyExtent.of(body).target_m for body in bodies)
     rate = mesh.timebase.frames_per_s
     shape = mesh.frame_count, mesh.vertex_count
     return MeshInput(str(path), identity, *shape, rate, (x, y, z), faces, reading, others_m)

@@ -121,22 +121,22 @@ class Pool:
             return Ending(tasks)
         except Exception as failure:
             error = failure
-        found = f"The worker cannot run it ({type(error).__name__}: {error})"
-        failed = Outcome(error=Sd2Error(found).arguments)
+        message = f"The worker cannot run it ({type(error).__name__}: {error})"
+        failed = Outcome(error=Sd2Error(message).arguments)
         return Ending(tasks, [failed] * len(tasks))
 
     def _look(self) -> None:
         try:
             threads = dict(self._client.nthreads())
             new = [address for address in threads if address not in self._checked]
-            told = self._probed(new) if new else {}
+            answers = self._probed(new) if new else {}
         except OSError as error:
             raise Sd2Error(
                 f"The scheduler does not answer any more ({error})",
                 "a scheduler that stays",
                 "Start it again, then the same command: what is done is kept",
             ) from error
-        for address, about in told.items():
+        for address, about in answers.items():
             _check_worker(address, about, self._folder.path)
             self._checked.add(address)
         self._workers = {one: count for one, count in threads.items() if one in self._checked}
@@ -148,7 +148,7 @@ class Pool:
         marker = self._folder.path / BEGUN / token
         marker.touch()
         try:
-            told: dict[str, Any] = self._client.run(
+            answers: dict[str, Any] = self._client.run(
                 probe,
                 str(self._folder.path.absolute()),
                 token,
@@ -159,7 +159,7 @@ class Pool:
             marker.unlink(missing_ok=True)
         # One that has gone meanwhile is none.
         gone = (CommClosedError, ConnectionError, TimeoutError)
-        return {one: about for one, about in told.items() if not isinstance(about, gone)}
+        return {one: about for one, about in answers.items() if not isinstance(about, gone)}
 
 
 def _run_here(tasks: list[Task], folder: str, most_deaths: int) -> tuple[str, list[Outcome]]:

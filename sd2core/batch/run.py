@@ -199,18 +199,18 @@ class _Run:
             )
 
     def _counts(self) -> dict[str, Any]:
-        tally = None if self._driver is None else self._driver.tally
+        counts = None if self._driver is None else self._driver.counts
         steps = self._graph.steps
 
-        def of(counts: Any) -> dict[str, int]:
-            return {step: counts[step] if counts else 0 for step in steps}
+        def of(by_step: Any) -> dict[str, int]:
+            return {step: by_step[step] if by_step else 0 for step in steps}
 
         return {
             "total": of(self._graph.total),
-            "there": of(tally and tally.there),
-            "done": of(tally and tally.done),
-            "failed": sum(tally.failed.values()) if tally else 0,
-            "waiting": sum(tally.waiting.values()) if tally else 0,
+            "there": of(counts and counts.made_before),
+            "done": of(counts and counts.done),
+            "failed": sum(counts.failed.values()) if counts else 0,
+            "waiting": sum(counts.waiting.values()) if counts else 0,
             "elapsed_s": time.monotonic() - self._begun_s,
         }
 
@@ -267,9 +267,9 @@ class _Run:
                         stream.write((json.dumps(row, ensure_ascii=False) + "\n").encode())
 
     def _end(self, outcome: str, error: Sd2Error | None) -> dict[str, Any]:
-        told = None
+        error_fields = None
         if error is not None:
-            told = error.arguments
+            error_fields = error.arguments
             self._log(str(error))
         export = self._graph.plan.export
         dataset = None if export is None else dataset_path(self._folder, export)
@@ -278,13 +278,13 @@ class _Run:
             **self._counts(),
             "report": str(self._folder.report),
             "dataset": str(dataset) if dataset is not None and dataset.exists() else None,
-            "error": told,
+            "error": error_fields,
         }
         # The pace of other machines is of no use here.
         if self._driver is not None and self._scheduler is None:
-            tally = self._driver.tally
-            for step in self._graph.steps:
-                keep_pace(pace_kind(self._graph.plan, step), tally.seconds[step], tally.work[step])
+            graph, counts = self._graph, self._driver.counts
+            for step in graph.steps:
+                keep_pace(pace_kind(graph.plan, step), counts.seconds[step], counts.work[step])
         self._write_report(facts)
         self._folder.set_state(outcome)  # type: ignore[arg-type]
         self._lines.say("end", **facts)
@@ -310,8 +310,8 @@ class _Run:
 
 def _if_there(out: Sequence[str | Path], root: Path) -> str | None:
     """Path of a file below the root; None where none is made, or it is missing."""
-    there = (path.relative_to(root).as_posix() for path in map(Path, out) if path.exists())
-    return next(there, None)
+    existing = (path.relative_to(root).as_posix() for path in map(Path, out) if path.exists())
+    return next(existing, None)
 
 
 def remove_old_leftovers(folder: Path, old_s: float = _OLD_S) -> None:

@@ -209,7 +209,7 @@ def chosen_plan(mesh: MeshInput, section: Synthesis, choosing: Choosing) -> dict
     from sd2core.accuracy.places import choose_for_places
 
     assert section.tolerance is not None
-    found = choose_for_places(
+    placed = choose_for_places(
         kept_mesh(mesh),
         choosing.places,
         choosing.frames,
@@ -220,7 +220,7 @@ def chosen_plan(mesh: MeshInput, section: Synthesis, choosing: Choosing) -> dict
     handle, temporary = tempfile.mkstemp(prefix=".sd2-", suffix=".tmp", dir=path.parent)
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            json.dump({"plan": found.plan.to_json(), "provenance": found.provenance()}, stream)
+            json.dump({"plan": placed.plan.to_json(), "provenance": placed.provenance()}, stream)
         os.link(temporary, path)
     except FileExistsError:
         pass  # another process was first

@@ -87,8 +87,8 @@ class TaskGraph:
         section = plan.synthesise
         self._scene: dict[str, Any] = {}
         if section is not None:
-            told = ("tolerance", "vertices_kept", "left_out", "limbs")
-            self._scene = {name: getattr(section, name) for name in told}
+            settings = ("tolerance", "vertices_kept", "left_out", "limbs")
+            self._scene = {name: getattr(section, name) for name in settings}
             self._scene["options"] = asdict(chosen_options(section))
         self._model = None if plan.denoise is None else _model_of(plan)
         self._simulation = None if plan.simulate is None else simulation_of(plan.simulate)
@@ -142,15 +142,15 @@ class TaskGraph:
     def after(self, task: Task) -> Iterator[Task]:
         """Yield the tasks that can be done after this one."""
         if task.step == "inspect":
-            found = known_inspection(self.folder, task.origin)
-            if found is None:
+            inspection = known_inspection(self.folder, task.origin)
+            if inspection is None:
                 raise _changing(task.origin)
-            return self._after_inspection(task.origin, found)
+            return self._after_inspection(task.origin, inspection)
         if task.step == "fit":
-            mesh, found = fitted(Path(task.out)), known_inspection(self.folder, task.origin)
-            if mesh is None or found is None:
+            mesh, inspection = fitted(Path(task.out)), known_inspection(self.folder, task.origin)
+            if mesh is None or inspection is None:
                 raise _changing(task.origin)
-            return self._synthesis(task.origin, found, mesh)
+            return self._synthesis(task.origin, inspection, mesh)
         if task.step == "synthesise":
             return self._after_map(task)
         return iter(())
@@ -169,17 +169,17 @@ class TaskGraph:
         maps = recordings * self.plan.placement_count
         return {step: maps for step in _MAPS if step in self.steps}
 
-    def _after_inspection(self, origin: Origin, found: Inspection) -> Iterator[Task]:
-        if found.mesh is not None:
-            return self._synthesis(origin, found, found.mesh)
-        assert found.video is not None
+    def _after_inspection(self, origin: Origin, inspection: Inspection) -> Iterator[Task]:
+        if inspection.mesh is not None:
+            return self._synthesis(origin, inspection, inspection.mesh)
+        assert inspection.video is not None
         if self.plan.fit is None:
             raise Sd2Error(
                 f"{origin.path} is a video without a mesh",
                 "a section [fit] in the plan, which makes one",
             )
         self.total["fit"] += 1
-        return iter((self.fit_task(origin, found.video),))
+        return iter((self.fit_task(origin, inspection.video),))
 
     def fit_task(self, origin: Origin, video: VideoInput) -> Task:
         """Return the task that makes a mesh of a video."""
@@ -195,10 +195,10 @@ class TaskGraph:
         }
         return Task("fit", key, origin, arguments, None, video.frames, origin.name, out)
 
-    def _synthesis(self, origin: Origin, found: Inspection, mesh: MeshInput) -> Iterator[Task]:
+    def _synthesis(self, origin: Origin, inspection: Inspection, mesh: MeshInput) -> Iterator[Task]:
         if self.plan.synthesise is None:
             return
-        for planned in self.maps_of(origin, found, mesh):
+        for planned in self.maps_of(origin, inspection, mesh):
             self.total["synthesise"] += len(planned.stretches) - 1
             if self._model is not None:
                 self.total["denoise"] += len(planned.denoising) - 1
@@ -209,7 +209,7 @@ class TaskGraph:
             yield from planned.synthesis
         if self._simulation is not None:
             # After all that is quick, so that this can be given out together.
-            for planned in self.maps_of(origin, found, mesh):
+            for planned in self.maps_of(origin, inspection, mesh):
                 self.total["simulate"] += len(planned.stretches) - 1
                 yield from planned.simulation
 
@@ -223,12 +223,14 @@ class TaskGraph:
         del self._missing[where]
         return iter(self._denoising.pop(where))
 
-    def maps_of(self, origin: Origin, found: Inspection, mesh: MeshInput) -> Iterator[PlannedMap]:
+    def maps_of(
+        self, origin: Origin, inspection: Inspection, mesh: MeshInput
+    ) -> Iterator[PlannedMap]:
         """Yield all maps of one recording, for a data set those of whom its labels name."""
-        people = () if self.plan.export is None else found.people
+        people = () if self.plan.export is None else inspection.people
         bodies = 1 + len(mesh.others_m) if people else 1
         stretches = tuple(stretches_of(mesh.frames))
-        sensors = self.plan.sensors(found.sensor, mesh.target_m)
+        sensors = self.plan.sensors(inspection.sensor, mesh.target_m)
         choosing = self._choosing(mesh, list(sensors.values()))
         for placement, sensor in sensors.items():
             where = (origin, mesh, placement, sensor)
@@ -314,14 +316,14 @@ class TaskGraph:
         With the hash of what else is in the recording.
         """
         for origin in self.origins:
-            found = known_inspection(self.folder, origin)
-            mesh = None if found is None else found.mesh
-            if found is not None and mesh is None and self.plan.fit is not None:
-                assert found.video is not None
-                mesh = fitted(Path(self.fit_task(origin, found.video).out))
-            if found is not None and mesh is not None:
-                for planned in self.maps_of(origin, found, mesh):
-                    yield origin, found.about, mesh, planned
+            inspection = known_inspection(self.folder, origin)
+            mesh = None if inspection is None else inspection.mesh
+            if inspection is not None and mesh is None and self.plan.fit is not None:
+                assert inspection.video is not None
+                mesh = fitted(Path(self.fit_task(origin, inspection.video).out))
+            if inspection is not None and mesh is not None:
+                for planned in self.maps_of(origin, inspection, mesh):
+                    yield origin, inspection.about, mesh, planned
 
 
 def _changing(origin: Origin) -> Sd2Error:

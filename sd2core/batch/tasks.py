@@ -56,8 +56,8 @@ class Outcome:
     worker_died: bool = False  # True if the task is given up because of that
 
 
-def _failed(found: str, expected: str = "", remedy: str = "", **more: Any) -> Outcome:
-    return Outcome(error=Sd2Error(found, expected, remedy).arguments, **more)
+def _failed(message: str, expected: str = "", remedy: str = "", **more: Any) -> Outcome:
+    return Outcome(error=Sd2Error(message, expected, remedy).arguments, **more)
 
 
 def too_many_deaths(deaths: int) -> Outcome:
