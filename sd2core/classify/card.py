@@ -78,13 +78,13 @@ class ClassifierCard(NetworkCard):
 
         Background, or where that is none of the classes nothing is known: all the same.
         """
-        found = np.full(len(self.classes), 1.0 / len(self.classes), np.float32)
+        answer = np.full(len(self.classes), 1.0 / len(self.classes), np.float32)
         if self.background is not None:
-            found[:] = 0.0
-            found[self.background] = 1.0
-        return found
+            answer[:] = 0.0
+            answer[self.background] = 1.0
+        return answer
 
-    def told(self) -> dict[str, Any]:
+    def own_header(self) -> dict[str, Any]:
         """Return what only classifiers have, as JSON can hold it."""
         return {
             "features": self.features.kind,
@@ -98,7 +98,7 @@ class ClassifierCard(NetworkCard):
 
     @classmethod
     def parsed(cls, content: dict[str, Any]) -> dict[str, Any]:
-        """Parse :meth:`told`; those of version 1 are of 16 units where they do not say."""
+        """Parse :meth:`own_header`; those of version 1 are of 16 units where they do not say."""
         before = {"width": 16} if content["version"] < 2 else {}
         return {
             "options": {**before, **content["options"]},

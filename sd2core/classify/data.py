@@ -225,16 +225,16 @@ def frame_labels(timebase: Timebase, labels: Labels) -> tuple[NDArray[np.int8], 
     spans = labels.decided
     names = {span.label: _class_of(span.label, labels.label_set) for span in spans}
     classes = in_order([BACKGROUND, *(name for name in names.values() if name)])
-    found = np.zeros(len(timebase), np.int8)
+    label = np.zeros(len(timebase), np.int8)
     taken = np.zeros(len(timebase), bool)
     for span in spans:
         name = names[span.label]
         number = classes.index(name) if name else UNKNOWN
         frames = slice(*timebase.frames_between(span.start_s, span.end_s))
-        clash = taken[frames] & (found[frames] != number)
-        found[frames] = np.where(clash, UNKNOWN, number)
+        clash = taken[frames] & (label[frames] != number)
+        label[frames] = np.where(clash, UNKNOWN, number)
         taken[frames] = True
-    return found, classes
+    return label, classes
 
 
 def merged(sets: Sequence[ClipSet]) -> ClipSet:

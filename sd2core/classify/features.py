@@ -133,14 +133,14 @@ class Features:
 
 def _running_median(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
     """Running median over a window that ends at every value."""
-    found = np.empty(len(values))
+    medians = np.empty(len(values))
     early = min(window - 1, len(values))
     for last in range(early):
-        found[last] = np.median(values[: last + 1])
+        medians[last] = np.median(values[: last + 1])
     if len(values) >= window:
         rows = np.lib.stride_tricks.sliding_window_view(values, window)
         # In blocks: a long recording's windows would not fit into memory at once.
         for start in range(0, len(rows), _BLOCK):
             block = rows[start : start + _BLOCK]
-            found[early + start : early + start + len(block)] = np.median(block, axis=1)
-    return found
+            medians[early + start : early + start + len(block)] = np.median(block, axis=1)
+    return medians

@@ -73,9 +73,9 @@ def user_classifiers_folder() -> Path:
 
 
 def _read_header(path: Path) -> tuple[ClassifierCard, Shapes]:
-    told, shapes = read_header(path, _EXPECTED)
-    if told.get("format") == "sd2-denoiser":
+    header, shapes = read_header(path, _EXPECTED)
+    if header.get("format") == "sd2-denoiser":
         raise Sd2Error(
             f"{path} is a denoiser", "a classifier", "Train one with `sd2 classify train`"
         )
-    return ClassifierCard.from_json(told, path), shapes
+    return ClassifierCard.from_json(header, path), shapes

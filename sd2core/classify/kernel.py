@@ -55,12 +55,12 @@ class KernelClassifier(Classifier):
         """Score the next frames."""
         seen = torch.cat([state, features], dim=1)
         kept = seen[:, seen.shape[1] - self._frames + 1 :]
-        found = []
+        scores = []
         for start in range(0, features.shape[1], _BLOCK):
             stop = min(start + _BLOCK, features.shape[1])
             part = seen[:, start : stop + self._frames - 1]
-            found.append(self._likeness(self._described(part)) @ self.weights)
-        return _SHARPNESS * torch.cat(found, dim=1), kept
+            scores.append(self._likeness(self._described(part)) @ self.weights)
+        return _SHARPNESS * torch.cat(scores, dim=1), kept
 
     def fit(
         self,
@@ -122,9 +122,9 @@ class KernelClassifier(Classifier):
             normal += weighted.T @ alike
             wanted += weighted.T @ nn.functional.one_hot(y[part], wanted.shape[1]).double()
         normal += 1e-6 * torch.eye(len(known), dtype=torch.float64)
-        found = torch.zeros(count, wanted.shape[1])
-        found[: len(known)] = torch.linalg.solve(normal, wanted).float()
-        self.weights.data = found
+        solution = torch.zeros(count, wanted.shape[1])
+        solution[: len(known)] = torch.linalg.solve(normal, wanted).float()
+        self.weights.data = solution
 
     def _of_clip(self, features: Tensor) -> Tensor:
         before = self.initial_state(1)[0]

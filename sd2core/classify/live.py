@@ -71,27 +71,27 @@ class TrainedClassifier:
             When the map is not on the axis that the model knows.
         """
         matching.check_bins(doppler, self.card)
-        found = np.tile(self.card.no_person(), (len(doppler.timebase), 1))
+        answers = np.tile(self.card.no_person(), (len(doppler.timebase), 1))
         energies = matching.input_of(doppler)
         matching.apply_to_stretches(
-            self.probabilities_of, doppler, energies, self.card.frame_rate_hz, found, progress
+            self.probabilities_of, doppler, energies, self.card.frame_rate_hz, answers, progress
         )
-        return found
+        return answers
 
     def probabilities_of(
         self, energies: NDArray[np.float32], progress: Progress = silent
     ) -> Probabilities:
         """Compute one clip at the model's frame rate, (frames, bins) → (frames, classes)."""
-        found = np.empty((len(energies), len(self.classes)), np.float32)
+        probabilities = np.empty((len(energies), len(self.classes)), np.float32)
         memory = self.initial_memory()
         known = 0
         for start in range(0, len(energies), CHUNK):
             progress(start, len(energies))
             answers, memory = self.advance(energies[start : start + CHUNK], memory)
-            found[known : known + len(answers)] = answers
+            probabilities[known : known + len(answers)] = answers
             known += len(answers)
-        found[known:] = self.finish(memory)
-        return found
+        probabilities[known:] = self.finish(memory)
+        return probabilities
 
     def live(self) -> LiveClasses:
         """Session for the frames of one stretch, all with a person."""
@@ -150,8 +150,8 @@ class TrainedClassifier:
         """Run the network; answers before the first frame of a clip are dropped."""
         with torch.no_grad():
             answer, state = self.network.chunk(torch.from_numpy(shown)[None], memory.network)
-            found: Probabilities = torch.softmax(answer[0], dim=-1).numpy()
-        return found[max(self.card.delay_frames - memory.owed, 0) :], state
+            probabilities: Probabilities = torch.softmax(answer[0], dim=-1).numpy()
+        return probabilities[max(self.card.delay_frames - memory.owed, 0) :], state
 
 
 class LiveClasses:

@@ -16,21 +16,23 @@ Confusion = NDArray[np.int64]
 """(true classes, found classes) of frames or gestures."""
 
 
-def confusion_of(truth: NDArray[np.integer], found: NDArray[np.integer], classes: int) -> Confusion:
+def confusion_of(
+    truth: NDArray[np.integer], answer: NDArray[np.integer], classes: int
+) -> Confusion:
     """Compute the confusion matrix; unknown frames do not count."""
-    if truth.shape != found.shape:
-        raise Sd2Error(f"{len(found)} answers for {len(truth)} frames", "one for each")
+    if truth.shape != answer.shape:
+        raise Sd2Error(f"{len(answer)} answers for {len(truth)} frames", "one for each")
     counted = truth != UNKNOWN
     counts = np.zeros((classes, classes), np.int64)
-    np.add.at(counts, (truth[counted], found[counted]), 1)
+    np.add.at(counts, (truth[counted], answer[counted]), 1)
     return counts
 
 
 def shares(confusion: Confusion) -> NDArray[np.float64]:
     """Normalise the rows of a confusion matrix; NaN in an empty row."""
     totals = confusion.sum(axis=1, keepdims=True)
-    found = np.full(confusion.shape, np.nan)
-    return np.divide(confusion, totals, out=found, where=totals > 0)
+    normalised = np.full(confusion.shape, np.nan)
+    return np.divide(confusion, totals, out=normalised, where=totals > 0)
 
 
 def recalls(confusion: Confusion) -> NDArray[np.float64]:
@@ -136,10 +138,10 @@ def score(
     frames = np.zeros((number, number), np.int64)
     gestures = np.zeros((number, number), np.int64)
     latencies, missed = [], 0
-    for truth, found in zip(truths, answers, strict=True):
-        frames += confusion_of(truth, found, number)
+    for truth, answer in zip(truths, answers, strict=True):
+        frames += confusion_of(truth, answer, number)
         for start, stop, true in gesture_runs(truth, background):
-            own = found[start:stop]
+            own = answer[start:stop]
             # Of several equally frequent ones the first: background before a gesture.
             gestures[true, np.bincount(own, minlength=number).argmax()] += 1
             right = np.flatnonzero(own == true)

@@ -68,10 +68,10 @@ def predicted_spans(
     """
     options = options or SpanOptions()
     values = _checked(probabilities, len(timebase), len(classes))
-    there = np.ones(len(timebase), bool) if present is None else checked(present, len(timebase))
-    first, last = stretches(timebase, there)
+    mask = np.ones(len(timebase), bool) if present is None else checked(present, len(timebase))
+    first, last = stretches(timebase, mask)
     starts_s, ends_s = timebase.times_s, frame_ends_s(timebase, last)
-    winner = np.where(there, values.argmax(axis=1), -1)
+    winner = np.where(mask, values.argmax(axis=1), -1)
     runs = [
         (start, stop, number)
         for start, stop, number in _runs(winner, first)

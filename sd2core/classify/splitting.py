@@ -93,12 +93,12 @@ def dealt(known: ClipSet, clips: Sequence[Clip], parts: int, seed: int) -> dict[
     by_class: dict[int, list[Movement]] = {}
     for key, number in rarest(known, clips).items():
         by_class.setdefault(number, []).append(key)
-    found: dict[Movement, int] = {}
+    part_of: dict[Movement, int] = {}
     for number, keys in by_class.items():
         order = np.random.default_rng([seed, number]).permutation(len(keys))
         # The next class goes on where this one has ended, so that parts are of one size.
-        found |= {keys[place]: (len(found) + at) % parts for at, place in enumerate(order)}
-    return found
+        part_of |= {keys[place]: (len(part_of) + at) % parts for at, place in enumerate(order)}
+    return part_of
 
 
 def _apart(clips: Sequence[Clip], kept: set[Movement]) -> tuple[tuple[Clip, ...], tuple[Clip, ...]]:

@@ -165,12 +165,12 @@ def train(
             again = [number for number, (one, clean) in enumerate(noisy) if one is not clean]
             own_weights = np.concatenate([own_weights, own_weights[again]])
             shown = [*training, *(shown[number] for number in again)]
-        material = TrainingArrays.of(shown, features, delay_frames)
+        arrays = TrainingArrays.of(shown, features, delay_frames)
         if network.closed_form:
             say("start", steps=1, clips=len(training), frames=sum(map(len, training)))
             network.fit(
-                [torch.from_numpy(one) for one in material.features],
-                [torch.from_numpy(one) for one in material.labels],
+                [torch.from_numpy(one) for one in arrays.features],
+                [torch.from_numpy(one) for one in arrays.labels],
                 of_classes,
                 own_weights.tolist(),
                 chosen.seed,
@@ -180,7 +180,7 @@ def train(
             return Trained(TrainedClassifier(network, card), events, False)
         loop = _ClassifierLoop(
             network,
-            material,
+            arrays,
             TrainingArrays.of(validation, features, delay_frames),
             of_classes,
             chosen,
@@ -241,7 +241,7 @@ class _ClassifierLoop(Loop):
     def __init__(
         self,
         network: Classifier,
-        material: TrainingArrays,
+        arrays: TrainingArrays,
         validation: TrainingArrays,
         weights: torch.Tensor,
         chosen: TrainOptions,
@@ -255,7 +255,7 @@ class _ClassifierLoop(Loop):
             steps=chosen.steps,
             patience=chosen.patience,
         )
-        self._network, self._material, self._validation = network, material, validation
+        self._network, self._arrays, self._validation = network, arrays, validation
         self._weights, self._chosen, self._say = weights, chosen, say
         # Without chances all clips are shown in turn.
         self._chances = None if chances is None else chances / chances.sum()
@@ -297,24 +297,24 @@ class _ClassifierLoop(Loop):
             return self._rng.choice(len(self._chances), batch, p=self._chances).tolist()
         while len(self._waiting) < batch:
             # The last are taken first.
-            self._waiting[:0] = self._rng.permutation(len(self._material.labels)).tolist()
+            self._waiting[:0] = self._rng.permutation(len(self._arrays.labels)).tolist()
         return [self._waiting.pop() for _ in range(batch)]
 
     def _windows(self, clips: Sequence[int]) -> tuple[torch.Tensor, torch.Tensor]:
         """Cut a window from each clip: (batch, frames, size) and (batch, frames)."""
         length = min(
-            self._chosen.window_frames, max(len(self._material.labels[one]) for one in clips)
+            self._chosen.window_frames, max(len(self._arrays.labels[one]) for one in clips)
         )
-        size = self._material.features[0].shape[1]
+        size = self._arrays.features[0].shape[1]
         shown = np.zeros((len(clips), length, size), np.float32)
         label = np.full((len(clips), length), UNKNOWN, np.int64)
         for row, one in enumerate(clips):
-            frames = len(self._material.labels[one])
+            frames = len(self._arrays.labels[one])
             start = int(self._rng.integers(max(frames - length, 0) + 1))
             part = slice(start, start + length)
             count = min(frames, length)
-            shown[row, :count] = self._material.features[one][part]
-            label[row, :count] = self._material.labels[one][part]
+            shown[row, :count] = self._arrays.features[one][part]
+            label[row, :count] = self._arrays.labels[one][part]
         return torch.from_numpy(shown), torch.from_numpy(label)
 
     def _learn(self, shown: torch.Tensor, label: torch.Tensor) -> float:
@@ -362,14 +362,14 @@ def _schedule(share: float) -> float:
     return 0.02 + 0.98 * 0.5 * (1.0 + math.cos(math.pi * (share - rise) / (1.0 - rise)))
 
 
-def _score(network: Classifier, material: TrainingArrays, classes: int) -> float:
+def _score(network: Classifier, arrays: TrainingArrays, classes: int) -> float:
     """Mean recall over classes of all frames."""
     network.eval()
     confusion = np.zeros((classes, classes), np.int64)
     with torch.no_grad():
-        for shown, label in zip(material.features, material.labels, strict=True):
-            found = network(torch.from_numpy(shown)[None])[0].argmax(1).numpy()
-            confusion += confusion_of(label, found, classes)
+        for shown, label in zip(arrays.features, arrays.labels, strict=True):
+            answer = network(torch.from_numpy(shown)[None])[0].argmax(1).numpy()
+            confusion += confusion_of(label, answer, classes)
     return mean_recall(confusion)
 
 

@@ -112,7 +112,7 @@ class ModelCard(NetworkCard):
             )
         return self.texture
 
-    def told(self) -> dict[str, Any]:
+    def own_header(self) -> dict[str, Any]:
         """Return what only denoisers have, as JSON can hold it."""
         return {
             "scaling": self.scaling.to_json(),
@@ -128,7 +128,7 @@ class ModelCard(NetworkCard):
 
     @classmethod
     def parsed(cls, content: dict[str, Any]) -> dict[str, Any]:
-        """Parse :meth:`told`, and the options of version 1."""
+        """Parse :meth:`own_header`, and the options of version 1."""
         before = {}
         if content["version"] < VERSION:
             before["options"] = options_of_version_1(str(content["model"]), content["options"])

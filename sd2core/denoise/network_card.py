@@ -53,13 +53,13 @@ class NetworkCard:
                 f"The {self.KIND.noun}'s frame rate is {frame_rate_hz}", FRAME_RATE_HZ.words
             )
 
-    def told(self) -> dict[str, Any]:
+    def own_header(self) -> dict[str, Any]:
         """Return what only this kind of card has, as JSON can hold it."""
         raise NotImplementedError
 
     @classmethod
     def parsed(cls, content: dict[str, Any]) -> dict[str, Any]:
-        """Parse :meth:`told`, and options that are written otherwise in earlier versions."""
+        """Parse :meth:`own_header`, and options that are written otherwise in earlier versions."""
         raise NotImplementedError
 
     def to_json(self) -> dict[str, Any]:
@@ -69,7 +69,7 @@ class NetworkCard:
             "version": self.KIND.version,
             "model": self.model,
             "options": dict(self.options),
-            **self.told(),
+            **self.own_header(),
             "title": self.title,
             "about": dict(self.about),
             "parameters": self.parameters,
