@@ -128,7 +128,7 @@ def _count_sources(sources: Iterable[dict[str, Any]], header: Header) -> dict[st
             if kind == "synthetic" and "body_error_l1" in made:
                 accuracies.append(MapAccuracy.of(provenance | made))
     accuracies.sort(key=lambda one: one.total or 0.0)
-    found = {
+    facts = {
         "sources": totals["sources"],
         "recordings": len(views),
         "minutes": minutes,
@@ -144,18 +144,18 @@ def _count_sources(sources: Iterable[dict[str, Any]], header: Header) -> dict[st
         **({"everybody": list(everybody)} if everybody else {}),
     }
     if header.imu:
-        found["imu_cutoff_hz"] = [min(cutoffs_hz), max(cutoffs_hz)]
+        facts["imu_cutoff_hz"] = [min(cutoffs_hz), max(cutoffs_hz)]
     if header.spans is not None:
-        found["spans_counted"] = dict(spans)
-    return found
+        facts["spans_counted"] = dict(spans)
+    return facts
 
 
 def _most_common(ways: Counter[str]) -> dict[str, int]:
     """Count the sources of each way in which their maps were made."""
-    found = dict(ways.most_common(_MANY))
+    counts = dict(ways.most_common(_MANY))
     if len(ways) > _MANY:
-        found[f"{len(ways) - _MANY} other descriptions"] = ways.total() - sum(found.values())
-    return found
+        counts[f"{len(ways) - _MANY} other descriptions"] = ways.total() - sum(counts.values())
+    return counts
 
 
 def made_text(kind: str, made: dict[str, Any], provenance: dict[str, Any]) -> str:
@@ -173,12 +173,12 @@ def made_text(kind: str, made: dict[str, Any], provenance: dict[str, Any]) -> st
             f" weight {options.get('weight', 'not stated')}"
         )
     if kind == "denoised":
-        told = made.get("denoiser", {})
-        name = told.get("title") or told.get("name") or "a denoiser"
+        denoiser = made.get("denoiser", {})
+        name = denoiser.get("title") or denoiser.get("name") or "a denoiser"
         return (
-            f"the synthetic map through {name} ({told.get('model', 'model not stated')}),"
-            f" trained on {told.get('trained_on', 'unknown')} radar data: "
-            f"{told.get('data') or 'not stated which'}"
+            f"the synthetic map through {name} ({denoiser.get('model', 'model not stated')}),"
+            f" trained on {denoiser.get('trained_on', 'unknown')} radar data: "
+            f"{denoiser.get('data') or 'not stated which'}"
         )
     if "pairs" in provenance:
         return f"from the pairs {provenance['pairs']}"
@@ -231,80 +231,80 @@ def card_text(card: dict[str, Any]) -> str:
 
 def limits(card: dict[str, Any]) -> list[str]:
     """Return the limits of the data set, as sentences."""
-    found = []
+    notes = []
     if len(card["segments_of_kind"]) and "real" not in card["segments_of_kind"]:
-        found.append(
+        notes.append(
             "It has no maps of a real radar: how a model does on one must be tested on other data."
         )
     if not card["splits"].get("test"):
-        found.append(
+        notes.append(
             "There are too few subjects to keep one for a test: nothing measured on it says how a"
             " model does on other people."
         )
     if card["accuracy"]:
-        found.append(
+        notes.append(
             "Bodies were fitted to videos: in the median source the synthetic map is off the truth"
             f" by {card['accuracy']} (relative L1)."
         )
     if kinds := card.get("everybody"):
-        found.append(
+        notes.append(
             f"The {' and '.join(kinds)} maps of scenes show everybody, not the subject alone; where"
             " somebody else is labelled otherwise they are not available. Who is in one scene is"
             " in these maps together: keep them in one split to test on them."
         )
     missing = [kind for kind, count in card["segments_of_kind"].items() if count < card["segments"]]
     if missing:
-        found.append(
+        notes.append(
             f"Not every segment has {' and '.join(missing)}: see the array `available`; values of"
             " what is not available are zero."
         )
     several = [kind for kind, units in card["units"].items() if len(units) > 1]
     if several:
-        found.append(f"Values of {' and '.join(several)} come in several units: scale each source.")
+        notes.append(f"Values of {' and '.join(several)} come in several units: scale each source.")
     spans = card.get("spans")
     left_out = card["spans_counted"].items() if spans else ()
-    found += [
+    notes += [
         f"{count:,} labelled spans are {why}: they give no segment."
         for why, count in left_out
         if why != "segments"
     ]
     if spans and spans["length"] == "resampled":
-        found.append(
+        notes.append(
             "Spans were stretched to one length: velocities are as they were, durations are"
             " `end_s` - `start_s`."
         )
     elif card["resampled_segments"]:
-        found.append(
+        notes.append(
             f"{card['resampled_segments']:,} segments had uneven frames or another frame rate and"
             f" were brought to {card['frame_rate_hz']:g} frames/s by linear interpolation."
         )
     if damaged := card["frames_damaged"]:
-        found.append(lost_in_words(damaged))
+        notes.append(lost_in_words(damaged))
     if card["frames_without_person"] > damaged:
-        found.append(
+        notes.append(
             f"{card['frames_without_person'] - damaged:,} frames without a person are in no"
             " segment."
         )
     if card["sources_without_segments"]:
-        found.append(
+        notes.append(
             f"{card['sources_without_segments']} sources give no segment:"
             f" {'nothing is labelled there' if spans else 'they are too short, or not pure'}."
         )
     if len([count for count in card["segments_of_label"].values() if count]) < 2:
-        found.append("All segments have the same label.")
+        notes.append("All segments have the same label.")
     never = [name for name, count in card["segments_of_label"].items() if not count]
     if never:
-        found.append(f"No segment is labelled {', '.join(never)}; single frames may be.")
+        notes.append(f"No segment is labelled {', '.join(never)}; single frames may be.")
     if not spans:
-        found.append(
+        notes.append(
             f"Neighbouring segments share {card['overlap']} frames or more: they are not"
             " independent."
         )
     if card["placements"] > 1:
-        found.append(
+        notes.append(
             "Placements show the same movements from other places: they add views, not movements."
         )
-    return found
+    return notes
 
 
 def duration_text(card: dict[str, Any]) -> str:
@@ -335,15 +335,15 @@ _KINDS = {
 
 
 def _simulated(card: dict[str, Any]) -> str:
-    said = [_KINDS[kind] for kind in card["segments_of_kind"] if kind in _KINDS]
+    sentences = [_KINDS[kind] for kind in card["segments_of_kind"] if kind in _KINDS]
     if card["simulated_recordings"]:
         count, of = card["simulated_recordings"], card["recordings"]
         who = f"{count:,} of {of:,} recordings {'is' if count == 1 else 'are'}"
-        said.append(
+        sentences.append(
             f"{'Every recording is' if count == of else who} simulated as a whole: no camera was"
             " there either."
         )
-    return " ".join(said)
+    return " ".join(sentences)
 
 
 def _limbs(card: dict[str, Any]) -> str:
@@ -456,8 +456,8 @@ def _made(card: dict[str, Any]) -> str:
         (kind, way, f"{count:,}") for kind, found_counts in card["how"].items()
         for way, count in found_counts.items()
     ]  # fmt: skip
-    told = card["provenance"].get("command")
-    command = f"\n\n```\n{told}\n```" if told else ""
+    typed = card["provenance"].get("command")
+    command = f"\n\n```\n{typed}\n```" if typed else ""
     return _table(("kind", "made", "sources"), rows) + command
 
 

@@ -62,17 +62,17 @@ def clips_of(
     length, overlap : int
         Frames of a segment, and those that it shares with the next one.
     """
-    there = np.ones(len(times_s), bool) if present is None else present
-    found = []
-    for start, stop in clips(times_s, there, frame_rate_hz):
+    mask = np.ones(len(times_s), bool) if present is None else present
+    pieces = []
+    for start, stop in clips(times_s, mask, frame_rate_hz):
         own_s = times_s[start:stop]
         resampled = not is_regular(own_s, frame_rate_hz)
         if resampled:
             count = int(np.floor((own_s[-1] - own_s[0]) * frame_rate_hz + 1e-6)) + 1
             own_s = own_s[0] + np.arange(count) / frame_rate_hz
         starts = segment_starts(len(own_s), length, overlap)
-        found.append(Clip(start, stop, own_s, resampled, starts))
-    return found
+        pieces.append(Clip(start, stop, own_s, resampled, starts))
+    return pieces
 
 
 def _clips_of_spans(
@@ -86,7 +86,7 @@ def _clips_of_spans(
     times_s = outline.times_s
     whole = clips_of(times_s, outline.present, frame_rate_hz, 1, 0)
     ends_s = np.array([clip.times_s[-1] for clip in whole])
-    found: list[Clip] = []
+    pieces: list[Clip] = []
     left_out: Counter[str] = Counter()
     for span in sorted(outline.spans):
         parts = []
@@ -117,8 +117,8 @@ def _clips_of_spans(
         around = int(resampled)
         start = max(int(np.searchsorted(times_s, own_s[0])) - around, clip.start)
         stop = min(int(np.searchsorted(times_s, own_s[-1], "right")) + around, clip.stop)
-        found.append(Clip(start, stop, own_s, resampled, np.zeros(1, np.int64), span))
-    return found, left_out
+        pieces.append(Clip(start, stop, own_s, resampled, np.zeros(1, np.int64), span))
+    return pieces, left_out
 
 
 def count_spans(
@@ -137,16 +137,16 @@ def count_spans(
     options : SpanOptions
         Margins, shortest span, and whether spans are padded or resampled.
     """
-    found, left_out = _clips_of_spans(outline, frame_rate_hz, length, options)
-    return {"segments": len(found), **left_out}
+    pieces, left_out = _clips_of_spans(outline, frame_rate_hz, length, options)
+    return {"segments": len(pieces), **left_out}
 
 
 def count_segments(outline: Outline, frame_rate_hz: float, options: DatasetOptions) -> Counter[str]:
     """Count the segments of a source by their labels."""
     counts: Counter[str] = Counter()
     if options.spans is not None:
-        found, _ = _clips_of_spans(outline, frame_rate_hz, options.length, options.spans)
-        return Counter(outline.labels[clip.span.label] for clip in found if clip.span)
+        pieces, _ = _clips_of_spans(outline, frame_rate_hz, options.length, options.spans)
+        return Counter(outline.labels[clip.span.label] for clip in pieces if clip.span)
     for clip in clips_of(
         outline.times_s, outline.present, frame_rate_hz, options.length, options.overlap
     ):
@@ -189,13 +189,13 @@ def cut_source(
     kinds = [kind for kind in options.kinds if kind in source.maps]
     length = options.length
     if options.spans is None:
-        found = clips_of(source.times_s, source.present, frame_rate_hz, length, options.overlap)
+        pieces = clips_of(source.times_s, source.present, frame_rate_hz, length, options.overlap)
     else:
-        found, _ = _clips_of_spans(source.outline(), frame_rate_hz, length, options.spans)
-    for clip in found:
+        pieces, _ = _clips_of_spans(source.outline(), frame_rate_hz, length, options.spans)
+    for clip in pieces:
         label = _filled(label_numbers[_label(source.times_s, source.label, clip)], length)
-        there = {kind: _known(source.times_s, known[kind], clip) for kind in kinds}
-        there = {kind: _filled(one, length, True) for kind, one in there.items()}
+        is_known = {kind: _known(source.times_s, known[kind], clip) for kind in kinds}
+        is_known = {kind: _filled(one, length, True) for kind, one in is_known.items()}
         values = {
             kind: _values(source.maps[kind].values, source.times_s, clip, null_bins, length)
             for kind in kinds
@@ -213,7 +213,7 @@ def cut_source(
             places = starts[:, None] + np.arange(length)  # (segments, length)
             arrays: Arrays = {"available": np.zeros((len(starts), len(KINDS)), bool)}
             for kind in kinds:
-                whole = there[kind][places].all(axis=1)
+                whole = is_known[kind][places].all(axis=1)
                 # A map that is partly unknown says nothing, rather than something false.
                 arrays[kind] = cut(values[kind], starts, length) * whole[:, None, None]
                 if kind == "synthetic" and limbs is not None:

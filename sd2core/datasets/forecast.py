@@ -54,18 +54,18 @@ class Counting:
     @classmethod
     def of(cls, sources: Iterable[Source | LazySource], progress: Progress = silent) -> Counting:
         """Read the outlines of sources; those without one are refused."""
-        found = cls()
+        counting = cls()
         sources = list(sources)
         for number, one in enumerate(sources):
             progress(number, len(sources))
             try:
                 if one.outline is None:
                     raise Sd2Error(f"{one.key.title} does not say what it holds", "an outline")
-                found.outlines.append((one.key, one.outline()))
+                counting.outlines.append((one.key, one.outline()))
             except Sd2Error as error:
-                found.failed.append(f"{one.key.title}: {error}")
+                counting.failed.append(f"{one.key.title}: {error}")
         progress(len(sources), len(sources))
-        return found
+        return counting
 
     def forecast(self, options: DatasetOptions, bins: int) -> Forecast:
         """Count the segments that these options give on a velocity axis of ``bins``."""

@@ -95,8 +95,8 @@ class Hdf5Rows:
         try:
             return np.asarray(self._array[key])
         except (OSError, RuntimeError, ValueError) as error:
-            found = self.damage("values") or f"{self.name} ({error})"
-            raise unreadable(self.path, found) from error
+            cause = self.damage("values") or f"{self.name} ({error})"
+            raise unreadable(self.path, cause) from error
 
     def damage(
         self, depth: Depth, rows: range | None = None, progress: Progress = silent
@@ -104,15 +104,15 @@ class Hdf5Rows:
         """Return the chunks of rows that cannot be read; HDF5 looks at all at every depth."""
         rows = range(self.shape[0]) if rows is None else rows
         step = (self._array.chunks or self.shape)[0]
-        found = []
+        damaged = []
         for start in range(rows.start // step * step, rows.stop, step):
             progress(start - rows.start, len(rows))
             stop = min(start + step, self.shape[0])
             try:
                 self._array[start:stop]
             except (OSError, RuntimeError, ValueError) as error:
-                found.append(Damage(self.name, start, stop, "segments", str(error)))
-        return tuple(found)
+                damaged.append(Damage(self.name, start, stop, "segments", str(error)))
+        return tuple(damaged)
 
 
 def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], Any]:
@@ -136,12 +136,12 @@ def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], Any]:
 def open_npz(path: Path) -> tuple[Header, dict[str, Any], list[dict[str, Any]]]:
     """Read an NPZ data set: header, arrays and sources."""
     with open_npz_file(path, "a data set", _EXPECTED) as data:
-        found = dict(data)
-    if META not in found:
+        members = dict(data)
+    if META not in members:
         raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
-    header = Header.from_dict(_json(str(found[META]), path), path)
-    lines = [_json(str(line), path) for line in found.get(SOURCES, ())]
-    arrays = {name: found[name] for name in _whole(header, found.keys(), path)}
+    header = Header.from_dict(_json(str(members[META]), path), path)
+    lines = [_json(str(line), path) for line in members.get(SOURCES, ())]
+    arrays = {name: members[name] for name in _whole(header, members.keys(), path)}
     check_arrays(header, arrays, path)
     return header, arrays, lines
 
@@ -215,9 +215,9 @@ def _json(text: str, path: Path) -> Any:
         raise Sd2Error(f"{path}: its description is damaged ({error})", "JSON") from error
 
 
-def _whole(header: Header, there: Iterable[str], path: Path) -> list[str]:
+def _whole(header: Header, existing: Iterable[str], path: Path) -> list[str]:
     names = list(row_shapes(header))
-    missing = sorted({*names} - {*there})
+    missing = sorted({*names} - {*existing})
     if missing:
         raise Sd2Error(f"{path} lacks {', '.join(missing)}", "a data set that is whole")
     return names

@@ -172,21 +172,21 @@ def entry_of(source: Source, header: Header, fingerprint: str) -> dict[str, Any]
     }
 
 
-def refuse_other_settings(out: Path, there: Header, options: DatasetOptions) -> None:
+def refuse_other_settings(out: Path, header: Header, options: DatasetOptions) -> None:
     """Refuse to go on with a data set that was begun with other options."""
     for what, before, now in (
-        ("segments of", there.length, options.length),
-        ("an overlap of", there.overlap, options.overlap),
-        ("kinds", list(there.kinds_wanted), list(options.kinds)),
-        ("limb maps", bool(there.parts), options.limbs),
-        ("kinematics", bool(there.joints), options.limbs),
-        ("inertial sensors at", list(there.imu), list(options.imu)),
-        ("frames/s", there.frame_rate_hz, options.frame_rate_hz),
-        ("null bins", there.null_bins, options.null_bins),
-        ("the label rule", there.label_rule, options.label_rule),
-        ("the least share", there.min_share, options.min_share),
-        ("the least purity", there.min_purity, options.min_purity),
-        ("spans as", there.spans or "windows", options.spans or "windows"),
+        ("segments of", header.length, options.length),
+        ("an overlap of", header.overlap, options.overlap),
+        ("kinds", list(header.kinds_wanted), list(options.kinds)),
+        ("limb maps", bool(header.parts), options.limbs),
+        ("kinematics", bool(header.joints), options.limbs),
+        ("inertial sensors at", list(header.imu), list(options.imu)),
+        ("frames/s", header.frame_rate_hz, options.frame_rate_hz),
+        ("null bins", header.null_bins, options.null_bins),
+        ("the label rule", header.label_rule, options.label_rule),
+        ("the least share", header.min_share, options.min_share),
+        ("the least purity", header.min_purity, options.min_purity),
+        ("spans as", header.spans or "windows", options.spans or "windows"),
     ):
         if now is not None and before != now:
             raise Sd2Error(

@@ -41,14 +41,14 @@ def found_map(key: str) -> DopplerMap | None:
 
 def kept_map(key: str, make: Callable[[], DopplerMap]) -> DopplerMap:
     """Map of a key, made where none is kept; what cannot be written is made every time."""
-    found = found_map(key)
-    if found is None:
-        found, place = make(), _place(key)
+    kept = found_map(key)
+    if kept is None:
+        kept, place = make(), _place(key)
         with suppress(OSError):
             place.parent.mkdir(parents=True, exist_ok=True)
-            found.save(place)
+            kept.save(place)
             _make_room(place.parent)
-    return found
+    return kept
 
 
 def mesh_identity(recording: Recording, digest: Callable[[Path], str] = cached_digest) -> str:

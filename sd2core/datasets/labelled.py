@@ -57,13 +57,13 @@ class LabelledFacts:
 
 def unfolded(sources: Sequence[LabelledSource]) -> list[LabelledSource]:
     """Replace folders by the recordings and radar files in them."""
-    found: list[LabelledSource] = []
+    result: list[LabelledSource] = []
     for one in sources:
         if not one.path.exists():
             raise Sd2Error(f"{one.path} does not exist", "labelled data", "Check the path")
         inside = inside_of(one.path)
-        found += [LabelledSource(path, one.subject) for path in inside] if inside else [one]
-    return found
+        result += [LabelledSource(path, one.subject) for path in inside] if inside else [one]
+    return result
 
 
 def inside_of(folder: Path) -> list[Path]:

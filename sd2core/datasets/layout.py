@@ -135,8 +135,8 @@ _HEADER = TypeAdapter(Header)
 
 def check_format(entry: Any, path: Path) -> None:
     """Refuse a file that is no data set, or of a later version."""
-    found = entry.get("format") if isinstance(entry, dict) else None
-    if found != FORMAT:
+    stored_format = entry.get("format") if isinstance(entry, dict) else None
+    if stored_format != FORMAT:
         raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
     version = entry.get("version")
     if not isinstance(version, int) or not 1 <= version <= VERSION:
@@ -149,10 +149,10 @@ def check_format(entry: Any, path: Path) -> None:
 
 def format_of(path: Path) -> FileFormat:
     """Return the format of a data set by the ending of its name."""
-    found = SUFFIXES.get(path.suffix.lower())
-    if found is None:
+    file_format = SUFFIXES.get(path.suffix.lower())
+    if file_format is None:
         raise Sd2Error(f"The data set is to be {path}", f"a name ending in {', '.join(SUFFIXES)}")
-    return found
+    return file_format
 
 
 def row_shapes(header: Header) -> dict[str, tuple[str, tuple[int, ...]]]:

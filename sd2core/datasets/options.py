@@ -118,15 +118,15 @@ class DatasetOptions:
 
 
 def dataset_options(
-    told: Exporting, spans: SpanOptions | None, provenance: dict[str, Any] | None = None
+    export: Exporting, spans: SpanOptions | None, provenance: dict[str, Any] | None = None
 ) -> DatasetOptions:
     """Options of a data set as a plan or a command says them."""
     return DatasetOptions(
-        length=told.segment_frames,
-        overlap=told.overlap_frames,
-        validation=told.validation_subjects,
-        test=told.test_subjects,
+        length=export.segment_frames,
+        overlap=export.overlap_frames,
+        validation=export.validation_subjects,
+        test=export.test_subjects,
         spans=spans,
         provenance=provenance or {},
-        **{name: getattr(told, name) for name in _ALIKE},
+        **{name: getattr(export, name) for name in _ALIKE},
     )

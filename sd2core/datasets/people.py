@@ -21,10 +21,10 @@ from sd2core.recording.recording import Recording
 
 def subject_of(recording: Recording, person: str, first: str) -> str:
     """Subject whom a person of a recording is; ``first`` is that of the first, or of everybody."""
-    there = recording.persons
-    if person in ("", there[0]):
+    persons = recording.persons
+    if person in ("", persons[0]):
         return first
-    own = dict(zip(there[1:], (one.person for one in recording.bodies), strict=True))
+    own = dict(zip(persons[1:], (one.person for one in recording.bodies), strict=True))
     # Who has no name is somebody else in each recording.
     return person if own.get(person, person) else f"{recording.folder.stem} {person}"
 
@@ -43,17 +43,17 @@ class People:
         return () if self.mesh is None else self.mesh.bodies
 
     @property
-    def there(self) -> tuple[str, ...]:
+    def in_scene(self) -> tuple[str, ...]:
         """Persons who are in the scene, in the order of the bodies; a video is fitted to one."""
         return self.recording.persons[: None if self.recording.mesh else 1]
 
     def number(self, person: str) -> int | None:
         """Number of a person's body; None where the person is not in the scene."""
-        there = self.there
+        persons = self.in_scene
         # Whoever is named is the only one there is.
-        if len(there) == len(self.labels.persons) == 1:
+        if len(persons) == len(self.labels.persons) == 1:
             return 0
-        return there.index(person) if person in there else None
+        return persons.index(person) if person in persons else None
 
     def bodies(self, person: str) -> tuple[MeshSequence, ...]:
         """Bodies whose map a source is of; none where the person is not in the scene."""
@@ -117,8 +117,8 @@ class People:
 
     def shown(self, person: str, kinds: Iterable[MapKind]) -> dict[str, Any]:
         """Who is in the scene, and which kinds of maps show them all, for provenance."""
-        there = self.there if self.recording.mesh else ()
-        scene = list(dict.fromkeys([*there, *self.labels.persons]))
+        persons = self.in_scene if self.recording.mesh else ()
+        scene = list(dict.fromkeys([*persons, *self.labels.persons]))
         if not person or len(scene) < 2:
             return {}
         everybody = [kind for kind in kinds if kind not in FROM_A_MESH]
@@ -127,8 +127,8 @@ class People:
 
 def map_of(person: str, body: MeshSequence, everybody: DopplerMap, start: int = 0) -> DopplerMap:
     """Map of a person of a scene alone, from the split map of all from a frame of the body on."""
-    there = present_frames([body])[start : start + len(everybody.timebase)]
-    return replace(everybody.of_person(person), present=there)
+    present = present_frames([body])[start : start + len(everybody.timebase)]
+    return replace(everybody.of_person(person), present=present)
 
 
 def present_frames(bodies: Iterable[MeshSequence]) -> NDArray[np.bool_]:

@@ -74,17 +74,17 @@ def examples_of(dataset: Dataset, each: int = EXAMPLES) -> list[Example]:
         name: np.asarray(dataset[name][:_MAX_SEGMENTS])
         for name in ("segment_label", "purity", "available", "subject", "placement", "range_m")
     }
-    found = []
+    examples = []
     counts = np.bincount(columns["segment_label"], minlength=len(header.labels))
     for label in sorted(np.argsort(-counts, kind="stable")[:_MAX_LABELS].tolist()):
         rows = np.flatnonzero(columns["segment_label"] == label)
         kinds = columns["available"][rows].sum(axis=1)
         # Those of most kinds first, then those that hold most of their label.
         order = rows[np.lexsort((rows, -columns["purity"][rows], -kinds))]
-        found += [
+        examples += [
             _example(dataset, columns, label, row) for row in _different(order, columns, each)
         ]
-    return found
+    return examples
 
 
 def draw_preview(title: str, header: Header, examples: list[Example], segments: int) -> Figure:

@@ -55,14 +55,14 @@ class Dataset:
 
     def sources(self) -> Iterator[dict[str, Any]]:
         """Yield the facts of each source, in the order of the array ``source``."""
-        found: Iterable[dict[str, Any]]
+        entries: Iterable[dict[str, Any]]
         if self._sources is not None:
-            found = self._sources
+            entries = self._sources
         elif self.form == "zarr":
-            found = store.read_sources(self.path / store.SOURCES_NAME)
+            entries = store.read_sources(self.path / store.SOURCES_NAME)
         else:
-            found = formats.hdf5_sources(self._file, self.path)
-        for number, entry in enumerate(found, start=1):
+            entries = formats.hdf5_sources(self._file, self.path)
+        for number, entry in enumerate(entries, start=1):
             check_record(SourceEntry, entry, f"{self.path}: source {number}")
             yield entry
 

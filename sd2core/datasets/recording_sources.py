@@ -98,9 +98,9 @@ class Making:
     @property
     def pace_kind(self) -> Kind:
         """Kind of work whose items are segments of recordings, see :mod:`sd2core.runs.pace`."""
-        told = (self.synthesis.visibility, self.tolerance, self.model, self.simulation is not None)
+        facts = (self.synthesis.visibility, self.tolerance, self.model, self.simulation is not None)
         more = (["limbs"] if self.limbs else []) + (["imu"] if self.imu else [])
-        return ("export", *self.kinds, *map(str, told), *more)
+        return ("export", *self.kinds, *map(str, facts), *more)
 
 
 def recording_sources(
@@ -113,7 +113,7 @@ def recording_sources(
     subject of each recording, the first person of a scene.
     """
     shared = _Shared(making)
-    found = []
+    sources = []
     for path, subject in zip(paths, subjects, strict=True):
         recording = open_recording(path)
         if recording.mesh is None and recording.radar is None:
@@ -127,8 +127,8 @@ def recording_sources(
             for person in named or ("",):
                 who = subject_of(recording, person, subject)
                 key = SourceKey(who, recording.folder.stem, placement)
-                found.append(_lazy(shared, recording, key, person))
-    return found
+                sources.append(_lazy(shared, recording, key, person))
+    return sources
 
 
 def labels_and_classes(labels: Labels) -> tuple[tuple[str, ...], dict[str, str]]:
@@ -258,8 +258,8 @@ class _Opened:
             "simulated", "real"
         } & {*wanted}:  # fmt: skip
             radar = radar_map(self.recording, self._making.synthesis.axis)
-            there = self._mesh.timebase if self._mesh is not None else radar.timebase
-            maps[radar.kind] = on_clock(radar, there)
+            clock = self._mesh.timebase if self._mesh is not None else radar.timebase
+            maps[radar.kind] = on_clock(radar, clock)
         if bodies and self._simulates:
             rest = part_of(progress, counted_share, 1.0)
             maps["simulated"] = self._simulated_map(key.placement, rest)
@@ -358,8 +358,10 @@ class _Opened:
         places = range(1 + len(places_of(self.recording, making)))
         sensors = [self._sensor(place) for place in places]
         frames = mesh.frame_count * len(sensors)
-        found = choose_for_places(mesh, spread(sensors), frames, making.tolerance, making.synthesis)
-        return synthesizer_for(found.plan, mesh, making.synthesis), found.provenance()
+        placed = choose_for_places(
+            mesh, spread(sensors), frames, making.tolerance, making.synthesis
+        )
+        return synthesizer_for(placed.plan, mesh, making.synthesis), placed.provenance()
 
 
 def places_of(recording: Recording, making: Making) -> tuple[Place, ...]:

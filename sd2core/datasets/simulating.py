@@ -50,8 +50,8 @@ class Simulation:
 
 def seed_of(mesh: MeshSequence, sensor: VirtualSensor, simulation: Simulation) -> int:
     """Return the seed for one mesh and place, so that maps do not share their noise."""
-    told = json.dumps([simulation.seed, sensor.as_dict()]).encode()
-    sums = hashlib.blake2b(told, digest_size=4)
+    content = json.dumps([simulation.seed, sensor.as_dict()]).encode()
+    sums = hashlib.blake2b(content, digest_size=4)
     sums.update(np.ascontiguousarray(mesh.read(0, 1), np.float32).tobytes())
     return int.from_bytes(sums.digest(), "little")
 

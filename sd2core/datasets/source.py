@@ -194,8 +194,8 @@ class Source:
     def fingerprint(self) -> str:
         """Return a hash of maps, labels and sensor."""
         sums = hashlib.blake2b(digest_size=16)
-        told = [self.sensor.as_dict(), self.labels, dict(self.classes)]
-        sums.update(json.dumps(told).encode())
+        metadata = [self.sensor.as_dict(), self.labels, dict(self.classes)]
+        sums.update(json.dumps(metadata).encode())
         sums.update(np.ascontiguousarray(self.label, np.int16).data)
         if self.spans != runs_of(self.label, self.times_s):
             sums.update(json.dumps(self.spans).encode())

@@ -92,13 +92,13 @@ def gather(
             "Leave it out, or export without inertial sensors",
         )
     labelled = dict(zip(maps, label_files, strict=False))
-    found = pair_sources(pairs, making) if pairs else []
+    sources = pair_sources(pairs, making) if pairs else []
     recordings = {path: name for path, name in zip(single, names, strict=True) if path not in maps}
-    found += recording_sources(list(recordings), list(recordings.values()), making)
+    sources += recording_sources(list(recordings), list(recordings.values()), making)
     for path, name in zip(single, names, strict=True):
         if path in maps:
-            found.append(map_source(path, name, labelled.get(path)))
-    return found
+            sources.append(map_source(path, name, labelled.get(path)))
+    return sources
 
 
 def _person(path: Path) -> str:
@@ -144,7 +144,7 @@ def map_source(path: Path, subject: str, label_file: Path | None = None) -> Lazy
         return sums.hexdigest()
 
     def load(_: Progress) -> Source:
-        doppler, labels, _told = _read_map(path, label_file)
+        doppler, labels, _remark = _read_map(path, label_file)
         names, classes = labels_and_classes(labels)
         return Source(
             *key,
@@ -164,7 +164,7 @@ def map_source(path: Path, subject: str, label_file: Path | None = None) -> Lazy
 
 def _read_map(path: Path, label_file: Path | None) -> tuple[DopplerMap, Labels, str]:
     """A map, its labels, and what of the file with labels is taken."""
-    labels, told = Labels(), ""
+    labels, remark = Labels(), ""
     if holds_map(path):
         recorded = load_recorded_map(path)
         doppler, labels = recorded.doppler, recorded.labels
@@ -172,16 +172,16 @@ def _read_map(path: Path, label_file: Path | None) -> tuple[DopplerMap, Labels, 
         doppler = DopplerMap.load(path)
     if label_file is not None:
         reading = read_label_file(label_file, doppler.timebase)
-        labels, told = reading.labels, f"{label_file}: {reading.sentence}"
-    return doppler, labels, told
+        labels, remark = reading.labels, f"{label_file}: {reading.sentence}"
+    return doppler, labels, remark
 
 
 def _sensor(meta: dict[str, Any]) -> VirtualSensor:
     """Return the sensor that a map names; otherwise the camera."""
-    found = meta.get("sensor")
-    if not isinstance(found, dict):
+    sensor = meta.get("sensor")
+    if not isinstance(sensor, dict):
         return VirtualSensor()
-    return VirtualSensor.from_dict(found)
+    return VirtualSensor.from_dict(sensor)
 
 
 # -- Pairs: synthetic Doppler beside a radar's, take by take -------------------------------------
@@ -250,8 +250,8 @@ class _PairStore:
     def _scene(self, take: TakeEntry) -> dict[str, Any]:
         """Who is in the scene that all maps of a take show, for provenance."""
         scenes = self.facts.provenance.get("scenes", {})
-        found = scenes.get(take.name.rpartition("-")[0])
-        return {"scene": found, "everybody": self._kinds} if found else {}
+        scene = scenes.get(take.name.rpartition("-")[0])
+        return {"scene": scene, "everybody": self._kinds} if scene else {}
 
     @cached_property
     def _lost(self) -> NDArray[np.bool_]:
@@ -271,9 +271,9 @@ class _PairStore:
         return np.asarray(regular_s + np.interp(frame, frame[kept], offset_s))
 
     def _outline(self, take: TakeEntry) -> Outline:
-        (label, there), times_s = self._label(take), self._times_s(take)
+        (label, present), times_s = self._label(take), self._times_s(take)
         runs, damaged = runs_of(label, times_s), int(self._lost[take.rows].sum())
-        return Outline(self._kinds, times_s, there, label, self.facts.labels, runs, damaged)
+        return Outline(self._kinds, times_s, present, label, self.facts.labels, runs, damaged)
 
     def _label(self, take: TakeEntry) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
         """Label of every frame, and where both are known."""
@@ -283,7 +283,7 @@ class _PairStore:
 
     def _source(self, key: SourceKey, take: TakeEntry) -> Source:
         lost = self._lost[take.rows]
-        (label, there), clock = self._label(take), Timebase(self._times_s(take))
+        (label, present), clock = self._label(take), Timebase(self._times_s(take))
         sensor = VirtualSensor(take.sensor_position_m)
         meta = {"sensor": {"position_m": list(sensor.position_m)}}
 
@@ -315,7 +315,7 @@ class _PairStore:
         return Source(
             *key,
             sensor,
-            {kind: replace(maps[kind], present=there) for kind in self._kinds},
+            {kind: replace(maps[kind], present=present) for kind in self._kinds},
             label,
             self.facts.labels,
             {name: known[name] for name in self.facts.labels if known.get(name)},

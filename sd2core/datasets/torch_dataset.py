@@ -97,12 +97,12 @@ class SegmentDataset(TorchDataset[Item]):
         self._reader: tuple[int, Callable[[str, int], NDArray]] | None = None  # of a process
         with open_dataset(self.path) as dataset:
             self.header = dataset.header
-            there: tuple[str, ...] = self.header.kinds
-            there += ("limbs",) if self.header.parts else ()
-            there += ("kinematics",) if self.header.joints else ()
+            available: tuple[str, ...] = self.header.kinds
+            available += ("limbs",) if self.header.parts else ()
+            available += ("kinematics",) if self.header.joints else ()
             for what in (inputs, *([target] if target not in LABEL_TARGETS else [])):
-                if what not in there:
-                    targets = ", ".join((*there, *LABEL_TARGETS))
+                if what not in available:
+                    targets = ", ".join((*available, *LABEL_TARGETS))
                     raise Sd2Error(f"{self.path} has no {what} maps", f"one of {targets}")
             self.names, self._numbers = self._names()
             self.indices = self._chosen(dataset, split)
@@ -175,12 +175,12 @@ class SegmentDataset(TorchDataset[Item]):
 
     def _rows(self, name: str, rows: NDArray[np.int64]) -> NDArray:
         chunks = rows // CHUNK_SEGMENTS
-        found: list[Any] = [None] * len(rows)
+        picked: list[Any] = [None] * len(rows)
         for chunk in np.unique(chunks).tolist():
             values = self._chunk(name, chunk)
             for place in np.flatnonzero(chunks == chunk).tolist():
-                found[place] = values[rows[place] - chunk * CHUNK_SEGMENTS]
-        return np.stack(found)
+                picked[place] = values[rows[place] - chunk * CHUNK_SEGMENTS]
+        return np.stack(picked)
 
     def _chunk(self, name: str, number: int) -> NDArray:
         # Opened once per process: a file is not shared with a fork.

@@ -109,7 +109,7 @@ class _Writer:
     def __init__(self, out: Path, work: Path, form: FileFormat, options: DatasetOptions) -> None:
         self._out, self._work, self._form, self._options = out, work, form, options
         self._names = Names()
-        self._there: dict[SourceKey, str] = {}  # fingerprints
+        self._fingerprints: dict[SourceKey, str] = {}
         self._store: SegmentStore | None = None
         begun = SegmentStore(work) if is_dataset(work) else None
         if begun is not None and begun.complete and not begun.sources:
@@ -123,10 +123,10 @@ class _Writer:
             for entry in begun.entries():
                 self._know(entry)
         elif form != "zarr" and out.exists():
-            with open_dataset(out) as there:
-                for entry in there.sources():
+            with open_dataset(out) as dataset:
+                for entry in dataset.sources():
                     self._know(entry)
-                refuse_other_settings(out, there.header, options)
+                refuse_other_settings(out, dataset.header, options)
         if self._store is not None:
             refuse_other_settings(out, self._store.header, options)
 
@@ -141,7 +141,7 @@ class _Writer:
         finally:
             if self._store is not None:
                 self._store.flush()
-        if not self._there:
+        if not self._fingerprints:
             raise first_error or Sd2Error("There are no sources", "one at least")
         segments, count = self._finish(progress)
         return Written(self._out, segments, count, added, tuple(failed))
@@ -179,7 +179,7 @@ class _Writer:
         return added, failed, first_error
 
     def _is_there(self, one: Source | LazySource) -> bool:
-        known = self._there.get(one.key)
+        known = self._fingerprints.get(one.key)
         if known is None:
             return False
         now = one.fingerprint()
@@ -200,8 +200,8 @@ class _Writer:
                 raise Sd2Error(f"{one.key.title} turned out to be {source.key.title}")
         if self._store is None:
             if self._out.exists() and self._form != "zarr":
-                with open_dataset(self._out) as there:
-                    self._store = self._unpacked(there)
+                with open_dataset(self._out) as dataset:
+                    self._store = self._unpacked(dataset)
             else:
                 self._store = SegmentStore.begin(self._work, header_of(source, self._options))
         store = self._store
@@ -241,17 +241,17 @@ class _Writer:
         self._know(entry)
         progress(1, 1)
 
-    def _unpacked(self, there: Dataset) -> SegmentStore:
-        return SegmentStore.unpack(self._work, there.header, there.arrays, there.sources())
+    def _unpacked(self, dataset: Dataset) -> SegmentStore:
+        return SegmentStore.unpack(self._work, dataset.header, dataset.arrays, dataset.sources())
 
     def _finish(self, progress: Progress) -> tuple[int, int]:
         store = self._store
         names = self._names
         if store is None:  # a file that holds everything already
-            with open_dataset(self._out) as there:
-                if self._final(there.header) == there.header:
-                    return len(there), len(self._there)
-                store = self._unpacked(there)
+            with open_dataset(self._out) as dataset:
+                if self._final(dataset.header) == dataset.header:
+                    return len(dataset), len(self._fingerprints)
+                store = self._unpacked(dataset)
         if store.rows == 0:
             raise Sd2Error(
                 f"No source has {self._options.length} frames on end with a person",
@@ -286,7 +286,7 @@ class _Writer:
 
     def _know(self, entry: dict[str, Any]) -> None:
         key = SourceKey(entry["subject"], entry["recording"], entry["placement"])
-        self._there[key] = entry["fingerprint"]
+        self._fingerprints[key] = entry["fingerprint"]
         self._names.learn(entry)
 
 
