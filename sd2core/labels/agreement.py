@@ -105,9 +105,9 @@ def frame_agreement(a: Sequence[Span], b: Sequence[Span], timebase: Timebase) ->
     labels = sorted({span.label for span in (*a, *b)})
     held_a, held_b = (held_labels(spans, labels, timebase) for spans in (a, b))  # (labels, T)
     kinds, kind = np.unique(np.hstack([held_a, held_b]), axis=1, return_inverse=True)
-    said = [_answer(labels, one) for one in kinds.T]
-    answers = tuple(sorted({(), *said}))
-    numbers = np.array([answers.index(answer) for answer in said])[kind.ravel()]
+    kind_answers = [_answer(labels, one) for one in kinds.T]
+    answers = tuple(sorted({(), *kind_answers}))
+    numbers = np.array([answers.index(answer) for answer in kind_answers])[kind.ravel()]
     frames = len(timebase)
     return FrameAgreement(
         overall=Kappa.of(confusion := _confusion(numbers[:frames], numbers[frames:], len(answers))),
@@ -185,15 +185,15 @@ def disagreements(
     labels = sorted({span.label for span in (*a, *b)})
     held = np.stack([held_labels(spans, labels, timebase) for spans in (a, b)])  # (2, labels, T)
     differs = (held[0] != held[1]).any(axis=0)
-    found = []
+    result = []
     for start, stop in runs(differs):
         both = held[:, :, start:stop].reshape(-1, stop - start)
         answers, counts = np.unique(both, axis=1, return_counts=True)
         usual = answers[:, int(np.argmax(counts))].reshape(2, -1)
-        said = [_answer(labels, row) for row in usual]
+        pair = [_answer(labels, row) for row in usual]
         start_s, end_s = timebase.edges_s[[start, stop]].tolist()
-        found.append(Disagreement(start_s, end_s, stop - start, said[0], said[1]))
-    return tuple(found)
+        result.append(Disagreement(start_s, end_s, stop - start, pair[0], pair[1]))
+    return tuple(result)
 
 
 def kappa_words(kappa: float | None) -> str:

@@ -91,13 +91,13 @@ class Alike(NamedTuple):
 
 def alike(labels: Sequence[Label]) -> list[Alike]:
     """Find pairs of labels whose colours look alike, each with the first vision that fails."""
-    found = []
+    pairs = []
     for one, other in combinations(labels, 2):
         for vision in _VISION:
             if distance(one.colour, other.colour, vision) < ALIKE:
-                found.append(Alike(one.name, other.name, vision))
+                pairs.append(Alike(one.name, other.name, vision))
                 break
-    return found
+    return pairs
 
 
 def distance(one: str, other: str, vision: str = "") -> float:

@@ -21,12 +21,12 @@ class Comparison:
     def __str__(self) -> str:
         """Such as ``2 spans added, 1 removed, other tracks``; empty where nothing differs."""
         counts = {"added": self.added, "changed": self.changed, "removed": self.removed}
-        said = [f"{count:,} {what}" for what, count in counts.items() if count]
-        if said:
-            first, what = said[0].split()
-            said[0] = f"{first} {'span' if first == '1' else 'spans'} {what}"
+        parts = [f"{count:,} {what}" for what, count in counts.items() if count]
+        if parts:
+            first, what = parts[0].split()
+            parts[0] = f"{first} {'span' if first == '1' else 'spans'} {what}"
         others = {"other tracks": self.tracks, "another label set": self.label_set}
-        return ", ".join([*said, *(words for words, so in others.items() if so)])
+        return ", ".join([*parts, *(words for words, so in others.items() if so)])
 
 
 def compare(before: Labels, after: Labels) -> Comparison:

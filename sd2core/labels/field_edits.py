@@ -67,7 +67,7 @@ def pending(labels: Labels) -> tuple[Span, ...]:
 
 
 def offer(
-    labels: Labels, timebase: Timebase, found: Sequence[Span], declined: Sequence[Span] = ()
+    labels: Labels, timebase: Timebase, suggested: Sequence[Span], declined: Sequence[Span] = ()
 ) -> Edit:
     """Put suggestions on a track of their own, in place of earlier ones.
 
@@ -76,7 +76,7 @@ def offer(
     labels : Labels
     timebase : Timebase
         Of the recording.
-    found : sequence of Span
+    suggested : sequence of Span
         Suggestions, whose edges are put on frames. Those that overlap a labelled or a rejected span
         by :data:`SAME_IOU` are left out.
     declined : sequence of Span
@@ -84,10 +84,10 @@ def offer(
     """
     kept = [one for one in labels.spans if one.origin != "suggestion" or one.track != TRACK]
     known = [*declined, *(one for one in kept if one.origin != "suggestion")]
-    again = np.asarray((iou_of(found, known) >= SAME_IOU).any(axis=1))
+    again = np.asarray((iou_of(suggested, known) >= SAME_IOU).any(axis=1))
     frames, first = Frames.of(timebase), labels.next_id
     made: list[Span] = []
-    for span in (one for one, before in zip(found, again, strict=True) if not before):
+    for span in (one for one, before in zip(suggested, again, strict=True) if not before):
         start_s, end_s = frames.stretch(span.start_s, span.end_s)
         made.append(replace(span, id=first + len(made), track=TRACK, start_s=start_s, end_s=end_s))
     tracks = labels.tracks
@@ -301,13 +301,13 @@ def remove_label(labels: Labels, name: str, instead: str | None = None) -> Edit:
 
 
 def _known(labels: Labels, name: str) -> Label:
-    found = labels.label_set.find(name)
-    if found is None:
+    label = labels.label_set.find(name)
+    if label is None:
         raise Sd2Error(
             f"The set {labels.label_set.name!r} has no label {name!r}",
             f"one of {', '.join(one.name for one in labels.label_set.labels)}",
         )
-    return found
+    return label
 
 
 def _with_label(labels: Labels, which: str, **fields: str) -> Labels:

@@ -69,13 +69,13 @@ class LabelSet:
 def with_own_keys(labels: Iterable[Label], taken: Iterable[str] = ()) -> list[Label]:
     """Return labels without the keys that are taken, or that one before them has."""
     keys = {key.casefold() for key in taken}
-    found = []
+    result = []
     for label in labels:
         if label.key.casefold() in keys:
             label = replace(label, key="")
         keys.add(label.key.casefold())
-        found.append(label)
-    return found
+        result.append(label)
+    return result
 
 
 def check_name(name: str, what: str) -> None:

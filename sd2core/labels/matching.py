@@ -124,10 +124,10 @@ def _paired(
     # A sum of IoU is at most the number of matches, which is below `above`.
     above = min(iou.shape) + 1.0
     worth = np.where(allowed, above**2 + above * same + iou, 0.0)
-    found = zip(*linear_sum_assignment(worth, maximize=True), strict=True)
+    pairs = zip(*linear_sum_assignment(worth, maximize=True), strict=True)
     return [
         (rows[row], columns[column], float(iou[row, column]))
-        for row, column in found
+        for row, column in pairs
         if allowed[row, column]
     ]
 

@@ -70,22 +70,22 @@ def _by_name(
 ) -> dict[str, Value]:
     """Entries of both sides, without those that a side removed and the other left as they were."""
     order = theirs if list(mine) == list(base) else mine
-    found = {}
+    merged = {}
     for name in dict.fromkeys((*order, *mine, *theirs)):
         before = base.get(name)
         if name in mine and name in theirs:
-            found[name] = chosen(before, mine[name], theirs[name])
+            merged[name] = chosen(before, mine[name], theirs[name])
         elif (one := mine.get(name) or theirs.get(name)) is not None and one != before:
-            found[name] = one
-    return found
+            merged[name] = one
+    return merged
 
 
 def _tracks(base: Labels, mine: Labels, theirs: Labels, used: set[str]) -> list[LabelTrack]:
     named = [{one.name: one for one in side.tracks} for side in (base, mine, theirs)]
-    found = _by_name(*named)
+    merged = _by_name(*named)
     for side in (named[1], named[2]):
-        found.update((name, one) for name, one in side.items() if name in used - found.keys())
-    return list(found.values())
+        merged.update((name, one) for name, one in side.items() if name in used - merged.keys())
+    return list(merged.values())
 
 
 def _with_room(
@@ -99,12 +99,12 @@ def _with_room(
     below: dict[str, LabelTrack] = {}
     aside = 0
     for span in spans:
-        there = taken.get(span.track)
-        if there is not None:
-            at = bisect_left(there, (span.start_s, span.end_s))
-            near = there[max(at - 1, 0) : at + 1]
+        occupied = taken.get(span.track)
+        if occupied is not None:
+            at = bisect_left(occupied, (span.start_s, span.end_s))
+            near = occupied[max(at - 1, 0) : at + 1]
             if not any(start_s < span.end_s and span.start_s < end_s for start_s, end_s in near):
-                there.insert(at, (span.start_s, span.end_s))
+                occupied.insert(at, (span.start_s, span.end_s))
             else:
                 if span.track not in below:
                     names = {one.name for one in (*tracks, *below.values())}
@@ -119,8 +119,8 @@ def _label_set(base: LabelSet, mine: LabelSet, theirs: LabelSet) -> LabelSet:
     if base in (mine, theirs) or mine == theirs:
         return chosen(base, mine, theirs)
     named = [{one.name: one for one in side.labels} for side in (base, mine, theirs)]
-    found = _by_name(*named)
-    brought = [one for name, one in found.items() if one != named[1].get(name)]
-    kept_keys = (one.key for name, one in found.items() if one == named[1].get(name))
-    found |= {one.name: one for one in with_own_keys(brought, [*kept_keys])}
-    return LabelSet(chosen(base.name, mine.name, theirs.name), tuple(found.values()))
+    merged = _by_name(*named)
+    brought = [one for name, one in merged.items() if one != named[1].get(name)]
+    kept_keys = (one.key for name, one in merged.items() if one == named[1].get(name))
+    merged |= {one.name: one for one in with_own_keys(brought, [*kept_keys])}
+    return LabelSet(chosen(base.name, mine.name, theirs.name), tuple(merged.values()))

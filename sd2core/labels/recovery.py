@@ -57,7 +57,7 @@ class Recoverable(Kept):
 
 
 @dataclass(frozen=True)
-class Found:
+class Recoveries:
     """Offers, the newest of a recording first, and notes on what could not be read.
 
     ``settled`` parts hold nothing but what the user's file holds as well; ``damaged`` ones are
@@ -70,7 +70,7 @@ class Found:
     damaged: tuple[Path, ...] = field(default=(), compare=False)
 
 
-def search(folder: Path, *, declined: bool = False, without: Container[int] = ()) -> Found:
+def search(folder: Path, *, declined: bool = False, without: Container[int] = ()) -> Recoveries:
     """Read what sessions, except ``without``, left in a recording's folder, the newest first.
 
     ``declined`` ones only when asked for.
@@ -100,7 +100,7 @@ def search(folder: Path, *, declined: bool = False, without: Container[int] = ()
             else:
                 (damaged if note else settled).extend(parts)
             break
-    return Found(tuple(offers), tuple(notes), tuple(settled), tuple(damaged))
+    return Recoveries(tuple(offers), tuple(notes), tuple(settled), tuple(damaged))
 
 
 def _make_private(*paths: Path) -> None:
@@ -217,7 +217,7 @@ class RecoveryPlace:
     def _locks(self) -> tuple[EditLock, ...]:
         return (self._lock,) if self._beside is None else (self._beside, self._lock)
 
-    def offers(self, *, declined: bool = False) -> Found:
+    def offers(self, *, declined: bool = False) -> Recoveries:
         """Find labels of earlier sessions; ``declined`` ones only when asked for."""
         return search(self._folder, declined=declined, without=self._begun)
 
@@ -269,16 +269,16 @@ class RecoveryPlace:
             )
 
 
-def offers_in(root: Path, *, declined: bool = False) -> Found:
+def offers_in(root: Path, *, declined: bool = False) -> Recoveries:
     """Find unsaved labels of all recordings not being edited, the newest first.
 
     ``declined`` ones only when asked for.
     """
-    found = [
+    searches = [
         search(folder, declined=declined)
         for folder in listed(Path(root))
         if folder.is_dir() and not is_locked(folder / _LOCK_NAME)
     ]
-    offers = [offer for one in found for offer in one.offers]
-    notes = [note for one in found for note in one.notes]
-    return Found(tuple(sorted(offers, key=lambda one: -one.time_unix_s)), tuple(notes))
+    offers = [offer for one in searches for offer in one.offers]
+    notes = [note for one in searches for note in one.notes]
+    return Recoveries(tuple(sorted(offers, key=lambda one: -one.time_unix_s)), tuple(notes))

@@ -220,10 +220,10 @@ class Labels:
     def these(self, ids: Iterable[int]) -> list[Span]:
         """Return the spans of some ids, in order; they must exist."""
         wanted = set(ids)
-        found = [span for span in self.spans if span.id in wanted]
-        for missing in wanted.difference(span.id for span in found):
+        spans = [span for span in self.spans if span.id in wanted]
+        for missing in wanted.difference(span.id for span in spans):
             self.span(missing)
-        return found
+        return spans
 
     def track(self, name: str) -> LabelTrack:
         """Return the track of a name; it must exist."""

@@ -45,13 +45,13 @@ def label_statistics(
     for span in labels.spans:
         (spans if span.label in spans else unknown).setdefault(span.label, []).append(span)
     ordered = [*spans.items(), *sorted(unknown.items())]
-    return [_of(label, found, extent_s) for label, found in ordered]
+    return [_of(label, own, extent_s) for label, own in ordered]
 
 
-def statistics_rows(found: Iterable[LabelStatistics]) -> list[tuple[str, ...]]:
+def statistics_rows(statistics: Iterable[LabelStatistics]) -> list[tuple[str, ...]]:
     """Format a row of text per label, in the order of :data:`HEADINGS`."""
     rows = []
-    for one in found:
+    for one in statistics:
         label, count, *seconds, share = astuple(one)
         cells = [NO_NUMBER if value is None else f"{value:.3f}" for value in seconds]
         percent = NO_NUMBER if share is None else f"{100 * share:.1f}"

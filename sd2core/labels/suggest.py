@@ -60,20 +60,20 @@ def motion_energy_db(doppler: DopplerMap) -> NDArray[np.float64]:
             f"The Doppler map holds {values[bin_, frame]} in bin {bin_} of frame {frame}",
             "finite values from 0 on",
         )
-    there = Presence.of(doppler.present, values.shape[1]).present
-    energy_db = np.where(there, 0.0, np.nan)
-    seen = _smoothed(values, doppler.timebase, there)[:, there]
-    told = np.asarray(seen.any(axis=1))  # (bins,)
-    told[[*doppler.null_bins, *doppler.unseen_bins]] = False
-    if not told.any():
+    present = Presence.of(doppler.present, values.shape[1]).present
+    energy_db = np.where(present, 0.0, np.nan)
+    seen = _smoothed(values, doppler.timebase, present)[:, present]
+    known_bins = np.asarray(seen.any(axis=1))  # (bins,)
+    known_bins[[*doppler.null_bins, *doppler.unseen_bins]] = False
+    if not known_bins.any():
         return energy_db
-    seen = seen[told] / seen[told].sum(axis=0).max()
+    seen = seen[known_bins] / seen[known_bins].sum(axis=0).max()
     quiet = np.maximum(np.quantile(seen, _QUIET_SHARE, axis=1), _FLOOR / len(seen))
     # Zero velocity is in the middle of a bin, or between two.
-    still = np.abs(doppler.axis.centres_mps[told]) < 0.75 * doppler.axis.bin_width_mps
+    still = np.abs(doppler.axis.centres_mps[known_bins]) < 0.75 * doppler.axis.bin_width_mps
     energy = (seen / np.maximum(quiet[:, None], _leaked(seen, still))).mean(axis=0)
     energy /= max(float(np.quantile(energy, _QUIET_SHARE)), 1.0)
-    energy_db[there] = 10.0 * np.log10(np.maximum(energy, 1.0))
+    energy_db[present] = 10.0 * np.log10(np.maximum(energy, 1.0))
     return energy_db
 
 
@@ -118,17 +118,17 @@ def suggest_spans(
     first, last = stretches(doppler.timebase, ~np.isnan(energy_db))
     ends_s = frame_ends_s(doppler.timebase, last)
     starts_s = doppler.times_s
-    found: list[tuple[int, int]] = []
+    spans: list[tuple[int, int]] = []
     for start, stop in _loud(energy_db, options.low_db, first):
-        same = found and first[found[-1][1] - 1] == first[start]
-        if same and starts_s[start] - ends_s[found[-1][1] - 1] <= options.merge_gap_s + _ROUNDING_S:
-            found[-1] = (found[-1][0], stop)
+        same = spans and first[spans[-1][1] - 1] == first[start]
+        if same and starts_s[start] - ends_s[spans[-1][1] - 1] <= options.merge_gap_s + _ROUNDING_S:
+            spans[-1] = (spans[-1][0], stop)
         else:
-            found.append((start, stop))
-    peaks_db = [float(np.max(energy_db[start:stop])) for start, stop in found]
+            spans.append((start, stop))
+    peaks_db = [float(np.max(energy_db[start:stop])) for start, stop in spans]
     kept = [
         (frames, peak_db)
-        for frames, peak_db in zip(found, peaks_db, strict=True)
+        for frames, peak_db in zip(spans, peaks_db, strict=True)
         if peak_db >= options.high_db
         and ends_s[frames[1] - 1] - starts_s[frames[0]] >= options.min_duration_s - _ROUNDING_S
     ]
@@ -153,13 +153,13 @@ def suggest_spans(
 
 
 def stretches(
-    timebase: Timebase, there: NDArray[np.bool_]
+    timebase: Timebase, present: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return first and last frame of the uninterrupted part that each frame is in.
 
     Parts end at pauses of the recording and where no person is present.
     """
-    presence = Presence.of(there, len(timebase))
+    presence = Presence.of(present, len(timebase))
     longest_s = max(_PAUSE_FRAMES * timebase.frame_duration_s, _PAUSE_S)
     begins = presence.first == np.arange(len(timebase))
     begins[1:] |= np.diff(timebase.times_s) > longest_s
@@ -176,10 +176,10 @@ def frame_ends_s(timebase: Timebase, last: NDArray[np.int64]) -> NDArray[np.floa
 
 
 def _smoothed(
-    values: NDArray[np.float64], timebase: Timebase, there: NDArray[np.bool_]
+    values: NDArray[np.float64], timebase: Timebase, present: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """Mean over a tenth of a second within the same stretch, (bins, T)."""
-    first, last = stretches(timebase, there)
+    first, last = stretches(timebase, present)
     times_s, half_s = timebase.times_s, 0.5 * _SMOOTHING_S + _ROUNDING_S
     start = np.maximum(np.searchsorted(times_s, times_s - half_s), first)
     stop = np.minimum(np.searchsorted(times_s, times_s + half_s, side="right"), last + 1)
@@ -193,13 +193,13 @@ def _loud(
     energy_db: NDArray[np.float64], low_db: float, first: NDArray[np.int64]
 ) -> list[tuple[int, int]]:
     """Half-open runs of frames from the low threshold on, each within one stretch."""
-    found: list[tuple[int, int]] = []
+    loud_runs: list[tuple[int, int]] = []
     with np.errstate(invalid="ignore"):
         loud = energy_db >= low_db
     for start, stop in runs(loud):
         cuts = [at for at in range(start + 1, stop) if first[at] == at]
-        found += zip([start, *cuts], [*cuts, stop], strict=True)
-    return found
+        loud_runs += zip([start, *cuts], [*cuts, stop], strict=True)
+    return loud_runs
 
 
 def _with_margins(

@@ -46,8 +46,8 @@ def typed_duration_end(text: str, start_s: float, timebase: Timebase) -> float:
 
 
 def _typed_frames(text: str) -> int | None:
-    found = _FRAMES.fullmatch(text.strip())
-    return None if found is None else int(found[1] or found[2])
+    match = _FRAMES.fullmatch(text.strip())
+    return None if match is None else int(match[1] or match[2])
 
 
 def _typed_seconds(text: str) -> float:
@@ -60,12 +60,12 @@ def _typed_seconds(text: str) -> float:
 
 def seconds_of(text: str) -> float | None:
     """Parse ``1.5``, ``1:02.5`` or ``0:01:02,5``; None for any other text."""
-    found = _SECONDS.fullmatch(text.strip())
-    if found is None:
+    match = _SECONDS.fullmatch(text.strip())
+    if match is None:
         return None
-    hours, minutes = (int(found[name] or 0) for name in ("h", "min"))
-    seconds = 3600.0 * hours + 60.0 * minutes + float(found["s"].replace(",", "."))
-    return -seconds if found["sign"] else seconds
+    hours, minutes = (int(match[name] or 0) for name in ("h", "min"))
+    seconds = 3600.0 * hours + 60.0 * minutes + float(match["s"].replace(",", "."))
+    return -seconds if match["sign"] else seconds
 
 
 def _known(frame: int, timebase: Timebase) -> int:

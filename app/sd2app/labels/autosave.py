@@ -16,7 +16,7 @@ from sd2app.widgets.text import clock_text
 from sd2core.errors import Sd2Error
 from sd2core.files.edit_lock import HEARTBEAT_EVERY_S, edit_lock
 from sd2core.labels.journal import Journal
-from sd2core.labels.recovery import Found, Recoverable, RecoveryPlace, offers_in
+from sd2core.labels.recovery import Recoverable, Recoveries, RecoveryPlace, offers_in
 from sd2core.labels.spans import Labels
 from sd2core.recording.edited import differing, edited_fields
 from sd2core.recording.recording import Recording
@@ -51,7 +51,7 @@ class LabelAutosave(QObject):
         self._others: dict[str, Any] = {}  # its other fields, as they are saved or kept
         self._step = 0  # of the history
         self.notes: tuple[str, ...] = ()  # on unreadable sessions, or edits that are not kept
-        self.waiting = Found()  # at the start, until a recording is open
+        self.waiting = Recoveries()  # at the start, until a recording is open
         heartbeat = QTimer(self)
         heartbeat.timeout.connect(lambda: self._place is not None and self._place.heartbeat())
         heartbeat.start(round(HEARTBEAT_EVERY_S * 1000))
@@ -80,7 +80,7 @@ class LabelAutosave(QObject):
         recording = self._document.recording
         if recording is not None and not self._document.same_recording:
             self.close()
-            self.waiting = Found()
+            self.waiting = Recoveries()
             self._others = edited_fields(recording)
             self._begin(reread=True)
         self._recording = recording
@@ -203,14 +203,14 @@ class LabelAutosave(QObject):
         self.waiting = offers_in(self._root)
         self.changed.emit()
 
-    def recoveries(self) -> Found:
+    def recoveries(self) -> Recoveries:
         """Find unsaved labels of all recordings, discarded ones included."""
         others = offers_in(self._root, declined=True)
         if self._place is None or not self._place.held:
             return others
         own = self._place.offers(declined=True)
         offers = sorted((*own.offers, *others.offers), key=lambda one: -one.time_unix_s)
-        return Found(tuple(offers), (*own.notes, *others.notes))
+        return Recoveries(tuple(offers), (*own.notes, *others.notes))
 
     def is_of_open(self, offer: Recoverable) -> bool:
         """True if the offer is for the open recording."""
@@ -229,7 +229,7 @@ class LabelAutosave(QObject):
             if own is None:
                 place.release()
         self._offers = tuple(one for one in self._offers if one != offer)
-        self.waiting = Found(tuple(one for one in self.waiting.offers if one != offer))
+        self.waiting = Recoveries(tuple(one for one in self.waiting.offers if one != offer))
         self.changed.emit()
 
     def ask_for(self, offer: Recoverable) -> None:
@@ -274,7 +274,7 @@ class LabelAutosave(QObject):
 
     def dismiss(self) -> None:
         """Clear the notes once they were read."""
-        self.notes, self.waiting = (), Found()
+        self.notes, self.waiting = (), Recoveries()
         self.changed.emit()
 
     def _look_for_offers(self, place: RecoveryPlace) -> None:

@@ -217,15 +217,14 @@ def read_label_file(
     chosen = format_for(path, writing=False) if format is None else _named(format)
     with errors_in(path):
         if chosen.name in _READ:
-            found = _READ[chosen.name](path, observation)
+            content = _READ[chosen.name](path, observation)
         else:
-            found = _plug_in(chosen.name).use(
+            content = _plug_in(chosen.name).use(
                 lambda program: program.read(path, timebase, observation), (Labels, LabelRows)
             )
-        reading = (
-            assembled(path, found, clock) if isinstance(found, LabelRows) else LabelReading(found)
-        )
-        return reading.beside(timebase)
+        if isinstance(content, LabelRows):
+            return assembled(path, content, clock).beside(timebase)
+        return LabelReading(content).beside(timebase)
 
 
 def observations(path: Path, format: str | None = None) -> tuple[str, ...]:

@@ -58,7 +58,7 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
 
     Raises Sd2Error naming the line that is no label.
     """
-    found = LabelRows()
+    result = LabelRows()
     for number, line in enumerate(read_text(path, _EXPECTED).split("\n"), start=1):
         line = line.removesuffix("\r")
         if not line.strip() or line.startswith("\\"):
@@ -66,11 +66,11 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
         cells = line.split("\t", 2)
         if len(cells) < 2:
             raise Sd2Error(f"{path}, line {number} is {line[:100]!r}", _EXPECTED)
-        with found.entry():
+        with result.entry():
             start_s, end_s = (_seconds(path, number, cell) for cell in cells[:2])
             text = cells[2] if len(cells) > 2 else ""
-            found.rows.append(Row(f"line {number}", start_s, end_s, text or UNNAMED))
-    return found
+            result.rows.append(Row(f"line {number}", start_s, end_s, text or UNNAMED))
+    return result
 
 
 def _seconds(path: Path, line: int, text: str) -> float:

@@ -128,16 +128,16 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
     points = {
         str(one.get("code")) for one in behaviours if "point" in str(one.get("type")).casefold()
     }
-    found = LabelRows(label_set=_label_set(project.get(_LABEL_SET), behaviours))
-    _add_rows(found, path, events, points, _start_s(content))
+    result = LabelRows(label_set=_label_set(project.get(_LABEL_SET), behaviours))
+    _add_rows(result, path, events, points, _start_s(content))
     subjects = [str(one.get("name", "")) for one in _entries(project, "subjects_conf")]
-    used = {row.track for row in found.rows}
+    used = {row.track for row in result.rows}
     ours = _LABEL_SET in project
     for subject in subjects:
         track, overlap = track_of(subject)
         if ours or track in used:
-            found.tracks.append((track, overlap))
-    return found
+            result.tracks.append((track, overlap))
+    return result
 
 
 def _start_s(observation: dict[str, Any]) -> float:
@@ -173,8 +173,8 @@ def _project(path: Path) -> dict[str, Any]:
 
 
 def _entries(project: dict[str, Any], key: str) -> list[Any]:
-    found = project.get(key)
-    entries = list(found.values()) if isinstance(found, dict) else []
+    section = project.get(key)
+    entries = list(section.values()) if isinstance(section, dict) else []
     return [one for one in entries if isinstance(one, dict)]
 
 
@@ -200,29 +200,29 @@ def _chosen(path: Path, observations: dict[str, Any], wanted: str | None) -> str
 
 
 def _add_rows(
-    found: LabelRows, path: Path, events: list[Any], points: set[str], video_s: float
+    taken: LabelRows, path: Path, events: list[Any], points: set[str], video_s: float
 ) -> None:
     """Add spans of events: each second one of a subject, behaviour and modifiers is a stop."""
     begun: dict[tuple[str, str, str], tuple[float, str]] = {}
     for number, event in enumerate(events, start=1):
         place = f"event {number}"
-        with found.entry():
+        with taken.entry():
             time_s, subject, code, modifiers, comment = _event(path, place, event)
             time_s -= video_s  # when the video begins
             track = track_of(subject or _NO_SUBJECT)[0]
             key = (subject, code, modifiers)
             if code in points:  # behaviours without a duration
                 note = _note(modifiers, comment, "")
-                found.rows.append(Row(place, time_s, time_s, code, track, note))
+                taken.rows.append(Row(place, time_s, time_s, code, track, note))
             elif key not in begun:
                 begun[key] = (time_s, comment)
             else:
                 start_s, first = begun.pop(key)
                 details = _details(comment)
                 note = _note(modifiers, first, comment if details is None else "")
-                found.rows.append(Row(place, start_s, time_s, code, track, note, **(details or {})))
+                taken.rows.append(Row(place, start_s, time_s, code, track, note, **(details or {})))
     for (subject, code, _), (time_s, _) in begun.items():
-        with found.entry():
+        with taken.entry():
             raise Sd2Error(
                 f"{path}, {code!r} of {subject or _NO_SUBJECT!r} begins at {time_s:g} s and does"
                 " not end",
@@ -329,7 +329,7 @@ def _observation(
 
 def _events(lanes: Sequence[Lane], timebase: Timebase, *, frames: bool) -> list[list[Any]]:
     """Starts and stops in the order of time; a stop before the start that it touches."""
-    found: list[tuple[tuple[float, int, int], list[Any]]] = []
+    keyed: list[tuple[tuple[float, int, int], list[Any]]] = []
     for lane in lanes:
         for span in lane.spans:
             for side, time_s, comment in (
@@ -339,8 +339,8 @@ def _events(lanes: Sequence[Lane], timebase: Timebase, *, frames: bool) -> list[
                 event = [time_s, lane.name, span.label, "", comment]
                 if frames:
                     event.append(timebase.frame_at(time_s))
-                found.append(((time_s, side, span.id), event))
-    return [event for _, event in sorted(found, key=lambda one: one[0])]
+                keyed.append(((time_s, side, span.id), event))
+    return [event for _, event in sorted(keyed, key=lambda one: one[0])]
 
 
 def _stop_comment(span: Span) -> str:

@@ -129,10 +129,10 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
     separator = _separator(path, text)
     heading, lines = _table(path, text, separator)
     where = _columns(path, heading)
-    found = LabelRows()
+    result = LabelRows()
     whole: list[tuple[int, list[str]]] = []
     for line, cells in lines:
-        with found.entry():
+        with result.entry():
             _check_width(path, line, cells, heading, separator)
             whole.append((line, cells))
     if "observation" in where:
@@ -140,17 +140,17 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
     units_s = {column: _named(heading[where[column]])[1] for column in _TIMES if column in where}
     numbers = _Numbers(path, whole, where, units_s)
     if not where.keys() & {"end_s", "duration_s", "start_frame"}:
-        found.remarks.append(f"marks, as no column of ends is known ({', '.join(heading)[:200]})")
+        result.remarks.append(f"marks, as no column of ends is known ({', '.join(heading)[:200]})")
     for line, cells in whole:
-        with found.entry():
+        with result.entry():
             cell = {name: of_cell(cells[index]) for name, index in where.items()}
             start_s, end_s, frames = _times(path, line, numbers, cell)
             known = cell.get("confidence")
             confidence = numbers.of(line, "confidence", known) if known else None
             label = cell["label"] or UNNAMED
             row = Row(f"line {line}", start_s, end_s, label, confidence=confidence, frames=frames)
-            found.add_line(row, cell)
-    return found
+            result.add_line(row, cell)
+    return result
 
 
 def _table(path: Path, text: str, separator: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
@@ -243,12 +243,12 @@ def _columns(path: Path, heading: Sequence[str]) -> dict[str, int]:
     twice = sorted({name for name in plain if name and plain.count(name) > 1})
     if any(name in names for name in twice for names in _NAMES.values()):
         raise Sd2Error(f"{path} has two columns {twice[0]!r}", "columns of different names")
-    found: dict[str, int] = {}
+    columns: dict[str, int] = {}
     for column, names in _NAMES.items():
         index = next((plain.index(name) for name in names if name in plain), None)
         if index is not None:
-            found[column] = index
-    return found
+            columns[column] = index
+    return columns
 
 
 def _of_observation(

@@ -48,23 +48,23 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
     slots = ElanTimes(document)
     shift_s = _origin_s(document)
     below = _dependents(document)
-    found = LabelRows(label_set=_label_set(document))
+    result = LabelRows(label_set=_label_set(document))
     for tier in document.iter("TIER"):
         if tier.find("ANNOTATION/REF_ANNOTATION") is not None or (
             tier.get("LINGUISTIC_TYPE_REF") in DETAILS.values()
         ):
             continue
         name = tier.get("TIER_ID", "")
-        found.tracks.append(track_of(name))
+        result.tracks.append(track_of(name))
         times_ms = slots.of_tier(tier)
         for annotation in tier.iter("ALIGNABLE_ANNOTATION"):
-            with found.entry():
-                found.rows.append(_row(path, tier, annotation, times_ms, shift_s, below))
+            with result.entry():
+                result.rows.append(_row(path, tier, annotation, times_ms, shift_s, below))
     if slots.placed:
-        found.remarks.append(
+        result.remarks.append(
             f"{counted(len(slots.placed), 'edge')} without a time put evenly between those with one"
         )
-    return found
+    return result
 
 
 def _origin_s(document: Element) -> float:
@@ -106,15 +106,15 @@ def _document(path: Path) -> Element:
 
 def _dependents(document: Element) -> dict[str, list[tuple[str, str, str]]]:
     """Type, tier and text of what refers to each annotation, by the annotation's id."""
-    found: dict[str, list[tuple[str, str, str]]] = {}
+    dependents: dict[str, list[tuple[str, str, str]]] = {}
     for tier in document.iter("TIER"):
         kind, name = tier.get("LINGUISTIC_TYPE_REF", ""), tier.get("TIER_ID", "")
         for annotation in tier.iter("REF_ANNOTATION"):
             text = annotation.findtext("ANNOTATION_VALUE") or ""
             if text:
                 about = annotation.get("ANNOTATION_REF", "")
-                found.setdefault(about, []).append((kind, name, text))
-    return found
+                dependents.setdefault(about, []).append((kind, name, text))
+    return dependents
 
 
 def _row(
@@ -268,7 +268,7 @@ class ElanTimes:
 
     def _between(self, names: Sequence[str]) -> dict[str, float]:
         """Times of slots without one that stand between two with one."""
-        found: dict[str, float] = {}
+        times_ms: dict[str, float] = {}
         run: list[str] = []
         before_ms: float | None = None
         for name in names:
@@ -278,6 +278,6 @@ class ElanTimes:
             after_ms = self._stated_ms.get(name)
             if before_ms is not None and after_ms is not None:
                 step_ms = (after_ms - before_ms) / (len(run) + 1)
-                found |= {one: before_ms + step_ms * k for k, one in enumerate(run, start=1)}
+                times_ms |= {one: before_ms + step_ms * k for k, one in enumerate(run, start=1)}
             before_ms, run = after_ms, []
-        return found
+        return times_ms

@@ -62,11 +62,11 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
             "one task" if observation is None else f"the task {observation!r}",
             "Name the one to read, as an observation",
         )
-    found = LabelRows()
-    for place, region, author in _regions(path, found, tasks[observation]):
-        with found.entry():
-            found.rows.extend(_rows(path, place, region, author))
-    return found
+    result = LabelRows()
+    for place, region, author in _regions(path, result, tasks[observation]):
+        with result.entry():
+            result.rows.extend(_rows(path, place, region, author))
+    return result
 
 
 def _tasks(path: Path) -> dict[str, dict[str, Any]]:
@@ -86,7 +86,7 @@ def _is_annotated(task: dict[str, Any]) -> bool:
     if isinstance(task.get("annotations", task.get("completions")), list):
         return True
     lists = (one for one in task.values() if isinstance(one, list))
-    return any(isinstance(one, dict) and {*_KINDS} & one.keys() for found in lists for one in found)
+    return any(isinstance(one, dict) and {*_KINDS} & one.keys() for items in lists for one in items)
 
 
 def _name(task: dict[str, Any]) -> str:
@@ -105,7 +105,7 @@ def _name(task: dict[str, Any]) -> str:
 
 
 def _regions(
-    path: Path, found: LabelRows, task: dict[str, Any]
+    path: Path, taken: LabelRows, task: dict[str, Any]
 ) -> Iterator[tuple[str, dict[str, Any], str]]:
     """Regions of a task, each with its place and author; cancelled annotations are left out."""
     annotations = task.get("annotations", task.get("completions"))
@@ -119,7 +119,7 @@ def _regions(
                     yield f"{name} {number}", region, author
         return
     for number, annotation in enumerate(annotations, start=1):
-        with found.entry():
+        with taken.entry():
             regions = annotation.get("result") if isinstance(annotation, dict) else None
             if not isinstance(regions, list) or annotation.get("was_cancelled"):
                 why = "is cancelled" if isinstance(regions, list) else "has no result"

@@ -34,7 +34,7 @@ def lanes_of(labels: Labels, edges: Callable[[Span], tuple[Time, Time]]) -> list
 
     ``edges`` gives start and end of a span in the times of the file, half-open.
     """
-    found: list[Lane] = []
+    lanes: list[Lane] = []
     for track in labels.tracks:
         rows = apart(labels.of_track(track.name), edges)
         free = track.overlap == "free" or len(rows) > 1
@@ -42,8 +42,8 @@ def lanes_of(labels: Labels, edges: Callable[[Span], tuple[Time, Time]]) -> list
         bare = not free and not _ROW.fullmatch(track.name)
         for number, spans in enumerate(rows, start=first):
             name = track.name if bare else f"{track.name} [overlap {number}]"
-            found.append(Lane(name, track, tuple(spans)))
-    return found
+            lanes.append(Lane(name, track, tuple(spans)))
+    return lanes
 
 
 def edges_s(span: Span) -> tuple[float, float]:

@@ -51,11 +51,11 @@ class Loss:
 def losses_by_format(labels: Labels, file_format: LabelFormat) -> list[Loss]:
     """List the losses of these labels in a file of a format."""
     title = file_format.title
-    found: list[Loss] = []
+    losses: list[Loss] = []
 
     def leave_out(what: Aspect, count: int, sentence: str) -> None:
         if count and what not in file_format.keeps:
-            found.append(Loss(what, count, sentence))
+            losses.append(Loss(what, count, sentence))
 
     names = {track.name for track in labels.tracks}
     if names != {DEFAULT_TRACK}:
@@ -98,7 +98,7 @@ def losses_by_format(labels: Labels, file_format: LabelFormat) -> list[Loss]:
         else:
             words = f"{title} keeps no colours and keys: those of the set {name!r} left out"
             leave_out("colours and keys", len(labels.label_set.labels), words)
-    return found
+    return losses
 
 
 def hold_texts(labels: Labels, banned: re.Pattern[str], title: str) -> tuple[Labels, list[Loss]]:

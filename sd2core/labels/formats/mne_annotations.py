@@ -84,14 +84,14 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
     # Lone surrogates are decoded as well.
     decode = partial(unquote, errors="surrogatepass") if _ENCODED in heading else str
     columns = _columns(path, heading)
-    found = LabelRows()
+    result = LabelRows()
     for number, line in enumerate(lines, start=1):
         if line.startswith("#") or not line.strip():
             continue
         cells = line.split(",")
         if columns is None:
             columns = [*_BASIC, "ch_names"][: max(len(cells), 3)]
-        with found.entry():
+        with result.entry():
             if len(cells) != len(columns):
                 raise Sd2Error(
                     f"{path}, line {number} has {len(cells)} columns: {line[:100]!r}",
@@ -104,8 +104,8 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
             known = cell.get("confidence", "").strip()
             confidence = _number(path, number, "confidence", known) if known else None
             row = Row(f"line {number}", start_s, end_s, cell["description"], confidence=confidence)
-            found.add_line(row, cell)
-    return found
+            result.add_line(row, cell)
+    return result
 
 
 def _columns(path: Path, heading: list[str]) -> list[str] | None:

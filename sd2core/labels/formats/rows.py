@@ -183,34 +183,34 @@ class LabelReading:
     def sentence(self) -> str:
         """What was taken, and what was not."""
         spans, tracks = len(self.labels.spans), len(self.labels.tracks)
-        said = [f"{counted(spans, 'span')} on {counted(tracks, 'track')} taken", *self.remarks]
+        parts = [f"{counted(spans, 'span')} on {counted(tracks, 'track')} taken", *self.remarks]
         if self.beyond:
-            said.insert(1, self.beyond)
+            parts.insert(1, self.beyond)
         if not self.left_out:
-            said.append("nothing left out")
+            parts.append("nothing left out")
         else:
             more = len(self.left_out) - _MAX_LISTED
             listed = [*self.left_out[:_MAX_LISTED], *([f"{more} more"] if more > 0 else [])]
-            said.append(f"{len(self.left_out):,} left out ({'; '.join(listed)})")
-        return ", ".join(said) + "."
+            parts.append(f"{len(self.left_out):,} left out ({'; '.join(listed)})")
+        return ", ".join(parts) + "."
 
     def beside(self, timebase: Timebase | None) -> LabelReading:
         """The same, with a remark on spans that reach beyond a recording; their times stay."""
         if timebase is None:
             return self
         spans_s = [(one.start_s, one.end_s) for one in self.labels.spans]
-        found = judge_spans(spans_s, timebase.start_s, timebase.end_s)
-        if not found:
+        findings = judge_spans(spans_s, timebase.start_s, timebase.end_s)
+        if not findings:
             return self
         beyond = int(are_beyond(spans_s, timebase.start_s, timebase.end_s).sum())
         reach = "reaches" if beyond == 1 else "reach"
         extent = f"{timebase.start_s:.3f} to {timebase.end_s:.3f} s"
-        cause = found[0].remedy[0].lower() + found[0].remedy[1:]
-        said = f"of which {beyond} {reach} beyond the recording ({extent}; {cause})"
-        return replace(self, beyond=said)
+        cause = findings[0].remedy[0].lower() + findings[0].remedy[1:]
+        remark = f"of which {beyond} {reach} beyond the recording ({extent}; {cause})"
+        return replace(self, beyond=remark)
 
 
-def assembled(path: Path, found: LabelRows, clock: LabelClock) -> LabelReading:
+def assembled(path: Path, content: LabelRows, clock: LabelClock) -> LabelReading:
     """Make labels of what a reader found.
 
     Ids are kept where they are positive and differ; the other spans are numbered after them, in
@@ -221,20 +221,20 @@ def assembled(path: Path, found: LabelRows, clock: LabelClock) -> LabelReading:
     Sd2Error
         When frames or marks need a clock that is not known, or when nothing is left to be taken.
     """
-    _check_clock(path, found.rows, clock)
+    _check_clock(path, content.rows, clock)
     rows: list[Row] = []
     unnumbered: list[Span] = []
-    for row in found.rows:
-        with found.entry(), errors_in(f"{path}, {row.place}"):
+    for row in content.rows:
+        with content.entry(), errors_in(f"{path}, {row.place}"):
             timed = _timed(row, clock)
             unnumbered.append(_span(timed))
             rows.append(timed)
-    if found.odd and not rows:
-        raise found.odd[0]
+    if content.odd and not rows:
+        raise content.odd[0]
     numbered = zip(unnumbered, _ids(rows), strict=True)
     spans = tuple(replace(span, id=number) for span, number in numbered)
     overlaps: dict[str, Overlap | None] = {}
-    for name, overlap in found.tracks:
+    for name, overlap in content.tracks:
         clean = clean_name(name)
         overlaps[clean] = overlap or overlaps.get(clean)
     for span in spans:
@@ -246,8 +246,8 @@ def assembled(path: Path, found: LabelRows, clock: LabelClock) -> LabelReading:
         LabelTrack(name, "free" if name in crowded else overlap or "exclusive")
         for name, overlap in overlaps.items()
     )
-    left_out = tuple(error.found.removeprefix(f"{path}, ") for error in found.odd)
-    return LabelReading(Labels(made, spans, found.label_set), left_out, tuple(found.remarks))
+    left_out = tuple(error.found.removeprefix(f"{path}, ") for error in content.odd)
+    return LabelReading(Labels(made, spans, content.label_set), left_out, tuple(content.remarks))
 
 
 def clean_name(name: str) -> str:
@@ -327,9 +327,9 @@ def _ids(rows: Sequence[Row]) -> list[int]:
 
 def _overlapping(spans: Sequence[Span]) -> set[str]:
     last_end_s: dict[str, float] = {}
-    found: set[str] = set()
+    crowded: set[str] = set()
     for span in sorted(spans, key=lambda one: (one.start_s, one.end_s)):
         if span.start_s < last_end_s.get(span.track, float("-inf")):
-            found.add(span.track)
+            crowded.add(span.track)
         last_end_s[span.track] = max(span.end_s, last_end_s.get(span.track, span.end_s))
-    return found
+    return crowded

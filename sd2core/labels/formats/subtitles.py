@@ -35,7 +35,7 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
 
     Raises Sd2Error when the file has no cues.
     """
-    found = LabelRows()
+    result = LabelRows()
     blocks = re.split(r"\n[ \t]*\n", "\n".join(read_text(path, _EXPECTED).splitlines()))
     cues = 0
     for block in blocks:
@@ -44,16 +44,16 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
         if at is None or lines[0].startswith("NOTE"):
             continue
         cues += 1
-        with found.entry():
+        with result.entry():
             start_s, end_s = _times(path, cues, lines[at])
             text = "\n".join(lines[at + 1 :])
             voice = _VOICE.search(text)
             label = " ".join(html.unescape(_TAG.sub("", text)).split())
             track = html.unescape(voice[1]) if voice else DEFAULT_TRACK
-            found.rows.append(Row(f"cue {cues}", start_s, end_s, label or UNNAMED, track))
+            result.rows.append(Row(f"cue {cues}", start_s, end_s, label or UNNAMED, track))
     if not cues and not blocks[0].startswith("WEBVTT"):
         raise Sd2Error(f"{path} has no cues", _EXPECTED, "Check the file, or name its format")
-    return found
+    return result
 
 
 def _times(path: Path, cue: int, line: str) -> tuple[float, float]:

@@ -84,14 +84,14 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
     tokens.heading()
     tokens.number("xmin")
     tokens.number("xmax")
-    found = LabelRows()
+    result = LabelRows()
     has_tiers = tokens.next("flag", "flag <exists>") == "<exists>"
     for _ in range(tokens.count("tiers") if has_tiers else 0):
         kind, name = tokens.text("class of a tier"), tokens.text("name of a tier")
         if kind not in ("IntervalTier", "TextTier"):
             raise Sd2Error(f"{path} has a tier of class {kind[:50]!r}", "IntervalTier or TextTier")
         track, overlap = track_of(name)
-        found.tracks.append((track, overlap))
+        result.tracks.append((track, overlap))
         tokens.number("xmin")
         tokens.number("xmax")
         for number in range(tokens.count("intervals")):
@@ -101,8 +101,8 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
             # An interval of nothing is the gap between two spans, a point of nothing is not.
             if text.strip() or kind == "TextTier":
                 place = f"tier {name!r}, interval {number + 1}"
-                found.rows.append(Row(place, start_s, end_s, text, track))
-    return found
+                result.rows.append(Row(place, start_s, end_s, text, track))
+    return result
 
 
 def _tier(number: int, lane: Lane, start_s: float, end_s: float) -> list[str]:
@@ -159,27 +159,27 @@ class _Tokens:
         if "ooTextFile" not in self._first_line:
             raise Sd2Error(f"{self._path} begins with {self._first_line!r}", _EXPECTED)
         self.text("type of the file")
-        found = self.text("class of the object")
-        if found != "TextGrid":
+        class_name = self.text("class of the object")
+        if class_name != "TextGrid":
             raise Sd2Error(
-                f"{self._path} holds a {found[:50]!r}", _EXPECTED, "Save the TextGrid in Praat"
+                f"{self._path} holds a {class_name[:50]!r}", _EXPECTED, "Save the TextGrid in Praat"
             )
 
     def text(self, what: str) -> str:
         return self.next("text", what).replace('""', '"')
 
     def number(self, what: str) -> float:
-        found = self.next("number", what)
-        value = finite_number(found)
+        token = self.next("number", what)
+        value = finite_number(token)
         if value is None:
-            raise Sd2Error(f"{self._path} has {found[:50]!r} for the {what}", "a finite number")
+            raise Sd2Error(f"{self._path} has {token[:50]!r} for the {what}", "a finite number")
         return value
 
     def count(self, what: str) -> int:
-        found = self.next("number", f"number of {what}")
-        value = whole_number(found)
+        token = self.next("number", f"number of {what}")
+        value = whole_number(token)
         if value is None:
-            raise Sd2Error(f"{self._path} has {found[:50]!r} {what}", "a whole number from 0 on")
+            raise Sd2Error(f"{self._path} has {token[:50]!r} {what}", "a whole number from 0 on")
         return value
 
     def next(self, kind: str, what: str) -> str:

@@ -28,7 +28,7 @@ from sd2app.settings import Settings
 from sd2core.errors import Cure
 from sd2core.labels import edits as core_edits
 from sd2core.labels.files import read_labels, write_labels
-from sd2core.labels.recovery import Found, Recoverable, offers_in
+from sd2core.labels.recovery import Recoverable, Recoveries, offers_in
 from sd2core.recording.recording import Recording
 
 
@@ -205,7 +205,7 @@ class TestOpeningAndClosing:
         at = desk().open(recording)
         at.mark(10, 20)
         at.document.save()
-        assert offers_in(root) == Found()
+        assert offers_in(root) == Recoveries()
         at.mark(30, 40)
         at.session.close()
         at = desk().open(recording)
@@ -378,7 +378,7 @@ class TestOffers:
         at.session.look_around()
         assert [one.recording for one in at.session.waiting.offers] == [recording]
         at.open(mesh)
-        assert at.session.waiting == Found()
+        assert at.session.waiting == Recoveries()
         assert at.session.offer is None
         (offer,) = at.session.recoveries().offers
         assert not at.session.is_of_open(offer)
@@ -390,7 +390,7 @@ class TestOffers:
         at.open(recording)
         assert at.session.offer == offer
         at.session.give_up(offer)
-        assert at.session.recoveries() == Found()
+        assert at.session.recoveries() == Recoveries()
         assert at.session.offer is None
 
     def test_what_cannot_be_read_is_said(self, desk, root, recording, crashed) -> None:

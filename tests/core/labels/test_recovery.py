@@ -15,7 +15,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.edit_lock import Holder
 from sd2core.labels import journal as journal_module
 from sd2core.labels.journal import Journal
-from sd2core.labels.recovery import Found, RecoveryPlace, offers_in
+from sd2core.labels.recovery import Recoveries, RecoveryPlace, offers_in
 from sd2core.labels.spans import Labels, Span
 
 START = imported(even(), 7)
@@ -91,18 +91,18 @@ class TestOffers:
         crashed(root, recording, 4, saved_after=4)
         crashed(root, recording, 0)
         place = taken(root, recording)
-        assert place.offers() == Found()
+        assert place.offers() == Recoveries()
         journal = place.begin(START)
         journal.write("Edit", edited(1))
         journal.close()
-        assert place.offers() == Found()
+        assert place.offers() == Recoveries()
         # What only says what the user's file says as well is gone too.
         assert not list(root.rglob("*.journal"))
 
     def test_of_all_recordings_but_those_in_use(
         self, taken: Take, root: Path, tmp_path: Path
     ) -> None:
-        assert offers_in(root) == Found()
+        assert offers_in(root) == Recoveries()
         for name in "ab":
             crashed(root, tmp_path / name, 2)
         assert [one.recording.name for one in offers_in(root).offers] == ["b", "a"]
@@ -147,8 +147,8 @@ class TestOffers:
         place = taken(root, recording)
         (offer,) = place.offers().offers
         place.decline(offer)
-        assert place.offers() == Found()
-        assert offers_in(root) == Found()
+        assert place.offers() == Recoveries()
+        assert offers_in(root) == Recoveries()
         place.release()
         assert offers_in(root, declined=True).offers[0].declined
         assert place.take()
@@ -231,7 +231,7 @@ class TestDamage:
         assert str(newest) in found.notes[0]
         assert says in found.notes[0]
         place.begin(START, found.offers[0]).close()
-        assert place.offers() == Found()
+        assert place.offers() == Recoveries()
         assert newest.with_suffix(".damaged").read_bytes() == content
 
     def test_of_the_newest_part_costs_that_part(
@@ -273,7 +273,7 @@ class TestDamage:
         assert found.offers == ()
         assert "ends within an edit" in found.notes[0]
         place.begin(START).close()
-        assert place.offers() == Found()
+        assert place.offers() == Recoveries()
 
     def test_a_later_version_is_left_alone(
         self, taken: Take, root: Path, recording: Path, monkeypatch: pytest.MonkeyPatch
