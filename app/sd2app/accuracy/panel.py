@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction
+from PySide6.QtGui import QAction, QShowEvent
 from PySide6.QtWidgets import QLabel, QSizePolicy, QToolButton, QWidget
 
 from sd2app.accuracy.model import PRESETS, AccuracyModel
@@ -40,8 +40,9 @@ class AccuracyPanel(QWidget):
         self.setObjectName("page")
         self._accuracy = accuracy
         self._nothing = sentence(_NO_MESH)
+        self._tolerance = ToleranceRow(accuracy, self)
         self._parts = (
-            ToleranceRow(accuracy, self),
+            self._tolerance,
             # Above what a click on it says, so that it stays where it is.
             self._plot_part(display, measure),
             self._use_part(),
@@ -51,7 +52,12 @@ class AccuracyPanel(QWidget):
             column_of(self._nothing, *self._parts, STRETCH, spacing_px=6, margins_px=(8, 6, 8, 6))
         )
         for signal in (accuracy.changed, accuracy.plan_changed):
-            signal.connect(self._refresh)
+            signal.connect(self._follow)
+        self._refresh()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Bring up to date what drags, which change much of it, left alone while it was hidden."""
+        super().showEvent(event)
         self._refresh()
 
     def _use_part(self) -> QWidget:
@@ -87,12 +93,17 @@ class AccuracyPanel(QWidget):
         fold = Fold("Why this plan", tip, self._reasons, self)
         return pane(rule(), row_of(fold, STRETCH), self._reasons, spacing_px=4)
 
+    def _follow(self) -> None:
+        if self.isVisible():
+            self._refresh()
+
     def _refresh(self) -> None:
-        there = self._accuracy.frames > 0
-        self._nothing.setVisible(not there)
+        has_mesh = self._accuracy.frames > 0
+        self._nothing.setVisible(not has_mesh)
         for part in self._parts:
-            part.setVisible(there)
-        if there:
+            part.setVisible(has_mesh)
+        if has_mesh:
+            self._tolerance.refresh()
             self._refresh_use()
             self._refresh_plot()
             choice, in_use = self._accuracy.choice, self._accuracy.in_use
@@ -129,6 +140,7 @@ class AccuracyPanel(QWidget):
         self._empty.setVisible(measurement is None)
         self._measure.setText("Measure this scene" if measurement is None else "Measure again")
         self._plot.setVisible(measurement is not None)
+        self._plot.refresh()
         self._source.setVisible(measurement is not None)
         words = ""
         if measurement is not None:
@@ -208,10 +220,9 @@ class ToleranceRow(QWidget):
         top = row_of(title("Tolerance"), STRETCH, self._box)
         presets = row_of(*((button, 1) for button in self._presets.values()), spacing_px=4)
         self.setLayout(column_of(top, presets, self._meaning, spacing_px=4, margins_px=0))
-        accuracy.changed.connect(self._refresh)
-        self._refresh()
 
-    def _refresh(self) -> None:
+    def refresh(self) -> None:
+        """Show the tolerance, and what each costs."""
         accuracy = self._accuracy
         self._box.show_value(100 * accuracy.tolerance)
         clicked = accuracy.in_use is not None and accuracy.in_use.origin == "clicked"

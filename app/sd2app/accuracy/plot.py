@@ -41,10 +41,9 @@ class AccuracyPlot(ChartView):
     def __init__(self, accuracy: AccuracyModel, display: DisplayModel) -> None:
         super().__init__(display, "Error against cost of every plan", accuracy_chart(accuracy))
         self._accuracy = accuracy
-        accuracy.changed.connect(self._refresh)
-        accuracy.plan_changed.connect(self._refresh)
 
-    def _refresh(self) -> None:
+    def refresh(self) -> None:
+        """Show the plans as they are measured."""
         self.show_chart(accuracy_chart(self._accuracy))
 
     def along(self, key: Qt.Key) -> Sequence[Mark]:
