@@ -5,9 +5,9 @@ set -uo pipefail
 cd "$(dirname "$0")/.."
 
 NO_TESTS_COLLECTED=5
-# Small products gain nothing from threads, and threads that wait for each other cost much
+# Small products and pictures gain nothing from threads, and threads that wait for each other cost much
 # when the machine does other work.
-export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 LP_NUM_THREADS=0
 # Without kept bytecode every worker and every process that a test starts compiles every module,
 # and pytest rewrites the assertions of every test file.
 unset PYTHONDONTWRITEBYTECODE
