@@ -69,7 +69,7 @@ class Component:
     text: str = ""
 
 
-Found = dict[Component, set[str]]
+Parts = dict[Component, set[str]]
 """The components of a bundle and the files of each."""
 Users = dict[Component, set[str]]
 """Packages, or files that are of none, that are linked to a component."""
@@ -115,13 +115,13 @@ def of_distribution(one: importlib.metadata.Distribution) -> Component:
         short = ""
     classified = [text for text in about.get_all("Classifier", []) if text.startswith("License ::")]
     last = [re.sub(r" \([^()]*\)$", "", text.rpartition(" :: ")[2]) for text in classified]
-    said = about.get("License-Expression") or " AND ".join(
+    declared = about.get("License-Expression") or " AND ".join(
         text for text in last if text not in ("DFSG approved", "OSI Approved")
     )
     urls = [text.partition(", ") for text in about.get_all("Project-URL", [])]
-    found = (url for label, _, url in urls if re.match("(?i)source|repo|code|github", label))
-    source = next(found, about.get("Home-page")) or f"the package {name} of the index"
-    licence = CORRECTED.get(name.lower()) or said or short or "no licence named"
+    links = (url for label, _, url in urls if re.match("(?i)source|repo|code|github", label))
+    source = next(links, about.get("Home-page")) or f"the package {name} of the index"
+    licence = CORRECTED.get(name.lower()) or declared or short or "no licence named"
     return Component(name, one.version, licence, source)
 
 
@@ -145,9 +145,9 @@ def native(name: str, path: str) -> list[dict[str, str]]:
     return [row for row in rows if not row["mark"] or holds(path, row["mark"])]
 
 
-def components(carried: Carried, own: Component) -> Found:
+def components(carried: Carried, own: Component) -> Parts:
     """Find what a bundle consists of; refuse files that are of nothing known."""
-    found: Found = defaultdict(set)
+    parts: Parts = defaultdict(set)
     unknown = []
     homes = (sysconfig.get_path("stdlib"), os.path.join(sys.base_prefix, "DLLs"))
     python = tuple(os.path.realpath(folder) + os.sep for folder in homes)
@@ -158,18 +158,18 @@ def components(carried: Carried, own: Component) -> Found:
         path = place(source)
         rows, owner = native(name, path), owners().get(path)
         if owner:
-            found[of_distribution(owner)].add(path)
+            parts[of_distribution(owner)].add(path)
         elif path.startswith(python):
             rows += [row for _, row in table() if row["library"] == "Python"]
         elif path.startswith(str(ROOT) + os.sep) and not path.startswith(environment) and not rows:
-            found[own].add(path)
+            parts[own].add(path)
             continue
         for row in rows:
             version = f"in {owner.metadata['Name']} {owner.version}" if owner else "of the system"
             if row["library"] == "Python":
                 version = sys.version.split()[0]
             part = Component(row["library"], version, row["licence"], row["source"], row["text"])
-            found[part].add(path)
+            parts[part].add(path)
         # What wheels bring from elsewhere lies in a folder of its own.
         foreign = os.path.dirname(path).endswith((".libs", ".dylibs"))
         if not rows and (foreign or not owner):
@@ -180,19 +180,19 @@ def components(carried: Carried, own: Component) -> Found:
             f"Expected are files of installed packages and those named in {HERE.name}/"
             "native_libraries.csv. Leave it out in the recipe, or find its licence and add a row."
         )
-    return dict(found)
+    return dict(parts)
 
 
-def judge(found: Iterable[Component]) -> list[Component]:
+def judge(parts: Iterable[Component]) -> list[Component]:
     """Refuse what may not be passed on, or not together; find the parts that are under the GPL."""
-    for one in sorted(found):
+    for one in sorted(parts):
         if not allowed(one.licence, FREE | GPL | APART):
             raise Refused(
                 f"The bundle would carry {one.name} ({one.version}) under “{one.licence}”. "
                 f"Expected are licences of {HERE.name}/passed_on.txt, which go together with the "
                 "GPL's version 3. Leave it out in the recipe, or read its licence and list that."
             )
-    return sorted(one for one in found if not allowed(one.licence, FREE | APART))
+    return sorted(one for one in parts if not allowed(one.licence, FREE | APART))
 
 
 @functools.cache
@@ -203,10 +203,10 @@ def imports(path: str) -> set[str]:
     return {place(library) for _, library in get_imports(path) if library}
 
 
-def keep_apart(found: Found, binaries: Iterable[str], imports: Imports = imports) -> Users:
+def keep_apart(parts: Parts, binaries: Iterable[str], imports: Imports = imports) -> Users:
     """Tell who is linked to what is under the GPL or may not be; refuse one that is to both."""
-    under = judge(found)
-    beside = [one for one in found if not allowed(one.licence, FREE | GPL)]
+    under = judge(parts)
+    beside = [one for one in parts if not allowed(one.licence, FREE | GPL)]
     users: Users = {one: set() for one in (*under, *beside)}
     for binary in map(place, binaries):
         reached, to_do = {binary}, [binary]
@@ -214,7 +214,7 @@ def keep_apart(found: Found, binaries: Iterable[str], imports: Imports = imports
             new = imports(to_do.pop()) - reached
             reached |= new
             to_do += new
-        touched = [one for one in users if found[one] & reached]
+        touched = [one for one in users if parts[one] & reached]
         if set(touched) & set(under) and set(touched) & set(beside):
             names = " and ".join(f"{one.name} ({one.licence})" for one in touched)
             raise Refused(
@@ -246,7 +246,7 @@ def of_system(paths: Iterable[str]) -> Iterator[tuple[str, str]]:
             yield title, file.read_text("utf-8", "replace")
 
 
-def texts(found: Found, common: Path = COMMON) -> dict[str, list[str]]:
+def texts(parts: Parts, common: Path = COMMON) -> dict[str, list[str]]:
     """Collect each text once, with what it is of; refuse if one that has to be there is nowhere."""
     collected: dict[str, list[str]] = defaultdict(list)
     for title, file in (
@@ -256,7 +256,7 @@ def texts(found: Found, common: Path = COMMON) -> dict[str, list[str]]:
     ):
         if file.is_file():
             collected[file.read_text("utf-8").strip()].append(title)
-    paths = set().union(*found.values())
+    paths = set().union(*parts.values())
     carried = {of_distribution(owners()[path]): owners()[path] for path in paths & owners().keys()}
     for part, distribution in sorted(carried.items(), key=lambda pair: pair[0].name.lower()):
         for name in distribution.files or ():
@@ -264,11 +264,11 @@ def texts(found: Found, common: Path = COMMON) -> dict[str, list[str]]:
             if named and name.suffix not in (".json", ".py", ".pyc", ".pyi", ".so"):
                 text = Path(str(distribution.locate_file(name))).read_text("utf-8", "replace")
                 collected[text.strip()].append(f"{part.name} {part.version}: {name.name}")
-    system = [files for one, files in found.items() if one.version == "of the system"]
+    system = [files for one, files in parts.items() if one.version == "of the system"]
     for title, text in of_system(set().union(*system)):
         collected[text.strip()].append(title)
     words = [" ".join(text.split()) for text in collected]
-    needed = re.findall(r"L?GPL-\d\.\d", " ".join(one.licence for one in found))
+    needed = re.findall(r"L?GPL-\d\.\d", " ".join(one.licence for one in parts))
     # Version 2.0 of the LGPL is met as “or later” only.
     for name in sorted({name.replace("LGPL-2.0", "LGPL-2.1") for name in ("GPL-3.0", *needed)}):
         if any(all(part in text for part in GNU[name]) for text in words):
@@ -281,7 +281,7 @@ def texts(found: Found, common: Path = COMMON) -> dict[str, list[str]]:
                 "https://www.gnu.org/licenses/."
             )
         collected[file.read_text("utf-8").strip()].append(name)
-    missing = [one for one in sorted(found) if not any(one.text in text for text in words)]
+    missing = [one for one in sorted(parts) if not any(one.text in text for text in words)]
     if missing:
         lines = [f"  - {one.name} ({one.version}): {one.source}" for one in missing]
         collected["\n".join([_MISSING, *lines])].append("NOTICES TO ADD")
@@ -291,26 +291,26 @@ def texts(found: Found, common: Path = COMMON) -> dict[str, list[str]]:
 def write(file: Path, carried: Carried, binaries: Iterable[str], version: str) -> Path:
     """Write down what a bundle carries, or refuse it."""
     own = Component("SD² Studio", version, "Apache-2.0", "where this folder is from")
-    found = components(carried, own)
-    under, users = judge(found), keep_apart(found, binaries)
-    said = {
+    parts = components(carried, own)
+    under, users = judge(parts), keep_apart(parts, binaries)
+    entries = {
         one: f"  - {one.name} ({one.version}): {one.licence}\n    used by {', '.join(sorted(who))}"
         for one, who in sorted(users.items())
     }
     head = (HERE / "licences_head.txt").read_text("utf-8")
     head = head.format(
         version=version,
-        components=len(found),
-        under="\n".join(said[one] for one in under) or "  - none",
-        beside="\n".join(said[one] for one in said if one not in under) or "  - none",
+        components=len(parts),
+        under="\n".join(entries[one] for one in under) or "  - none",
+        beside="\n".join(entries[one] for one in entries if one not in under) or "  - none",
     )
     rows = [
-        f"{one.name} ({one.version})\n    {one.licence}\n    {one.source}" for one in sorted(found)
+        f"{one.name} ({one.version})\n    {one.licence}\n    {one.source}" for one in sorted(parts)
     ]
     line = "=" * 80
-    parts = [
-        f"{line}\n{'; '.join(titles)}\n{line}\n\n{text}" for text, titles in texts(found).items()
+    sections = [
+        f"{line}\n{'; '.join(titles)}\n{line}\n\n{text}" for text, titles in texts(parts).items()
     ]
-    file.write_text("\n\n".join([head, "COMPONENTS", *rows, "TEXTS", *parts]) + "\n", "utf-8")
-    print(f"{file.name} names {len(found)} components")
+    file.write_text("\n\n".join([head, "COMPONENTS", *rows, "TEXTS", *sections]) + "\n", "utf-8")
+    print(f"{file.name} names {len(parts)} components")
     return file
