@@ -31,13 +31,13 @@ application = QApplication(sys.argv[:1])
 # A font may be there that has no letters, such as one of symbols.
 letters = all(map(QFontMetrics(QFont()).inFont, "az09"))
 families = len(QFontDatabase.families()) if letters else 0
-found = {"platform": application.platformName(), "fonts": families}
+facts = {"platform": application.platformName(), "fonts": families}
 try:
     from sd2app.scene.offscreen_backend import ImageBackend
     ImageBackend()
 except RuntimeError as error:
-    found["gl"] = str(error)
-print(json.dumps(found))
+    facts["gl"] = str(error)
+print(json.dumps(facts))
 """
 """Opens what a window needs, in a process of its own: Qt ends it where something is missing."""
 
@@ -85,8 +85,8 @@ def _libraries() -> Finding:
 
 def _window() -> list[Finding]:
     if silent := silent_displays(sys.platform, os.environ):
-        said = f"the display cannot be reached: {', '.join(silent)}"
-        return [Finding("Window", "problem", said, "Begin its session again, or unset it")]
+        why = f"the display cannot be reached: {', '.join(silent)}"
+        return [Finding("Window", "problem", why, "Begin its session again, or unset it")]
     on_screen = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
     environment = dict(os.environ)
     if not on_screen and sys.platform.startswith("linux"):
@@ -104,8 +104,8 @@ def _window() -> list[Finding]:
     except subprocess.TimeoutExpired:
         return [Finding("Window", "problem", f"nothing within {_PROBE_S:.0f} s", "Try once more")]
     except (IndexError, ValueError):
-        said = (run.stderr.strip().splitlines() or [f"it ended with code {run.returncode}"])[-1]
-        return [Finding("Window", "problem", said, "Install what is missing above, or named here")]
+        why = (run.stderr.strip().splitlines() or [f"it ended with code {run.returncode}"])[-1]
+        return [Finding("Window", "problem", why, "Install what is missing above, or named here")]
     return [
         Finding("Window", "ok", f"opens ({seen['platform']})")
         if on_screen or not sys.platform.startswith("linux")
@@ -154,7 +154,7 @@ def _landmark_models() -> Finding:
     from sd2core.body.landmark_models import LANDMARKERS, landmark_models
 
     try:
-        there = [landmark_models(download=False, model=model) for model in LANDMARKERS]
+        models = [landmark_models(download=False, model=model) for model in LANDMARKERS]
     except Sd2Error as error:
         return Finding(
             "Landmark models",
@@ -163,7 +163,7 @@ def _landmark_models() -> Finding:
             "sd2 doctor --fetch-models (some 80 MB, once; only fits of videos need them)",
         )
     names = " and ".join(LANDMARKERS)
-    return Finding("Landmark models", "ok", f"{names} in {there[0].detector.parent}")
+    return Finding("Landmark models", "ok", f"{names} in {models[0].detector.parent}")
 
 
 def _gpu() -> Finding:
@@ -192,7 +192,7 @@ def plug_in_findings() -> list[Finding]:
         RADAR_PLUG_INS, RADAR_FILES, MESH_FILES, LABEL_PLUG_INS, DENOISERS, CLASSIFIERS,
         COMMAND_PLUG_INS, LIVE_RADARS,
     )  # fmt: skip
-    found = []
+    findings = []
     for plug_in, made in (one for group in groups for one in group.loaded()):
         if isinstance(made, Sd2Error):
             remedy = made.remedy or f"Uninstall {plug_in.package}"
@@ -202,35 +202,35 @@ def plug_in_findings() -> list[Finding]:
         else:
             words = f"{plug_in.name} ({plug_in.group.name}) of {plug_in.package}"
             finding = Finding("Plug-in", "ok", words)
-        found.append(finding)
-    return found or [Finding("Plug-in", "ok", "none is installed")]
+        findings.append(finding)
+    return findings or [Finding("Plug-in", "ok", "none is installed")]
 
 
 def _folders() -> list[Finding]:
-    found = []
+    findings = []
     for about, folder in (("Cache", user_cache("")), ("Data", user_data(""))):
-        there = next(one for one in (folder, *folder.parents) if one.exists())
-        free_gb = shutil.disk_usage(there).free / 1e9
-        if not os.access(there, os.W_OK):
-            finding = Finding(about, "problem", f"{there} cannot be written to", "Mend its rights")
+        place = next(one for one in (folder, *folder.parents) if one.exists())
+        free_gb = shutil.disk_usage(place).free / 1e9
+        if not os.access(place, os.W_OK):
+            finding = Finding(about, "problem", f"{place} cannot be written to", "Mend its rights")
         elif free_gb < _FREE_GB:
-            finding = Finding(about, "problem", f"{free_gb:.1f} GB free at {there}", "Make room")
+            finding = Finding(about, "problem", f"{free_gb:.1f} GB free at {place}", "Make room")
         else:
             finding = Finding(about, "ok", f"{folder}, {free_gb:,.0f} GB free")
-        found.append(finding)
-    return found
+        findings.append(finding)
+    return findings
 
 
 def report(as_json: bool) -> int:
     """Print what was found; returns 1 where something must be mended."""
-    found = examine()
+    findings = examine()
     if as_json:
-        print(json.dumps([asdict(one) for one in found], indent=2, ensure_ascii=False))
+        print(json.dumps([asdict(one) for one in findings], indent=2, ensure_ascii=False))
     else:
-        width = max(len(one.about) for one in found)
-        for one in found:
+        width = max(len(one.about) for one in findings)
+        for one in findings:
             mark = "PROBLEM" if one.state == "problem" else one.state
             print(f"{mark:<8} {one.about:<{width}}  {one.found}")
             if one.remedy:
                 print(f"{'':<8} {'':<{width}}  → {one.remedy}")
-    return int(any(one.state == "problem" for one in found))
+    return int(any(one.state == "problem" for one in findings))

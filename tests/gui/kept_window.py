@@ -45,9 +45,9 @@ _PASSING = (
     # Of the start page, hidden.
     *("start.recent", "_pictures._wanted", "_pictures._writer.busy", "_pictures._writer._pending"),
     *("_tour._before", "]._target"),  # of a tour that is over
-    *("edges_s", "limb_hand._model._found"),  # worked out once, when first asked for
+    *("edges_s", "limb_hand._model._mesh_parts"),  # worked out once, when first asked for
     # Of places and a search that are no more.
-    *("inertial_hand._model._chosen", "limb_hand._surface._model._chosen", "].found"),
+    *("inertial_hand._model._chosen", "limb_hand._surface._model._chosen", "].result"),
     *("._body", "scene.inertial.points"),  # what places were last drawn about, and their markers
     *("scene.markers.points", "scene.markers._colours", "scene.markers._colour_array"),
     *("scene.markers._length_m", "scene.view._planned[2].wavelength_m"),

@@ -137,8 +137,8 @@ class MeasuredModel(ReportingModel):
         self._known[measurement.family] = replace(measurement, stale=measurement.stale or elsewhere)
         self.changed.emit()
 
-    def _receive_remembered(self, found: list[Measurement | None]) -> None:
-        stored = {known.family: known for known in found if known is not None}
+    def _receive_remembered(self, measurements: list[Measurement | None]) -> None:
+        stored = {known.family: known for known in measurements if known is not None}
         self._known |= stored
         if stored:
             self.changed.emit()

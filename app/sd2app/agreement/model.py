@@ -38,7 +38,7 @@ class AgreementModel(ReportingModel):
         self.path: Path | None = None  # of the other person's labels, while they are open
         self.sentence = ""  # on what was taken of their file, and what was not
         self.left_out = 0  # spans of theirs outside the recording
-        self.found: Agreement | None = None  # until it is computed
+        self.measures: Agreement | None = None  # until they are computed
         self.disagreements: tuple[Disagreement, ...] = ()  # in order
         self._reader = LatestRunner("labels", self, self._receive, self._fail)
         self._comparer = LatestRunner("agreement", self, self._take, self._fail)
@@ -80,7 +80,7 @@ class AgreementModel(ReportingModel):
         self._comparer.cancel()
         if self.active:
             self.path, self.sentence = None, ""
-            self.found, self.disagreements = None, ()
+            self.measures, self.disagreements = None, ()
             self.other.open(Labels())
             self.changed.emit()
 
@@ -101,7 +101,7 @@ class AgreementModel(ReportingModel):
         incoming = Incoming.of(reading.labels, self._playback.timebase)
         self.sentence = reading.sentence
         self.left_out = len(incoming.outside)
-        self.found, self.disagreements = None, ()
+        self.measures, self.disagreements = None, ()
         # Colours are those of this recording wherever it has the label.
         own = self._labels.labels.label_set
         names = {one.name for one in own.labels}
@@ -124,5 +124,5 @@ class AgreementModel(ReportingModel):
         self.changed.emit()
 
     def _take(self, compared: Compared) -> None:
-        self.found, self.disagreements = compared
+        self.measures, self.disagreements = compared
         self.changed.emit()

@@ -98,18 +98,18 @@ def _row(
 
 def verdict(model: AgreementModel) -> str:
     """Return the kappa of all frames, and the customary word for it."""
-    if model.found is None:
+    if model.measures is None:
         return "Comparing…"
-    kappa = model.found.frames.overall.value
+    kappa = model.measures.frames.overall.value
     return f"Kappa {'–' if kappa is None else f'{kappa:.2f}'}: {kappa_words(kappa)}"
 
 
 def facts(model: AgreementModel) -> list[tuple[str, str]]:
     """Return names and values of the measures of agreement."""
-    found = model.found
-    if found is None:
+    measures = model.measures
+    if measures is None:
         return []
-    frames, spans = found.frames, found.spans
+    frames, spans = measures.frames, measures.spans
     same = sum(match.same_label for match in spans.matches)
     rows = [
         ("Frames the same", _share(frames.overall.observed)),
@@ -132,19 +132,19 @@ def facts(model: AgreementModel) -> list[tuple[str, str]]:
 
 def label_facts(model: AgreementModel) -> list[tuple[str, str]]:
     """Return every label that either used, with its kappa."""
-    found = model.found
-    if found is None:
+    measures = model.measures
+    if measures is None:
         return []
     return [
         (label, "–" if kappa.value is None else f"{kappa.value:.2f}")
-        for label, kappa in found.frames.of_label.items()
+        for label, kappa in measures.frames.of_label.items()
     ]
 
 
 def where(model: AgreementModel) -> str:
     """Describe the disagreement at the present frame, or all of them."""
     stretches, number = model.disagreements, model.current
-    if model.found is None:
+    if model.measures is None:
         return "Comparing…"
     if not stretches:
         return "No frame is labelled differently."
@@ -154,11 +154,11 @@ def where(model: AgreementModel) -> str:
     one = stretches[number]
     return (
         f"{number + 1} of {len(stretches)}, {one.start_s:.2f} to {one.end_s:.2f} s.\n"
-        f"You: {_said(one.a)}.\n{model.name}: {_said(one.b)}."
+        f"You: {_answer_text(one.a)}.\n{model.name}: {_answer_text(one.b)}."
     )
 
 
-def _said(answer: Sequence[str]) -> str:
+def _answer_text(answer: Sequence[str]) -> str:
     return " and ".join(answer) or "nothing"
 
 

@@ -89,7 +89,7 @@ def reason_in(event: Mapping[str, Any]) -> str:
     return str(Sd2Error(*(str(error.get(part) or "") for part in ("found", "expected", "remedy"))))
 
 
-class _Found(NamedTuple):
+class _Status(NamedTuple):
     """One look at the folder of a run."""
 
     launching: bool
@@ -236,7 +236,7 @@ class RunMonitor(QObject, Generic[F]):
 
     # --- looking ----------------------------------------------------------------------------
 
-    def _look(self) -> _Found:
+    def _look(self) -> _Status:
         folder = self.folder
         # The process first: when it is gone, all that it wrote is there to be read.
         launching = self._launched is not None and self._launched.is_alive
@@ -247,34 +247,34 @@ class RunMonitor(QObject, Generic[F]):
                 state = folder.state()
         process = folder.process
         # Read last: of a run that has ended, the lines are complete.
-        return _Found(
+        return _Status(
             launching, live, folder.exists, state, process,
             read_control(folder.control), self._tail.new(), self.inspect(),
         )  # fmt: skip
 
-    def _take(self, found: _Found) -> None:
-        told = self.history.take(found.events)
-        told |= found.facts != self.facts
-        self.facts = found.facts
-        if self._launched is None or found.live or _is_begun_by(found.process, self._launched):
+    def _take(self, status: _Status) -> None:
+        has_news = self.history.take(status.events)
+        has_news |= status.facts != self.facts
+        self.facts = status.facts
+        if self._launched is None or status.live or _is_begun_by(status.process, self._launched):
             self._has_begun = True
         before, was_loaded = self._phase, self.loaded
-        self._phase, self.loaded = self._phase_of(found), True
-        self._obey(found)
+        self._phase, self.loaded = self._phase_of(status), True
+        self._obey(status)
         another = self._phase != before or not was_loaded
         if another:
             self._settle()
             self.phase_changed.emit()
-        if told or another:
+        if has_news or another:
             self.changed.emit()
         if before in UNDER_WAY and self._phase not in UNDER_WAY:
             self.ended.emit()
 
-    def _phase_of(self, found: _Found) -> Phase:
-        if found.live:
-            return self._phase_under_way(found.word)
-        ended = found.state in ("finished", "stopped", "failed", "cancelled")
-        if found.launching and not (self._has_begun and ended):
+    def _phase_of(self, status: _Status) -> Phase:
+        if status.live:
+            return self._phase_under_way(status.word)
+        ended = status.state in ("finished", "stopped", "failed", "cancelled")
+        if status.launching and not (self._has_begun and ended):
             # It is taking its folder while one looks, or about to exit.
             return self._phase if self._has_begun else "starting"
         if self._request == "cancel":
@@ -284,9 +284,9 @@ class RunMonitor(QObject, Generic[F]):
         if not self._has_begun:
             # Refused, or told to stop, before it had its folder.
             return "stopped" if self._request == "stop" else "failed"
-        if not found.exists or found.state == "cancelled":
+        if not status.exists or status.state == "cancelled":
             return "gone"
-        state = found.state
+        state = status.state
         if state in LIVE:
             return "starting"  # a process took it up between the two looks
         if state == "finished" or state == "stopped" or state == "failed":
@@ -304,19 +304,19 @@ class RunMonitor(QObject, Generic[F]):
             return "paused" if word == "pause" else "resuming"
         return "pausing" if word == "pause" else "running"
 
-    def _obey(self, found: _Found) -> None:
+    def _obey(self, status: _Status) -> None:
         """Repeat an order that the process may not have heard; forget one that it has obeyed."""
         if self._request is None or not self.under_way:
             return
-        if found.live and found.word != self._request:
+        if status.live and status.word != self._request:
             # It had no folder when the order was given, and may have cleared up meanwhile.
             with suppress(FileNotFoundError):
                 write_control(self.folder.control, self._request)
-        elif not found.live and self._request in ("stop", "cancel") and self._launched is not None:
+        elif not status.live and self._request in ("stop", "cancel") and self._launched is not None:
             self._launched.terminate()
         if self._phase == {"run": "running", "pause": "paused"}.get(self._request):
             self._request = None
-        process = found.process if found.live else self._launched
+        process = status.process if status.live else self._launched
         if self._stopped_s is not None and self.stop_patience_s is not None:
             waited_s = self._clock_s() - self._stopped_s
             if waited_s > self.stop_patience_s and process is not None:
@@ -336,10 +336,10 @@ class RunMonitor(QObject, Generic[F]):
         self._request = None
         output = self.folder.output
         lines = [line for line in last_output(output).splitlines() if not line.startswith("{")]
-        said = "\n".join(lines)
+        message = "\n".join(lines)
         self.text = ""
         if self._phase == "failed":
-            self.text = self.history.error or said.removeprefix("sd2: ") or _SILENT
+            self.text = self.history.error or message.removeprefix("sd2: ") or _SILENT
         elif self._phase == "died":
             self.text = lines[-1] if lines else ""
         if self._phase in ("finished", "stopped", "gone") and output.parent != self.path:

@@ -85,7 +85,7 @@ class BatchFeature(Feature):
         report(shell, self.model)
         self._shell = shell
         self._questions = BatchQuestions(self.model, session, shell, placements, denoiser)
-        self._questions.said.connect(self._say)
+        self._questions.warned.connect(self._say)
         self._window: BatchWindow | None = None
 
     def show(self) -> None:

@@ -92,8 +92,8 @@ class BatchModel(Runs[BatchMonitor]):
         self._estimating.cancel()
         self._asked, self.estimate, self._refusal = None, None, ""
 
-    def _take_estimate(self, found: BatchEstimate) -> None:
-        self.estimate = found
+    def _take_estimate(self, estimate: BatchEstimate) -> None:
+        self.estimate = estimate
         self.changed.emit()
 
     def _refuse_estimate(self, error: Exception) -> None:

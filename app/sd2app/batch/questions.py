@@ -42,7 +42,7 @@ _PLAN_BEFORE = "what was planned before"
 class BatchQuestions(QObject):
     """Dialogs, followed by calls of the models; ``denoiser`` is that of the open recording."""
 
-    said = Signal(str)  # what went wrong; empty when something else is tried
+    warned = Signal(str)  # what went wrong; empty when something else is tried
 
     def __init__(
         self,
@@ -133,7 +133,7 @@ class BatchQuestions(QObject):
         elif index == _PLANNED:
             placements = self._placements.plan
             if placements is None:
-                self.said.emit("The open recording plans no placements: Edit → Placements… does.")
+                self.warned.emit("The open recording plans no placements: Edit → Placements… does.")
             setup.set_placements(placements, _PLAN_HERE)
         elif path := ask_file(self._over, "Placements", _PLACEMENTS):
             read = self._attempt(lambda: read_placements(path))
@@ -233,11 +233,11 @@ class BatchQuestions(QObject):
 
     def _attempt(self, work: Callable[[], T]) -> T | None:
         """Result of ``work``; an error is said, and None returned."""
-        self.said.emit("")
+        self.warned.emit("")
         try:
             return work()
         except (Sd2Error, OSError) as error:
-            self.said.emit(str(error))
+            self.warned.emit(str(error))
             return None
 
 

@@ -73,9 +73,9 @@ class BatchResults(RecordTableModel[Result]):
         """Stop reading."""
         self._runner.close()
 
-    def _take(self, found: tuple[list[Result], str]) -> None:
+    def _take(self, results: tuple[list[Result], str]) -> None:
         self.beginResetModel()
-        self.rows, self.card = found
+        self.rows, self.card = results
         self.endResetModel()
         self.changed.emit()
 

@@ -113,11 +113,11 @@ class BatchRunView(RunView[BatchMonitor]):
             for widget in (name, bar, words):
                 widget.setVisible(shown)
             if shown:
-                text, done, total, said = facts[row]
+                text, done, total, count_text = facts[row]
                 name.setText(text)
                 bar.show_count(done, total)
-                bar.setAccessibleName(f"{text}: {said}")
-                words.setText(said)
+                bar.setAccessibleName(f"{text}: {count_text}")
+                words.setText(count_text)
 
     def _open(self) -> None:
         index = self._table.currentIndex()

@@ -147,8 +147,8 @@ def most_workers() -> int:
 def _looked_at(path: Path) -> Entry:
     """Read a file or folder, in the background."""
     try:
-        if path.is_dir() and (found := _in_folder(path)):
-            patterns, count = found
+        if path.is_dir() and (content := _in_folder(path)):
+            patterns, count = content
             return Entry(path, patterns, count)
         kind = kind_of(path)
     except (Sd2Error, OSError) as error:

@@ -58,11 +58,11 @@ def step_facts(batch: BatchMonitor) -> list[tuple[str, int, int, str]]:
     for step in batch.steps:
         if not (total := status.total.get(step, 0)):
             continue
-        done, there = status.done.get(step, 0), status.there.get(step, 0)
-        words = f"{done + there:,} of {total:,}"
-        if there:
-            words += f", {there:,} there already"
-        facts.append((STEP_WORDS.get(step, step), done + there, total, words))
+        done, existing = status.done.get(step, 0), status.there.get(step, 0)
+        words = f"{done + existing:,} of {total:,}"
+        if existing:
+            words += f", {existing:,} there already"
+        facts.append((STEP_WORDS.get(step, step), done + existing, total, words))
     return facts
 
 

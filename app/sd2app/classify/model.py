@@ -16,7 +16,7 @@ from sd2app.denoise.validity import MapValidity
 from sd2app.labels.model import LabelsModel
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
-from sd2app.suggestions.finders import Found, Threshold
+from sd2app.suggestions.finders import SearchResult, Threshold
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.files import GESTURES
 from sd2core.classify.spans import SpanOptions, predicted_spans
@@ -112,10 +112,10 @@ class ClassifyModel(ReportingModel):
     @property
     def source(self) -> MapModel | None:
         """The map that is looked at: the one chosen, else one of a kind that was learnt from."""
-        there = self.sources
-        if self._chosen in there:
+        sources = self.sources
+        if self._chosen in sources:
             return self._chosen
-        ordered = [one for one in self._in_favour if one in there]
+        ordered = [one for one in self._in_favour if one in sources]
         known = [one for one in ordered if self._knows(one)]
         return next(iter(known or ordered), None)
 
@@ -174,7 +174,7 @@ class ClassifyModel(ReportingModel):
         """True once every frame of the map is classified."""
         return self.track.complete
 
-    def look(self, threshold: float) -> Callable[[], Found]:
+    def look(self, threshold: float) -> Callable[[], SearchResult]:
         """Make the search, to be run in the background."""
         source, card = self.source, self.track.card
         assert source is not None
@@ -185,12 +185,12 @@ class ClassifyModel(ReportingModel):
         options = SpanOptions(min_confidence=threshold / 100.0)
         names = {name: self.label_of(name) for name in card.classes}
 
-        def look() -> Found:
+        def look() -> SearchResult:
             spans = predicted_spans(
                 shares, timebase, card.classes, options, present=doppler.present
             )
             named = tuple(replace(span, label=names[span.label]) for span in spans)
-            return Found(named, "" if named else "Nothing: no gesture is that sure")
+            return SearchResult(named, "" if named else "Nothing: no gesture is that sure")
 
         return look
 

@@ -268,8 +268,8 @@ class ClassTrack(BackgroundModel):
         self.done = np.append(self.done, np.zeros(more, bool))
         self.shares = np.pad(self.shares, ((0, more), (0, 0)), constant_values=np.nan)
         values = np.pad(before.values, ((0, 0), (0, more)))
-        there = np.append(before.present_mask, np.ones(more, bool))
-        return replace(before, values=values, timebase=timebase, present=there)
+        present = np.append(before.present_mask, np.ones(more, bool))
+        return replace(before, values=values, timebase=timebase, present=present)
 
     def _differs(
         self, before: DopplerMap, doppler: DopplerMap, known: NDArray[np.bool_], part: slice
@@ -295,8 +295,8 @@ class ClassTrack(BackgroundModel):
         is_growing = self.source is not None and self.source.growing
 
         def work(emit: Emit) -> None:
-            there = replace(doppler, present=doppler.present_mask & known)
-            for start, stop in stretches(there, rate_hz):
+            known_map = replace(doppler, present=doppler.present_mask & known)
+            for start, stop in stretches(known_map, rate_hz):
                 if not waiting[start:stop].any():
                     continue
                 # What follows is still to come: the last frames have no answer until then.

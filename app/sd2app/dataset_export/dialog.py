@@ -169,12 +169,12 @@ class ExportDialog(Dialog):
         self._length.show_value(choice.length)
         self._overlap.show_value(choice.overlap)
         self._format.show_value(choice.ending)
-        there = {self._sensors: model.places > 0, self._inertial: bool(model.imu_places)}
+        available = {self._sensors: model.places > 0, self._inertial: bool(model.imu_places)}
         for field in (
             self._this, self._other, self._sensors, self._inertial, self._cut, self._length,
             self._overlap, self._margin, self._format, self._people, *self._boxes.values(),
         ):  # fmt: skip
-            field.setEnabled(not model.under_way and there.get(field, True))
+            field.setEnabled(not model.under_way and available.get(field, True))
         self._show_counts()
         self._show_writing()
 
@@ -192,8 +192,8 @@ class ExportDialog(Dialog):
         left_out = [] if forecast is None else list(forecast.failed)
         if model.result is not None:
             left_out = list(model.result.left_out)
-        said = [model.problem, *(f"Left out: {one}" for one in left_out)]
-        show_words(self._message, "\n".join(filter(None, said)))
+        messages = [model.problem, *(f"Left out: {one}" for one in left_out)]
+        show_words(self._message, "\n".join(filter(None, messages)))
 
     def _show_writing(self) -> None:
         model = self._model

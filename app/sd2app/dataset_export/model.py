@@ -236,8 +236,8 @@ class ExportModel(Runs[ExportRun]):
     def find(self) -> Sequence[KnownRun]:
         """Look for what is being written, or has been meanwhile."""
         # One that has ended is there again where its folder could not be deleted.
-        found = [one for one in commands_in(self._folder) if one.path not in self._over]
-        return [KnownRun(one.path, one.path.name, one.live) for one in found]
+        runs = [one for one in commands_in(self._folder) if one.path not in self._over]
+        return [KnownRun(one.path, one.path.name, one.live) for one in runs]
 
     def _take_up(self) -> None:
         one = self.live or next(iter(self.known), None)

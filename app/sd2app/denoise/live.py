@@ -123,8 +123,8 @@ class LiveDenoiseModel(QObject):
             live = session or denoiser.live()
             began = time.perf_counter()
             answers = [
-                live.step(frame, bool(there))
-                for frame, there in zip(energies, present, strict=True)
+                live.step(frame, bool(is_present))
+                for frame, is_present in zip(energies, present, strict=True)
             ]
             cost_s = (time.perf_counter() - began) / len(answers)
             return _Stepped(live, start, np.stack(answers, axis=1), cost_s)

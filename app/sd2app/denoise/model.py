@@ -214,9 +214,9 @@ class DenoiseModel(ReportingModel):
             return None
         if choice.path is not None:
             # What is missing was said when the recording was opened.
-            there = choice.path.is_file()
-            self.problem = "" if there else f"The model {choice.path} is not there"
-            return choice.path if there else None
+            exists = choice.path.is_file()
+            self.problem = "" if exists else f"The model {choice.path} is not there"
+            return choice.path if exists else None
         card = self._library.named(choice.bundled or default_name(limbs=self._splits))
         if card is None and choice.bundled:
             self._say_problem(

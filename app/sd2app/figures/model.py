@@ -247,8 +247,8 @@ class StripModel(DrawnFigure):
 
     def __init__(self, content: Content, cursor_s: float, parent: QObject | None = None) -> None:
         recording = content.recording
-        there = {"video": content.video, "mesh": content.mesh}
-        rows: Any = tuple(row for row, part in there.items() if part is not None)
+        parts = {"video": content.video, "mesh": content.mesh}
+        rows: Any = tuple(row for row, part in parts.items() if part is not None)
         super().__init__("strip", StripChoice(options=StripOptions(rows=rows)), parent)
         named = recording.title if recording.folder == UNTITLED else str(recording.folder)
         self.source = StripSource.of(recording, content.video, content.mesh, named)
@@ -285,7 +285,7 @@ class StripModel(DrawnFigure):
         """Rows that can be drawn."""
         video, mesh = self.source.video is not None, self.source.mesh is not None
         rows: dict[Row, bool] = {"video": video, "mesh": mesh, "overlay": video and mesh}
-        return tuple(row for row, there in rows.items() if there)
+        return tuple(row for row, can_draw in rows.items() if can_draw)
 
     def frames(self) -> list[int]:
         """The frames of the strip; raises Sd2Error where the list is none."""

@@ -86,10 +86,10 @@ class MeshPreview(VideoFrames):
         middle, mesh, reader = super().first_frame(), self.mesh, self.reader
         if mesh is None or reader is None:
             return middle
-        there = np.flatnonzero(mesh.presence.present)
-        if not there.size or mesh.person_at(reader.timebase.time_of(middle)) is not None:
+        frames = np.flatnonzero(mesh.presence.present)
+        if not frames.size or mesh.person_at(reader.timebase.time_of(middle)) is not None:
             return middle
-        return reader.timebase.nearest_frame(float(mesh.times_s[there[len(there) // 2]]))
+        return reader.timebase.nearest_frame(float(mesh.times_s[frames[len(frames) // 2]]))
 
     def change(self, **settings: Any) -> None:
         """Read it another way: fields of :class:`MeshReading`, None as the file says."""

@@ -76,8 +76,8 @@ def _unbroken(x_px: NDArray[np.float64], values: NDArray[np.float64]) -> list[Li
 
 def extent(signals: list[InertialSignals], name: str) -> tuple[float, float]:
     """Limits of a lane that holds all values of a quantity, and zero."""
-    found = [getattr(one, name) for one in signals]
-    known = np.concatenate([values[np.isfinite(values)] for values in found] or [np.zeros(0)])
+    arrays = [getattr(one, name) for one in signals]
+    known = np.concatenate([values[np.isfinite(values)] for values in arrays] or [np.zeros(0)])
     low, high = float(known.min(initial=0.0)), float(known.max(initial=0.0))
     room = _ROOM * (high - low) or 1.0
     if math.isinf(room):  # of a damaged file

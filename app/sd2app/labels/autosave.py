@@ -279,13 +279,13 @@ class LabelAutosave(QObject):
 
     def _look_for_offers(self, place: RecoveryPlace) -> None:
         wanted = self._wanted.files if self._wanted is not None else ()
-        found = place.offers(declined=bool(wanted))
-        asked = [one for one in found.offers if one.files == wanted]
+        recoveries = place.offers(declined=bool(wanted))
+        asked = [one for one in recoveries.offers if one.files == wanted]
         if asked:
             self._wanted = None
-        others = (one for one in found.offers if not one.declined and one not in asked)
+        others = (one for one in recoveries.offers if not one.declined and one not in asked)
         self._offers = tuple(self._other_than_open(place, (*asked, *others)))
-        self.notes = found.notes
+        self.notes = recoveries.notes
 
     def _other_than_open(
         self, place: RecoveryPlace, offers: Iterable[Recoverable]

@@ -188,9 +188,9 @@ def _groups(labels: Labels, selected: Sequence[Span]) -> list[SpanGroup]:
     by_label: dict[str, list[Span]] = {}
     for span in labels.decided:
         by_label.setdefault(span.label, []).append(span)
-    found = [SpanGroup("the selected", chosen, None)] if chosen else []
+    selection = [SpanGroup("the selected", chosen, None)] if chosen else []
     each = (SpanGroup(name, tuple(spans), (name,)) for name, spans in by_label.items())
-    return [*found, SpanGroup("all", labels.decided), *each]
+    return [*selection, SpanGroup("all", labels.decided), *each]
 
 
 class CutOutDialog(Dialog):
@@ -205,13 +205,13 @@ class CutOutDialog(Dialog):
         self._which.addItems([f"{one.name} ({len(one.spans)})" for one in groups])
         self._which.currentIndexChanged.connect(self._refresh)
         maps = ", ".join(source.maps)
-        there: dict[Part, tuple[str, bool]] = {
+        available: dict[Part, tuple[str, bool]] = {
             "video": ("video", source.video is not None),
             "mesh": ("mesh", source.mesh is not None),
             "maps": (f"maps: {maps}" if maps else "maps", bool(maps)),
         }
         self._parts: dict[Part, CheckBox] = {}
-        for part, (text, has) in there.items():
+        for part, (text, has) in available.items():
             box = self._parts[part] = CheckBox(text, self, lambda _: self._refresh())
             box.setEnabled(has)
             box.show_checked(has)

@@ -198,11 +198,11 @@ class LabelEdits(QObject):
         spans = self.labels.labels.of_track(track) if track else ()
         from_s = chosen[0].start_s if chosen else self._now_s
         if towards > 0:
-            found = next((one for one in spans if one.start_s > from_s), None)
+            span = next((one for one in spans if one.start_s > from_s), None)
         else:
-            found = next((one for one in reversed(spans) if one.start_s < from_s), None)
-        if found is not None:
-            self.go_to(found)
+            span = next((one for one in reversed(spans) if one.start_s < from_s), None)
+        if span is not None:
+            self.go_to(span)
 
     def go_to(self, span: Span) -> None:
         """Select a span and show its first frame."""
@@ -247,9 +247,9 @@ class LabelEdits(QObject):
     def make(self, done: Edit, before: Labels) -> None:
         """Apply a computed edit as one step in the history."""
         if done.labels is not before:
-            there = done.name, before, done.labels
+            forward = done.name, before, done.labels
             back = f"Undo {done.name.lower()}", done.labels, before
-            step = Assign(done.name, lambda change: self._become(*change), back, there)
+            step = Assign(done.name, lambda change: self._become(*change), back, forward)
             step.redo()
             self.undo_stack.push(step)
         if done.ids:

@@ -77,11 +77,11 @@ class LabelExportDialog(Dialog):
         self._formats = all_formats()
         self._format.addItems([one.title for one in self._formats])
         self._format.currentIndexChanged.connect(self._look)
-        self._about, self._said = sentence(""), sentence("")
+        self._about, self._message = sentence(""), sentence("")
         self._buttons = ExportButtons(self, self._ask)
         form = form_of(("For", self._format))
         foot = with_help("Export labels", self._buttons, copy_button(lambda: self.line, self))
-        parts = form, self._about, rule(), self._said, STRETCH, foot
+        parts = form, self._about, rule(), self._message, STRETCH, foot
         self.setLayout(column_of(*parts, spacing_px=8, margins_px=16))
         self._look()
         self.resize(560, 300)
@@ -154,7 +154,7 @@ class LabelExportDialog(Dialog):
         else:
             lines = "\n".join(f"• {one}." for one in self.losses)
             text = f"It cannot hold everything:\n{lines}"
-        say(self._said, self.problem or text, "warning" if self.problem else "muted")
+        say(self._message, self.problem or text, "warning" if self.problem else "muted")
         self._buttons.show_state(possible=self.losses is not None, exporting=self.exporting)
 
     def _ask(self) -> None:

@@ -88,10 +88,10 @@ def _frame_source(recording: Recording) -> dict[str, Any]:
     return dict([(name, path) for name, path in sources.items() if path is not None][:1])
 
 
-def _spans(found: Incoming) -> str:
-    spans = found.labels.spans
+def _spans(incoming: Incoming) -> str:
+    spans = incoming.labels.spans
     if not spans:
-        return "none within this recording" if found.outside else "none"
+        return "none within this recording" if incoming.outside else "none"
     end_s = max(span.end_s for span in spans)
     return f"{len(spans):,}, from {spans[0].start_s:.3f} to {end_s:.3f} s"
 
@@ -136,7 +136,7 @@ class LabelImportDialog(Dialog):
         self._observation.currentTextChanged.connect(self._observe)
         self._observation_name = QLabel("Observation", self)
         self._facts = FactRows(_MAX_FACTS, at_the_edge=False, parent=self)
-        self._said, self._consequence = sentence(""), sentence("")
+        self._message, self._consequence = sentence(""), sentence("")
         self._way = Choice("What becomes of the labels that are there", self, _WAYS)
         self._way.show_value("add" if labels.spans else "replace")
         self._way.currentIndexChanged.connect(self._refresh)
@@ -153,7 +153,7 @@ class LabelImportDialog(Dialog):
         )
         take = form_of(("Take them", self._way))
         foot = with_help("Import labels", buttons, copy_button(lambda: self.line, self))
-        content = form, rule(), self._said, self._facts, rule(), take, self._consequence
+        content = form, rule(), self._message, self._facts, rule(), take, self._consequence
         parts = title(path.name), *content, 8, foot
         self.setLayout(column_of(*parts, spacing_px=8, margins_px=16))
         self._read()
@@ -181,24 +181,25 @@ class LabelImportDialog(Dialog):
 
     def facts(self) -> list[tuple[str, str]]:
         """Return names and values on the content and what importing changes."""
-        found = self.incoming
-        if found is None:
+        incoming = self.incoming
+        if incoming is None:
             return []
-        tracks, counts = found.labels.tracks, Counter(span.label for span in found.labels.spans)
+        tracks = incoming.labels.tracks
+        counts = Counter(span.label for span in incoming.labels.spans)
         facts = [
-            ("Spans", _spans(found)),
+            ("Spans", _spans(incoming)),
             ("Tracks", f"{len(tracks)}: {_names([track.name for track in tracks])}"),
             ("Labels", _names([f"{name} ({count})" for name, count in counts.items()]) or "none"),
         ]
-        if unknown := found.unknown(set_after(self._labels.label_set, found, self.way)):
+        if unknown := incoming.unknown(set_after(self._labels.label_set, incoming, self.way)):
             are = "It is" if len(unknown) == 1 else "They are"
             text = f"{_names(list(unknown))}. {are} kept and shown in grey."
             facts.append(("Not in the label set", text))
-        if found.cut:
-            spans = counted(len(found.cut), "span")
+        if incoming.cut:
+            spans = counted(len(incoming.cut), "span")
             facts.append(("Cut", f"{spans} beyond the recording, cut where it ends or begins"))
-        if found.outside:
-            spans, base = counted(len(found.outside), "span"), self._timebase
+        if incoming.outside:
+            spans, base = counted(len(incoming.outside), "span"), self._timebase
             where = f"outside the recording ({base.start_s:.3f} to {base.end_s:.3f} s)"
             facts.append(("Left out", f"{spans} {where}"))
         if self.reading is not None and (self.reading.left_out or self.reading.remarks):
@@ -243,8 +244,8 @@ class LabelImportDialog(Dialog):
     def _learn(self, names: tuple[str, ...]) -> None:
         self.observations = names if len(names) > 1 else ()
 
-    def _receive(self, found: tuple[LabelReading, Incoming]) -> None:
-        self.reading, self.incoming = found
+    def _receive(self, result: tuple[LabelReading, Incoming]) -> None:
+        self.reading, self.incoming = result
         self._refresh()
 
     def _refuse(self, error: Exception) -> None:
@@ -256,9 +257,9 @@ class LabelImportDialog(Dialog):
         self._refresh()
 
     def _refresh(self) -> None:
-        said = self.problem or ("" if self.incoming is not None else "Reading…")
-        say(self._said, said, "warning" if self.problem else "muted")
-        self._said.setVisible(bool(said))
+        message = self.problem or ("" if self.incoming is not None else "Reading…")
+        say(self._message, message, "warning" if self.problem else "muted")
+        self._message.setVisible(bool(message))
         self._facts.show_facts(self.facts())
         for widget in (self._observation_name, self._observation):
             widget.setVisible(bool(self.observations))

@@ -156,9 +156,9 @@ def _held(
 
 def _lanes(spans: list[Span]) -> tuple[list[int], int]:
     """Lane of each span, and the number of lanes."""
-    found = apart(spans, lambda span: (span.start_s, span.end_s))
-    lane_of = {span.id: lane for lane, row in enumerate(found) for span in row}
-    return [lane_of[span.id] for span in spans], len(found)
+    lanes = apart(spans, lambda span: (span.start_s, span.end_s))
+    lane_of = {span.id: lane for lane, row in enumerate(lanes) for span in row}
+    return [lane_of[span.id] for span in spans], len(lanes)
 
 
 @dataclass(frozen=True)
@@ -206,8 +206,8 @@ class LabelsModel(QObject):
         """Return the span at a time: one on the track for new spans, else the shortest."""
         arrays = self.arrays
         rows = np.flatnonzero((arrays.starts_s <= time_s) & (time_s < arrays.ends_s))
-        found = [self.labels.spans[row] for row in rows]
-        return min(found, key=lambda one: (one.track != self.track, one.duration_s), default=None)
+        spans = [self.labels.spans[row] for row in rows]
+        return min(spans, key=lambda one: (one.track != self.track, one.duration_s), default=None)
 
     def colour_of(self, label: str) -> str:
         """Return the ``#rrggbb`` of a label."""
@@ -231,9 +231,9 @@ class LabelsModel(QObject):
         """Assign labels; spans that no longer exist are deselected."""
         if labels is self.labels:
             return
-        there = {span.id for span in labels.spans}
-        pruned = not self.selected_ids <= there
-        self.selected_ids = self.selected_ids & there
+        ids = {span.id for span in labels.spans}
+        pruned = not self.selected_ids <= ids
+        self.selected_ids = self.selected_ids & ids
         self._assign(labels)
         if pruned:
             self.selection_changed.emit()

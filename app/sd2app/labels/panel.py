@@ -61,8 +61,8 @@ class StatisticsTableModel(RecordTableModel[tuple[str, ...]]):
     def _refresh(self) -> None:
         base = self._playback.timebase
         self.beginResetModel()
-        found = label_statistics(self._labels.labels, (base.start_s, base.end_s))
-        self.rows = statistics_rows(found)
+        statistics = label_statistics(self._labels.labels, (base.start_s, base.end_s))
+        self.rows = statistics_rows(statistics)
         self.endResetModel()
 
     def _text(self, record: tuple[str, ...], column: int) -> str:

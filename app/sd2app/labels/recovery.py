@@ -27,7 +27,7 @@ from sd2core.labels.comparison import compare
 from sd2core.labels.files import write_labels
 from sd2core.labels.recovery import Recoverable
 
-_SAID = (
+_ABOUT = (
     "Edits that were not saved when the program ended. Open a recording to see what they change."
 )
 _NOTHING = "There is nothing to recover: all edits were saved or discarded."
@@ -125,8 +125,8 @@ class RecoverLabelsDialog(Dialog):
     def __init__(self, autosave: LabelAutosave, parent: QWidget) -> None:
         super().__init__("Recover labels", parent)
         self._autosave = autosave
-        self._said, self._notes = sentence(""), sentence("", "warning")
-        self._said.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self._about, self._notes = sentence(""), sentence("", "warning")
+        self._about.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._list = QTreeWidget(self)
         self._list.setHeaderLabels(_HEADINGS)
         self._list.setAccessibleName("Labels that can be recovered")
@@ -146,14 +146,14 @@ class RecoverLabelsDialog(Dialog):
         self._write.clicked.connect(self._write_file)
         self._discard.clicked.connect(self._give_up)
         foot = with_help("Recover labels", buttons)
-        self.setLayout(column_of(self._said, self._list, self._notes, foot))
+        self.setLayout(column_of(self._about, self._list, self._notes, foot))
         self.resize(800, 320)
         self._fill()
 
     def _fill(self) -> None:
-        found = self._autosave.recoveries()
+        recoveries = self._autosave.recoveries()
         self._list.clear()
-        for offer in found.offers:
+        for offer in recoveries.offers:
             name, spans = offer.recording.name, counted(len(offer.labels.spans), "span")
             declined = "discarded" if offer.declined else ""
             item = QTreeWidgetItem([name, _edits_text(offer), spans, declined])
@@ -162,9 +162,9 @@ class RecoverLabelsDialog(Dialog):
             width = self._list.fontMetrics().horizontalAdvance(name)
             item.setSizeHint(0, QSize(width + _MARGIN_PX, _ROW_PX))
             self._list.addTopLevelItem(item)
-        self._said.setText(_SAID if found.offers else _NOTHING)
-        self._list.setVisible(bool(found.offers))
-        show_words(self._notes, "\n".join(found.notes))
+        self._about.setText(_ABOUT if recoveries.offers else _NOTHING)
+        self._list.setVisible(bool(recoveries.offers))
+        show_words(self._notes, "\n".join(recoveries.notes))
         if (first := self._list.topLevelItem(0)) is not None:
             self._list.setCurrentItem(first)
         self._follow()
@@ -177,11 +177,11 @@ class RecoverLabelsDialog(Dialog):
 
     def _follow(self) -> None:
         offer = self.offer
-        there = offer is not None and offer.recording.exists()
-        self._open.setEnabled(there)
+        exists = offer is not None and offer.recording.exists()
+        self._open.setEnabled(exists)
         self._open.setToolTip(
             f"{offer.recording} is not there any more; its labels can be written to a file"
-            if offer is not None and not there
+            if offer is not None and not exists
             else "Its labels are offered there beside those that were saved"
         )
         self._write.setEnabled(offer is not None)

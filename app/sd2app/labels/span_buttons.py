@@ -105,5 +105,5 @@ class SpanButtons:
         self, place: QPointF, scale: TimeScale, plot: QRectF, rows: LabelRows
     ) -> Decision | None:
         """Return the button at a place."""
-        found = (one for box, one in self.placed(scale, plot, rows) if box.contains(place))
-        return next(found, None)
+        hits = (one for box, one in self.placed(scale, plot, rows) if box.contains(place))
+        return next(hits, None)

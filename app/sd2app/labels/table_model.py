@@ -247,8 +247,8 @@ class SpanTableModel(RecordTableModel[Span]):
             return
         self._filter = wanted
         self._follow()
-        there = [span.id for span in self._labels.selected if self.row_of(span.id) is not None]
-        self._labels.select(there)
+        shown = [span.id for span in self._labels.selected if self.row_of(span.id) is not None]
+        self._labels.select(shown)
 
     def sort(self, column: int, order: Qt.SortOrder = Qt.SortOrder.AscendingOrder) -> None:
         """Sort by a column."""
@@ -266,11 +266,11 @@ class SpanTableModel(RecordTableModel[Span]):
             self.following = False
 
     def _show(self, rows: list[Span]) -> None:
-        there = {span.id: span for span in rows}
-        self._replace([there.get(span.id, span) for span in self.rows])
+        by_id = {span.id: span for span in rows}
+        self._replace([by_id.get(span.id, span) for span in self.rows])
         before = self.rows
         head, tail = same_ends(rows, before)
-        if len(rows) == len(before) and all(span.id in there for span in before):
+        if len(rows) == len(before) and all(span.id in by_id for span in before):
             if head < len(rows):
                 self._reorder(rows)
             return

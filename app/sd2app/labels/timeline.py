@@ -21,7 +21,7 @@ from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, paint_cursor
 from sd2core.labels.spans import Span
 
 _EDGE_PX = 5.0
-_SAID_MS = 6000
+_TIP_MS = 6000
 
 
 class HitTarget(NamedTuple):
@@ -126,7 +126,7 @@ class LabelTimeline(ZoomedPlot):
         row = self.rows.row_of(self._labels.track) if self._labels.track else self.rows.tracks[0]
         x_px = min(max(self.scale.x_of(self._playback.time_s), GUTTER_PX), self.width())
         place = QPoint(round(x_px), round(row.top_px + row.height_px))
-        QToolTip.showText(self.mapToGlobal(place), why, self, QRect(), _SAID_MS)
+        QToolTip.showText(self.mapToGlobal(place), why, self, QRect(), _TIP_MS)
 
     def _follow(self) -> None:
         labels = self._labels

@@ -63,9 +63,9 @@ class CheckDialog(Dialog):
         self._stop.clicked.connect(check.stop)
         self._again = buttons.addButton("Again", action)
         self._again.clicked.connect(again)
-        told = column_of(self._head, findings, STRETCH, spacing_px=16, margins_px=0)
+        column = column_of(self._head, findings, STRETCH, spacing_px=16, margins_px=0)
         below = row_of((self._place, 1), self._take, spacing_px=12)
-        parts = row_of((self._picture, 1), (told, 1), spacing_px=20)
+        parts = row_of((self._picture, 1), (column, 1), spacing_px=20)
         foot = with_help("Check the place", buttons)
         self.setLayout(column_of((parts, 1), below, foot, spacing_px=16, margins_px=16))
         check.changed.connect(self._refresh)
@@ -88,10 +88,10 @@ class CheckDialog(Dialog):
         self._stop.setVisible(check.busy)
         self._stop.setEnabled(check.state != "stopping")
         self._again.setVisible(not check.busy)
-        found = {one.name: one for one in check.findings}
+        findings = {one.name: one for one in check.findings}
         say(self._head, self._words(), "warning" if check.state == "failed" else "title")
         for name, (mark, _, words) in self._rows.items():
-            one = found.get(name)
+            one = findings.get(name)
             text, role = (
                 ("…", "muted") if one is None else ("✓", "") if one.passed else ("✗", "warning")
             )

@@ -62,8 +62,8 @@ class GuidedModel(SteeredCommand):
                 self.missing = tuple(event["takes"])
                 self.not_agreed = tuple(event["not_agreed"])
 
-    def _end(self, code: int, said: str) -> None:
-        super()._end(code, said)
+    def _end(self, code: int, error_text: str) -> None:
+        super()._end(code, error_text)
         if code:
             self.warned.emit(self.text)
 

@@ -160,11 +160,11 @@ class LiveModel(QObject):
         """Listen once the recording that is continued is open, with its map."""
         if self.state != "opening" or not self.on_screen or self._document.maps_capture:
             return
-        there = self._document.radar_map
-        if there is None and self._document.capture is not None:
+        radar_map = self._document.radar_map
+        if radar_map is None and self._document.capture is not None:
             return  # about to be made
-        if there is not None:
-            self._map = there
+        if radar_map is not None:
+            self._map = radar_map
         self._launch()
 
     def _fail_to_open(self, reason: str) -> None:
@@ -219,7 +219,7 @@ class LiveModel(QObject):
         self.pictures_dropped = int(event.get("pictures_dropped", self.pictures_dropped))
         self._is_linked = bool(event.get("linked", True))
 
-    def _end(self, code: int, said: str) -> None:
+    def _end(self, code: int, error_text: str) -> None:
         self._process = None
         if self.on_screen:
             try:
@@ -230,7 +230,7 @@ class LiveModel(QObject):
         if code == 0:
             self._set_state("stopped")
         else:
-            self.text = why_it_ended(said)
+            self.text = why_it_ended(error_text)
             self._set_state("failed")
 
     # --- on screen ------------------------------------------------------------------------

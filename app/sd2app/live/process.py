@@ -89,9 +89,9 @@ class LiveProcess:
 
     def _end(self, code: int) -> None:
         self._read()
-        said = bytes(self._process.readAllStandardError().data()).decode("utf-8", "replace")
+        error_text = bytes(self._process.readAllStandardError().data()).decode("utf-8", "replace")
         self._process.deleteLater()
-        self._ended(code, said)
+        self._ended(code, error_text)
 
     def _fail_to_start(self, error: QProcess.ProcessError) -> None:
         if error == QProcess.ProcessError.FailedToStart:
@@ -145,9 +145,9 @@ class SteeredCommand(QObject):
     def _take(self, event: dict[str, Any]) -> None:
         raise NotImplementedError
 
-    def _end(self, code: int, said: str) -> None:
+    def _end(self, code: int, error_text: str) -> None:
         self._process = None
-        self.text = why_it_ended(said) if code else ""
+        self.text = why_it_ended(error_text) if code else ""
         self._set_state("failed" if code else "ended")
 
     def _set_state(self, state: State) -> None:
@@ -156,9 +156,9 @@ class SteeredCommand(QObject):
         self.changed.emit()
 
 
-def why_it_ended(said: str) -> str:
+def why_it_ended(error_text: str) -> str:
     """Reason of a failure, from what was said on standard error."""
-    return said.strip().removeprefix("sd2: ") or "It ended without saying why."
+    return error_text.strip().removeprefix("sd2: ") or "It ended without saying why."
 
 
 CHECK_S = 60.0
@@ -192,6 +192,6 @@ class PlaceCheck(SteeredCommand):
                 if self.state == "starting":
                     self._set_state("running")
 
-    def _end(self, code: int, said: str) -> None:
+    def _end(self, code: int, error_text: str) -> None:
         # The exit code tells bad findings, too.
-        super()._end(code if self.left_s else 0, said)
+        super()._end(code if self.left_s else 0, error_text)

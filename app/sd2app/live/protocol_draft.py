@@ -138,8 +138,8 @@ class GestureRows(RecordTableModel[Gesture]):
     def setData(self, index: Index, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:
         """Take what was typed."""
         rows = [*self.rows]
-        told = vars(rows[index.row()]) | {_FIELDS[index.column()]: str(value).strip()}
-        rows[index.row()] = Gesture(**told)
+        fields = vars(rows[index.row()]) | {_FIELDS[index.column()]: str(value).strip()}
+        rows[index.row()] = Gesture(**fields)
         self._set(rows)
         return True
 

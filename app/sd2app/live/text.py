@@ -41,8 +41,8 @@ def frames_text(counts: Counts, pictures: int = 0, pictures_dropped: int = 0) ->
         (counts.damaged, "with lost packets"),
         (counts.not_shown, "stored and not shown yet"),
     ]
-    told = [f"{number:,} {what}" for number, what in lacks if number]
-    return f"{filmed}{counts.frames}, {', '.join(told) or 'none missing'}"
+    missing = [f"{number:,} {what}" for number, what in lacks if number]
+    return f"{filmed}{counts.frames}, {', '.join(missing) or 'none missing'}"
 
 
 def level_text(level_db: float | None) -> str:

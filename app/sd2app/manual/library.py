@@ -28,11 +28,11 @@ def described(directives: str) -> str:
     for one in re.split(r"^\.\. ", directives, flags=re.MULTILINE)[1:]:
         heading, *options = one.splitlines()
         node, doc = _definition(heading.partition("::")[2].strip())
-        parts += [f"## {_name(node)}", *_said(node, doc)]
+        parts += [f"## {_name(node)}", *_entry(node, doc)]
         if isinstance(node, ast.ClassDef) and ":members:" in "".join(options):
             for member, text in _documented(node.body):
                 if text and not _name(member).startswith("_"):
-                    parts += [f"### {node.name}.{_name(member)}", *_said(member, text)]
+                    parts += [f"### {node.name}.{_name(member)}", *_entry(member, text)]
     return "\n\n".join(parts)
 
 
@@ -61,8 +61,8 @@ def _documented(body: list[ast.stmt]) -> Iterator[tuple[Definition, str]]:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             yield node, ast.get_docstring(node) or ""
         elif isinstance(node, ast.Assign | ast.AnnAssign):
-            said = after.value if isinstance(after, ast.Expr) else None
-            yield node, str(said.value) if isinstance(said, ast.Constant) else ""
+            docstring = after.value if isinstance(after, ast.Expr) else None
+            yield node, str(docstring.value) if isinstance(docstring, ast.Constant) else ""
 
 
 def _name(node: Definition) -> str:
@@ -71,7 +71,7 @@ def _name(node: Definition) -> str:
     return ast.unparse(node.target if isinstance(node, ast.AnnAssign) else node.targets[0])
 
 
-def _said(node: Definition, doc: str) -> tuple[str, str]:
+def _entry(node: Definition, doc: str) -> tuple[str, str]:
     call = re.sub(r"field\(default_factory=(\w+)\)", r"\1()", _call(node))
     call = textwrap.fill(call, _COLUMNS, subsequent_indent="    ", break_on_hyphens=False)
     return f"```python\n{call}\n```", _as_markdown(doc)

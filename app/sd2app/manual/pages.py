@@ -71,7 +71,7 @@ MEASURED = "how-good-is-it.md"
 _COMMANDS, _IMAGES = "commands/", "images/"
 _FENCE = r"^(?P<indent> *)```(?P<kind>\S*)[^\n]*\n(?P<body>.*?)^(?P=indent)``` *$"
 _MARKUP = re.compile(
-    rf"{_FENCE}|(?P<comment><!--.*?-->\n?)|\{{(?P<role>[\w:]+)\}}`(?P<said>[^`]+)`|`[^`]+`"
+    rf"{_FENCE}|(?P<comment><!--.*?-->\n?)|\{{(?P<role>[\w:]+)\}}`(?P<content>[^`]+)`|`[^`]+`"
     r"|!?\[(?P<words>(?:(?!\n\n)[^\]])*)\]\((?P<target>[^)\s]+)\)",
     re.MULTILINE | re.DOTALL,
 )
@@ -105,7 +105,7 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Found:
+class Hit:
     """Page that a search found, with the section that says most and a few of its words."""
 
     name: str
@@ -156,11 +156,11 @@ class Manual:
         for line in filter(None, (line.strip() for line in toctree.splitlines())):
             own = re.fullmatch(r"(.+) <(.+)>", line)
             title, target = own.groups() if own else ("", line)
-            there = [posixpath.normpath(posixpath.join(folder, target))]
+            names = [posixpath.normpath(posixpath.join(folder, target))]
             if "*" in target:
-                files = sorted(self.folder.glob(f"{there[0]}.*"))
-                there = [file.relative_to(self.folder).with_suffix("").as_posix() for file in files]
-            for one in there if not line.startswith(":") else ():
+                files = sorted(self.folder.glob(f"{names[0]}.*"))
+                names = [file.relative_to(self.folder).with_suffix("").as_posix() for file in files]
+            for one in names if not line.startswith(":") else ():
                 is_notebook = (self.folder / f"{one}.ipynb").is_file()
                 page = f"{one}.ipynb" if is_notebook else f"{one}.md"
                 if page not in listed:
@@ -193,10 +193,10 @@ class Manual:
     def sections(self, name: str) -> tuple[Section, ...]:
         """Headings of a page in their order, with anchors as GitHub gives them."""
         text = self.text(name)
-        found = [one for one in _HEADING.finditer(text) if one["level"]]
-        ends = [one.start() for one in found[1:]] + [len(text)]
+        headings = [one for one in _HEADING.finditer(text) if one["level"]]
+        ends = [one.start() for one in headings[1:]] + [len(text)]
         sections: list[Section] = []
-        for one, end in zip(found, ends, strict=True):
+        for one, end in zip(headings, ends, strict=True):
             heading = plain_words(one["text"])
             slug = re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
             same = sum(re.fullmatch(rf"{slug}(-\d+)?", one.anchor) is not None for one in sections)
@@ -206,7 +206,7 @@ class Manual:
 
     def _source(self, name: str) -> str:
         if name == SEARCH:
-            return found_text(self.search(self.sought))
+            return hits_text(self.search(self.sought))
         if name not in self._sources:
             if name.startswith(_COMMANDS):
                 text = command_text(self._parser(), name[len(_COMMANDS) :].removesuffix(".md"))
@@ -215,25 +215,25 @@ class Manual:
             self._sources[name] = notebook_text(text) if name.endswith(".ipynb") else text
         return self._sources[name]
 
-    def _plain(self, name: str, found: re.Match[str]) -> str:
+    def _plain(self, name: str, match: re.Match[str]) -> str:
         """Say in GitHub's dialect what MyST has of its own; unlink what is not in the manual."""
-        if found["comment"]:
+        if match["comment"]:
             return ""
-        if found["kind"] == "{toctree}":
-            return self._shown_list(name, found["body"])
-        if found["kind"] == "{eval-rst}":
-            return described(found["body"])
-        words, target = found["words"], found["target"]
-        if found["role"]:
-            link = re.fullmatch(r"(.+?) <(.+)>", found["said"], re.DOTALL)
+        if match["kind"] == "{toctree}":
+            return self._shown_list(name, match["body"])
+        if match["kind"] == "{eval-rst}":
+            return described(match["body"])
+        words, target = match["words"], match["target"]
+        if match["role"]:
+            link = re.fullmatch(r"(.+?) <(.+)>", match["content"], re.DOTALL)
             if link is None:
-                return f"`{re.sub(r'^~.*[.]', '', found['said'])}`"
+                return f"`{re.sub(r'^~.*[.]', '', match['content'])}`"
             words, target = link.groups()
         if not target:
-            return found[0]
+            return match[0]
         if "://" in target or self.place(name, target) in self.titles:
             return f"[{words}]({target})"
-        return found[0] if self.place(name, target).startswith(_IMAGES) else words
+        return match[0] if self.place(name, target).startswith(_IMAGES) else words
 
     def _shown_list(self, name: str, toctree: str) -> str:
         """Links to the pages of a table of contents, unless it is hidden."""
@@ -263,7 +263,7 @@ class Manual:
                 index.append((name, sections, [_spaced(one) for one in headings], text))
         return index
 
-    def search(self, text: str) -> list[Found]:
+    def search(self, text: str) -> list[Hit]:
         """Pages that have all words of a text, or words that begin so, the best first.
 
         Those with all words in the title come before those with all in one heading; then words in
@@ -280,9 +280,9 @@ class Manual:
                 whole = (counts[0] == len(words), best == len(words))
                 ranked.append(((*whole, counts[0], best, often), name, sections))
         ranked.sort(key=lambda one: one[0], reverse=True)
-        return [self._found(name, sections, words) for _, name, sections in ranked]
+        return [self._hit(name, sections, words) for _, name, sections in ranked]
 
-    def _found(self, name: str, sections: tuple[Section, ...], words: list[str]) -> Found:
+    def _hit(self, name: str, sections: tuple[Section, ...], words: list[str]) -> Hit:
         def fits(one: Section) -> tuple[int, int]:
             heading, all_of_it = _spaced(one.heading), _spaced(f"{one.heading} {one.text}")
             return sum(word in all_of_it for word in words), sum(word in heading for word in words)
@@ -294,13 +294,13 @@ class Manual:
         start = best.text.rfind(" ", 0, start) + 1
         words_on = best.text[start:]
         cut = words_on if len(words_on) < _SNIPPET else words_on[:_SNIPPET].rpartition(" ")[0] + "…"
-        return Found(name, self.titles[name], best, f"…{cut}" if start else cut)
+        return Hit(name, self.titles[name], best, f"…{cut}" if start else cut)
 
 
-def found_text(found: Sequence[Found]) -> str:
+def hits_text(hits: Sequence[Hit]) -> str:
     """Markdown of what a search found."""
-    lines = ["# Search", *([] if found else ["No page has all these words."])]
-    for one in found:
+    lines = ["# Search", *([] if hits else ["No page has all these words."])]
+    for one in hits:
         where = f"*{_escaped(one.section.heading)}*: " if "#" in one.place else ""
         lines += [f"### [{_escaped(one.title)}]({one.place})", where + _escaped(one.snippet)]
     return "\n\n".join(lines)

@@ -120,8 +120,8 @@ class ManualWindow(QWidget):
             self.view.follow(address(SEARCH))
 
     def _open_first(self) -> None:
-        for found in self._manual.search(self.search.text())[:1]:
-            self.view.follow(address(found.place))
+        for hit in self._manual.search(self.search.text())[:1]:
+            self.view.follow(address(hit.place))
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Remember where the window was."""

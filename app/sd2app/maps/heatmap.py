@@ -399,7 +399,7 @@ class HeatmapView(TrackMouse, MapWidget):
 
     def read(self, time_s: float, velocity_mps: float) -> Reading | None:
         """Cell at a time and velocity, with the range of the body that was synthesised from."""
-        found = self.track.read(time_s, velocity_mps)
-        if found is None or self.track is not self._session.maps.synthetic:
-            return found
-        return replace(found, range_m=body_range_m(self._session, time_s))
+        reading = self.track.read(time_s, velocity_mps)
+        if reading is None or self.track is not self._session.maps.synthetic:
+            return reading
+        return replace(reading, range_m=body_range_m(self._session, time_s))

@@ -92,12 +92,12 @@ class Columns:
 
     def _strongest(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """The largest of every column's frames, (bins, columns), of (bins, end - begin)."""
-        found = np.zeros((len(values), len(self.filled)), np.float32)
+        strongest = np.zeros((len(values), len(self.filled)), np.float32)
         if values.shape[1] > self.starts.size:
-            found[:, self.filled] = np.maximum.reduceat(values, self.starts, axis=1)
+            strongest[:, self.filled] = np.maximum.reduceat(values, self.starts, axis=1)
         else:
-            found[:, self.filled] = values[:, self.starts]
-        return found
+            strongest[:, self.filled] = values[:, self.starts]
+        return strongest
 
 
 def heatmap_image(
@@ -152,13 +152,13 @@ def difference_image(
 
     Where several frames share a column, of the strongest of each, as the maps show them.
     """
-    (denoised, there), (real, as_well) = (
+    (denoised, has_denoised), (real, has_real) = (
         Columns.of(track, start_s, stop_s, columns).shown()
         for track in (difference.denoised, difference.real)
     )
     shades = difference.shades(denoised, real, levels)
     colours = table[127 + np.rint(127.0 * shades).astype(np.int16)]
-    colours[:, ~(there & as_well)] = background
+    colours[:, ~(has_denoised & has_real)] = background
     return image_of(colours[::-1], QImage.Format.Format_RGB32)
 
 

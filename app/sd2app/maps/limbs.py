@@ -26,7 +26,7 @@ class LimbsModel(ReportingModel):
         super().__init__(parent)
         self.track, self._synthesis = session.maps.synthetic, synthesis
         self._document = session.document
-        self._found: tuple[MeshSequence, VertexParts | None] | None = None
+        self._mesh_parts: tuple[MeshSequence, VertexParts | None] | None = None
         self._finder = LatestRunner("limbs", self, self._take, self._fail)
         synthesis.completed.connect(self._check)
         session.document.opened.connect(self.show)
@@ -91,13 +91,13 @@ class LimbsModel(ReportingModel):
         mesh = self._document.mesh
         if mesh is None:
             return None
-        if self._found is None or not same_bodies(self._found[0], mesh):
-            self._found = mesh, None
+        if self._mesh_parts is None or not same_bodies(self._mesh_parts[0], mesh):
+            self._mesh_parts = mesh, None
             self._finder.submit(lambda _: (mesh, body_parts(mesh)))
-        return self._found[1]
+        return self._mesh_parts[1]
 
-    def _take(self, found: tuple[MeshSequence, VertexParts | None]) -> None:
-        self._found = found
+    def _take(self, mesh_parts: tuple[MeshSequence, VertexParts | None]) -> None:
+        self._mesh_parts = mesh_parts
         self.changed.emit()
 
     def _leave_out(self) -> None:

@@ -129,7 +129,7 @@ class MapStack(QScrollArea):
             return  # maps change many times a second
         self._shown = state
         before = self._with_content
-        self._with_content = frozenset(name for name, there in with_content.items() if there)
+        self._with_content = frozenset(name for name, has in with_content.items() if has)
         if self._offer is not None:
             denoised = with_content["denoised"]
             self._offer.setVisible(maps.synthetic.map is not None and not denoised)
@@ -299,9 +299,9 @@ class _Hands(QObject):
             self._stack.arrangement.set_height(self._name, round(place.y()) + BELOW_PX // 2)
         elif self._moved and not self._view.enlarged:
             self._view.setCursor(Qt.CursorShape.ClosedHandCursor)
-            found = self._stack.under(self._name, self._view.y() + place.y())
-            if found is not None:
-                self._swap(*found)
+            target = self._stack.under(self._name, self._view.y() + place.y())
+            if target is not None:
+                self._swap(*target)
         return True
 
     def _swap(self, other: str, lower: bool) -> None:

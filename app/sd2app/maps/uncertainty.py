@@ -101,11 +101,11 @@ class UncertaintyModel(ReportingModel):
         elif self.shown and self._track.uncertainty is None:
             self._runner.submit(of_cells, "Finding how well the map is known")
 
-    def _take(self, found: CellUncertainty | float | None) -> None:
-        if isinstance(found, CellUncertainty):
-            self._track.set_uncertainty(found)
+    def _take(self, uncertainty: CellUncertainty | float | None) -> None:
+        if isinstance(uncertainty, CellUncertainty):
+            self._track.set_uncertainty(uncertainty)
         else:
-            self._accuracy.set_body(found)
-            self._large = found is not None and found >= _LARGE_ERROR
+            self._accuracy.set_body(uncertainty)
+            self._large = uncertainty is not None and uncertainty >= _LARGE_ERROR
             self._follow()
             self.changed.emit()

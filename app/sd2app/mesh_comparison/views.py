@@ -166,14 +166,14 @@ class JointTable(QTableWidget):
 
     def _cells(self, joint: int, name: str) -> tuple[str, ...]:
         """Name of a joint, its differences, and how much it trembles in either mesh."""
-        comparison, found = self._comparison.comparison, self._comparison.difference
+        comparison, difference = self._comparison.comparison, self._comparison.difference
         assert comparison is not None  # it has joints
-        assert found is not None
-        same = found.correlation[joint]
+        assert difference is not None
+        same = difference.correlation[joint]
         return (
             joint_words(name),
-            f"{100 * found.distance_m[joint]:.1f}",
-            f"{found.velocity_rms_mps[joint]:.2f}",
+            f"{100 * difference.distance_m[joint]:.1f}",
+            f"{difference.velocity_rms_mps[joint]:.2f}",
             "–" if math.isnan(same) else f"{same:.2f}".replace("-", "−"),
             *(f"{one.jitter_mps3[joint]:.0f}" for one in comparison.differences),
         )

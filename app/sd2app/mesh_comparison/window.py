@@ -92,14 +92,14 @@ class ComparisonWindow(QWidget):
             return "Comparing…"
         if model.problem:
             return "These cannot be compared"
-        found = model.difference
-        if found is None:
+        difference = model.difference
+        if difference is None:
             return ""
-        distance_cm = 100 * found.distance_m.mean()
-        error = found.group(found.velocity_rms_mps, "hands")
+        distance_cm = 100 * difference.distance_m.mean()
+        error = difference.group(difference.velocity_rms_mps, "hands")
         return (
             f"Joints {distance_cm:.1f} cm apart · hands' velocity off by {error:.2f} m/s ·"
-            f" Doppler maps differ by {found.map_l1:.2f} (relative L1)"
+            f" Doppler maps differ by {difference.map_l1:.2f} (relative L1)"
         )
 
     def _ask(self) -> None:

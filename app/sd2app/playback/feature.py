@@ -18,35 +18,35 @@ class PlaybackFeature(Feature):
     def actions(self) -> Sequence[Action]:
         """Play, step, speed, zoom."""
         s = self._session
-        playback, span, there = s.playback, s.span, s.has_content
+        playback, span, enabled = s.playback, s.span, s.has_content
         return (
             Action(
-                "play", "Play", "Play", ("Space",), "Play or pause", playback.toggle, there,
+                "play", "Play", "Play", ("Space",), "Play or pause", playback.toggle, enabled,
                 lambda: playback.playing, icon="play",
             ),
             Action(
                 "previous_frame", "Play", "Previous frame", ("Left",), "One frame back",
-                lambda: playback.step_frames(-1), there, icon="previous",
+                lambda: playback.step_frames(-1), enabled, icon="previous",
             ),
             Action(
                 "next_frame", "Play", "Next frame", ("Right",), "One frame on",
-                lambda: playback.step_frames(1), there, icon="next",
+                lambda: playback.step_frames(1), enabled, icon="next",
             ),
             Action(
                 "back_second", "Play", "Back one second", ("Shift+Left",), "One second back",
-                lambda: playback.step_seconds(-1.0), there,
+                lambda: playback.step_seconds(-1.0), enabled,
             ),
             Action(
                 "on_second", "Play", "On one second", ("Shift+Right",), "One second on",
-                lambda: playback.step_seconds(1.0), there,
+                lambda: playback.step_seconds(1.0), enabled,
             ),
             Action(
                 "first_frame", "Play", "First frame", ("Home", "Ctrl+Left"), "Go to the start",
-                lambda: playback.seek_frame(0), there, icon="first",
+                lambda: playback.seek_frame(0), enabled, icon="first",
             ),
             Action(
                 "last_frame", "Play", "Last frame", ("End", "Ctrl+Right"), "Go to the end",
-                lambda: playback.seek_frame(len(playback.timebase) - 1), there, icon="last",
+                lambda: playback.seek_frame(len(playback.timebase) - 1), enabled, icon="last",
             ),
             Action(
                 "slower", "Play", "Slower", (",",), "Play slower",
@@ -64,13 +64,13 @@ class PlaybackFeature(Feature):
             Action(
                 "zoom_in", "View", "Zoom in on time", ("+", "="),
                 "Show less time, around the cursor",
-                lambda: span.zoom(0.7, playback.time_s), there,
+                lambda: span.zoom(0.7, playback.time_s), enabled,
             ),
             Action(
                 "zoom_out", "View", "Zoom out", ("-",), "Show more time",
-                lambda: span.zoom(1.0 / 0.7, playback.time_s), there,
+                lambda: span.zoom(1.0 / 0.7, playback.time_s), enabled,
             ),
             Action(
-                "zoom_fit", "View", "Whole recording", ("0",), "Show all of it", span.fit, there
+                "zoom_fit", "View", "Whole recording", ("0",), "Show all of it", span.fit, enabled
             ),
         )  # fmt: skip

@@ -65,9 +65,9 @@ class Backend(Protocol):
 
 def chosen_backend() -> BackendName:
     """``SD2_SCENE``, or what suits the machine; needs a QGuiApplication."""
-    wish = os.environ.get("SD2_SCENE", "").strip().lower()
-    if wish == "gl" or wish == "image":
-        return "image" if _has_no_window() else wish  # type: ignore[return-value]
+    requested = os.environ.get("SD2_SCENE", "").strip().lower()
+    if requested == "gl" or requested == "image":
+        return "image" if _has_no_window() else requested  # type: ignore[return-value]
     if _has_no_window() or not _has_gpu_device():
         return "image"
     name = opengl_renderer()

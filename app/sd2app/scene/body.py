@@ -60,9 +60,9 @@ def is_closed_outward(vertices: NDArray[np.floating], faces: NDArray[np.integer]
     begin = faces.astype(np.int64)
     end = np.roll(begin, -1, axis=1)
     count = len(vertices)
-    there = np.sort((begin * count + end).ravel())
+    forward = np.sort((begin * count + end).ravel())
     back = np.sort((end * count + begin).ravel())
-    if not np.array_equal(there, back):
+    if not np.array_equal(forward, back):
         return False
     corners = np.asarray(vertices, np.float64)[faces] - np.mean(vertices, axis=0)  # (F, 3, 3)
     volume = np.einsum("fi,fi->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))

@@ -97,23 +97,23 @@ class SceneFeature(Feature):
 
     def actions(self) -> Sequence[Action]:
         """Colours, dots and views."""
-        display, there = self._session.display, self._session.has_mesh
+        display, has_mesh = self._session.display, self._session.has_mesh
         colours = (
             Action(
                 f"colour_{colour}", "View", text, (f"Alt+{number}",), tip,
-                partial(display.set_mesh_colour, colour), there,
+                partial(display.set_mesh_colour, colour), has_mesh,
                 partial(self._shows, colour),
             )
             for number, (colour, text, tip) in enumerate(_COLOURS, start=1)
         )  # fmt: skip
         dots = Action(
             "dots", "View", "Vertices as dots", ("D",), "Draw vertices instead of the surface",
-            lambda: display.set_as_dots(not display.as_dots), there, lambda: display.as_dots,
+            lambda: display.set_as_dots(not display.as_dots), has_mesh, lambda: display.as_dots,
         )  # fmt: skip
         views = (
             Action(
                 name, "View", f"Scene: {text}", (f"Ctrl+{number}",), tip,
-                partial(self._look_from, preset), there,
+                partial(self._look_from, preset), has_mesh,
             )
             for number, (name, preset, text, tip) in enumerate(_VIEWS, start=1)
         )  # fmt: skip

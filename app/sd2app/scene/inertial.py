@@ -137,14 +137,14 @@ class LimbHand:
 
     def part_at(self, x_px: float, y_px: float) -> str | None:
         """Part of a body under the pointer; None beside it, and where that is not known."""
-        found = self._navigator.thing_at(x_px, y_px)
-        if found is None:
+        hit = self._navigator.thing_at(x_px, y_px)
+        if hit is None:
             vertex = self._surface.vertex_at(x_px, y_px)
             return None if vertex is None else self._model.part_of(vertex)
-        other = self._scene.person_of(found[0])
+        other = self._scene.person_of(hit[0])
         if other is None:
             return None
-        return self._model.part_of(self._scene.people.vertex_near(other, found[1]), other + 1)
+        return self._model.part_of(self._scene.people.vertex_near(other, hit[1]), other + 1)
 
     def click(self, x_px: float, y_px: float, keys: Qt.KeyboardModifier) -> None:
         """Choose the part under the pointer, or with nothing there everybody."""

@@ -100,12 +100,12 @@ class Navigator:
         scene, pose = self._scene, self._scene.pose
         if self.sensor_at(x_px, y_px):
             return None
-        found = scene.movable_under(x_px, y_px)
-        if found is None or not scene.mesh_shown:
-            return found
+        hit = scene.movable_under(x_px, y_px)
+        if hit is None or not scene.mesh_shown:
+            return hit
         x, y, depth = pose.project(scene.body.points).T
         beneath = depth[np.hypot(x - x_px, y - y_px) <= _BODY_PX]
-        return None if (beneath < pose.project(found[1])[0, 2]).any() else found
+        return None if (beneath < pose.project(hit[1])[0, 2]).any() else hit
 
     def marker_at(self, x_px: float, y_px: float) -> int | None:
         """Number of the planned place within reach of a pointer, the nearest to it."""
@@ -217,11 +217,11 @@ class Navigator:
             self._edits.drag_sensor(triple(position))
 
     def _take_thing(self, x_px: float, y_px: float) -> bool:
-        found = None if self.marker_at(x_px, y_px) is not None else self.thing_at(x_px, y_px)
-        if found is not None:
-            self._held_thing = _HeldThing(*found, np.zeros(3), (x_px, y_px))
-            self._edits.begin_scene_drag(found[0])
-        return found is not None
+        hit = None if self.marker_at(x_px, y_px) is not None else self.thing_at(x_px, y_px)
+        if hit is not None:
+            self._held_thing = _HeldThing(*hit, np.zeros(3), (x_px, y_px))
+            self._edits.begin_scene_drag(hit[0])
+        return hit is not None
 
     def _drag_thing(
         self, held: _HeldThing, x_px: float, y_px: float, constraint: Constraint
@@ -240,8 +240,8 @@ class Navigator:
             self._changed()
 
     def _look(self, x_px: float, y_px: float) -> None:
-        marker, found = self.marker_at(x_px, y_px), self.thing_at(x_px, y_px)
-        thing = None if found is None or marker is not None else found[0]
+        marker, hit = self.marker_at(x_px, y_px), self.thing_at(x_px, y_px)
+        thing = None if hit is None or marker is not None else hit[0]
         self._hover(self.sensor_at(x_px, y_px), marker, thing)
 
     def _hover(self, sensor: bool, marker: int | None, thing: int | None) -> None:

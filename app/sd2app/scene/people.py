@@ -27,7 +27,7 @@ class People(Movables):
         super().__init__(renderer)
         self.meshes: tuple[MeshSequence, ...] = ()
         self._shapes: list[Body] = []
-        self._there: list[bool] = []
+        self._present: list[bool] = []
         self._limb_colours: Sequence[str] = ()
         self._limbs: Sequence[NDArray[np.intp] | None] = ()
         self._frame: int | None = None
@@ -54,10 +54,10 @@ class People(Movables):
 
     def show_frame(self, frame: int, shown: bool = True) -> None:
         """Move all to another frame; nobody is drawn unless ``shown``."""
-        self._there = [shown and bool(mesh.presence.present[frame]) for mesh in self.meshes]
-        for mesh, shape, there in zip(self.meshes, self._shapes, self._there, strict=True):
-            shape.show(there)
-            if there and frame != self._frame:
+        self._present = [shown and bool(mesh.presence.present[frame]) for mesh in self.meshes]
+        for mesh, shape, present in zip(self.meshes, self._shapes, self._present, strict=True):
+            shape.show(present)
+            if present and frame != self._frame:
                 shape.set_vertices(mesh.frame(frame))
         self._frame = frame if shown else None
 
@@ -93,13 +93,13 @@ class People(Movables):
     def _to_meet(self) -> Sequence[Surface | None]:
         return [
             (shape.points.astype(np.float64), mesh.faces)
-            if there and mesh.faces is not None
+            if present and mesh.faces is not None
             else None
-            for mesh, shape, there in zip(self.meshes, self._shapes, self._there, strict=True)
+            for mesh, shape, present in zip(self.meshes, self._shapes, self._present, strict=True)
         ]
 
     def _shown(self) -> list[Body]:
-        return [one for one, there in zip(self._shapes, self._there, strict=True) if there]
+        return [one for one, present in zip(self._shapes, self._present, strict=True) if present]
 
 
 _OPACITY = 0.12
@@ -149,8 +149,8 @@ def grid_on(
     along = np.cross(outward, across)
     steps = (np.arange(_CELLS + 1) - 0.5 * _CELLS) * _CELL_M
     rim = np.stack([np.full_like(steps, steps[0]), np.full_like(steps, steps[-1])], axis=1)
-    there = np.stack([steps, steps], axis=1)
-    flat = np.concatenate([np.stack([there, rim], axis=2), np.stack([rim, there], axis=2)])
+    lines = np.stack([steps, steps], axis=1)
+    flat = np.concatenate([np.stack([lines, rim], axis=2), np.stack([rim, lines], axis=2)])
     ends = flat.reshape(-1, 2)
     points = middle + ends[:, :1] * across + ends[:, 1:] * along
     segments = np.arange(len(points), dtype=np.int32).reshape(-1, 2)

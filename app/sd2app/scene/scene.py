@@ -161,8 +161,8 @@ class Scene:
         thing, person = self.things.under(eye_m, ray), self.people.under(eye_m, ray)
         if person is not None:
             person = person[0] + len(self.things.surfaces), person[1]
-        found = [one for one in (thing, person) if one is not None]
-        return min(found, key=lambda one: float(np.linalg.norm(one[1] - eye_m)), default=None)
+        hits = [one for one in (thing, person) if one is not None]
+        return min(hits, key=lambda one: float(np.linalg.norm(one[1] - eye_m)), default=None)
 
     def person_of(self, movable: int) -> int | None:
         """Number of the other body that a movable is, from 0; None of a thing."""

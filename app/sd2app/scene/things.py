@@ -116,8 +116,8 @@ def sharp_edges(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> N
     total = np.zeros((len(unique), 3))
     np.add.at(total, which.ravel(), normals[owner])
     # Two unit normals add up to 2 cos(half the angle between them).
-    bent = np.linalg.norm(total, axis=1) < 2.0 * np.sqrt(0.5 * (1.0 + _SHARP_COSINE))
-    return unique[bent | (counts != 2)].astype(np.int32)
+    sharp = np.linalg.norm(total, axis=1) < 2.0 * np.sqrt(0.5 * (1.0 + _SHARP_COSINE))
+    return unique[sharp | (counts != 2)].astype(np.int32)
 
 
 def first_meeting(

@@ -238,8 +238,8 @@ class SceneView(QWidget):
 
     def _at_something(self, place: tuple[float, float]) -> bool:
         """True at what is no body."""
-        at_marker, found = self.navigator.marker_at(*place) is not None, self.navigator.thing
-        at_thing = found is not None and self.scene.person_of(found) is None
+        at_marker, thing = self.navigator.marker_at(*place) is not None, self.navigator.thing
+        at_thing = thing is not None and self.scene.person_of(thing) is None
         return at_marker or at_thing or self.navigator.sensor_at(*place)
 
     # What changed
@@ -249,8 +249,8 @@ class SceneView(QWidget):
         self._frame = None
         self.scene.clear_mesh()
         document = self._session.document
-        mesh, there = document.mesh, document.recording is not None
-        self.overlay.message = "No mesh in this recording" if there and mesh is None else ""
+        mesh, has_recording = document.mesh, document.recording is not None
+        self.overlay.message = "No mesh in this recording" if has_recording and mesh is None else ""
         if mesh is not None:
             frame = mesh.timebase.frame_at(self._session.playback.time_s)
             with self._explaining():

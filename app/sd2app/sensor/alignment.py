@@ -24,7 +24,7 @@ class AlignmentModel(ProblemModel):
         super().__init__(parent)
         self._session, self._synthesis = session, synthesis
         self.within_s = WITHIN_S  # how far is searched
-        self.found: Alignment | None = None
+        self.result: Alignment | None = None
         self._runner = LatestRunner("alignment", self, self._take, self._refuse)
 
     @property
@@ -65,7 +65,7 @@ class AlignmentModel(ProblemModel):
     def search(self, within_s: float | None = None) -> None:
         """Search up to so many seconds from the recording's offset, by default as before."""
         self.within_s = reach_s = within_s or self.within_s
-        self.found, self.problem = None, ""
+        self.result, self.problem = None, ""
         maps, now_s = self._session.maps, self.now_s
         synthetic, radar = maps.synthetic.map, maps.real.map
         if synthetic is None or radar is None:
@@ -75,27 +75,27 @@ class AlignmentModel(ProblemModel):
 
     def apply(self) -> None:
         """Give the recording the offset, as one step in the history."""
-        if self.found is not None and not self.problem:
-            self._session.edits.set_radar_offset(self.found.offset_s)
+        if self.result is not None and not self.problem:
+            self._session.edits.set_radar_offset(self.result.offset_s)
 
     def cancel(self) -> None:
         """Stop searching."""
         self._runner.cancel()
 
-    def _take(self, found: Any) -> None:
-        self.found, self.problem = found, found.problem
+    def _take(self, result: Any) -> None:
+        self.result, self.problem = result, result.problem
         self.changed.emit()
 
 
 def result_text(model: AlignmentModel) -> str:
     """What was found, in a sentence; empty where there is a problem."""
-    found = model.found
+    result = model.result
     if model.busy:
         return "Comparing…"
-    if found is None or model.problem:
+    if result is None or model.problem:
         return ""
-    sure = "high" if found.confidence >= _SURE else "sufficient"
+    sure = "high" if result.confidence >= _SURE else "sufficient"
     return (
-        f"The radar fits best with an offset of {found.offset_s:.3f} s (now {model.now_s:.3f} s)."
-        f" Confidence is {sure} ({found.confidence:.2f})."
+        f"The radar fits best with an offset of {result.offset_s:.3f} s (now {model.now_s:.3f} s)."
+        f" Confidence is {sure} ({result.confidence:.2f})."
     )

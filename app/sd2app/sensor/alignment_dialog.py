@@ -48,7 +48,7 @@ class AlignmentDialog(Dialog):
         self._chart.show_chart(offset_chart(model))
         show_words(self._result, result_text(model))
         show_words(self._problem, model.problem)
-        possible = model.found is not None and not model.problem
+        possible = model.result is not None and not model.problem
         appears = possible and not self._apply.isEnabled()
         self._apply.setEnabled(possible)
         if appears and not self._within.hasFocus():
@@ -58,16 +58,16 @@ class AlignmentDialog(Dialog):
 
 def offset_chart(model: AlignmentModel) -> Chart:
     """Correlation over the offsets, with the best one and the present one marked."""
-    found, now_s, within_s = model.found, model.now_s, model.within_s
+    result, now_s, within_s = model.result, model.now_s, model.within_s
     across = Scale(now_s - within_s, now_s + within_s)
     chart = Chart(across, Scale(0.0, 1.0), "Offset of the radar, s", "correlation")
-    if found is None:
+    if result is None:
         return chart
-    points = list(zip(found.offsets_s.tolist(), found.correlation.tolist(), strict=True))
-    best = Mark(found.offset_s, found.peak, f"Best: {found.offset_s:.3f} s, {found.peak:.2f}")
+    points = list(zip(result.offsets_s.tolist(), result.correlation.tolist(), strict=True))
+    best = Mark(result.offset_s, result.peak, f"Best: {result.offset_s:.3f} s, {result.peak:.2f}")
     marks = [best]
-    if found.other_s is not None:
-        other = min(points, key=lambda point: abs(point[0] - found.other_s))
+    if result.other_s is not None:
+        other = min(points, key=lambda point: abs(point[0] - result.other_s))
         marks.append(Mark(*other, f"Next best: {other[0]:.3f} s, {other[1]:.2f}"))
     curves = (
         Curve("now", "muted", ((now_s, 0.0), (now_s, 1.0)), width_px=1.0),

@@ -123,11 +123,11 @@ def _plan_of(kind: Kind, texts: dict[Name, str]) -> Placements:
 def _plain(text: str, unit: str) -> str:
     """Numbers without their units: ``1, 250 cm`` as ``1, 2.5``; what is no number stays."""
 
-    def value_of(found: re.Match[str]) -> str:
+    def value_of(match: re.Match[str]) -> str:
         try:
-            return repr(parse_quantity(found[0], unit))
+            return repr(parse_quantity(match[0], unit))
         except Sd2Error:
-            return found[0]
+            return match[0]
 
     return _WITH_UNIT.sub(value_of, text)
 

@@ -111,8 +111,8 @@ class ThingsPage(SceneList):
     def name_of(self, one: Thing) -> str:
         """What one is called in the list."""
         recording = self._session.document.recording
-        there = recording is None or one in recording.things_there
-        return one.name if there else f"{one.name} (file missing)"
+        exists = recording is None or one in recording.things_there
+        return one.name if exists else f"{one.name} (file missing)"
 
     def _add_thing(self) -> None:
         mesh, shape = self._session.document.mesh, self._shelf.currentData()

@@ -162,8 +162,8 @@ def load_content(recording: Recording, progress: Progress) -> Content:
         )
 
     video = attempt(recording.video, lambda: recording.open_video(step(0)))
-    there = replace(recording, bodies=recording.bodies_there, things=recording.things_there)
-    mesh = attempt(recording.mesh, lambda: there.load_mesh(step(1)))
+    available = replace(recording, bodies=recording.bodies_there, things=recording.things_there)
+    mesh = attempt(recording.mesh, lambda: available.load_mesh(step(1)))
     capture = recorded = None
     if recording.holds_radar_map:
         recorded = attempt(recording.radar, recording.load_radar_map)
@@ -203,8 +203,8 @@ def load_content(recording: Recording, progress: Progress) -> Content:
 
 def offers_of(unlikely: Iterable[Exception | Finding]) -> tuple[OfferedCure, ...]:
     """What can be read another way, of errors and findings."""
-    told = [one for one in unlikely if isinstance(one, (Sd2Error, Finding))]
-    return tuple(OfferedCure(one.words, one.cure) for one in told if one.cure is not None)
+    known = [one for one in unlikely if isinstance(one, (Sd2Error, Finding))]
+    return tuple(OfferedCure(one.words, one.cure) for one in known if one.cure is not None)
 
 
 def words_of(error: Exception) -> str:

@@ -365,10 +365,10 @@ class DocumentModel(QObject):
         mesh, recording = content.mesh, content.recording
         around, things = mesh.surroundings, recording.things_there
         try:
-            there = recording.bodies_there if recording.bodies or mesh.others else ()
-            if there != tuple(body.placed for body in mesh.others):
-                ready = [body for body in there if at_hand(body, mesh)]
-                for body in there:
+            bodies = recording.bodies_there if recording.bodies or mesh.others else ()
+            if bodies != tuple(body.placed for body in mesh.others):
+                ready = [body for body in bodies if at_hand(body, mesh)]
+                for body in bodies:
                     if body not in ready and not self._meshes.awaits(body):
                         self.read_body(body, self._surround_by_read)
                 mesh = with_bodies(mesh, ready, person=recording.subject)

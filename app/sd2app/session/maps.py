@@ -344,9 +344,9 @@ def part_words(part: str) -> str:
 
 def colours_of(parts: Iterable[str]) -> dict[str, str]:
     """Colour of each of some parts or people: a limb's own, unless another one has it."""
-    found: dict[str, str] = {}
+    colours: dict[str, str] = {}
     for part in parts:
-        free = [one for one in LIMB_COLOURS.values() if one not in found.values()]
+        free = [one for one in LIMB_COLOURS.values() if one not in colours.values()]
         own = LIMB_COLOURS.get(part.rpartition(OF)[2], "")
-        found[part] = own if own in free else (free or [*LIMB_COLOURS.values()])[-1]
-    return found
+        colours[part] = own if own in free else (free or [*LIMB_COLOURS.values()])[-1]
+    return colours

@@ -89,15 +89,15 @@ class MeshReader(QObject):
         bodies = [one for one, _ in self._awaited]
 
         def read(emit: Emit) -> list[Exception | None]:
-            found: list[Exception | None] = []
+            errors: list[Exception | None] = []
             for one in bodies:
-                emit((len(found), len(bodies)))
+                emit((len(errors), len(bodies)))
                 try:
                     with_bodies(mesh, [one])
-                    found.append(None)
+                    errors.append(None)
                 except (Sd2Error, OSError) as error:
-                    found.append(error)
-            return found
+                    errors.append(error)
+            return errors
 
         self._bodies.submit(read, f"Reading {body.file_name}")
 
@@ -105,9 +105,9 @@ class MeshReader(QObject):
         """True while the file of a body is read."""
         return any(one == body for one, _ in self._awaited)
 
-    def _take_bodies(self, found: list[Exception | None]) -> None:
+    def _take_bodies(self, errors: list[Exception | None]) -> None:
         awaited, self._awaited = self._awaited, []
-        for (_, then), error in zip(awaited, found, strict=True):
+        for (_, then), error in zip(awaited, errors, strict=True):
             then() if error is None else self._say(error)
 
     def follow(self, recording: Recording) -> None:

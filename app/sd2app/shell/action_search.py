@@ -70,7 +70,7 @@ def _plain(text: str) -> str:
     return text.split("\t")[0].replace("&&", "\0").replace("&", "").replace("\0", "&")
 
 
-def found(entries: Iterable[MenuEntry], text: str) -> list[MenuEntry]:
+def matching(entries: Iterable[MenuEntry], text: str) -> list[MenuEntry]:
     """Entries that have all words of a search, the best first; what can be done before the rest."""
     words = text.casefold().split()
     ranked = [(rank, one) for one in entries if (rank := one.rank(words)) is not None]
@@ -107,10 +107,10 @@ class ActionSearch(Dialog):
         self._find("")
 
     def _find(self, text: str) -> None:
-        self._found = found(self._entries, text)
+        self._matches = matching(self._entries, text)
         grey = self.palette().color(QPalette.ColorGroup.Disabled, QPalette.ColorRole.Text)
         self._list.clear()
-        for one in self._found:
+        for one in self._matches:
             keys = ", ".join(
                 key.toString(QKeySequence.SequenceFormat.NativeText)
                 for key in one.action.shortcuts()
@@ -127,11 +127,11 @@ class ActionSearch(Dialog):
     def current(self) -> MenuEntry | None:
         """Entry that Return would do."""
         row = self._list.currentIndex().row()
-        return self._found[row] if 0 <= row < len(self._found) else None
+        return self._matches[row] if 0 <= row < len(self._matches) else None
 
     def _explain(self) -> None:
         if self.current is None:
-            self._about.setText("" if self._found else "Nothing has all these words.")
+            self._about.setText("" if self._matches else "Nothing has all these words.")
             return
         role = "muted" if self.current.action.isEnabled() else "warning"
         say(self._about, self.current.tip, role)

@@ -33,7 +33,7 @@ from sd2core.recording.recording import GoneError, Recording, SavedElsewhereErro
 from sd2core.recording.relinking import Role, role_words
 
 Kept = Literal["mine", "theirs", "merge"]
-_SAID = (
+_SAVED_ELSEWHERE = (
     "{title} was saved by another window or program since it was opened here: {changes}.\n\n"
     "Merge keeps what both changed, and can be undone. Take theirs gives up what is not saved"
     " here; undo brings it back. Keep mine writes over theirs."
@@ -340,7 +340,7 @@ def ask_what_is_kept(parent: QWidget, title: str, divergence: Divergence) -> Kep
     box = QMessageBox(parent)
     box.setIcon(QMessageBox.Icon.Question)
     box.setWindowTitle("Saved elsewhere as well")
-    box.setText(_SAID.format(title=title, changes=", ".join(divergence.changes)))
+    box.setText(_SAVED_ELSEWHERE.format(title=title, changes=", ".join(divergence.changes)))
     roles = QMessageBox.ButtonRole
     offered: dict[QPushButton, Kept] = {
         box.addButton("Merge", roles.AcceptRole): "merge",

@@ -161,10 +161,10 @@ class MainWindow(QMainWindow):
         for bar in bars:
             self._column.insertWidget(0, bar)
         self._dock.keep_clear([*bars, self._suggestions])
-        said = (notice for feature in self.features for notice in feature.notices())
-        notices = [notice for notice in said if isinstance(notice, Notice)]
+        offered = (notice for feature in self.features for notice in feature.notices())
+        notices = [notice for notice in offered if isinstance(notice, Notice)]
         for notice in notices:
-            notice.said.connect(self.messages.keep)
+            notice.announced.connect(self.messages.keep)
         beside = self._column.parentWidget()
         assert beside is not None
         notices.insert(0, MessageNotice(self.messages))
@@ -291,8 +291,8 @@ class MainWindow(QMainWindow):
     def _show_panes(self) -> None:
         """Show the panes of the layout that have content."""
         document, filmed = self.session.document, self.session.video.picture is not None
-        there = {"video": filmed or document.video is not None, "scene": document.mesh is not None}
-        shown = {name: there[name] and self.session.layouts.shows(name) for name in there}
+        has = {"video": filmed or document.video is not None, "scene": document.mesh is not None}
+        shown = {name: has[name] and self.session.layouts.shows(name) for name in has}
         for name, is_shown in shown.items():
             self._panels[name].setVisible(is_shown)
         self._views.setVisible(any(shown.values()))

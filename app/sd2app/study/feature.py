@@ -110,8 +110,8 @@ class StudyRunView(RunView[StudyRun]):
         stop_tip = "End it now; what it has trained is kept"
         words = RunWords(_headline, _note, what="study", stop_tip=stop_tip)
         super().__init__(runs, shell, words, buttons)
-        self._found, self._about = sentence("", "plain"), sentence("")
-        for part in (self._found, self._about):
+        self._conclusion, self._about = sentence("", "plain"), sentence("")
+        for part in (self._conclusion, self._about):
             self.column.addWidget(part)
         self.refresh()
 
@@ -124,7 +124,7 @@ class StudyRunView(RunView[StudyRun]):
 
     def show_made(self, run: StudyRun) -> None:
         """Show the conclusion."""
-        show_words(self._found, run.conclusion)
+        show_words(self._conclusion, run.conclusion)
         self._about.setText(str(run.out))
 
 

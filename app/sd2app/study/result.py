@@ -173,17 +173,17 @@ def _of_score(path: Path, content: Mapping[str, Any]) -> ClassResult:
 
 def _notes(content: Mapping[str, Any]) -> tuple[str, ...]:
     """People and delay of an evaluation; files of earlier versions may lack them."""
-    found = []
+    notes = []
     if subjects := content.get("subjects"):
-        found.append(f"People: {', '.join(map(str, subjects))}.")
+        notes.append(f"People: {', '.join(map(str, subjects))}.")
     if learnt := content.get("learnt_from"):
         names = ", ".join(map(str, learnt))
-        found.append(f"It has learnt from {names}: this is not what it does for others.")
+        notes.append(f"It has learnt from {names}: this is not what it does for others.")
     latency_s = content.get("latency_s")
     if latency_s is not None:
         gestures = int(np.array(content["gestures"], np.int64).sum())
-        found.append(
+        notes.append(
             f"A gesture is recognised after {float(latency_s):.2f} s (median);"
             f" {int(content['missed'])} of {gestures} never."
         )
-    return tuple(found)
+    return tuple(notes)

@@ -48,9 +48,9 @@ class ConfusionView(Canvas):
         self.setAccessibleName(f"Confusion matrix: {matrix.title}")
         self.setAccessibleDescription(
             "; ".join(
-                f"{true} taken for {found}: {matrix.cell(row, column).text()} %"
+                f"{true} taken for {predicted}: {matrix.cell(row, column).text()} %"
                 for row, true in enumerate(classes)
-                for column, found in enumerate(classes)
+                for column, predicted in enumerate(classes)
             )
         )
         self.updateGeometry()

@@ -29,7 +29,7 @@ class Threshold(NamedTuple):
     tip: str
 
 
-class Found(NamedTuple):
+class SearchResult(NamedTuple):
     """Spans found, and a sentence for when there are none."""
 
     spans: tuple[Span, ...]
@@ -68,7 +68,7 @@ class SpanFinder(Protocol):
     def wake(self) -> None:
         """Begin to get ready."""
 
-    def look(self, threshold: float) -> Callable[[], Found]:
+    def look(self, threshold: float) -> Callable[[], SearchResult]:
         """Make the search, to be run in the background."""
 
     def words(self, recording: Path, threshold: float) -> list[str]:
@@ -101,10 +101,10 @@ class MotionFinder:
     @property
     def source(self) -> MapModel | None:
         """Map that is searched: the one chosen, else the first."""
-        there = self.sources
-        if self._source in there:
+        sources = self.sources
+        if self._source in sources:
             return self._source
-        return there[0] if there else None
+        return sources[0] if sources else None
 
     def set_source(self, source: MapModel | None) -> None:
         """Search another map; None: the first."""
@@ -123,7 +123,7 @@ class MotionFinder:
     def wake(self) -> None:
         """Wait for the map, which is made anyway."""
 
-    def look(self, threshold: float) -> Callable[[], Found]:
+    def look(self, threshold: float) -> Callable[[], SearchResult]:
         """Make the search, to be run in the background."""
         source = self.source
         assert source is not None
@@ -131,12 +131,12 @@ class MotionFinder:
         doppler = source.map.shifted(source.offset_s)
         options = SuggestOptions(**_levels(threshold))
 
-        def look() -> Found:
+        def look() -> SearchResult:
             spans = suggest_spans(doppler, options)
             loudest_db = float(np.nanmax(motion_energy_db(doppler), initial=0.0))
             if loudest_db < threshold:
-                return Found(spans, f"Nothing: the loudest frame has {loudest_db:.1f} dB")
-            return Found(spans)
+                return SearchResult(spans, f"Nothing: the loudest frame has {loudest_db:.1f} dB")
+            return SearchResult(spans)
 
         return look
 

@@ -10,7 +10,7 @@ from sd2app.background.latest import LatestRunner, ProblemModel
 from sd2app.background.quoting import quoted
 from sd2app.labels.edits import LabelEdits
 from sd2app.session.maps import MapModel
-from sd2app.suggestions.finders import Found, SpanFinder
+from sd2app.suggestions.finders import SearchResult, SpanFinder
 from sd2app.widgets.text import counted
 from sd2core.labels.field_edits import offer, pending, reject, take
 from sd2core.labels.spans import Labels, Span
@@ -211,8 +211,8 @@ class SuggestionsModel(ProblemModel):
         elif self.active and self._why_not != before:
             self.changed.emit()
 
-    def _receive(self, found: Found) -> None:
-        self._if_none = found.if_none
+    def _receive(self, result: SearchResult) -> None:
+        self._if_none = result.if_none
         labels, step = self._made or (None, 0)
         if labels is self._labels.labels and step == self._stack.index():
             self._stack.undo()  # nothing was edited since
@@ -221,7 +221,7 @@ class SuggestionsModel(ProblemModel):
         declined = tuple(one for one in self._declined if (one.start_s, one.end_s) not in here)
         self._declined = declined
         before = self._labels.labels
-        self._edits.apply(lambda labels, base: offer(labels, base, found.spans, declined))
+        self._edits.apply(lambda labels, base: offer(labels, base, result.spans, declined))
         after = self._labels.labels
         self._made = (after, self._stack.index()) if after is not before else None
         self._go_on(self._playback.time_s)

@@ -148,9 +148,9 @@ class TrainingModel(Runs[TrainingMonitor]):
             folders = runs_in(self._folder)
         except Sd2Error:
             return ()  # there has been no run yet
-        found = [(one.path, status) for one in folders if (status := self._status(one)) is not None]
-        found.sort(key=lambda one: one[1].started_unix_s, reverse=True)
-        return [KnownRun(path, _title(status), status.state in LIVE) for path, status in found]
+        runs = [(one.path, status) for one in folders if (status := self._status(one)) is not None]
+        runs.sort(key=lambda one: one[1].started_unix_s, reverse=True)
+        return [KnownRun(path, _title(status), status.state in LIVE) for path, status in runs]
 
     def _status(self, run: TrainingFolder) -> RunStatus | None:
         """Status of a run; None where it is damaged, or deleted meanwhile."""

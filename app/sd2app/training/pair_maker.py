@@ -91,8 +91,8 @@ class PairMaker(QObject):
         if run.phase == "finished":
             self.made.emit(out)
         elif not self.cancelling:
-            said = run.text.splitlines() or [f"{out.stem} could not be made."]
-            self.failed.emit(said[-1].removeprefix("sd2: "))
+            lines = run.text.splitlines() or [f"{out.stem} could not be made."]
+            self.failed.emit(lines[-1].removeprefix("sd2: "))
         self.cancelling = False
         self.changed.emit()
 
@@ -111,7 +111,7 @@ def usable_recordings(place: Path) -> list[Path]:
     Raises Sd2Error if there is none.
     """
     folders = [place] if is_recording(place) else sorted(place.iterdir())
-    found = []
+    usable = []
     for folder in folders:
         if is_recording(folder):
             try:
@@ -119,13 +119,13 @@ def usable_recordings(place: Path) -> list[Path]:
             except Sd2Error:
                 continue  # damaged: the others are still of use
             if recording.mesh is not None and recording.radar is not None:
-                found.append(folder)
-    if not found:
+                usable.append(folder)
+    if not usable:
         raise Sd2Error(
             f"{place} holds no recording with a mesh and a radar capture",
             "a recording (.sd2), or a folder of some",
         )
-    return found
+    return usable
 
 
 def _free(folder: Path, name: str) -> Path:

@@ -191,15 +191,15 @@ class TrainingSetupModel(RunSetup[Store]):
 
     def _people(self) -> list[tuple[str, PairFacts, str]]:
         """All people as the library names them, with store and name in it."""
-        found = [store.facts for store in self.data if store.facts is not None]
-        names = [subject for facts in found for subject in facts.subjects]
+        known = [store.facts for store in self.data if store.facts is not None]
+        names = [subject for facts in known for subject in facts.subjects]
         return [
             (
                 f"{facts.path.stem}:{subject}" if names.count(subject) > 1 else subject,
                 facts,
                 subject,
             )
-            for facts in found
+            for facts in known
             for subject in facts.subjects
         ]
 

@@ -16,7 +16,7 @@ from sd2app.widgets.layouts import pane
 
 
 class VideoFeature(Feature):
-    """The picture with mesh and landmarks over it, which may differ after ``found``.
+    """The picture with mesh and landmarks over it, which may differ after ``fit_signals``.
 
     ``offer_frame`` adds to its context menu what can be done with the frame on screen.
     """
@@ -26,12 +26,12 @@ class VideoFeature(Feature):
         session: Session,
         shell: Shell,
         landmarks_at: LandmarksAt,
-        found: Sequence[SignalInstance],
+        fit_signals: Sequence[SignalInstance],
         offer_frame: MenuPart,
         parent: QObject,
     ) -> None:
         self._session, self._shell = session, shell
-        self._landmarks_at, self._found = landmarks_at, found
+        self._landmarks_at, self._fit_signals = landmarks_at, fit_signals
         self._offer_frame = offer_frame
         self.overlay = OverlayModel(session.settings, parent)
         session.video.failed.connect(shell.warn)
@@ -57,7 +57,7 @@ class VideoFeature(Feature):
 
     def panels(self) -> Mapping[str, QWidget]:
         """The video under its bar."""
-        view = VideoView(self._session, self.overlay, self._landmarks_at, self._found)
+        view = VideoView(self._session, self.overlay, self._landmarks_at, self._fit_signals)
         export = self._shell.action("export_strip")
         view.menu_parts = (self._offer_frame, lambda menu, _: menu.addAction(export))
         return {"video": pane(VideoBar(self.overlay, self._shell.action), (view, 1))}

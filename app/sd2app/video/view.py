@@ -103,7 +103,7 @@ class VideoView(Canvas):
         session: Session,
         overlay: OverlayModel,
         landmarks_at: LandmarksAt,
-        found: Sequence[SignalInstance],
+        fit_signals: Sequence[SignalInstance],
     ) -> None:
         super().__init__()
         self.setAccessibleName("Video")
@@ -114,7 +114,7 @@ class VideoView(Canvas):
             session.display.theme_changed,
             session.document.changed,
             overlay.changed,
-            *found,
+            *fit_signals,
         )
 
     def paint(self, painter: QPainter) -> None:

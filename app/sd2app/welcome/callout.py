@@ -44,15 +44,15 @@ def beside(target: QRect, size: QSize, room: QRect) -> QRect:
         room.bottomRight(),
         room.topLeft(),
     )
-    found: list[Candidate] = []
+    candidates: list[Candidate] = []
     for corner in wanted:
         place = QRect(corner, size)
         place.moveLeft(max(min(place.left(), room.right() - size.width()), room.left()))
         place.moveTop(max(min(place.top(), room.bottom() - size.height()), room.top()))
         common = place & target
         hidden = max(common.width(), 0) * max(common.height(), 0)
-        found.append(Candidate(hidden, (place.topLeft() - corner).manhattanLength(), place))
-    return min(found, key=lambda one: one[:2]).place
+        candidates.append(Candidate(hidden, (place.topLeft() - corner).manhattanLength(), place))
+    return min(candidates, key=lambda one: one[:2]).place
 
 
 class Ring(QWidget):
@@ -176,9 +176,9 @@ class _Keys(dict[str, str]):
     def __missing__(self, name: str) -> str:
         if name == "label":
             return self._label_key()
-        found = self._action(name)
-        keys = found.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
-        return keys or f"“{found.text().replace('&', '')}”"
+        action = self._action(name)
+        keys = action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
+        return keys or f"“{action.text().replace('&', '')}”"
 
 
 def _shown(window: QWidget, names: Iterable[str], before: QWidget | None) -> QWidget | None:
@@ -186,9 +186,9 @@ def _shown(window: QWidget, names: Iterable[str], before: QWidget | None) -> QWi
     for name in names:
         if _is(before, name):
             return before
-        found = [one for one in window.findChildren(QWidget) if _is(one, name)]
-        if found:
-            return max(found, key=lambda one: one.width() * one.height())
+        widgets = [one for one in window.findChildren(QWidget) if _is(one, name)]
+        if widgets:
+            return max(widgets, key=lambda one: one.width() * one.height())
     return None
 
 

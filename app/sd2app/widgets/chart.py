@@ -72,14 +72,14 @@ class Scale:
             return self.values
         if self.log:
             return log_ticks(0.999 * self.low, 1.001 * self.high, most)
-        found = ticks(self.low, self.high, most)
-        return [value for value in found if value == round(value)] if self.whole else found
+        values = ticks(self.low, self.high, most)
+        return [value for value in values if value == round(value)] if self.whole else values
 
 
 def log_ticks(low: float, high: float, most: int) -> list[float]:
     """Round values of a logarithmic axis, as many of each decade as there is room for."""
     first, last = (math.floor(math.log10(end)) for end in (low, high))
-    found: list[float] = []
+    chosen: list[float] = []
     for steps in ROUND:
         values = [
             step * 10.0**power
@@ -87,10 +87,10 @@ def log_ticks(low: float, high: float, most: int) -> list[float]:
             for step in steps
             if low <= step * 10.0**power <= high
         ]
-        if len(found) < len(values) <= most:
-            found = values
+        if len(chosen) < len(values) <= most:
+            chosen = values
     decades = [10.0**power for power in range(first, last + 1) if low <= 10.0**power <= high]
-    return found or decades[:: -(-len(decades) // most)]
+    return chosen or decades[:: -(-len(decades) // most)]
 
 
 @dataclass(frozen=True)
@@ -232,10 +232,10 @@ class ChartView(Canvas):
 
         nearest = min(self.marks, key=far_px, default=None)
         if nearest is not None and scattered:
-            there = far_px(nearest) <= self.REACH_PX
+            is_near = far_px(nearest) <= self.REACH_PX
         else:
-            there = plot.left() - 4 <= where.x() <= plot.right() + 4
-        return nearest if there else None
+            is_near = plot.left() - 4 <= where.x() <= plot.right() + 4
+        return nearest if is_near else None
 
     def along(self, key: Qt.Key) -> Sequence[Mark]:
         """Marks that a key goes through, in order."""

@@ -43,16 +43,16 @@ def tab_to(regions: Sequence[QWidget], focus: QWidget | None, forward: bool) -> 
 
 
 def _rows_of(region: QWidget) -> list[QWidget]:
-    found = {one: one.mapTo(region, QPoint(0, 0)) for one in _controls(region)}
+    places = {one: one.mapTo(region, QPoint(0, 0)) for one in _controls(region)}
     rows: list[list[QWidget]] = []
-    for one in sorted(found, key=lambda one: found[one].y() + one.height() / 2):
-        middle_px = found[one].y() + one.height() / 2
+    for one in sorted(places, key=lambda one: places[one].y() + one.height() / 2):
+        middle_px = places[one].y() + one.height() / 2
         # A row is what the first control of it has beside itself.
-        if rows and middle_px < found[rows[-1][0]].y() + rows[-1][0].height():
+        if rows and middle_px < places[rows[-1][0]].y() + rows[-1][0].height():
             rows[-1].append(one)
         else:
             rows.append([one])
-    return [one for row in rows for one in sorted(row, key=lambda one: found[one].x())]
+    return [one for row in rows for one in sorted(row, key=lambda one: places[one].x())]
 
 
 def _controls(region: QWidget) -> list[QWidget]:

@@ -21,7 +21,7 @@ class Notice(QFrame):
     ``buttons`` are names with text, tip and what a click does; ``close`` is called by the cross.
     """
 
-    said = Signal(str)  # words that were not on screen before
+    announced = Signal(str)  # words that were not on screen before
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class Notice(QFrame):
             stack.place()
         if self.text and self.text != before:
             QAccessible.updateAccessibility(QAccessibleEvent(self, QAccessible.Event.Alert))
-            self.said.emit(self.text)
+            self.announced.emit(self.text)
 
     def _dismiss(self) -> None:
         self._closed = self._words

@@ -139,8 +139,8 @@ class RunView(QWidget, Generic[Run]):
         # never comes to where another one was.
         top = row_of(*harmless, STRETCH, spacing_px=6)
         below = row_of(delete, STRETCH, spacing_px=6)
-        said = self._headline, self._bar, self._time
-        parts = top, *said, below, self._reason, self._note
+        progress = self._headline, self._bar, self._time
+        parts = top, *progress, below, self._reason, self._note
         self.column = column_of(*parts, spacing_px=6, margins_px=0)
         self.setLayout(self.column)
         runs.changed.connect(self.refresh)

@@ -122,8 +122,8 @@ class TrainingForm(QWidget):
         """Show whether a training can be started."""
         data = self._setup.data
         # What is wrong with the data, or that there is none, is said above.
-        said = not data or any(one.problem for one in data)
-        show_words(self._problem, "" if said else why_not)
+        explained = not data or any(one.problem for one in data)
+        show_words(self._problem, "" if explained else why_not)
         self._start.setEnabled(not why_not)
         self._start.setToolTip(why_not or "Train in a background process")
         self._copy.setEnabled(can_copy)

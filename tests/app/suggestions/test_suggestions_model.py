@@ -10,7 +10,7 @@ from label_edits import label_edits
 
 from sd2app.labels.dragging import LabelDragging
 from sd2app.session.maps import MapModel
-from sd2app.suggestions.finders import Found, MotionFinder, Threshold
+from sd2app.suggestions.finders import MotionFinder, SearchResult, Threshold
 from sd2app.suggestions.model import SuggestionsModel
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.maps import DopplerMap
@@ -50,7 +50,7 @@ class KnownSpans:
             Span(2, "Suggestions", 8.0, 9.0, "up-to-down", confidence=0.6, origin="suggestion"),
         )
         named = tuple(span for span in spans if span.confidence >= threshold / 100)
-        return lambda: Found(named, "" if named else "Nothing that sure")
+        return lambda: SearchResult(named, "" if named else "Nothing that sure")
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.background.run_monitor import Phase, _Found
+from sd2app.background.run_monitor import Phase, _Status
 from sd2app.training.run import TrainingHistory, TrainingMonitor
 from sd2app.training.text import metric_rows
 from sd2app.widgets.chart import log_ticks
@@ -67,7 +67,7 @@ def run(qtbot, tmp_path):
 
 def phase_of(run: TrainingMonitor, live: bool, state: str, word: str = "run") -> Phase:
     run._has_begun = True
-    return run._phase_of(_Found(False, live, True, state, None, word, [], None))
+    return run._phase_of(_Status(False, live, True, state, None, word, [], None))
 
 
 def test_an_end_is_an_end_until_it_goes_on(run) -> None:
@@ -85,7 +85,7 @@ def test_an_end_is_an_end_until_it_goes_on(run) -> None:
 def test_a_process_that_takes_its_folder_meanwhile_is_not_taken_for_dead(run) -> None:
     """Its lock was looked for before it was there, its number was read after."""
     run._has_begun = True
-    begins = _Found(True, False, False, None, None, "run", [], None)
+    begins = _Status(True, False, False, None, None, "run", [], None)
     assert run._phase_of(begins) == "starting"
     run._phase = "running"
     assert run._phase_of(begins._replace(exists=True, state="died")) == "running"

@@ -29,7 +29,7 @@ def compared(window, qtbot, monkeypatch, tmp_path):
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
     qtbot.keyClick(window, Qt.Key.Key_K, CONTROL | Qt.KeyboardModifier.ShiftModifier)
     model = models_of(window).agreement
-    qtbot.waitUntil(lambda: model.found is not None, timeout=10_000)
+    qtbot.waitUntil(lambda: model.measures is not None, timeout=10_000)
     return window
 
 
@@ -95,7 +95,7 @@ def test_what_their_file_left_out_is_said_below_its_name(window, qtbot, monkeypa
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
     qtbot.keyClick(window, Qt.Key.Key_K, CONTROL | SHIFT)
     c, panel = models_of(window), window.findChild(AgreementPanel)
-    qtbot.waitUntil(lambda: c.agreement.found is not None, timeout=10_000)
+    qtbot.waitUntil(lambda: c.agreement.measures is not None, timeout=10_000)
     (said,) = [one for one in words_in(panel, "muted") if "taken" in one]
     assert said.startswith("1 span on 1 track taken")
     assert "1 left out (" in said

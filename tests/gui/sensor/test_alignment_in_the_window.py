@@ -98,7 +98,7 @@ def test_the_offset_is_found_shown_applied_and_taken_back(window, qtbot, motion)
     motion(1.5, 60.0)
 
     def apply(dialog: AlignmentDialog) -> None:
-        found_s = models.alignment.found.offset_s
+        found_s = models.alignment.result.offset_s
         assert found_s == pytest.approx(1.5, abs=0.01)
         assert f"offset of {found_s:.3f} s (now 0.000 s)" in words(dialog)
         assert "Confidence is high" in words(dialog)
@@ -109,7 +109,7 @@ def test_the_offset_is_found_shown_applied_and_taken_back(window, qtbot, motion)
         qtbot.keyClick(dialog, Qt.Key.Key_Return)
 
     find(window, qtbot, apply)
-    found_s = models.alignment.found.offset_s
+    found_s = models.alignment.result.offset_s
     assert models.document.recording.radar_offset_s == models.real.offset_s == found_s
     assert models.document.undo_stack.undoText() == "Radar offset"
     models.document.undo_stack.undo()
@@ -153,7 +153,7 @@ def test_farther_is_searched_when_it_is_typed(window, qtbot, motion):
         qtbot.keyClicks(box, "9")
         qtbot.keyClick(box, Qt.Key.Key_Return)
         qtbot.waitUntil(lambda: not model.busy and not model.problem, timeout=20_000)
-        assert model.found.offset_s == pytest.approx(7.0, abs=0.01)
+        assert model.result.offset_s == pytest.approx(7.0, abs=0.01)
         assert dialog.isVisible()
         qtbot.mouseClick(button(dialog, "Align"), Qt.MouseButton.LeftButton)
 

@@ -10,7 +10,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QApplication, QMainWindow
 from window_models import models_of
 
-from sd2app.shell.action_search import ActionSearch, entries_of, found
+from sd2app.shell.action_search import ActionSearch, entries_of, matching
 from sd2app.shell.menus import menus_in
 from sd2app.widgets.inputs import SearchLine
 
@@ -57,12 +57,12 @@ def test_all_entries_of_all_menus_are_there_by_their_plain_texts(window_with_men
 
 def test_beginnings_go_before_what_is_within_and_that_before_tips(window_with_menus):
     entries = entries_of(window_with_menus)
-    assert texts(found(entries, "open")) == ["Open…", "Open the palette"]  # the rest is disabled
-    assert texts(found(entries, "AS")) == ["Save as…"]
-    assert texts(found(entries, "reco")) == ["Open…"]  # "recording", in its tip
-    assert texts(found(entries, "file copy")) == ["Save as…"]
-    assert texts(found(entries, "pale open")) == ["Open the palette"]
-    assert found(entries, "open zebra") == []
+    assert texts(matching(entries, "open")) == ["Open…", "Open the palette"]  # the rest is disabled
+    assert texts(matching(entries, "AS")) == ["Save as…"]
+    assert texts(matching(entries, "reco")) == ["Open…"]  # "recording", in its tip
+    assert texts(matching(entries, "file copy")) == ["Save as…"]
+    assert texts(matching(entries, "pale open")) == ["Open the palette"]
+    assert matching(entries, "open zebra") == []
 
 
 def test_escape_empties_the_line_then_closes_the_dialog(window_with_menus, qtbot):
@@ -87,7 +87,7 @@ def test_more_words_never_find_more(window_with_menus, words):
     entries = entries_of(window_with_menus)
     before = set(map(id, entries))
     for count in range(len(words) + 1):
-        after = set(map(id, found(entries, " ".join(words[:count]))))
+        after = set(map(id, matching(entries, " ".join(words[:count]))))
         assert after <= before
         before = after
 
@@ -145,7 +145,7 @@ def test_every_action_of_the_window_can_be_found_by_its_own_text(empty_window):
     for row in empty_window.keys.actions:
         assert empty_window.action(row.id) in listed, row.id
     for one in entries:
-        assert one in found(entries, one.text)
+        assert one in matching(entries, one.text)
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ class KeysDialog(Dialog):
         self._table.selectionModel().currentRowChanged.connect(self._refresh)
         bindings.changed.connect(self._refresh)
         model.modelReset.connect(self._refresh)
-        self._said = sentence("", "warning")
+        self._warning = sentence("", "warning")
         self._change = self._button("Change", "Wait for another key", self._begin)
         self._add = self._button("Add", "Wait for a key besides", lambda: self._begin(besides=True))
         clear, reset = partial(self._attempt, model.clear), partial(self._attempt, model.reset)
@@ -67,7 +67,7 @@ class KeysDialog(Dialog):
         changing = (self._change, self._add, self._clear, self._reset)
         buttons = row_of(*changing, STRETCH, every, close)
         head = row_of((self._search, 1), help_button("Keys", self))
-        self.setLayout(column_of(head, (self._table, 1), self._said, buttons))
+        self.setLayout(column_of(head, (self._table, 1), self._warning, buttons))
         take_room(self, 760, 620)
         self._find()
 
@@ -86,7 +86,7 @@ class KeysDialog(Dialog):
         self._refresh()
 
     def _begin(self, besides: bool = False) -> None:
-        self._said.clear()
+        self._warning.clear()
         self._cells.besides = besides
         self._table.edit(self._table.currentIndex().siblingAtColumn(KEYS))
 
@@ -97,19 +97,19 @@ class KeysDialog(Dialog):
 
     def _attempt(self, change: Callable[[int], None]) -> None:
         """Change the current row, or say why that is refused."""
-        self._said.clear()
+        self._warning.clear()
         try:
             change(self._row)
         except Sd2Error as error:
-            self._said.setText(str(error))
+            self._warning.setText(str(error))
 
     @property
     def _row(self) -> int:
         return self._table.currentIndex().row()
 
     def _refresh(self) -> None:
-        there = 0 <= self._row < self._model.rowCount()
-        can = there and self._model.can_change(self._row)
+        is_row = 0 <= self._row < self._model.rowCount()
+        can = is_row and self._model.can_change(self._row)
         for button in (self._change, self._clear):
             button.setEnabled(can)
         self._add.setEnabled(can and bool(self._model.rows[self._row].action))
