@@ -114,10 +114,10 @@ def _measured(measurement: Measurement, picture: str) -> str:
 
 
 def _scaling() -> str:
-    found = [scaling for sight in ("facing", "exact") for scaling in scalings(sight)]
-    save_figure(_scaling_plot(found), IMAGES / "scaling.png")
+    measured = [scaling for sight in ("facing", "exact") for scaling in scalings(sight)]
+    save_figure(_scaling_plot(measured), IMAGES / "scaling.png")
     rows = [["what", "sizes", "growth", "longest, s", "most memory, MB"]]
-    for scaling in found:
+    for scaling in measured:
         first, last = scaling.points[0], scaling.points[-1]
         most_mb = max(point.peak_bytes for point in scaling.points) / 1e6
         numbers = f"{max(scaling.growth):.1f}", f"{last.seconds:.3g}", f"{most_mb:.0f}"
@@ -132,22 +132,22 @@ def _precision() -> dict[str, str]:
     for at in errors(mesh):
         off = (f"{value:.0e}" for value in (at.predicted, at.single, at.double))
         rows.append([f"{at.away_m:g}", *off, at.used])
-    found = costs(in_both_precisions(mesh))
-    ratios = ", ".join(f"{cost.ratio:.2f} ({cost.what})" for cost in found)
+    measured = costs(in_both_precisions(mesh))
+    ratios = ", ".join(f"{cost.ratio:.2f} ({cost.what})" for cost in measured)
     return {"precision": table(rows), "ratios": ratios}
 
 
-def _scaling_plot(found: list[Scaling]) -> Figure:
+def _scaling_plot(measured: list[Scaling]) -> Figure:
     figure = Figure(figsize=(9.0, 4.0), dpi=120, layout="constrained")
     cost, memory = figure.subplots(1, 2)
-    for scaling in found:
+    for scaling in measured:
         sizes = [point.size / scaling.points[0].size for point in scaling.points]
         seconds = [point.seconds / scaling.points[0].seconds for point in scaling.points]
         cost.plot(sizes, seconds, marker="o", label=scaling.what)
         memory.plot(
             sizes, [p.peak_bytes / 1e6 for p in scaling.points], marker="o", label=scaling.what
         )
-    longest = max(len(scaling.points) for scaling in found)
+    longest = max(len(scaling.points) for scaling in measured)
     tenfold = [10.0**k for k in range(longest)]
     cost.plot(tenfold, tenfold, color="black", linewidth=0.8, linestyle=":", label="in proportion")
     memory.axhline(BUDGET_BYTES / 1e6, color="black", linewidth=0.8, linestyle=":", label="budget")

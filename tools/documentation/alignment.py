@@ -51,17 +51,17 @@ class Tried:
 def tried(pairs: PairSet, subject: str, offsets_s: tuple[float, ...]) -> list[Tried]:
     """Align all maps of one person, with their own radar and with that of other takes."""
     takes = [take for take in pairs.takes if take.subject == subject and take.placement == 0]
-    found = []
+    outcomes = []
     for take in takes:
         for offset_s in offsets_s:
             synthetic, radar = maps_of(pairs, take)
-            found.append(outcome("moved", synthetic, radar.shifted(-offset_s), offset_s))
+            outcomes.append(outcome("moved", synthetic, radar.shifted(-offset_s), offset_s))
             # To whole frames, which are what can be cut.
             frames = round(abs(offset_s) * pairs.frame_rate_hz)
             kept = len(take.times_s) - frames
             early, late = (0, kept), (frames, frames + kept)
             ours, theirs = (early, late) if offset_s >= 0 else (late, early)
-            found.append(
+            outcomes.append(
                 outcome(
                     "cut",
                     from_zero(synthetic.between(*ours)),
@@ -74,8 +74,8 @@ def tried(pairs: PairSet, subject: str, offsets_s: tuple[float, ...]) -> list[Tr
                 same = pairs.kind == "real" and exercise(other) == exercise(take)
                 way: Way = "same exercise" if same else "other take"
                 maps = maps_of(pairs, take)[0], maps_of(pairs, other)[1]
-                found.append(outcome(way, *maps, float("inf")))
-    return found
+                outcomes.append(outcome(way, *maps, float("inf")))
+    return outcomes
 
 
 def exercise(take: Take) -> str:
@@ -100,16 +100,16 @@ def from_zero(doppler: DopplerMap) -> DopplerMap:
 def outcome(way: Way, synthetic: DopplerMap, radar: DopplerMap, offset_s: float) -> Tried:
     """Align; what cannot be aligned at all is refused."""
     try:
-        found = align(synthetic, radar)
+        alignment = align(synthetic, radar)
     except Sd2Error:
         return Tried(way, float("inf"), True)
-    return Tried(way, abs(found.offset_s - offset_s), bool(found.problem))
+    return Tried(way, abs(alignment.offset_s - offset_s), bool(alignment.problem))
 
 
-def rows(name: str, found: list[Tried]) -> Iterator[tuple[str, ...]]:
+def rows(name: str, outcomes: list[Tried]) -> Iterator[tuple[str, ...]]:
     """Lines of the table: one for each way."""
     for way, words in NAMES.items():
-        own = [one for one in found if one.way == way]
+        own = [one for one in outcomes if one.way == way]
         if not own:
             continue
         errors_s = np.array([one.error_s for one in own])
@@ -137,16 +137,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("pairs", type=Path, nargs="+", metavar="PAIRS")
     options = parser.parse_args()
-    found = []
+    lines = []
     for path in options.pairs:
         pairs = read_pairs(path)
         for subject in pairs.subjects:
-            found += rows(f"{path.stem}, {subject}", tried(pairs, subject, OFFSETS_S))
+            lines += rows(f"{path.stem}, {subject}", tried(pairs, subject, OFFSETS_S))
     heading = (
         "person", "maps", "tried", "refused", "within 0.1 s, all", "of those not refused",
         "median error",
     )  # fmt: skip
-    print(table((heading, *found)))
+    print(table((heading, *lines)))
 
 
 if __name__ == "__main__":

@@ -17,9 +17,9 @@ def write_command_pages(folder: Path) -> None:
     """Make ``folder`` hold a page per command and ``index.md``, and nothing else."""
     parser = full_parser()
     pages = {"index.md": _index(parser)}
-    told: dict[tuple[str, ...], str] = {}
+    links: dict[tuple[str, ...], str] = {}
     for name, command in commands_of(parser).items():
-        pages[f"{name}.md"] = "\n".join(_sections(command, 1, told)) + "\n"
+        pages[f"{name}.md"] = "\n".join(_sections(command, 1, links)) + "\n"
     folder.mkdir(exist_ok=True)
     for path in folder.glob("*.md"):
         if path.name not in pages:
@@ -62,11 +62,11 @@ def _index(parser: argparse.ArgumentParser) -> str:
 
 
 def _sections(
-    parser: argparse.ArgumentParser, level: int, told: dict[tuple[str, ...], str]
+    parser: argparse.ArgumentParser, level: int, links: dict[tuple[str, ...], str]
 ) -> Iterator[str]:
     """Heading, description, examples, usage and arguments of a command and of those in it.
 
-    ``told`` links, by its lines, to each titled group of options that stands on the pages so far.
+    ``links`` lead, by its lines, to each titled group of options that stands on the pages so far.
     """
     yield from (f"{'#' * level} {parser.prog}", "", *_paragraphs(parser.description or ""))
     examples = (parser.epilog or "").removeprefix("examples:\n")
@@ -82,15 +82,15 @@ def _sections(
         lines = (*_paragraphs(group.description or ""), *_explained(actions))
         if group in (parser._positionals, parser._optionals):
             yield from lines
-        elif lines in told:
+        elif lines in links:
             options = ", ".join(f"`{action.option_strings[0]}`" for action in actions)
-            yield from (f"{options}: as of {told[lines]}", "")
+            yield from (f"{options}: as of {links[lines]}", "")
         else:
             page, anchor = parser.prog.split()[1], parser.prog.replace(" ", "-")
-            told[lines] = f"[`{parser.prog}`]({page}.md#{anchor})"
+            links[lines] = f"[`{parser.prog}`]({page}.md#{anchor})"
             yield from lines
     for command in commands_of(parser).values():
-        yield from _sections(command, level + 1, told)
+        yield from _sections(command, level + 1, links)
 
 
 def _is_shown(action: argparse.Action) -> bool:
@@ -137,9 +137,9 @@ def _explanation(action: argparse.Action) -> str:
 def _example_lines(text: str) -> Iterator[str]:
     """Commands as one types them; what is said of one becomes a comment."""
     for line in text.splitlines():
-        command, _, said = re.sub(r"\s{3,}", "\0", line.strip(), count=1).partition("\0")
-        said = re.sub(r"^\((.*)\)$", r"\1", said)
-        yield f"{command}    # {said}" if said else command
+        command, _, comment = re.sub(r"\s{3,}", "\0", line.strip(), count=1).partition("\0")
+        comment = re.sub(r"^\((.*)\)$", r"\1", comment)
+        yield f"{command}    # {comment}" if comment else command
 
 
 def _paragraphs(text: str) -> Iterator[str]:

@@ -117,18 +117,18 @@ def _judged(models: Sequence[TrainedDenoiser], pairs: PairSet, takes: Sequence[T
 
 
 def _take(name: str, mesh: MeshSequence, sensor: VirtualSensor, radar: np.ndarray) -> Take:
-    found = synthetic_map(Synthesizer(mesh, OPTIONS), sensor, limbs=True)
-    there = np.flatnonzero(mesh.presence.present)
-    frames = slice(int(there[0]), min(int(there[-1]) + 1, len(radar)))
+    synthetic = synthetic_map(Synthesizer(mesh, OPTIONS), sensor, limbs=True)
+    present = np.flatnonzero(mesh.presence.present)
+    frames = slice(int(present[0]), min(int(present[-1]) + 1, len(radar)))
     whole = Take(
         name,
         "clip",
-        np.ascontiguousarray(found.values.T[: len(radar)]),
+        np.ascontiguousarray(synthetic.values.T[: len(radar)]),
         np.ascontiguousarray(radar[: len(mesh.times_s)]),
         mesh.times_s[: len(radar)],
         np.zeros(min(len(radar), len(mesh.times_s)), np.int8),
         np.array(sensor.position_m),
-        limbs=None if found.limbs is None else found.limbs.of_frames(slice(len(radar))),
+        limbs=None if synthetic.limbs is None else synthetic.limbs.of_frames(slice(len(radar))),
     )
     return whole.part(frames)
 
@@ -249,18 +249,18 @@ def _table(evaluation: Mapping[str, Any]) -> str:
 
 def _leader(evaluation: Mapping[str, Any]) -> str:
     """Sentence on how the S4's peaks and those of its rivals on the same input compare."""
-    found = {run_of(one): one["peak_mae_mps"] for one in evaluation["groups"] if one["trained"]}
+    peaks = {run_of(one): one["peak_mae_mps"] for one in evaluation["groups"] if one["trained"]}
     none = evaluation["groups"][0]["peak_mae_mps"]["mean"]
-    rivals = {name: found[name] for name in ("gru", "unet")}
+    rivals = {name: peaks[name] for name in ("gru", "unet")}
     best = min(rivals, key=lambda name: rivals[name]["mean"])
-    ahead = rivals[best]["mean"] - found["s4"]["mean"]
-    spread_of_both = max(found["s4"]["sd"] or 0.0, rivals[best]["sd"] or 0.0)
+    ahead = rivals[best]["mean"] - peaks["s4"]["mean"]
+    spread_of_both = max(peaks["s4"]["sd"] or 0.0, rivals[best]["sd"] or 0.0)
     how = "ahead of" if ahead > spread_of_both else "level with"
     if -ahead > spread_of_both:
         how = "behind"
     return (
         f"On the map the S4 is {how} the best of its rivals, `{best}`, in the peak"
-        f" ({100.0 * (found['s4']['mean'] / none - 1.0):+.0f} % beside none; wanted: −25 %)."
+        f" ({100.0 * (peaks['s4']['mean'] / none - 1.0):+.0f} % beside none; wanted: −25 %)."
     )
 
 

@@ -66,16 +66,16 @@ def board(path: Path) -> tuple[MeshSequence, InertialSignals, NDArray[np.bool_]]
         acceleration, turn_rate = file["imu_acc"][:], file["imu_gyr"][:]
         moved = file["movement"][:]
         rate_hz = float(file.attrs["sampling_rate"])
-    there = np.isfinite(position_m).all(axis=1) & np.isfinite(wxyz).all(axis=1)
-    turns = Rotation.from_quat(np.where(there[:, None], wxyz, [1, 0, 0, 0]), scalar_first=True)
+    present = np.isfinite(position_m).all(axis=1) & np.isfinite(wxyz).all(axis=1)
+    turns = Rotation.from_quat(np.where(present[:, None], wxyz, [1, 0, 0, 0]), scalar_first=True)
     corners_m = np.array([[0, 0, 0], [1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]]) * 0.1
     vertices = np.einsum("tij,vj->tvi", turns.as_matrix(), corners_m) + position_m[:, None]
     times = Timebase.regular(len(position_m), rate_hz)
     faces = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]])
     mesh = MeshSequence(
-        np.nan_to_num(vertices @ FROM_EAST_NORTH_UP.T), faces, times, "the board", present=there
+        np.nan_to_num(vertices @ FROM_EAST_NORTH_UP.T), faces, times, "the board", present=present
     )
-    return mesh, InertialSignals(times.times_s, acceleration, turn_rate), moved & there
+    return mesh, InertialSignals(times.times_s, acceleration, turn_rate), moved & present
 
 
 def beside(
@@ -174,11 +174,11 @@ def foot_beside(folder: Path, side: str, vertex: int = INSTEP) -> tuple[float, f
 
     def alike(shift_s: float) -> tuple[float, float, float]:
         at_s = virtual.times_s[inner] + shift_s
-        found = [
+        correlations = [
             np.corrcoef(one[inner], np.interp(at_s, real.times_s, np.linalg.norm(other, axis=1)))
             for one, other in zip(magnitudes, smooth, strict=True)
         ]
-        return float(found[0][0, 1]), float(found[1][0, 1]), float(shift_s)
+        return float(correlations[0][0, 1]), float(correlations[1][0, 1]), float(shift_s)
 
     return max(map(alike, SHIFTS_S))
 

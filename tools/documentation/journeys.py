@@ -35,7 +35,7 @@ class Station:
     words: str
     later: bool = False  # not called by the one before, but when the user asks for it
 
-    def found(self) -> object:
+    def resolve(self) -> object:
         """The function itself; AttributeError or ModuleNotFoundError if there is none."""
         module = import_module(self.file.removesuffix(".py").replace("/", "."))
         return attrgetter(self.function)(module)

@@ -28,7 +28,7 @@ _FRAMES = 4608
 def long_sequences(folder: Path, minutes: float) -> str:
     """Train what is missing; the text of the section, and its picture."""
     folder.mkdir(parents=True, exist_ok=True)
-    found: dict[str, dict[tuple[str, int], dict[str, Any]]] = {}
+    curves: dict[str, dict[tuple[str, int], dict[str, Any]]] = {}
     rows = [["network", "segment", "peak MAE m/s", "mean MAE m/s", "map RMSE", "memory", "time"]]
     for title, (rate, bins, take_s, total_min) in SETTINGS.items():
         data = folder / f"{rate}.zarr"
@@ -46,19 +46,19 @@ def long_sequences(folder: Path, minutes: float) -> str:
             for model, length in kinds
         ]
         runs = train(folder, jobs)
-        told = evaluated([run / "best.safetensors" for run in runs], data)
-        none, *_ = told["groups"]
-        reports = {one["name"]: one["all"] for group in told["groups"] for one in group["models"]}
+        groups = evaluated([run / "best.safetensors" for run in runs], data)["groups"]
+        none, *_ = groups
+        reports = {one["name"]: one["all"] for group in groups for one in group["models"]}
         rows.append([f"**{title}**: none", "", *_errors(none["models"][0]["all"]), "", ""])
-        found[title] = {}
+        curves[title] = {}
         for (model, length), run in zip(kinds, runs, strict=True):
             score = reports[run.name]
-            found[title][model, length] = score
+            curves[title][model, length] = score
             memory = f"{int((run / MEMORY).read_text()) / 1e6:.0f} MB"
             took = f"{1e6 * _frame_s(run, data):.0f} µs"
             rows.append([model, f"{length:,}", *_errors(score), memory, took])
-    _draw(found)
-    return filled("long-sequences.md", first=_first(found), minutes=minutes, table=table(rows))
+    _draw(curves)
+    return filled("long-sequences.md", first=_first(curves), minutes=minutes, table=table(rows))
 
 
 def _errors(score: dict[str, Any]) -> list[str]:
@@ -90,10 +90,10 @@ def _frame_s(run: Path, data: Path) -> float:
     return (time.perf_counter() - began) / len(values)
 
 
-def _first(found: dict[str, dict[tuple[str, int], dict[str, Any]]]) -> str:
+def _first(curves: dict[str, dict[tuple[str, int], dict[str, Any]]]) -> str:
     """Sentence on whether a state space leads, and where."""
     leads = []
-    for title, scores in found.items():
+    for title, scores in curves.items():
         best = min(scores, key=lambda run: scores[run]["mean"]["mae_mps"])
         leads.append((title, *best))
     where = [f"{title} ({model} at {length:,} frames)" for title, model, length in leads]
@@ -102,9 +102,9 @@ def _first(found: dict[str, dict[tuple[str, int], dict[str, Any]]]) -> str:
     return f"**A state space does not lead everywhere**: nearest are, at {' and '.join(where)}."
 
 
-def _draw(found: dict[str, dict[tuple[str, int], dict[str, Any]]]) -> None:
+def _draw(curves: dict[str, dict[tuple[str, int], dict[str, Any]]]) -> None:
     figure = Figure(figsize=(9.6, 3.4), dpi=110, layout="constrained")
-    for axes, (title, scores) in zip(figure.subplots(1, len(found)), found.items(), strict=True):
+    for axes, (title, scores) in zip(figure.subplots(1, len(curves)), curves.items(), strict=True):
         for model in MODELS:
             points = [(length, scores[name, length]) for name, length in scores if name == model]
             axes.plot(

@@ -97,10 +97,10 @@ def linked(text: str) -> str:
 def _link(match: re.Match[str]) -> str:
     path, _, name = match[1].partition(":")
     if path.isdecimal():
-        found = list((DOCS / "decisions").glob(f"{int(path):04d}-*.md"))
-        if len(found) != 1:
+        pages = list((DOCS / "decisions").glob(f"{int(path):04d}-*.md"))
+        if len(pages) != 1:
             raise ValueError(f"there is no decision {path}")
-        return f"[decision {path}](decisions/{found[0].name})"
+        return f"[decision {path}](decisions/{pages[0].name})"
     code = (REPOSITORY / "sd2core" / path).read_text("utf-8")
     known = rf"^( *(class|def) {name.rpartition('.')[2]}\b|{name}\b.*=)"
     if name and not re.search(known, code, re.MULTILINE):
@@ -249,12 +249,12 @@ def _change(value: float, reference: float) -> str:
 
 def _classifiers() -> str:
     """Tables 2 and 3."""
-    told = json.loads((STUDY / "study.json").read_text("utf-8"))
-    totals = {one["title"]: one["seeds"] for one in told["totals"]}
+    study = json.loads((STUDY / "study.json").read_text("utf-8"))
+    totals = {one["title"]: one["seeds"] for one in study["totals"]}
     return filled(
         "paper-classifiers.md",
-        seeds=told["plan"]["seeds"],
-        table=tables_2_and_3(told["classes"], totals),
+        seeds=study["plan"]["seeds"],
+        table=tables_2_and_3(study["classes"], totals),
     )
 
 
@@ -272,8 +272,8 @@ def tables_2_and_3(classes: Sequence[str], totals: Mapping[str, Any]) -> str:
     for words, title in ADDED.items():
         rows[0] += [f"the paper, {words}", f"ours, {words}"]
         ours = 100.0 * np.mean([shares(one) for one in confusions(title)], axis=0)
-        for row, given, found in zip(rows[1:], GIVEN[words], ours, strict=False):
-            row += [" / ".join(f"{value:.1f}" for value in values) for values in (given, found)]
+        for row, given, own in zip(rows[1:], GIVEN[words], ours, strict=False):
+            row += [" / ".join(f"{value:.1f}" for value in values) for values in (given, own)]
         rows[-2] += [f"{np.diagonal(GIVEN[words]).mean():.1f}", mean(title)]
         rows[-1] += ["", mean(PAPER_NETWORK) if title == "radar alone" else ""]
     return table(rows)

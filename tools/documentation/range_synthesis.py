@@ -47,8 +47,8 @@ def main() -> None:
 def results(evaluations: Mapping[tuple[str, str], Mapping[str, Any]]) -> dict[str, Any]:
     """Table and numbers of the page, from evaluations by what was learnt from and judged."""
     groups = {
-        key: {"s4" if one["trained"] else one["name"]: one for one in told["groups"]}
-        for key, told in evaluations.items()
+        key: {"s4" if one["trained"] else one["name"]: one for one in evaluation["groups"]}
+        for key, evaluation in evaluations.items()
     }
     head = [f"{place}: {name}" for place in ("beside", "all") for name in ERRORS.values()]
     rows = [["denoiser", *head]]

@@ -52,7 +52,7 @@ GRID = [
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Counts:
     """Suggestions in every file against its labels."""
 
     labels: NDArray[np.int64]  # (files,)
@@ -60,7 +60,7 @@ class Found:
     matched: NDArray[np.int64]  # (files, IoUs)
 
     @classmethod
-    def of(cls, recorded: Sequence[RecordedMap], options: SuggestOptions) -> Found:
+    def of(cls, recorded: Sequence[RecordedMap], options: SuggestOptions) -> Counts:
         """Suggest spans in every file."""
         suggested, matched = [], []
         for one in recorded:
@@ -93,14 +93,14 @@ def main() -> None:
             movement: own for (_, movement), own in dealt(known, known.clips, 2, number).items()
         }
         judged.append(np.array([part[path.stem] == 1 for path in paths]))
-    usual = Found.of(recorded, SuggestOptions())
-    tried = [Found.of(recorded, one) for one in GRID]
+    usual = Counts.of(recorded, SuggestOptions())
+    tried = [Counts.of(recorded, one) for one in GRID]
     best = [tried[int(np.argmax([one.f1(~files).mean() for one in tried]))] for files in judged]
     how = ("--seeds", SPLITS, "--shares", "100%")
     sd2("classify", "table", *DATA, "--out", FOLDER, *how)
     names = " ".join(folder.name for folder in DATA)
-    told = json.loads((FOLDER / "study.json").read_text("utf-8"))
-    networks, best_network, classes = _classified(told)
+    study = json.loads((FOLDER / "study.json").read_text("utf-8"))
+    networks, best_network, classes = _classified(study)
     write_filled(
         "real-gestures.md",
         files=len(paths),
@@ -132,14 +132,14 @@ def _found_by_kernel(
         scores, counts = [], np.zeros(4, int)
         for repeated in range(SPLITS):
             part = dealt(known, known.clips, parts, repeated)
-            found = []
+            folds = []
             for number in range(parts):
                 kept = [clip for clip in known.clips if part[clip.key] != number]
                 asked = [clip for clip in known.clips if part[clip.key] == number]
                 made = train(kept, (), known, KERNEL).classifier
-                found.append(judge(made, asked, known))
+                folds.append(judge(made, asked, known))
                 counts += sum(_spans(made, file_of[clip.movement]) for clip in asked)
-            scores.append(sum(found[1:], found[0]))
+            scores.append(sum(folds[1:], folds[0]))
         labels, suggested, matched, named = counts.tolist()
         rows.append(
             [
@@ -162,25 +162,25 @@ def _spans(made: TrainedClassifier, file: RecordedMap) -> NDArray[np.int64]:
     return np.array([len(file.labels.spans), len(spans), len(matches), named])
 
 
-def _by_gesture(found: Found, recorded: Sequence[RecordedMap]) -> list[list[str]]:
+def _by_gesture(counted: Counts, recorded: Sequence[RecordedMap]) -> list[list[str]]:
     rows = [["gesture", "labels", "suggested", "matched", "F1"]]
     names = np.array([one.gesture for one in recorded])
     for name in (*np.unique(names), "all"):
         files = (names == name) | (name == "all")
-        labels, suggested = found.labels[files].sum(), found.suggested[files].sum()
-        f1 = f"{found.f1(files)[AT]:.2f}" if labels else ""
-        counts = (labels, suggested, found.matched[files, AT].sum())
+        labels, suggested = counted.labels[files].sum(), counted.suggested[files].sum()
+        f1 = f"{counted.f1(files)[AT]:.2f}" if labels else ""
+        counts = (labels, suggested, counted.matched[files, AT].sum())
         rows.append([str(name), *(f"{count}" for count in counts), f1])
     return rows
 
 
-def _classified(told: dict[str, Any]) -> tuple[list[list[str]], str, list[list[str]]]:
+def _classified(study: dict[str, Any]) -> tuple[list[list[str]], str, list[list[str]]]:
     """Table of the networks, name of the best, and its table of the classes."""
     networks = [["network", "frames", "gestures", "latency s"]]
     best, name_of_best = -1.0, ""
     scores_of_best: list[Score] = []
-    first = Learner.model_validate(told["plan"]["classifiers"][0]).title
-    for total in told["totals"]:
+    first = Learner.model_validate(study["plan"]["classifiers"][0]).title
+    for total in study["totals"]:
         name = first if total["title"] == "radar alone" else total["title"]
         scores = [Score.from_json(one) for one in total["seeds"]]
         frames = [100.0 * one.mean_recall for one in scores]
@@ -189,7 +189,7 @@ def _classified(told: dict[str, Any]) -> tuple[list[list[str]], str, list[list[s
         networks.append([name, spread_of(frames, 1), spread_of(gestures, 1), latency])
         if np.mean(frames) > best:
             best, name_of_best, scores_of_best = float(np.mean(frames)), name, scores
-    classes = [[name] for name in ("class", *told["classes"], "all together")]
+    classes = [[name] for name in ("class", *study["classes"], "all together")]
     for what in ("frames", "gestures"):
         counts = np.array([getattr(one, what) for one in scores_of_best])  # (splits, true, found)
         right, judged = np.diagonal(counts, axis1=1, axis2=2), counts.sum(axis=2)

@@ -96,14 +96,14 @@ def mean_mps(maps: Iterable[NDArray[np.float32]]) -> Floats:
 def errors(maps: Maps, radar: Maps) -> list[str]:
     """Cells on the mean velocities of an input: their correlation with the radar's, their MAE."""
     seen = np.concatenate(radar).sum(axis=1) > 0
-    found, truth = mean_mps(maps)[seen], mean_mps(radar)[seen]
-    return agreement_cells(found, truth)
+    estimate, truth = mean_mps(maps)[seen], mean_mps(radar)[seen]
+    return agreement_cells(estimate, truth)
 
 
-def agreement_cells(found: Floats, truth: Floats) -> list[str]:
+def agreement_cells(estimate: Floats, truth: Floats) -> list[str]:
     """Cells of a correlation, if anything moves, and of a mean absolute error."""
-    alike = f"{np.corrcoef(found, truth)[0, 1]:.3f}" if found.any() else "–"
-    return [alike, f"{np.abs(found - truth).mean():.3f}"]
+    alike = f"{np.corrcoef(estimate, truth)[0, 1]:.3f}" if estimate.any() else "–"
+    return [alike, f"{np.abs(estimate - truth).mean():.3f}"]
 
 
 def drive(part: MarsPart) -> list[DrivenClip]:
@@ -203,15 +203,15 @@ def linear(pairs: PairSet) -> str:
 
 def own_minutes(pairs: PairSet) -> tuple[Floats, Floats]:
     """Answers to a quarter of a person's takes by the other three, and the truth."""
-    found, truth = [], []
+    answers, truth = [], []
     for fold in range(4):
         unseen = pairs.takes[fold::4]
         rest = tuple(take for number, take in enumerate(pairs.takes) if number % 4 != fold)
         x, y, _ = examples(replace(pairs, takes=rest), DENOISER_PARTS)
         asked, wanted, _ = examples(replace(pairs, takes=unseen), DENOISER_PARTS)
-        found.append(ridge_map(x, y, asked))
+        answers.append(ridge_map(x, y, asked))
         truth.append(wanted)
-    return np.concatenate(found), np.concatenate(truth)
+    return np.concatenate(answers), np.concatenate(truth)
 
 
 def halves_mps(stretch: MarsStretch, rng: np.random.Generator) -> tuple[Floats, Floats]:

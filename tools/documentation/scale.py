@@ -217,13 +217,13 @@ def _costs_of_maps(plan: BatchPlan, folder: Path, title: str) -> tuple[Cost, Cos
     folder.mkdir()
     origins = find_origins(plan.recordings, Path(plan.out))
     model, digest = TaskGraph(plan, BatchFolder(Path(plan.out)), origins).model
-    found, section = glance(origins[0]), plan.synthesise
-    mesh, counts = found.mesh, _TIMED_FRAMES
+    inspection, section = glance(origins[0]), plan.synthesise
+    mesh, counts = inspection.mesh, _TIMED_FRAMES
     assert mesh is not None
     assert section is not None
     choosing = None
     if section.tolerance is not None:
-        choosing = Choosing(folder / "plan.json", (found.sensor,), mesh.frames)
+        choosing = Choosing(folder / "plan.json", (inspection.sensor,), mesh.frames)
     places = (VirtualSensor((1e-3 * number, 0.0, 0.0)) for number in itertools.count(1))
 
     def made(count: int) -> Path:

@@ -129,11 +129,11 @@ class Hand:
 
     def rest(self) -> None:
         """Wait until nothing has been under way for half a second."""
-        synthesis, looks = self._window.features.maps.synthesis, [0]
+        synthesis, calm_looks = self._window.features.maps.synthesis, [0]
 
         def is_calm() -> bool:
-            looks[0] = looks[0] + 1 if self._window.settled and synthesis.complete else 0
-            return looks[0] * _LOOK_S > 0.5
+            calm_looks[0] = calm_looks[0] + 1 if self._window.settled and synthesis.complete else 0
+            return calm_looks[0] * _LOOK_S > 0.5
 
         self._until(is_calm, "come to rest")
 
@@ -188,10 +188,10 @@ class Hand:
         held = self._scene.childAt(start)
         QTest.mousePress(held, Qt.MouseButton.LeftButton, pos=held.mapFrom(self._scene, start))
         for step in range(60):
-            there = start + QPoint(round(30 * np.sin(step / 10)), step // 3)
-            QTest.mouseMove(held, held.mapFrom(self._scene, there))
+            place = start + QPoint(round(30 * np.sin(step / 10)), step // 3)
+            QTest.mouseMove(held, held.mapFrom(self._scene, place))
             spin(0.03)
-        QTest.mouseRelease(held, Qt.MouseButton.LeftButton, pos=held.mapFrom(self._scene, there))
+        QTest.mouseRelease(held, Qt.MouseButton.LeftButton, pos=held.mapFrom(self._scene, place))
 
     def _save(self) -> None:
         self._press("S", _CONTROL)
@@ -204,8 +204,8 @@ class Hand:
         deadline_s = time.monotonic() + LIMIT_S
         while not condition():
             if time.monotonic() > deadline_s:
-                said = self._window.messages.text or "the window says nothing"
-                raise RuntimeError(f"The window did not {step} within {LIMIT_S:.0f} s ({said})")
+                message = self._window.messages.text or "the window says nothing"
+                raise RuntimeError(f"The window did not {step} within {LIMIT_S:.0f} s ({message})")
             spin(_LOOK_S)
 
 

@@ -42,8 +42,8 @@ def texture_table(models: Mapping[str, tuple[Path, Path, str | None]]) -> str:
         drawn = [texture.drawn(mean, (0, number)) for number, mean in enumerate(means)]
         radar = [take.radar for take in takes]
         for name, maps in (("the radar's", radar), ("drawn", drawn), ("the mean", means)):
-            found = _statistics(*([one[:, counted] for one in each] for each in (means, maps)))
-            rows.append([f"{title}: {name}", *(f"{value:.2f}" for value in found)])
+            statistics = _statistics(*([one[:, counted] for one in each] for each in (means, maps)))
+            rows.append([f"{title}: {name}", *(f"{value:.2f}" for value in statistics)])
     return table(rows)
 
 

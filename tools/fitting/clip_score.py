@@ -265,26 +265,26 @@ def _vertex_velocity(mesh: MeshSequence, presence: Presence) -> float:
 def _overlap(true: MeshSequence, fitted: MeshSequence, truth: Truth) -> float:
     assert true.faces is not None
     assert fitted.faces is not None
-    found = [
+    overlaps = [
         overlap(
             silhouette(true.frame(frame), true.faces, truth.camera, _MASK),
             silhouette(fitted.frame(frame), fitted.faces, truth.camera, _MASK),
         )
         for frame in np.flatnonzero(fitted.presence.present)[::_MASK_STEP]
     ]
-    return float(np.nanmean(found))
+    return float(np.nanmean(overlaps))
 
 
 def _against_parents(velocity_mps: Floats, chosen: NDArray[np.bool_]) -> Floats:
     """Velocities (n,) of the chosen joints of limbs, less those of the joints they hang on."""
-    found = []
+    relative_mps = []
     for child, parent in _PARENTS.items():
         for side in ".L", ".R":
             row = JOINTS.index(child + side)
             rows = chosen[:, row]
             above = JOINTS.index(parent if parent in JOINTS else parent + side)
-            found.append(velocity_mps[rows, row] - velocity_mps[rows, above])
-    return np.concatenate(found)
+            relative_mps.append(velocity_mps[rows, row] - velocity_mps[rows, above])
+    return np.concatenate(relative_mps)
 
 
 def _sigma(

@@ -50,16 +50,16 @@ def measure_errors(truths: Sequence[Truth], fits: Path, progress: Progress = sil
     shapes = []
     for number, truth in enumerate(truths):
         progress(number, len(truths))
-        found = clip_samples(truth, fits, space)
-        shapes.append(found.shape_error)
-        for (group, _), sample in found.samples.items():
+        clip = clip_samples(truth, fits, space)
+        shapes.append(clip.shape_error)
+        for (group, _), sample in clip.samples.items():
             samples[group].append(sample)
     progress(len(truths), len(truths))
     apart = np.array(shapes)
     mean = apart.mean(axis=0)
     centred = apart - mean
     return FitErrors(
-        {group: group_errors(found) for group, found in samples.items()},
+        {group: group_errors(own) for group, own in samples.items()},
         mean,
         centred.T @ centred / len(apart),
         {

@@ -95,9 +95,9 @@ class Outcome:
 
     meeting: Meeting
     clothes: str
-    looks: int  # ten times a second, at one of them in the picture
+    observed: int  # ten times a second, at one of them in the picture
     visible: int  # of them, in which a third of that one or more is to be seen
-    found: int  # of those, in which that one was found
+    recognised: int  # of those, in which that one was found
     seen: int  # looks in which somebody was found
     wrong: int  # of those, in which it was the other one
     people: int  # who were told apart
@@ -134,7 +134,7 @@ def told_apart(
         people = find_people(video, landmark_models())
     across_px = np.stack([_hips_px(each)[:, 0] for each in actors])
     inside = (across_px > 0) & (across_px < CAMERA.width)
-    visible, found = inside & (shares >= _VISIBLE), np.zeros(inside.shape, bool)
+    visible, recognised = inside & (shares >= _VISIBLE), np.zeros(inside.shape, bool)
     seen = wrong = 0
     for person in people:
         off = _off(person, actors)
@@ -142,9 +142,9 @@ def told_apart(
         own = int(mistaken.sum(axis=1).argmin())
         seen += off.shape[1]
         wrong += int(mistaken[own].sum())
-        found[own, person.sightings.frames[person.seen][~mistaken[own]]] = True
-    looks, clear, known = (int(each.sum()) for each in (inside, visible, visible & found))
-    outcome = Outcome(meeting, clothes, looks, clear, known, seen, wrong, len(people))
+        recognised[own, person.sightings.frames[person.seen][~mistaken[own]]] = True
+    observed, clear, known = (int(each.sum()) for each in (inside, visible, visible & recognised))
+    outcome = Outcome(meeting, clothes, observed, clear, known, seen, wrong, len(people))
     return actors, people, outcome
 
 
@@ -179,11 +179,11 @@ def _measured(meeting: Meeting, clothes: str, folder: Path) -> Outcome:
         _film(alone, [mine])
         fit_video(alone, folder / "alone.npz", known, _SILENT)
         fits = [load_mesh(each) for each in (mesh, folder / "alone.npz")]
-        there = np.logical_and.reduce([fit.presence.present for fit in fits])
+        present = np.logical_and.reduce([fit.presence.present for fit in fits])
         for number, fit in enumerate(fits):
             off_m = np.asarray(fit.read(0, fit.frame_count)) - mine.vertices_m
-            places[number].append(float(np.linalg.norm(off_m[there], axis=2).mean()))
-            both = there[1:] & there[:-1]
+            places[number].append(float(np.linalg.norm(off_m[present], axis=2).mean()))
+            both = present[1:] & present[:-1]
             rate = np.diff(off_m[..., 2], axis=0)[both] * FRAMES_PER_S
             squares[number].append(float(np.square(rate).mean()))
     return replace(
@@ -214,18 +214,18 @@ def as_table(outcomes: Sequence[Outcome]) -> str:
     for each in outcomes:
         met = [each.meeting.name, f"{each.meeting.apart_m:g} m", each.clothes]
         fits = [_beside(each.place_m, "m"), _beside(each.velocity_mps, "m/s")]
-        rows.append([*met, *_told([each]), str(each.people), *fits])
-    rows.append(["all", "", "", *_told(outcomes), "", "", ""])
+        rows.append([*met, *_cells([each]), str(each.people), *fits])
+    rows.append(["all", "", "", *_cells(outcomes), "", "", ""])
     return "\n".join(markdown_table(rows, len(rows[0])))
 
 
-def _told(outcomes: Sequence[Outcome]) -> tuple[str, str, str]:
-    looks, visible, found, seen, wrong = (
+def _cells(outcomes: Sequence[Outcome]) -> tuple[str, str, str]:
+    observed, visible, recognised, seen, wrong = (
         sum(getattr(each, name) for each in outcomes)
-        for name in ("looks", "visible", "found", "seen", "wrong")
+        for name in ("observed", "visible", "recognised", "seen", "wrong")
     )
     right = f"{seen - wrong} of {seen}, {100.0 * (1.0 - wrong / max(seen, 1)):.2f} %"
-    return right, f"{found} of {visible} to be seen", str(looks)
+    return right, f"{recognised} of {visible} to be seen", str(observed)
 
 
 def _beside(errors: tuple[float, float] | None, unit: str) -> str:

@@ -87,6 +87,6 @@ def reprojection(
     rows = [LANDMARKS.index(one) for one in _BOTH]
     pixels = track.image_px[:, rows].astype(np.float64)
     inside = ((pixels >= 0) & (pixels <= (track.width, track.height))).all(axis=-1)
-    there = track.present[:, None] & (track.visibility[:, rows] >= _SEEN) & inside
-    away_px = np.linalg.norm(camera.project(joints[there]) - pixels[there], axis=-1)
-    return away_px, away_px * joints[there][:, 2] / camera.focal_px
+    seen = track.present[:, None] & (track.visibility[:, rows] >= _SEEN) & inside
+    away_px = np.linalg.norm(camera.project(joints[seen]) - pixels[seen], axis=-1)
+    return away_px, away_px * joints[seen][:, 2] / camera.focal_px

@@ -279,8 +279,8 @@ def _coverage_rows(scores: Sequence[ClipScore]) -> Iterator[Row]:
         for word, joint in (("least", _bottom(cover)), ("most", _top(cover))):
             what = f"1σ of a joint's velocity covers: {word}"
             yield Row(what, cover[joint], "", 0.5, 0.8, joint)
-        there = np.isfinite(errors) & (sigma > 0) & (errors != 0)
-        same = correlation(np.log(sigma[there]), np.log(np.abs(errors[there])))
+        usable = np.isfinite(errors) & (sigma > 0) & (errors != 0)
+        same = correlation(np.log(sigma[usable]), np.log(np.abs(errors[usable])))
         yield Row("correlation of the logarithms of σ and error", same, least=0.5)
 
 

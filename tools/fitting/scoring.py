@@ -43,10 +43,10 @@ class Fits(NamedTuple):
         name = f"real-{video.stem}"
         path, _ = self._fitted(name, video, [])
         with progress_bar(f"Looking at {video.name}") as progress, open_video(video) as reader:
-            found = find_landmarks(
+            landmarks = find_landmarks(
                 reader, landmark_models(), silhouettes=None, progress_of=lambda _: progress
             )
-        track = found.part(0, len(found))
+        track = landmarks.part(0, len(landmarks))
         camera = PinholeCamera.default(track.width, track.height)
         return score_real(name, load_mesh(path), track, camera)
 
@@ -71,8 +71,8 @@ def _fit(name: str, video: Path, out: Path, known: list[str]) -> tuple[float, fl
     started, before = time.perf_counter(), os.times()
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
-        said = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
-        raise Sd2Error(f"{name} could not be fitted: {said[0].removeprefix('sd2: ')}")
+        lines = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
+        raise Sd2Error(f"{name} could not be fitted: {lines[0].removeprefix('sd2: ')}")
     after = os.times()
     worked_s = after.children_user - before.children_user
     worked_s += after.children_system - before.children_system

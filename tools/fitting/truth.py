@@ -92,12 +92,12 @@ def truth_folders(folder: Path) -> list[Path]:
     folder = Path(folder)
     if (folder / "truth.json").is_file():
         return [folder]
-    found = sorted(path.parent for path in folder.glob("*/truth.json"))
-    found = [path for path in found if not path.name.startswith(".")]
-    if not found:
+    clips = sorted(path.parent for path in folder.glob("*/truth.json"))
+    clips = [path for path in clips if not path.name.startswith(".")]
+    if not clips:
         raise Sd2Error(
             f"{folder} holds no clip of known motion",
             "a folder made by `python -m tools.fitting clips`",
             f"Make it: python -m tools.fitting clips {folder}",
         )
-    return found
+    return clips

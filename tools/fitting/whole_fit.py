@@ -32,14 +32,14 @@ def fit_body(
     :func:`~sd2core.body.fit.fit_motion`.
     """
     fitting = Fitting(track, camera, stature_m, lift, workspace)
-    found = list(fitting.finished(progress))
+    parts = list(fitting.finished(progress))
 
     def joined(name: str) -> NDArray[Any]:
-        return np.concatenate([getattr(part, name) for part in found])
+        return np.concatenate([getattr(part, name) for part in parts])
 
     return BodyFit(
         timebase=track.timebase,
-        shape=found[0].shape,
+        shape=parts[0].shape,
         **{name: joined(name) for name in PER_FRAME},
     )
 

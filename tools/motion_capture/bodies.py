@@ -66,11 +66,11 @@ def _drive(out: Path, own: Sequence[Trial]) -> list[str]:
         except Sd2Error as error:
             notes.append(f"{trial.name}: {error}")
             continue
-        found = _clip(points_m, rate_hz)
-        if found is None:
+        shifted_clip = _clip(points_m, rate_hz)
+        if shifted_clip is None:
             notes.append(f"{trial.name}: shorter than {_MIN_S} s without a jump")
         else:
-            clips[trial] = found
+            clips[trial] = shifted_clip
     if all(path_of(out, trial).exists() for trial in clips):
         return notes
     puppet = puppet_of([clip for clip, _ in clips.values()], MARKERS)

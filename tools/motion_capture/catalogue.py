@@ -92,7 +92,7 @@ def trials(folder: Path) -> list[Trial]:
     Raises Sd2Error if the folder is not one of motion capture.
     """
     described = _descriptions(folder)
-    found: dict[str, Trial] = {}
+    by_name: dict[str, Trial] = {}
     for path in sorted((folder / "cmu_amc").glob("*.amc.gz")):
         stem = path.name.partition(".")[0]
         trial, dash, variant = stem.partition("-")  # 07_05-walk is trial 07_05 on 07-walk.asf
@@ -100,15 +100,15 @@ def trials(folder: Path) -> list[Trial]:
         skeleton = path.parent / f"{subject}{dash}{variant}.asf.gz"
         if skeleton.exists() and trial not in _NO_PERSON:
             what = described.get(path.name, "")
-            found[trial] = Trial(trial, f"cmu{subject}", what, path, skeleton=skeleton)
+            by_name[trial] = Trial(trial, f"cmu{subject}", what, path, skeleton=skeleton)
     for path in sorted((folder / "cmu_bvh").glob("*.bvh.gz")):
         converter, _, trial = path.name.partition(".")[0].partition("_")
         person = trial.partition("_")[0]
         if converter != "dance":
             person = f"cmu{person}"
-        if trial not in found:
+        if trial not in by_name:
             what = described.get(f"{trial}.bvh.gz", "dance" if converter == "dance" else "")
-            found[trial] = Trial(trial, person, what, path)
+            by_name[trial] = Trial(trial, person, what, path)
     for number, kind in enumerate(_UI_KINDS, start=1):
         path = folder / "uiprmd" / f"m{number:02d}_ok.npz"
         if path.exists():
@@ -118,12 +118,12 @@ def trials(folder: Path) -> list[Trial]:
                 if name[-3:] not in _REPETITIONS:
                     continue
                 trial = f"ui_m{number:02d}_{name}"
-                found[trial] = Trial(trial, f"ui{name[1:3]}", kind, path, episode=episode)
-    if not found:
+                by_name[trial] = Trial(trial, f"ui{name[1:3]}", kind, path, episode=episode)
+    if not by_name:
         raise Sd2Error(
             f"{folder} holds no motion capture", "a folder with cmu_amc/, cmu_bvh/ or uiprmd/"
         )
-    return [found[name] for name in sorted(found)]
+    return [by_name[name] for name in sorted(by_name)]
 
 
 def _descriptions(folder: Path) -> dict[str, str]:

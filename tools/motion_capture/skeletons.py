@@ -75,9 +75,9 @@ def read_amc(path: Path, skeleton: Path) -> SkeletonMotion:
 def read_bvh(path: Path, unit_m: float) -> tuple[SkeletonMotion, float]:
     """Motion of a BVH file whose lengths are in units of ``unit_m``, and its frames per second."""
     text = "\n".join(_lines(path))
-    hierarchy, found, motion = text.partition("MOTION")
+    hierarchy, keyword, motion = text.partition("MOTION")
     timing = re.search(r"Frame Time:\s*([\d.eE+-]+)", motion)
-    if not found or timing is None:
+    if not keyword or timing is None:
         raise Sd2Error(f"{path} has no motion", "a BVH file with `MOTION` and `Frame Time:`")
     bones = _bvh_bones(hierarchy)
     values = np.array(motion[timing.end() :].split(), float)
@@ -124,16 +124,16 @@ def _read_asf(path: Path) -> tuple[list[_Bone], float]:
         order += [child for child, above in parent.items() if above == name]
     bones = []
     for name in order:
-        said = own[name]
-        axes = said.get("axis", ["0", "0", "0", "XYZ"])
-        channels = said["order"] if name == "root" else said.get("dof", [])
-        angles = said.get("orientation", ["0", "0", "0"]) if name == "root" else axes[:3]
-        direction = np.array(said.get("direction", ["0", "0", "0"]), float)
+        fields = own[name]
+        axes = fields.get("axis", ["0", "0", "0", "XYZ"])
+        channels = fields["order"] if name == "root" else fields.get("dof", [])
+        angles = fields.get("orientation", ["0", "0", "0"]) if name == "root" else axes[:3]
+        direction = np.array(fields.get("direction", ["0", "0", "0"]), float)
         bones.append(
             _Bone(
                 name,
                 order.index(parent[name]) if name in parent else -1,
-                float(said.get("length", ["0"])[0]) * direction,
+                float(fields.get("length", ["0"])[0]) * direction,
                 _axes([float(angle) for angle in angles], (axes[3:] or ["XYZ"])[0]),
                 tuple(channel.upper() for channel in channels),
             )

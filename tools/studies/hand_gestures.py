@@ -154,9 +154,9 @@ def made_take(space: ShapeSpace, seed: int, person: int, number: int, index: int
     )
     sensor = VirtualSensor((0.0, 0.0, 0.0))
     synthetic = Synthesizer(mesh, SYNTHESIS, threads=1).map(sensor)
-    looks = TargetOptions(looks=int(rng.choice([1, 2, 4])), above_noise=0.0)
+    options = TargetOptions(looks=int(rng.choice([1, 2, 4])), above_noise=0.0)
     radar = radar_target(mesh, RADAR, sensor, AXIS, (), seed=[seed, person, number, index],
-                         options=looks)  # fmt: skip
+                         options=options)  # fmt: skip
     still = rng.uniform(*_STILL_DB, 2)
     noise_db = float(rng.uniform(*_NOISE_DB))
     maps = []

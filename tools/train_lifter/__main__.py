@@ -102,12 +102,12 @@ def _train(options: Train) -> None:
     takes = [repaired(take) for folder in options.data for take in load_takes(folder)]
     kept = [take for folder in options.kept for take in load_takes(folder)]
     motions = load_motions(options.motions, "learn") if options.motions else []
-    from tools.train_lifter.training import Recipe, material, save_lifter, train  # needs torch
+    from tools.train_lifter.training import Recipe, make_arrays, save_lifter, train  # needs torch
 
     with progress_bar("Training", unit="step") as progress:
         recipe = Recipe(steps=options.steps, seed=options.seed)
         start = None if options.start is None else Lifter.load(options.start)
-        lifter = train(material(takes, kept, motions, recipe), recipe, progress, start=start)
+        lifter = train(make_arrays(takes, kept, motions, recipe), recipe, progress, start=start)
     with progress_bar("Fitting", unit="take") as progress:
         lifter = replace(lifter, fit_law=fit_law(kept, lifter, progress))
     save_lifter(lifter, options.out)
@@ -120,11 +120,11 @@ def _sides(options: Learning) -> None:
     motions = load_motions(options.motions, "learn") if options.motions else []
     from tools.train_lifter.network import save_network  # needs torch
     from tools.train_lifter.sides import SidesRecipe, train_sides
-    from tools.train_lifter.training import Recipe, material
+    from tools.train_lifter.training import Recipe, make_arrays
 
     recipe = SidesRecipe(steps=options.steps, seed=options.seed)
     with progress_bar("Training", unit="step") as progress:
-        known = material(takes, (), motions, Recipe(seed=options.seed))
+        known = make_arrays(takes, (), motions, Recipe(seed=options.seed))
         network, meta = train_sides(known, recipe, progress)
     save_network(network, options.out, meta)
     print(f"Wrote {options.out}")

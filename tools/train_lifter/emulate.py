@@ -97,13 +97,13 @@ class Emulator:
             depth.append(take.depth_px / take.camera.focal_px * walk.places[..., 2])
         self._across = np.array(across, np.float32)  # (N, T, 33, 2)
         known = np.array(regressors, np.float32)  # (N, T, 33, K)
-        said = np.concatenate([np.array(world), np.array(depth)[..., None]], axis=-1)
+        outputs = np.concatenate([np.array(world), np.array(depth)[..., None]], axis=-1)
         self._gains = np.empty((33, known.shape[-1], 4), np.float32)
         for k in range(33):
-            x, y = known[:, :, k].reshape(-1, known.shape[-1]), said[:, :, k].reshape(-1, 4)
+            x, y = known[:, :, k].reshape(-1, known.shape[-1]), outputs[:, :, k].reshape(-1, 4)
             gram = x.T @ x + 1e-3 * len(x) * np.eye(x.shape[1])
             self._gains[k] = np.linalg.solve(gram, x.T @ y)
-        self._left = (said - np.einsum("ntki,kio->ntko", known, self._gains)).astype(np.float32)
+        self._left = (outputs - np.einsum("ntki,kio->ntko", known, self._gains)).astype(np.float32)
         self._visibility = np.array([take.visibility for take in takes])
         self._sure = np.array([take.confidence for take in takes])
         self._marks = np.array([_marks(walk.places) for walk in walks])
@@ -125,12 +125,12 @@ class Emulator:
         depth = walk.places[..., 2]
         slopes = walk.apparent[..., :2] / walk.apparent[..., 2:]
         slopes = slopes + size * self._across[donor, part] / depth[..., None]
-        said = np.einsum("tki,kio->tko", _regressors(walk.places), self._gains)
-        said += size * self._left[donor, part]
+        outputs = np.einsum("tki,kio->tko", _regressors(walk.places), self._gains)
+        outputs += size * self._left[donor, part]
         return Seen(
             slopes,
-            said[..., 3] / depth,
-            said[..., :3],
+            outputs[..., 3] / depth,
+            outputs[..., :3],
             self._visibility[donor, part],
             self._sure[donor, part],
         )

@@ -35,7 +35,7 @@ class Example(NamedTuple):
 class Batch(NamedTuple):
     """Input and wanted output of the network."""
 
-    told: Singles  # (N, T, C)
+    features: Singles  # (N, T, C)
     root: Singles  # (N, T), logarithm of the centre's depth times the typical size
     depth: Singles  # (N, T, 33)
     velocity: Singles  # (N, T, 33)

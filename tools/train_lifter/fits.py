@@ -74,12 +74,12 @@ def track_of(take: Take) -> LandmarkTrack:
 def repaired(take: Take) -> Take:
     """A take with its landmarks as the lifter gets them; frames that stay empty as they were."""
     track = track_of(take)
-    found = {
+    arrays = {
         name: np.where(_like(track.present, own := getattr(take, name)), getattr(track, name), own)
         for name in ("image_px", "depth_px", "world_m", "visibility")
     }
     sure = np.where(track.bridged, 0.0, take.confidence).astype(np.float32)
-    return replace(take, confidence=sure, **found)
+    return replace(take, confidence=sure, **arrays)
 
 
 def _like(present: NDArray[np.bool_], values: NDArray[np.float32]) -> NDArray[np.bool_]:
@@ -90,7 +90,7 @@ def fitted_takes(
     takes: Sequence[Take], lifter: Lifter, progress: Progress = silent
 ) -> list[FittedTake]:
     """Fit takes in which the person is seen throughout; the person's height is known."""
-    found = []
+    fitted = []
     for number, take in enumerate(takes):
         progress(number, len(takes))
         track = track_of(take)
@@ -106,8 +106,8 @@ def fitted_takes(
             for points_m in (fit.keypoints_m, take.keypoints_m.astype(np.float64))
         )
         lifted_mps = take.stature_m * lifted.part(0, len(track)).velocity_sigma
-        found.append(FittedTake(fit, track, fitted_mps, true_mps, lifted_mps))
-    return found
+        fitted.append(FittedTake(fit, track, fitted_mps, true_mps, lifted_mps))
+    return fitted
 
 
 def fit_law(takes: Sequence[Take], lifter: Lifter, progress: Progress = silent) -> Singles:

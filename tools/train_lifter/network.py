@@ -37,10 +37,10 @@ class TemporalNetwork(nn.Module):
         self.arrays = nn.ParameterDict(learnt)
         self.dropout = nn.Dropout(dropout)
 
-    def forward(self, told: torch.Tensor) -> torch.Tensor:
+    def forward(self, features: torch.Tensor) -> torch.Tensor:
         """Outputs (N, T, M) of features (N, T, C)."""
         a = self.arrays
-        x = ((told - a["mean"]) / a["spread"]).clamp(-_FAR, _FAR)
+        x = ((features - a["mean"]) / a["spread"]).clamp(-_FAR, _FAR)
         state = x @ a["enter"] + a["enter_bias"]
         blocks = (a[name] for name in ("gain", "wide", "wide_bias", "flat", "flat_bias"))
         for dilation, gain, wide, wide_bias, flat, flat_bias in zip(
@@ -58,18 +58,20 @@ class TemporalNetwork(nn.Module):
         return Network(self.dilations, arrays)
 
 
-def random_network(told: Singles, width: int, dilations: tuple[int, ...], outputs: int) -> Network:
+def random_network(
+    features: Singles, width: int, dilations: tuple[int, ...], outputs: int
+) -> Network:
     """A network with random weights for features like those of some frames (T, C)."""
-    blocks, features = len(dilations), told.shape[1]
+    blocks, channels = len(dilations), features.shape[1]
 
     def drawn(fan_in: int, *shape: int) -> Singles:
         return np.asarray((2.0 * torch.rand(shape) - 1.0) / fan_in**0.5)
 
     arrays = {
-        "mean": told.mean(axis=0),
-        "spread": np.maximum(told.std(axis=0), 1e-3),
-        "enter": drawn(features, features, width),
-        "enter_bias": drawn(features, width),
+        "mean": features.mean(axis=0),
+        "spread": np.maximum(features.std(axis=0), 1e-3),
+        "enter": drawn(channels, channels, width),
+        "enter_bias": drawn(channels, width),
         "gain": np.ones((blocks, width)),
         "wide": drawn(3 * width, blocks, 3, width, width),
         "wide_bias": drawn(3 * width, blocks, width),
@@ -143,7 +145,7 @@ def save_network(
         name: array if name in _GIVEN else array.astype(np.float16)
         for name, array in network.arrays.items()
     }
-    told = {**meta, "dilations": list(network.dilations), "arrays": sorted(arrays)}
+    metadata = {**meta, "dilations": list(network.dilations), "arrays": sorted(arrays)}
     everything = arrays | dict(more or {})
     with atomic_write(path) as stream:
-        np.savez_compressed(stream, **everything, meta=json.dumps(told))
+        np.savez_compressed(stream, **everything, meta=json.dumps(metadata))

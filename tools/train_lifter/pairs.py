@@ -108,18 +108,18 @@ def make_pairs(options: Pairs, progress: Progress = silent) -> int:
                 seed=(options.seed, int(options.held_out), number, placement),
                 options=TargetOptions().drawn(rng),
             )
-            found = synthetic_map(synthesizer, sensor, limbs=True)
+            synthetic = synthetic_map(synthesizer, sensor, limbs=True)
             writer.append(
                 Pair(
                     subject,
                     name,
-                    np.ascontiguousarray(found.values.T),
+                    np.ascontiguousarray(synthetic.values.T),
                     radar,
                     fitted.times_s,
                     np.zeros(len(fitted.times_s), np.int8),
                     np.array(sensor.position_m),
                     placement,
-                    found.limbs,
+                    synthetic.limbs,
                 )
             )
         made += 1

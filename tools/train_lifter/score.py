@@ -48,15 +48,15 @@ def score(lifter: Lifter, takes: Sequence[Take]) -> tuple[Table, Table, float]:
     still, distances, squares = [], [], []
     for take in takes:
         one = example(repaired(take))
-        right, said = batch([one]), by_landmark(lifter.outputs(one.seen))
+        right, out = batch([one]), by_landmark(lifter.outputs(one.seen))
         distances.append(_distance(lifter, right))
-        squares.append(take.stature_m**2 * _squares(one, right, said, take.stature_m))
-        rest = said * take.stature_m
+        squares.append(take.stature_m**2 * _squares(one, right, out, take.stature_m))
+        rest = out * take.stature_m
         truth = right.velocity[0] * take.stature_m
         errors.append(rest[:, 2] - truth)
         truths.append(truth)
         depths.append(rest[:, 0] - right.depth[0] * take.stature_m)
-        sigmas.append(spread(said[:, 3]) * take.stature_m)
+        sigmas.append(spread(out[:, 3]) * take.stature_m)
         inside.append(_inside(take))
         frames.append(np.minimum(np.arange(len(truth)), np.arange(len(truth))[::-1]))
         if np.abs(truth).max() < _STILL_MPS:
@@ -85,11 +85,11 @@ def score(lifter: Lifter, takes: Sequence[Take]) -> tuple[Table, Table, float]:
 def _distance(lifter: Lifter, right: Batch) -> Floats:
     """How unlike what was learnt from each frame is, (T,): the features' mean square."""
     arrays = lifter.network.arrays
-    features = (right.told[0] - arrays["mean"]) / arrays["spread"]
+    features = (right.features[0] - arrays["mean"]) / arrays["spread"]
     return np.asarray((features**2).mean(axis=1))
 
 
-def _squares(one: Example, right: Batch, said: Floats, stature_m: float) -> Floats:
+def _squares(one: Example, right: Batch, out: Floats, stature_m: float) -> Floats:
     """Mean squares of errors over the landmarks, (T, 4), in the order of :func:`_by_likeness`.
 
     Of the lifter's depth and of the landmark model's own, and of their rates, in statures.
@@ -98,7 +98,7 @@ def _squares(one: Example, right: Batch, said: Floats, stature_m: float) -> Floa
     own = (world - world[:, TORSO_CORNERS].mean(axis=1, keepdims=True)) / stature_m
     depth, velocity = right.depth[0], right.velocity[0]
     centre = velocity - rate(depth, 0)
-    off = said[:, 0] - depth, own - depth, said[:, 2] - velocity, rate(own, 0) + centre - velocity
+    off = out[:, 0] - depth, own - depth, out[:, 2] - velocity, rate(own, 0) + centre - velocity
     return np.stack([np.square(each).mean(axis=1) for each in off], axis=1)
 
 

@@ -42,8 +42,8 @@ def train_sides(
     torch.manual_seed(recipe.seed)
     rng = np.random.default_rng(recipe.seed)
     learnt = [known_of(take) for take in known.takes]
-    told = np.concatenate([features(free_of_place(one.seen)) for one in learnt[:200]])
-    begun = random_network(told, recipe.width, recipe.dilations, len(SIDED_PARTS))
+    inputs = np.concatenate([features(free_of_place(one.seen)) for one in learnt[:200]])
+    begun = random_network(inputs, recipe.width, recipe.dilations, len(SIDED_PARTS))
     network = TemporalNetwork(begun, recipe.dropout)
     walks = (*known.captured, *known.walks)
 

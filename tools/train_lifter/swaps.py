@@ -79,7 +79,7 @@ def spoilt(rng: np.random.Generator, one: Known) -> Known:
         one = _put_in(rng, one)
     seen, wrong, weight = one
     seen = seen._replace(
-        visibility=_told(rng, np.asarray(seen.visibility)),
+        visibility=_reported(rng, np.asarray(seen.visibility)),
         slopes=_jittered(rng, np.asarray(seen.slopes)),
     )
     if rng.random() < _THINNED:
@@ -92,7 +92,7 @@ def spoilt(rng: np.random.Generator, one: Known) -> Known:
     return Known(Seen(*(np.asarray(part, np.float32) for part in seen)), wrong, weight)
 
 
-def _told(rng: np.random.Generator, visibility: Singles) -> Singles:
+def _reported(rng: np.random.Generator, visibility: Singles) -> Singles:
     """Visibility as another landmark model might tell it, or none at all."""
     if rng.random() < _SAME_VISIBILITY:
         return np.full_like(visibility, rng.uniform(0.5, 1.0))

@@ -293,42 +293,42 @@ class TakeMaker:
         """
         roi = self._landmarker.on_crop(*_first(rng, painter, vertices[0], places_px[0])).next_roi
         frames = len(vertices)
-        looks = np.append(np.arange(0, frames - 1, 2), frames - 1)
+        watched = np.append(np.arange(0, frames - 1, 2), frames - 1)
         poses: dict[int, Pose] = {}
-        for frame in looks:
+        for frame in watched:
             poses[frame] = self._look(painter, vertices[frame], roi)
             if poses[frame].confidence < _LOST:
                 roi = _around(places_px[frame])
             else:
                 roi = _towards(roi, poses[frame].next_roi)
         times_s = np.arange(frames) / RATE_HZ
-        told = _told([poses[frame] for frame in looks])
-        sizes_px = np.array([poses[frame].roi.size_px for frame in looks]) / CLOSE_UP
-        fast = fast_looks(times_s[looks], told["image_px"], told["visibility"], sizes_px)
-        for before, after in pairwise(range(len(looks))):
+        arrays = _stacked([poses[frame] for frame in watched])
+        sizes_px = np.array([poses[frame].roi.size_px for frame in watched]) / CLOSE_UP
+        fast = fast_looks(times_s[watched], arrays["image_px"], arrays["visibility"], sizes_px)
+        for before, after in pairwise(range(len(watched))):
             if fast[before] or fast[after]:
-                for frame in range(looks[before] + 1, looks[after]):
-                    near = poses[looks[before]].next_roi
+                for frame in range(watched[before] + 1, watched[after]):
+                    near = poses[watched[before]].next_roi
                     poses[frame] = self._look(painter, vertices[frame], near)
         known = sorted(poses)
         empty = np.ones(frames, bool)
         empty[known] = False
-        found = {}
-        for name, values in _told([poses[frame] for frame in known]).items():
+        filled = {}
+        for name, values in _stacked([poses[frame] for frame in known]).items():
             whole = np.full((frames, *values.shape[1:]), np.nan, np.float32)
             whole[known] = values
-            found[name] = on_cubics(times_s, whole, empty).astype(np.float32)
-        np.clip(found["visibility"], 0.0, 1.0, out=found["visibility"])
-        sure, between = found["confidence"], np.flatnonzero(empty)
+            filled[name] = on_cubics(times_s, whole, empty).astype(np.float32)
+        np.clip(filled["visibility"], 0.0, 1.0, out=filled["visibility"])
+        sure, between = filled["confidence"], np.flatnonzero(empty)
         sure[between] = np.minimum(sure[between - 1], sure[between + 1])
-        return found
+        return filled
 
     def _look(self, painter: CropPainter, surface: NDArray[np.float32], roi: Roi) -> Pose:
         near = roi.scaled(CLOSE_UP)
         return self._landmarker.on_both_sides(painter.crop(surface, near), near)
 
 
-def _told(poses: Sequence[Pose]) -> dict[str, NDArray[np.float32]]:
+def _stacked(poses: Sequence[Pose]) -> dict[str, NDArray[np.float32]]:
     """What is kept of some looks."""
     return {
         "image_px": np.array([pose.image_px[:33] for pose in poses], np.float32),

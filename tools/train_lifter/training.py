@@ -88,7 +88,7 @@ class TrainingArrays:
     captured: Sequence[Walk] = ()
 
 
-def material(
+def make_arrays(
     takes: Sequence[Take],
     kept: Sequence[Take],
     motions: Sequence[BodyMotion],
@@ -124,13 +124,13 @@ def train(
     if start is not None:
         begun = start.network
     else:
-        told = np.concatenate([batch([one]).told[0] for one in learnt[:200]])
-        begun = random_network(told, recipe.width, recipe.dilations, OUTPUTS)
+        features = np.concatenate([batch([one]).features[0] for one in learnt[:200]])
+        begun = random_network(features, recipe.width, recipe.dilations, OUTPUTS)
     network = TemporalNetwork(begun, recipe.dropout)
 
     def lost() -> torch.Tensor:
         drawn = _drawn(rng, learnt, known, recipe)
-        return loss(network(torch.from_numpy(drawn.told)), drawn, recipe)
+        return loss(network(torch.from_numpy(drawn.features)), drawn, recipe)
 
     exported = trained(network, recipe.steps, recipe.rate, lost, progress)
     return Lifter(
@@ -174,14 +174,14 @@ def loss(out: torch.Tensor, truth: Batch, recipe: Recipe) -> torch.Tensor:
     centre = torch.exp(out[..., :1].detach()) / size[:, None, None] * _rate(out[..., :1])
     velocity_error = rest[..., 2, :] + _rate(rest[..., 0, :]) + centre - velocity
     across_error = rest[..., 4:6, :].transpose(-1, -2) - across
-    said, true = (_deviation(one) for one in (velocity + velocity_error, velocity))
+    estimated, true = (_deviation(one) for one in (velocity + velocity_error, velocity))
     change = sum(
         (_huber((depth_error[:, k:] - depth_error[:, :-k]) * 30.0 / k, 1.0) * weights).mean()
         for k in (1, 2, 4)
     )
     parts = (
         recipe.velocity * (_huber(velocity_error, 0.6) * weights).mean(),
-        recipe.spread * _huber(said - true, 0.3).mean(),
+        recipe.spread * _huber(estimated - true, 0.3).mean(),
         recipe.depth * (_huber(depth_error, 0.15) * weights).mean(),
         recipe.across * (_huber(across_error, 0.1) * weights[:, None]).mean(),
         recipe.root * _huber(root_error, 0.2).mean(),

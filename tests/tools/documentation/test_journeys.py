@@ -17,7 +17,7 @@ def test_every_station_is_there_and_in_its_file(name: str) -> None:
     stations = JOURNEYS[name].stations
     assert len(stations) <= MAX_STATIONS
     for station in stations:
-        found = station.found()
+        found = station.resolve()
         assert callable(found)
         assert found.__module__.replace(".", "/") + ".py" == station.file
 

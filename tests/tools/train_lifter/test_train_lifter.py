@@ -132,7 +132,7 @@ def test_emulated_people_look_like_the_takes(takes: list[Take]) -> None:
     drawn = emulated(np.random.default_rng(1), emulator, cut)
     assert drawn.seen.slopes.shape == (24, 33, 2)
     np.testing.assert_array_equal(drawn.places, cut.places)
-    assert np.isfinite(batch([drawn]).told).all()
+    assert np.isfinite(batch([drawn]).features).all()
 
 
 @pytest.mark.slow
