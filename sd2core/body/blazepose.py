@@ -97,13 +97,13 @@ class PoseDetector:
         places = np.concatenate([raw[:, :2], raw[:, 4:8]], axis=1)
         places += np.tile(self._anchors[kept], 3)
         corner = np.array([square.centre_x_px, square.centre_y_px]) - square.size_px / 2.0
-        found = []
+        detections = []
         for rows in _same_person(places[:, :2], raw[:, 2:4], scores[kept]):
             weights = scores[kept[rows]]
             middle = weights @ places[rows] / weights.sum()
             middle = square.size_px * middle + np.tile(corner, 3)
-            found.append(Detection(Roi.around(middle[2:4], middle[4:6]), float(weights[0])))
-        return found, float(scores.max())
+            detections.append(Detection(Roi.around(middle[2:4], middle[4:6]), float(weights[0])))
+        return detections, float(scores.max())
 
     @cached_property
     def _anchors(self) -> Floats:

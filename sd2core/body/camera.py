@@ -112,10 +112,10 @@ def check_field_of_view(angle_deg: float) -> None:
 def written_focal_mm(metadata: Mapping[str, str]) -> float | None:
     """35 mm equivalent focal length among a file's metadata, or None."""
     for name, value in metadata.items():
-        found = _NUMBER.search(value) if _EQUIVALENT.search(name) else None
-        if found is None:
+        match = _NUMBER.search(value) if _EQUIVALENT.search(name) else None
+        if match is None:
             continue
-        numerator, _, denominator = found[0].partition("/")
+        numerator, _, denominator = match[0].partition("/")
         focal_mm = float(numerator) / (float(denominator or 1) or math.nan)
         if _PLAUSIBLE_MM[0] <= focal_mm <= _PLAUSIBLE_MM[1]:
             return focal_mm

@@ -172,11 +172,11 @@ class Fitting:
     ) -> BodyShape:
         """Bone lengths from evenly chosen frames, then girth from those with outlines."""
         track = self._track
-        there = track.present & ~track.bridged
-        there = there if there.any() else track.present
-        outlined = _outlined(track, there)
+        present = track.present & ~track.bridged
+        present = present if present.any() else track.present
+        outlined = _outlined(track, present)
         outlined_frames = track.silhouette_frames[outlined]
-        frames = _thinned(np.flatnonzero(there), PART_FRAMES)
+        frames = _thinned(np.flatnonzero(present), PART_FRAMES)
         known = np.union1d(frames, outlined_frames)
         evidence, trust = self._chosen(known, looked)
         rows = np.searchsorted(known, frames)
@@ -222,17 +222,17 @@ class Fitting:
             present=track.present,
             keypoints_m=keypoints_m,
             residual_m=residual_m,
-            along_sd_mps=_there(along_sd_mps, track.present),
-            across_sd_mps=_there(
+            along_sd_mps=_masked(along_sd_mps, track.present),
+            across_sd_mps=_masked(
                 _ACROSS_PER_S * lifted.across_sigma * keypoints_m[..., 2], track.present
             ),
         )
 
 
-def _outlined(track: Landmarks, there: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _outlined(track: Landmarks, present: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Numbers of the outlines that the girth is taken from, evenly spread."""
     seen = (track.silhouettes >= _MASK_SURE).any(axis=(1, 2))
-    return _thinned(np.flatnonzero(there[track.silhouette_frames] & seen), _OUTLINES)
+    return _thinned(np.flatnonzero(present[track.silhouette_frames] & seen), _OUTLINES)
 
 
 def _thinned(rows: NDArray[np.intp], most: int) -> NDArray[np.intp]:
@@ -248,5 +248,5 @@ def speed_mps(points_m: Floats, times_s: Floats) -> Floats:
     return np.asarray(moved_m / np.diff(times_s, prepend=times_s[0] - 1.0)[:, None])
 
 
-def _there(values: Floats, present: NDArray[np.bool_]) -> Floats:
+def _masked(values: Floats, present: NDArray[np.bool_]) -> Floats:
     return np.where(present[:, None], values, 0.0)

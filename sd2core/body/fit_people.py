@@ -53,9 +53,9 @@ def people_to_fit(
     models : Path, optional
         Folder of the landmark models.
     """
-    found = landmark_models(models, report.progress_of("models"), model=choices.landmark_model)
+    networks = landmark_models(models, report.progress_of("models"), model=choices.landmark_model)
     with open_video(path) as video:
-        return chosen_people(find_people(video, found, report.progress_of("people")), numbers)
+        return chosen_people(find_people(video, networks, report.progress_of("people")), numbers)
 
 
 def fit_people(
@@ -151,14 +151,14 @@ def _with_statures(
     feet, known = {}, {}
     with open_video(path) as video:
         camera, _ = camera_of(video, choices.focal_px, choices.field_of_view_deg)
-        found = landmark_models(models, model=choices.landmark_model)
+        networks = landmark_models(models, model=choices.landmark_model)
         _, partial, report = next(iter(people.values()))
         report.started(video, (partial / LANDMARKS).is_dir())
         for row, (person, partial, report) in people.items():
             with claim_folder(partial, restart), one_thread():
                 track = find_landmarks(
                     video,
-                    found,
+                    networks,
                     person=person.sightings,
                     max_gap_s=choices.max_gap_s,
                     progress_of=report.progress_of,
@@ -169,10 +169,10 @@ def _with_statures(
             with suppress(OSError, ValueError):
                 known[row] = float((partial / _STATURE).read_text())
     first_m = choices.stature_m if 0 in people else None
-    told = dict(zip(feet, statures_on_one_floor(list(feet.values()), first_m), strict=True))
+    statures_m = dict(zip(feet, statures_on_one_floor(list(feet.values()), first_m), strict=True))
     chosen = {}
     for row, (_, partial, _) in people.items():
-        stature_m = known.get(row, told[row])
+        stature_m = known.get(row, statures_m[row])
         if row == 0 and first_m is not None:
             chosen[row] = choices
         else:

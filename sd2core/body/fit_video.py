@@ -152,14 +152,14 @@ def fit_video(
     partial = out.with_name(out.name + PARTIAL)
     with open_video(path) as video:
         camera, camera_source = camera_of(video, choices.focal_px, choices.field_of_view_deg)
-        found_models = landmark_models(
+        networks = landmark_models(
             models, report.progress_of("models"), model=choices.landmark_model
         )
         with claim_folder(partial, restart), remove_without_landmarks(partial), one_thread():
             report.started(video, (partial / LANDMARKS).is_dir())
             track = find_landmarks(
                 video,
-                found_models,
+                networks,
                 person=sightings or choices.person,
                 max_gap_s=choices.max_gap_s,
                 progress_of=report.progress_of,

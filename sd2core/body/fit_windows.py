@@ -19,7 +19,7 @@ _WINDOW_FRAMES = 600
 _OVERLAP_FRAMES = 60
 """Less than half of any window: no frame is in three of them."""
 
-_TOLD_BY = ("slopes", "depth_m", "trunk_m")
+_EVIDENCE = ("slopes", "depth_m", "trunk_m")
 """Arrays by which a kept window is known to be fitted to the same evidence."""
 
 
@@ -36,17 +36,17 @@ class Windows:
         self._store = store
         self._recent = lru_cache(maxsize=2)(self._read)
 
-    def keep(self, number: int, part: Evidence, found: Pose) -> None:
+    def keep(self, number: int, part: Evidence, pose: Pose) -> None:
         """Keep the pose that was found for a window's evidence."""
-        told = {name: getattr(part, name) for name in _TOLD_BY}
-        self._store.write(_name(number), told | found._asdict())
+        evidence = {name: getattr(part, name) for name in _EVIDENCE}
+        self._store.write(_name(number), evidence | pose._asdict())
 
     def is_kept(self, number: int, part: Evidence) -> bool:
         """True if an earlier run has finished a window with the same evidence."""
         kept = self._store.read(_name(number))
-        if kept is None or not {*_TOLD_BY, *Pose._fields} <= kept.keys():
+        if kept is None or not {*_EVIDENCE, *Pose._fields} <= kept.keys():
             return False
-        return all(np.array_equal(kept[name], getattr(part, name)) for name in _TOLD_BY)
+        return all(np.array_equal(kept[name], getattr(part, name)) for name in _EVIDENCE)
 
     def poses(self, frames: NDArray[np.intp]) -> Pose:
         """The pose in each of some frames (n,), of windows that are kept.
@@ -71,19 +71,19 @@ class Windows:
         low, middle, high = np.searchsorted(frames, [start, start + overlap, stop])
         if low == high:
             return
-        found = self._recent(number).at(frames[low:high] - start)
+        fitted = self._recent(number).at(frames[low:high] - start)
         if middle > low:
             shared = slice(int(low), int(middle))
             share = np.linspace(0.0, 1.0, overlap + 2)[1:-1][frames[shared] - start]
             share = share**3 * (10.0 + share * (6.0 * share - 15.0))  # no kink in velocity
-            other = found.at(slice(0, int(middle - low)))
+            other = fitted.at(slice(0, int(middle - low)))
             between = to_vector(transposed(pose.turns[shared]) @ other.turns)
             pose.turns[shared] = pose.turns[shared] @ from_vector(share[:, None, None] * between)
             pose.translation_m[shared] += share[:, None] * (
                 other.translation_m - pose.translation_m[shared]
             )
-        pose.turns[middle:high] = found.turns[middle - low :]
-        pose.translation_m[middle:high] = found.translation_m[middle - low :]
+        pose.turns[middle:high] = fitted.turns[middle - low :]
+        pose.translation_m[middle:high] = fitted.translation_m[middle - low :]
 
     def _read(self, number: int) -> Pose:
         what = f"The pose of frame {self.spans[number][0]} and on has"

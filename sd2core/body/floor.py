@@ -77,21 +77,21 @@ def statures_on_one_floor(
     first_m : float, optional
         Stature of the first person, where it is known.
     """
-    found = [each for each in people if each is not None]
-    if len(found) < 2:
+    known = [each for each in people if each is not None]
+    if len(known) < 2:
         return [None] * len(people)
-    mean = np.mean([each.down for each in found], axis=0)
+    mean = np.mean([each.down for each in known], axis=0)
     mean /= np.linalg.norm(mean)
     # Over the tilt of the floor and the height of the camera above it.
-    best, best_m = np.inf, np.full(len(found), DEFAULT_STATURE_M)
-    cost = np.stack([_unlikely(_STATURES_M)] * len(found))  # (people, statures)
+    best, best_m = np.inf, np.full(len(known), DEFAULT_STATURE_M)
+    cost = np.stack([_unlikely(_STATURES_M)] * len(known))  # (people, statures)
     if first_m is not None and people[0] is not None:
         cost[0] = np.where(np.abs(_STATURES_M - first_m) < 0.006, 0.0, np.inf)
     for tilt_deg in _TILTS_DEG:
         turn = np.radians(tilt_deg)
         c, s = np.cos(turn), np.sin(turn)
         normal = np.array([mean[0], c * mean[1] - s * mean[2], s * mean[1] + c * mean[2]])
-        logs = [np.log(np.maximum(each.points @ normal, _LEAST_M)) for each in found]
+        logs = [np.log(np.maximum(each.points @ normal, _LEAST_M)) for each in known]
         middle = np.array([np.median(each) for each in logs])
         within = sum(
             float(np.minimum(np.abs(each - level) / _DEPTH_SD, 3.0).mean()) ** 2
@@ -105,8 +105,8 @@ def statures_on_one_floor(
             here = own + float(total.min(axis=1).sum())
             if here < best:
                 best, best_m = here, _STATURES_M[total.argmin(axis=1)]
-    told = iter(best_m.tolist())
-    return [None if each is None else round(next(told), 2) for each in people]
+    statures_m = iter(best_m.tolist())
+    return [None if each is None else round(next(statures_m), 2) for each in people]
 
 
 def _unlikely(stature_m: Floats) -> Floats:

@@ -48,7 +48,7 @@ _AWAY, _AWAY_PER_S = 0.5, 1.5
 _STEADY, _STEADY_PER_S = 0.1, 0.15
 
 
-def signature(crop: Pixels, pose: Pose) -> Signature:
+def signature_of(crop: Pixels, pose: Pose) -> Signature:
     """Colours of a person in a crop of :data:`CROP_PX` pixels."""
     import cv2
 
@@ -78,9 +78,9 @@ def similarity(one: Signature, two: Signature) -> float:
     return float(parts.mean()) if len(parts) else 0.0
 
 
-def alike(known: Signature, looks: Signature, least: float = ALIKE) -> bool:
+def alike(known: Signature, signature: Signature, least: float = ALIKE) -> bool:
     """True if looks are like those of a known person in every part that is seen."""
-    parts = _similarities(known, looks)
+    parts = _similarities(known, signature)
     enough = len(parts) >= min(_MIN_PARTS, int(known.any(axis=1).sum()))
     return bool(enough and len(parts) and parts.min() >= least)
 
@@ -109,26 +109,26 @@ def _in_crop(pose: Pose) -> Floats:
 
 
 @dataclass(eq=False)
-class Looks:
+class Appearance:
     """Looks of one person from all sides, as far as seen."""
 
     recent: Signature  # mean over the last second or so
     kept: list[Signature] = field(default_factory=list)  # of earlier seconds, unlike one another
 
-    def likeness(self, looks: Signature) -> float:
+    def likeness(self, signature: Signature) -> float:
         """Similarity to the look that is most alike."""
-        return max(similarity(looks, each) for each in (self.recent, *self.kept))
+        return max(similarity(signature, each) for each in (self.recent, *self.kept))
 
-    def may_be(self, looks: Signature, least: float = ALIKE) -> bool:
+    def may_be(self, signature: Signature, least: float = ALIKE) -> bool:
         """True if the person has looked like this, in every part."""
-        return any(alike(each, looks, least) for each in (self.recent, *self.kept))
+        return any(alike(each, signature, least) for each in (self.recent, *self.kept))
 
-    def learn(self, looks: Signature) -> None:
+    def learn(self, signature: Signature) -> None:
         """Take in how the person looks now; what lasts for a second is kept."""
         # What is not seen now looks as it did; what was never seen is taken as it is.
         share = np.where(self.recent.any(axis=1), np.float32(0.05), np.float32(1.0))
-        share *= looks.any(axis=1)
-        self.recent = self.recent + share[:, None] * (looks - self.recent)
+        share *= signature.any(axis=1)
+        self.recent = self.recent + share[:, None] * (signature - self.recent)
         if max((similarity(self.recent, each) for each in self.kept), default=0.0) < _ANOTHER_LOOK:
             self.kept = [*self.kept, self.recent][-_MAX_LOOKS:]
 
@@ -209,5 +209,5 @@ class Trail:
 class Bystander:
     """Somebody else in the video."""
 
-    looks: Signature
+    signature: Signature
     trail: Trail

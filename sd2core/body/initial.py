@@ -50,9 +50,9 @@ def initial_pose(rig: Rig, seen_m: Floats, trust: Floats) -> Pose:
         fit.ball(f"hip.{side}", _pairs(*leg[:2]) + _pairs(*leg[1:]))
         foot = [f"{part}.{side}" for part in ("ankle", "heel", "foot_index")]
         fit.ball(f"ankle.{side}", _pairs(foot[0], foot[2]) + _pairs(foot[1], foot[2]))
-    there = rig.keypoints.positions(rig.transforms(pose.turns, pose.translation_m))
+    points_m = rig.keypoints.positions(rig.transforms(pose.turns, pose.translation_m))
     weights = trust[..., None] + 1e-9
-    pose.translation_m[:] = ((seen_m - there) * weights).sum(axis=1) / weights.sum(axis=1)
+    pose.translation_m[:] = ((seen_m - points_m) * weights).sum(axis=1) / weights.sum(axis=1)
     return pose
 
 
@@ -111,9 +111,9 @@ class _Fitting:
         parent = skeleton.parents[bone]
         start, end = (np.array(rows) for rows in zip(*pairs, strict=True))
         # Vectors as the joints below it have them already, seen from this bone.
-        there = self.rig.keypoints.positions(transforms)
+        points_m = self.rig.keypoints.positions(transforms)
         own = transposed(transforms[:, bone, :, :3])[:, None]
-        rest = applied(own, there[:, end] - there[:, start])
+        rest = applied(own, points_m[:, end] - points_m[:, start])
         above = transforms[:, parent, :, :3] if parent >= 0 else np.eye(3)[None]
         seen = applied(transposed(above)[:, None], self.seen_m[:, end] - self.seen_m[:, start])
         weights = np.minimum(self.trust[:, start], self.trust[:, end]) + 1e-3

@@ -169,16 +169,16 @@ def repaired_track(
     present, bridged = np.zeros((2, len(video)), bool)
     written = 0
 
-    def write(found: RawTrack) -> None:
+    def write(part: RawTrack) -> None:
         nonlocal written
-        frames = slice(written, written + len(found.present))
-        known = vars(found) | {"confidence": refined.confidence[frames]}
+        frames = slice(written, written + len(part.present))
+        known = vars(part) | {"confidence": refined.confidence[frames]}
         store.write(_name(written), {name: known[name] for name in PER_FRAME})
-        present[frames], bridged[frames] = found.present, found.bridged
+        present[frames], bridged[frames] = part.present, part.bridged
         written = frames.stop
 
     times_s, seen = video.timebase.times_s, refined.confidence > 0.0
-    repairs = repair_landmarks(refined.found, times_s, seen, max_gap_s, write, unclear)
+    repairs = repair_landmarks(refined.raw_track, times_s, seen, max_gap_s, write, unclear)
     silhouette_frames, silhouettes = refined.silhouettes()
     return TrackInParts(
         timebase=video.timebase,
@@ -243,7 +243,7 @@ class RefinedStretches:
         frames, masks = zip(*self._masks, strict=True)
         return np.concatenate(frames), np.concatenate(masks)
 
-    def found(self, start: int, stop: int) -> RawTrack:
+    def raw_track(self, start: int, stop: int) -> RawTrack:
         """Frames ``start`` to ``stop``, not repaired."""
         step = self._frames_each
         begin = start // step * step

@@ -176,10 +176,10 @@ def fetch_models(
 def _fetch(package: Package, into: Path, progress: Progress) -> None:
     with tempfile.TemporaryDirectory(prefix="sd2-models-") as place:
         archive = _downloaded(package, Path(place), progress)
-        found = _sha256(archive)
-        if found != package.sha256:
+        digest = _sha256(archive)
+        if digest != package.sha256:
             raise Sd2Error(
-                f"The downloaded {archive.name} is not the known one (sha256 {found})",
+                f"The downloaded {archive.name} is not the known one (sha256 {digest})",
                 package.sha256,
                 f"Try again. {_HOW}",
             )
@@ -200,10 +200,10 @@ def _checked(folder: Path, model: LandmarkModel) -> LandmarkModels:
                 f"{name} of {package.requirement}",
                 "Fetch it with `sd2 doctor --fetch-models`",
             )
-        found = _sha256(path)
-        if found != _SHA256[name]:
+        digest = _sha256(path)
+        if digest != _SHA256[name]:
             raise Sd2Error(
-                f"{path} is not the known landmark model (sha256 {found})",
+                f"{path} is not the known landmark model (sha256 {digest})",
                 _SHA256[name],
                 "Fetch it again with `sd2 doctor --fetch-models`",
             )
@@ -259,10 +259,10 @@ def _extract(package: Package, path: Path, into: Path) -> None:
             _HOW,
         ) from error
     for name, content in contents.items():
-        found = hashlib.sha256(content).hexdigest()
-        if found != _SHA256.get(name, found):
+        digest = hashlib.sha256(content).hexdigest()
+        if digest != _SHA256.get(name, digest):
             raise Sd2Error(
-                f"{name} in {path} is not the known one (sha256 {found})", package.requirement
+                f"{name} in {path} is not the known one (sha256 {digest})", package.requirement
             )
     for name, content in contents.items():
         with atomic_write(into / name) as stream:
@@ -287,8 +287,8 @@ def _pip() -> Sequence[str]:
 
 def _npm(scratch: Path) -> Sequence[Sequence[str]]:
     """Commands that lead to npm, of which the last is to be completed."""
-    if found := shutil.which("npm"):
-        return ((found,),)
+    if npm := shutil.which("npm"):
+        return ((npm,),)
     node = str(scratch / "node")
     return (
         (*_pip(), "install", _NODE, "--target", node, "--no-deps", *_QUIET),
@@ -311,15 +311,15 @@ def _downloaded(package: Package, folder: Path, progress: Progress) -> Path:
         *before, npm = _npm(scratch)
         pack = ("pack", package.requirement, "--silent", "--pack-destination", str(target))
         commands = (*before, (*npm, *pack))
-    said, code = "", 0
+    output, code = "", 0
     with (folder / "errors").open("w+", encoding="utf-8", errors="replace") as errors:
         for command in commands:
             code = code or _run(command, errors, os.environ | places, folder, package, progress)
         errors.seek(0)
-        said = errors.read()
+        output = errors.read()
     archives = list(target.glob("*"))
     if code != 0 or not archives:
-        raise _refused(package, said)
+        raise _refused(package, output)
     progress(package.size_bytes, package.size_bytes)
     return archives[0]
 
@@ -347,15 +347,15 @@ def _run(
     return process.returncode
 
 
-def _refused(package: Package, said: str) -> Sd2Error:
+def _refused(package: Package, output: str) -> Sd2Error:
     """Error for a failed download, by the output of the package manager."""
-    if "No module named pip" in said:
+    if "No module named pip" in output:
         return Sd2Error(
             f"The landmark models cannot be fetched: {sys.executable} has no pip",
             f"pip, to download {package.requirement}",
             f"Install it with `{sys.executable} -m ensurepip`. {_HOW}",
         )
-    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    lines = [line.strip() for line in output.splitlines() if line.strip()]
     reasons = [line for line in lines if line.startswith("ERROR:")] or lines or ["no reason given"]
     if any(word in line.lower() for line in lines for word in _OFFLINE):
         return Sd2Error(

@@ -39,7 +39,7 @@ _ONE_STRETCH_S, _SHORT_S = 1.0, 0.3
 # -- Outliers ------------------------------------------------------------------------------------
 
 
-def replace_outliers(found: RawTrack) -> tuple[RawTrack, NDArray[np.bool_]]:
+def replace_outliers(track: RawTrack) -> tuple[RawTrack, NDArray[np.bool_]]:
     """Replace landmarks that jump away and back within a tenth of a second.
 
     A run of frames is replaced by the cubic through two frames before and after it if every frame
@@ -47,14 +47,14 @@ def replace_outliers(found: RawTrack) -> tuple[RawTrack, NDArray[np.bool_]]:
     get and return (:data:`MAX_ACCELERATION_MPS2`), than six standard deviations of the noise, and
     than the frame before is from the frame after. Returns the track, and what was replaced (T, 33).
     """
-    replaced = np.zeros(found.visibility.shape, bool)
-    changed = {name: getattr(found, name).copy() for name in ("image_px", "depth_px", "world_m")}
-    rows = np.flatnonzero(found.present)
+    replaced = np.zeros(track.visibility.shape, bool)
+    changed = {name: getattr(track, name).copy() for name in ("image_px", "depth_px", "world_m")}
+    rows = np.flatnonzero(track.present)
     if len(rows) < 5:
-        return found, replaced
-    times, scale = found.times_s[rows], pixels_per_metre(found)[rows, None]
+        return track, replaced
+    times, scale = track.times_s[rows], pixels_per_metre(track)[rows, None]
     for landmark in range(len(LANDMARKS)):
-        place = place_m(found, rows, scale, landmark)
+        place = place_m(track, rows, scale, landmark)
         seen = find_spikes(times, place[:, :2])
         deep = find_spikes(times, place[:, 2:])
         replaced[rows, landmark] = seen | deep
@@ -66,7 +66,7 @@ def replace_outliers(found: RawTrack) -> tuple[RawTrack, NDArray[np.bool_]]:
             if wrong.any():
                 values = changed[name][rows, landmark]
                 changed[name][rows, landmark] = on_cubics(times, values, wrong)
-    return replace(found, **changed), replaced
+    return replace(track, **changed), replaced
 
 
 def find_spikes(times_s: Floats, places_m: Floats) -> NDArray[np.bool_]:
@@ -84,10 +84,10 @@ def find_spikes(times_s: Floats, places_m: Floats) -> NDArray[np.bool_]:
     away = np.linalg.norm(places_m - median_filter(places_m, window, mode="nearest"), axis=1)
     for length in range(min(longest, frames - 4), 0, -1):
         for _ in range(_ROUNDS):
-            found = _outlying_runs(times_s, current, away, length) & ~wrong
-            if not found.any():
+            spikes = _outlying_runs(times_s, current, away, length) & ~wrong
+            if not spikes.any():
                 break
-            wrong |= found
+            wrong |= spikes
             current = on_cubics(times_s, places_m, wrong)
     return wrong
 
@@ -115,13 +115,13 @@ def _outlying_runs(
     # Of two outliers and a good frame between them, the latter is where most are.
     rank = least + away_m[inner].min(axis=1)
     surely = np.flatnonzero(least > limit)
-    found = np.zeros(len(times_s), bool)
+    outlying = np.zeros(len(times_s), bool)
     for start in surely[np.argsort(-rank[surely], kind="stable")]:
         run = inner[start]
         # What overlaps a clearer one was its shadow.
-        if not found[max(run[0] - 2, 0) : run[-1] + 3].any():
-            found[run] = True
-    return found
+        if not outlying[max(run[0] - 2, 0) : run[-1] + 3].any():
+            outlying[run] = True
+    return outlying
 
 
 def _cubic(support: Floats, at: Floats) -> Floats:
@@ -153,15 +153,15 @@ def on_cubics(times_s: Floats, values: NDArray[Any], wrong: NDArray[np.bool_]) -
 # -- Gaps ----------------------------------------------------------------------------------------
 
 
-def bridge_gaps(found: RawTrack, max_gap_s: float) -> RawTrack:
+def bridge_gaps(track: RawTrack, max_gap_s: float) -> RawTrack:
     """Interpolate across gaps of up to ``max_gap_s``; longer ones stay empty.
 
     By a curve that does not overshoot (monotone piecewise cubic).
     """
-    rows, times = np.flatnonzero(found.present), found.times_s
+    rows, times = np.flatnonzero(track.present), track.times_s
     short = (np.diff(rows) > 1) & (np.diff(times[rows]) <= max_gap_s + 1e-9)
     if not short.any():
-        return found
+        return track
     from scipy.interpolate import PchipInterpolator
 
     fill = np.zeros(len(times), bool)
@@ -171,11 +171,11 @@ def bridge_gaps(found: RawTrack, max_gap_s: float) -> RawTrack:
         near[max(number - 2, 0) : number + 4] = True
     rows, changed = rows[near], {}
     for name in ("image_px", "depth_px", "world_m", "visibility"):
-        values = getattr(found, name).copy()
+        values = getattr(track, name).copy()
         values[fill] = PchipInterpolator(times[rows], values[rows], axis=0)(times[fill])
         changed[name] = values
     changed["visibility"][fill] *= _BRIDGED_VISIBILITY
-    return replace(found, present=found.present | fill, bridged=found.bridged | fill, **changed)
+    return replace(track, present=track.present | fill, bridged=track.bridged | fill, **changed)
 
 
 # -- The whole clip ------------------------------------------------------------------------------
@@ -210,13 +210,13 @@ def repair_landmarks(
     counts = _Counts(swapped)
     for start, stop in parts(len(times_s)):
         first, last = _around(start, stop, times_s, seen, max_gap_s)
-        found = read(first, last)
+        track = read(first, last)
         for part, frames in swapped.items():
-            found = swap_sides(found, part, frames[first:last])
-        found, replaced = replace_outliers(found)
-        found = bridge_gaps(found, max_gap_s).part(start - first, stop - first)
-        counts.add(found, replaced[start - first : stop - first])
-        write(found)
+            track = swap_sides(track, part, frames[first:last])
+        track, replaced = replace_outliers(track)
+        track = bridge_gaps(track, max_gap_s).part(start - first, stop - first)
+        counts.add(track, replaced[start - first : stop - first])
+        write(track)
     return counts.sentences(max_gap_s, np.zeros(len(seen), bool) if unclear is None else unclear)
 
 
@@ -255,11 +255,11 @@ class _Counts:
     outlying: int = 0
     bridged: list[NDArray[np.bool_]] = field(default_factory=list)
 
-    def add(self, found: RawTrack, replaced: NDArray[np.bool_]) -> None:
+    def add(self, track: RawTrack, replaced: NDArray[np.bool_]) -> None:
         self.landmarks += int(replaced.sum())
         self.outlying += int(replaced.any(axis=1).sum())
-        self.bridged.append(found.bridged)
-        self.missing.append(~found.present)
+        self.bridged.append(track.bridged)
+        self.missing.append(~track.present)
 
     def sentences(self, max_gap_s: float, unclear: NDArray[np.bool_]) -> tuple[str, ...]:
         notes = [

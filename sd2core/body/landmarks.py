@@ -99,7 +99,7 @@ def find_landmarks(
         sightings = person
         store.write(SIGHTINGS, vars(sightings))
     else:
-        sightings = _found(video, models, person, threads, progress_of("find"), on_frame, store)
+        sightings = _sighted(video, models, person, threads, progress_of("find"), on_frame, store)
     progress = progress_of("refine")
     refined = _refined(video, models, sightings, silhouettes, threads, progress, on_frame, store)
     if not refined.confidence.any():
@@ -113,7 +113,7 @@ def find_landmarks(
     return repaired_track(store, video, refined, max_gap_s, unclear, others)
 
 
-def _found(
+def _sighted(
     video: VideoReader,
     models: LandmarkModels,
     person: Rectangle | None,

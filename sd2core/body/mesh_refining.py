@@ -145,11 +145,11 @@ class RefinedVertices(MadeVertices):
         return [(k, min(k + self._step, frames)) for k in range(0, frames, self._step)]
 
     def _smoothed(self, rows: NDArray[np.intp]) -> NDArray[Any]:
-        found = np.empty((len(rows), *self.shape[1:]), self.dtype)
+        vertices = np.empty((len(rows), *self.shape[1:]), self.dtype)
         for start in np.unique(rows // self._step) * self._step:
-            there = rows // self._step == start // self._step
-            found[there] = self._part(int(start))[rows[there] - start]
-        return found
+            inside = rows // self._step == start // self._step
+            vertices[inside] = self._part(int(start))[rows[inside] - start]
+        return vertices
 
     def _part(self, start: int) -> NDArray[Any]:
         if self._kept is None or self._kept[0] != start:
@@ -183,9 +183,9 @@ class RefinedVertices(MadeVertices):
                 smooth[part], spread[part] = smooth_paths(times_s, limbs[part])
         kept = slice(start - first, stop - first)
         shape = (stop - start, -1, 3)
-        found = smooth[kept].reshape(shape) + calm[kept, None]
+        smoothed = smooth[kept].reshape(shape) + calm[kept, None]
         sigma = np.hypot(spread[kept].reshape(shape), calm_spread[kept, None])
-        return found, chosen[kept] - found, sigma
+        return smoothed, chosen[kept] - smoothed, sigma
 
 
 class _Limbs:
@@ -232,8 +232,8 @@ def smooth_paths(times_s: Floats, paths_m: Floats) -> tuple[Floats, Floats]:
     smooth = _below(_FIRST_HZ, times_s, paths_m - jumps, weights)
     for _ in range(_ROUNDS - 1):
         trust = _trust(paths_m - smooth, jitter_m)
-        found = sum(weights[k][:, None] * smooth[k : len(smooth) - 3 + k] for k in range(4))
-        sd = liveliness(np.asarray(found), times_s, _LEAST_MPS3, share=_LIVELY)
+        jerks = sum(weights[k][:, None] * smooth[k : len(smooth) - 3 + k] for k in range(4))
+        sd = liveliness(np.asarray(jerks), times_s, _LEAST_MPS3, share=_LIVELY)
         smooth = _solved(weights, paths_m, jitter_m / sd, trust)
     return smooth, _velocity_sd(times_s, paths_m - smooth, sd)
 

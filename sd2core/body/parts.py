@@ -66,12 +66,12 @@ def body_parts(mesh: MeshSequence) -> VertexParts | None:
     >>> parts.names[parts.numbers[0]]
     'trunk'
     """
-    found = [_parts_of(body) for body in mesh.bodies]
+    parts = [_parts_of(body) for body in mesh.bodies]
     if not mesh.others:
-        return found[0]
+        return parts[0]
     first, *others = (
         VertexParts((WHOLE,), np.zeros(body.vertex_count, np.uint8)) if one is None else one
-        for body, one in zip(mesh.bodies, found, strict=True)
+        for body, one in zip(mesh.bodies, parts, strict=True)
     )
     return replace(first, others=tuple(others))
 
@@ -95,8 +95,8 @@ def _find_parts(mesh: MeshSequence) -> VertexParts | None:
     if mesh.faces is None:
         return None
     first = int(np.argmax(mesh.presence.present))
-    found = parts_by_shape(mesh.frame(first).astype(np.float64), mesh.faces)
-    return None if found is None else VertexParts(PARTS, found)
+    numbers = parts_by_shape(mesh.frame(first).astype(np.float64), mesh.faces)
+    return None if numbers is None else VertexParts(PARTS, numbers)
 
 
 def known_parts(mesh: MeshSequence) -> VertexParts:

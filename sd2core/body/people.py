@@ -182,8 +182,8 @@ def of_two(sizes_px: Floats) -> NDArray[np.bool_]:
     ``sizes_px`` (N,) are those of one person's squares, NaN where they are not found.
     """
     two = np.zeros(len(sizes_px), bool)
-    found = np.isfinite(sizes_px)
-    stretches = list(runs(found))
+    sighted = np.isfinite(sizes_px)
+    stretches = list(runs(sighted))
     for number, (start, stop) in enumerate(stretches):
         rows = list(range(start, stop))
         if number > 0:
@@ -209,20 +209,20 @@ def _number(person: Somebody | None, people: list[Somebody]) -> int:
 def _people(kept: dict[str, NDArray[np.generic]], times_s: Floats) -> list[SeenPerson]:
     """People of the arrays of :func:`_followed`."""
     frames, rois, confidence = (np.asarray(kept[name]) for name in ("frames", "rois", "confidence"))
-    found = np.isfinite(rois[..., 0])  # (people, N)
+    sighted = np.isfinite(rois[..., 0])  # (people, N)
     people = []
     for row in range(len(rois)):
-        there = found[row]
+        own = sighted[row]
         others = np.zeros((len(frames), len(PLACES)), bool)
         for other in np.delete(np.arange(len(rois)), row):
             right = rois[other, :, 0] > rois[row, :, 0]
-            others[:, 0] |= found[other] & there & ~right
-            others[:, 1] |= found[other] & there & right
-            others[:, 2] |= found[other] & ~there
-        first, last = np.flatnonzero(there)[[0, -1]]
+            others[:, 0] |= sighted[other] & own & ~right
+            others[:, 1] |= sighted[other] & own & right
+            others[:, 2] |= sighted[other] & ~own
+        first, last = np.flatnonzero(own)[[0, -1]]
         between = np.arange(len(frames)) - first
         unsure = others[:, 2] | np.asarray(kept["doubtful"])
-        hidden = ~there & unsure & (between > 0) & (between < last - first)
+        hidden = ~own & unsure & (between > 0) & (between < last - first)
         sightings = Sightings(frames, rois[row], confidence[row], hidden, others)
         may_be = int(kept["may_be"][row]) or None
         certainty = float(kept["certainty"][row])

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.blazepose import Pose, PoseDetector, PoseLandmarker
-from sd2core.body.identity import Looks, Signature, Trail, signature
+from sd2core.body.identity import Appearance, Signature, Trail, signature_of
 from sd2core.body.person_selection import FOUND, parts_of_picture
 from sd2core.body.person_tracker import jumped
 from sd2core.body.roi import Floats, Pixels, Roi, apart_px, roi_numbers
@@ -54,7 +54,7 @@ class Sight:
     """One body in one picture."""
 
     pose: Pose
-    looks: Signature
+    signature: Signature
     body: NDArray[np.bool_]  # pixels of the picture made smaller
     score: float  # best of the detections there; 0: none
 
@@ -69,7 +69,7 @@ class Stretch:
     """Run of looks at one person."""
 
     trail: Trail
-    looks: Looks
+    appearance: Appearance
     numbers: list[int] = field(default_factory=list)  # of the pictures
     times_s: list[float] = field(default_factory=list)
     rois: list[Floats] = field(default_factory=list)
@@ -81,7 +81,7 @@ class Stretch:
         if self.numbers:
             self.trail = self.trail.followed(sight.roi, time_s)
         if learn:
-            self.looks.learn(sight.looks)
+            self.appearance.learn(sight.signature)
         self.numbers.append(number)
         self.times_s.append(time_s)
         self.rois.append(roi_numbers(sight.roi))
@@ -97,7 +97,7 @@ class Stretch:
 
     def unlikeness(self, sight: Sight, time_s: float, trail: Trail | None = None) -> float:
         """How much speaks against a body being this person, as the logarithm of odds."""
-        likeness = self.looks.likeness(sight.looks)
+        likeness = self.appearance.likeness(sight.signature)
         return against(trail or self.trail, sight.roi, time_s, likeness)
 
     def trail_from(self, row: int) -> Trail:
@@ -188,7 +188,7 @@ class PeopleFollower:
             self.doubts.append(Doubt(number, time_s, left))
             return
         for sight in left:
-            new = Stretch(Trail(sight.roi, time_s, time_s), Looks(sight.looks))
+            new = Stretch(Trail(sight.roi, time_s, time_s), Appearance(sight.signature))
             new.add(number, time_s, sight)
             self.stretches.append(new)
             self._active.append(new)
@@ -213,11 +213,11 @@ class PeopleFollower:
                 or any(_one_body(body, each) for each in past.bodies)
             ):
                 return
-            sight = Sight(pose, signature(pose.roi.cut(past.picture), pose), body, 0.0)
+            sight = Sight(pose, signature_of(pose.roi.cut(past.picture), pose), body, 0.0)
             own = stretch.unlikeness(sight, -past.time_s, trail)
             others = [
-                each.unlikeness(sight, past.time_s, there)
-                for each, there in past.unseen
+                each.unlikeness(sight, past.time_s, last_trail)
+                for each, last_trail in past.unseen
                 if each is not stretch
             ]
             if own > _NOBODY or own + _SURELY > min(others, default=np.inf):
@@ -252,15 +252,15 @@ class PeopleFollower:
             if not any(_same_square(person.roi, roi) for roi in looked):
                 looked.append(person.roi)
                 poses.append(self._landmarker.in_picture(picture, person.roi))
-        found: list[Sight] = []
+        sights: list[Sight] = []
         for pose in sorted(poses, key=lambda each: -each.confidence):
             body = _small_mask(pose, width, height)
-            if pose.confidence < FOUND or any(_one_body(body, each.body) for each in found):
+            if pose.confidence < FOUND or any(_one_body(body, each.body) for each in sights):
                 continue
             scores = [each.score for each in people if _same_square(each.roi, pose.next_roi)]
-            looks = signature(pose.roi.cut(picture), pose)
-            found.append(Sight(pose, looks, body, max(scores, default=0.0)))
-        return found
+            signature = signature_of(pose.roi.cut(picture), pose)
+            sights.append(Sight(pose, signature, body, max(scores, default=0.0)))
+        return sights
 
 
 def _small_mask(pose: Pose, width: int, height: int) -> NDArray[np.bool_]:

@@ -99,7 +99,7 @@ def _against_between(person: Somebody, sight: Sight, doubt: Doubt) -> float:
     """How much speaks against a body being somebody who was seen before, after, or both."""
     if any(doubt.number in each.numbers for each in person.stretches):
         return _NEVER
-    likeness = max(each.looks.likeness(sight.looks) for each in person.stretches)
+    likeness = max(each.appearance.likeness(sight.signature) for each in person.stretches)
     cost, gap_s = (1.0 - likeness) / UNLIKE, np.inf
     trails = []
     before = [each for each in person.stretches if each.numbers[0] < doubt.number]
@@ -159,7 +159,8 @@ def _next_best(costs: Floats, chosen: list[int], one: int, count: int) -> float:
 def _against(earlier: Stretch, later: Stretch, start: Trail) -> float:
     """How much speaks against two stretches being of one person."""
     gap_s = later.times_s[0] - earlier.times_s[-1]
-    likeness = max(earlier.looks.likeness(each) for each in (later.looks.recent, *later.looks.kept))
+    new = later.appearance
+    likeness = max(earlier.appearance.likeness(each) for each in (new.recent, *new.kept))
     ahead = against(earlier.trail, _roi(later, 0), later.times_s[0], likeness)
     back = against(start, _roi(earlier, -1), -earlier.times_s[-1], likeness)
     return 0.5 * (ahead + back) + max(gap_s - _LONG_S, 0.0)

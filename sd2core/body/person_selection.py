@@ -67,7 +67,7 @@ def find_prominent_person(
     for frames, part in _rounds(video):
         looked.update(frames)
         squares = parts_of_picture(video.width, video.height, part)
-        found: list[tuple[float, Start]] = []
+        ranked: list[tuple[float, Start]] = []
         for frame in frames:
             picture = video.read(frame)
             for square in squares:
@@ -79,11 +79,11 @@ def find_prominent_person(
                     best_score = max(best_score, min(score, pose.confidence))
                     if pose.confidence >= FOUND:
                         rank = each.score * _prominence(each.roi, video.width, video.height)
-                        found.append((rank, Start(frame, pose.next_roi)))
-        if found:
-            enough = _NEARLY * max(rank for rank, _ in found)
+                        ranked.append((rank, Start(frame, pose.next_roi)))
+        if ranked:
+            enough = _NEARLY * max(rank for rank, _ in ranked)
             # An early one: a video decodes forwards only.
-            return next(start for rank, start in found if rank >= enough)
+            return next(start for rank, start in ranked if rank >= enough)
     raise Sd2Error(
         f"No person was found in {video.path} (in the best of {len(looked)} frames the model is"
         f" {100 * best_score:.0f} % sure)",
@@ -181,7 +181,7 @@ def _squares(rectangle: Rectangle, picture: Pixels, detector: PoseDetector) -> l
     # A small person shows only where a part of the picture is looked at.
     part = Roi(x, y, 1.6 * size)
     people = detector.people(picture) + detector.look(picture, part)[0]
-    squares = [found.roi for found in people]
+    squares = [person.roi for person in people]
     squares = [roi for roi in squares if _within(roi, rectangle)]
     squares.sort(
         key=lambda roi: (

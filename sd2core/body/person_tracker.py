@@ -11,12 +11,12 @@ from sd2core.body.blazepose import Detection, Pose, PoseDetector, PoseLandmarker
 from sd2core.body.identity import (
     ALIKE,
     THE_SAME,
+    Appearance,
     Bystander,
-    Looks,
     Signature,
     Trail,
     alike,
-    signature,
+    signature_of,
     similarity,
 )
 from sd2core.body.person_selection import FOUND
@@ -58,7 +58,7 @@ class PersonTracker:
     lost: bool = False
     unclear: bool = False
     """True if whom the last picture shows may be another person."""
-    own: Looks | None = None
+    own: Appearance | None = None
     people: list[Detection] | None = None
     """Who was detected in the last picture, None if nobody was looked for."""
     others: list[Bystander] = field(default_factory=list)
@@ -85,25 +85,25 @@ class PersonTracker:
         assert self.trail is not None
         self.unclear, self.mistaken_s = False, np.inf
         self.people = self._watched(picture, time_s)
-        pose = looks = None
+        pose = signature = None
         if not self.lost:
             pose = self._look(picture, self.trail.predicted(time_s))
         if pose is not None:
-            looks = None if jumped(pose) else self._recognised(picture, pose, time_s)
-        followed = looks is not None
+            signature = None if jumped(pose) else self._recognised(picture, pose, time_s)
+        followed = signature is not None
         if not followed:
             people = self._seen(picture, self.trail.predicted(time_s))
-            pose, looks = self._search(picture, people, time_s)
-        if pose is None or looks is None:
+            pose, signature = self._search(picture, people, time_s)
+        if pose is None or signature is None:
             self.lost, self.hopes = True, []
             self._meet(time_s)
             return None
         if followed or not self._doubtful(time_s):
             self.hopes = []
-        elif not self._sure(pose, looks, time_s):
+        elif not self._sure(pose, signature, time_s):
             self.lost = True
             return None
-        self._accept(pose, looks, time_s)
+        self._accept(pose, signature, time_s)
         grown = max(past.growth(pose.next_roi) for past in self.lately)
         if time_s - self.looked_round_s >= _LOOK_ROUND_S or grown > 2.0 * _TELLING:
             self.looked_round_s = time_s
@@ -132,7 +132,7 @@ class PersonTracker:
         last_s = max((each.trail.time_s for each in self.others), default=-np.inf)
         return time_s - lost_s > _GONE_S or lost_s - last_s < _GONE_S
 
-    def _sure(self, pose: Pose, looks: Signature, time_s: float) -> bool:
+    def _sure(self, pose: Pose, signature: Signature, time_s: float) -> bool:
         """True if somebody has looked the same as the person who had gone for long enough.
 
         At a glance others in like clothes do too, the more so while they come into the picture.
@@ -143,7 +143,7 @@ class PersonTracker:
         near = self.hopes and self.hopes[-1][0].is_near(roi, time_s)
         if not near or self.stranger_s == -np.inf:  # others have come: who is alike may be one
             self.hopes = []
-        same = self.own.may_be(looks, THE_SAME)
+        same = self.own.may_be(signature, THE_SAME)
         self.hopes = [*self.hopes, (Trail(roi, time_s, time_s), pose)] if same else []
         here = self.trail.continues(roi, time_s)
         least_s = _SURE_HERE_S if here else _SURE_S
@@ -160,23 +160,23 @@ class PersonTracker:
     ) -> Signature | None:
         """Looks of the person, if this is them; who is followed may change their looks."""
         assert self.trail is not None
-        roi, looks = pose.next_roi, signature(pose.roi.cut(picture), pose)
+        roi, signature = pose.next_roi, signature_of(pose.roi.cut(picture), pose)
         if self.own is None:
-            return looks
-        mine, theirs = self._likeness(looks)
+            return signature
+        mine, theirs = self._likeness(signature)
         near = [each for each in self.others if time_s - each.trail.time_s < _GONE_S]
         least = THE_SAME if near and not followed else ALIKE
-        twins = [each for each in self.others if self.own.may_be(each.looks, THE_SAME)]
+        twins = [each for each in self.others if self.own.may_be(each.signature, THE_SAME)]
         # Who comes back from behind the edge of the picture was seen in part, and in a wrong size.
         any_size = not followed and not twins and not near
         if (
             self.trail.reaches(roi, time_s, any_size=any_size)
             and theirs <= mine + 0.05
             and (not near or not followed or self.trail.continues(roi, time_s))
-            and ((followed and not near) or self.own.may_be(looks, least))
+            and ((followed and not near) or self.own.may_be(signature, least))
             and not any(self._may_be(twin, roi, time_s, followed) for twin in twins)
         ):
-            return looks
+            return signature
         self.unclear = True
         return None
 
@@ -194,10 +194,10 @@ class PersonTracker:
             return False
         return not self.trail.continues(roi, time_s)
 
-    def _likeness(self, looks: Signature) -> tuple[float, float]:
+    def _likeness(self, signature: Signature) -> tuple[float, float]:
         assert self.own is not None
-        theirs = max((similarity(looks, other.looks) for other in self.others), default=0.0)
-        return self.own.likeness(looks), theirs
+        theirs = max((similarity(signature, other.signature) for other in self.others), default=0.0)
+        return self.own.likeness(signature), theirs
 
     def _search(
         self, picture: Pixels, people: list[Detection], time_s: float
@@ -206,20 +206,20 @@ class PersonTracker:
         assert self.trail is not None
         best: tuple[Pose | None, Signature | None] = None, None
         best_rank = -np.inf
-        for found in people[:_MAX_CANDIDATES]:
-            if not self.trail.is_near(found.roi, time_s):
+        for person in people[:_MAX_CANDIDATES]:
+            if not self.trail.is_near(person.roi, time_s):
                 self.unclear = True
                 continue
-            pose = self._look(picture, found.roi)
+            pose = self._look(picture, person.roi)
             if pose is None:
                 continue
-            looks = self._recognised(picture, pose, time_s, followed=False)
-            if looks is None:
+            signature = self._recognised(picture, pose, time_s, followed=False)
+            if signature is None:
                 continue
-            mine = 1.0 if self.own is None else self.own.likeness(looks)
+            mine = 1.0 if self.own is None else self.own.likeness(signature)
             rank = mine - 0.3 * min(self.trail.unlike(pose.next_roi, time_s), 2.0)
             if rank > best_rank:
-                best, best_rank = (pose, looks), rank
+                best, best_rank = (pose, signature), rank
         return best
 
     def _people(self, picture: Pixels, near: Roi) -> list[Detection]:
@@ -229,19 +229,19 @@ class PersonTracker:
         around = Roi(near.centre_x_px, near.centre_y_px, 1.5 * near.size_px)
         return self.detector.look(picture, around)[0] + self.detector.people(picture)
 
-    def _accept(self, pose: Pose, looks: Signature, time_s: float) -> None:
+    def _accept(self, pose: Pose, signature: Signature, time_s: float) -> None:
         assert self.trail is not None
         self.trail = self.trail.followed(pose.next_roi, time_s, steady=not self.lost)
         since_s = time_s - _PARTED_S
         self.lately = [*(each for each in self.lately if each.time_s > since_s), self.trail]
         self.lost, self.stranger_s = False, np.inf
         if self.own is None:
-            self.own = Looks(looks)
+            self.own = Appearance(signature)
             return
-        mine, theirs = self._likeness(looks)
+        mine, theirs = self._likeness(signature)
         # While another person covers them, the colours are not the person's own.
         if mine > theirs + 0.1:
-            self.own.learn(looks)
+            self.own.learn(signature)
 
     def _watched(self, picture: Pixels, time_s: float) -> list[Detection] | None:
         """People in the picture, if others may be near; these are followed."""
@@ -267,23 +267,25 @@ class PersonTracker:
         self, picture: Pixels, people: list[Detection], pose: Pose, time_s: float
     ) -> None:
         """Learn the colours of others while they stand apart."""
-        for found in people[: _MAX_CANDIDATES + 1]:
-            if _beside(found.roi, pose.next_roi):
+        for person in people[: _MAX_CANDIDATES + 1]:
+            if _beside(person.roi, pose.next_roi):
                 continue
-            other = self._look(picture, found.roi)
+            other = self._look(picture, person.roi)
             if other is None or _beside(other.next_roi, pose.next_roi):
                 continue
-            looks = signature(other.roi.cut(picture), other)
-            known = max(self.others, key=lambda each: similarity(looks, each.looks), default=None)
-            if known is None or not alike(known.looks, looks):
-                known = Bystander(looks, Trail(other.next_roi, time_s, time_s))
+            signature = signature_of(other.roi.cut(picture), other)
+            known = max(
+                self.others, key=lambda each: similarity(signature, each.signature), default=None
+            )
+            if known is None or not alike(known.signature, signature):
+                known = Bystander(signature, Trail(other.next_roi, time_s, time_s))
                 self.others = [*self.others, known][-_MAX_CANDIDATES:]
             elif known.trail.time_s < time_s:
                 known.trail = known.trail.followed(other.next_roi, time_s)
             self.mistaken_s = self._was_until_s(known)
             if self.mistaken_s < np.inf:
                 self.unclear = True
-                known.looks = signature(pose.roi.cut(picture), pose)
+                known.signature = signature_of(pose.roi.cut(picture), pose)
                 self.trail, known.trail, self.lately = known.trail, self.lately[-1], []
                 return
 
@@ -293,7 +295,7 @@ class PersonTracker:
         While one covers another in like clothes only their sizes tell them apart.
         """
         assert self.own is not None
-        if not self.own.may_be(other.looks):
+        if not self.own.may_be(other.signature):
             return np.inf
         here, there = self.lately[-1], other.trail
         grown = {
@@ -328,14 +330,14 @@ class PersonTracker:
         """State that the next step depends on, as arrays."""
         assert self.trail is not None
         assert self.own is not None
-        looks = [each.looks for each in self.others]
+        signatures = [each.signature for each in self.others]
         trails = [each.trail.numbers() for each in self.others]
         lately = [each.numbers() for each in self.lately]
         return {
             "trail": self.trail.numbers(),
             "clock": np.array([self.looked_round_s, self.stranger_s, float(self.lost)]),
             "own": np.array([self.own.recent, *self.own.kept]),
-            "others": np.array(looks, np.float32).reshape(-1, *self.own.recent.shape),
+            "others": np.array(signatures, np.float32).reshape(-1, *self.own.recent.shape),
             "trails": np.array(trails, np.float64).reshape(-1, 8),
             "lately": np.array(lately, np.float64).reshape(-1, 8),
         }
@@ -347,10 +349,10 @@ class PersonTracker:
         self.lost = bool(lost)
         self.lately = [Trail.of(each) for each in np.asarray(state["lately"], np.float64)]
         recent, *kept = np.asarray(state["own"], np.float32)
-        self.own = Looks(recent, kept)
+        self.own = Appearance(recent, kept)
         self.others = [
-            Bystander(looks, Trail.of(numbers))
-            for looks, numbers in zip(
+            Bystander(signature, Trail.of(numbers))
+            for signature, numbers in zip(
                 np.asarray(state["others"], np.float32),
                 np.asarray(state["trails"], np.float64),
                 strict=True,

@@ -40,31 +40,31 @@ class RawTrack:
         return RawTrack(**{name: values[start:stop] for name, values in vars(self).items()})
 
 
-def pixels_per_metre(found: RawTrack) -> Floats:
+def pixels_per_metre(track: RawTrack) -> Floats:
     """Scale of the person in the picture, (T,), in pixels per metre: median over 0.5 s."""
     from scipy.ndimage import median_filter
 
     image, world = (
         np.sqrt(places.var(axis=1, dtype=np.float64).sum(axis=1))
-        for places in (found.image_px, found.world_m[..., :2])
+        for places in (track.image_px, track.world_m[..., :2])
     )
     with np.errstate(invalid="ignore", divide="ignore"):
         scale = image / world
     good = np.isfinite(scale) & (scale > 0)
     middle = float(np.median(scale[good])) if good.any() else 1.0
     scale[~good] = middle
-    step_s = float(np.median(np.diff(found.times_s))) if len(scale) > 1 else SCALE_S
+    step_s = float(np.median(np.diff(track.times_s))) if len(scale) > 1 else SCALE_S
     # One landmark that jumps away makes that frame's picture look larger.
     window = max(round(SCALE_S / step_s), 5)
     return np.asarray(median_filter(scale, size=window, mode="nearest"))
 
 
-def place_m(found: RawTrack, rows: NDArray[np.intp], scale: Floats, landmark: int) -> Floats:
+def place_m(track: RawTrack, rows: NDArray[np.intp], scale: Floats, landmark: int) -> Floats:
     """One landmark in the picture and in the model's own coordinates, in metres, (N, 5).
 
     Parameters
     ----------
-    found : RawTrack
+    track : RawTrack
         Landmarks, not repaired.
     rows : int ndarray, (N,)
         Frames of it.
@@ -73,5 +73,5 @@ def place_m(found: RawTrack, rows: NDArray[np.intp], scale: Floats, landmark: in
     landmark : int
         Number of the landmark, 0 to 32.
     """
-    picture = found.image_px[rows, landmark] / scale
-    return np.concatenate([picture, found.world_m[rows, landmark]], axis=1, dtype=np.float64)
+    picture = track.image_px[rows, landmark] / scale
+    return np.concatenate([picture, track.world_m[rows, landmark]], axis=1, dtype=np.float64)

@@ -96,7 +96,7 @@ class Refiner:
         first = np.zeros(frames, bool)
         first[looked_at(times_s, _STEP_S)] = True
         first[[frame - start for frame in kept if start <= frame < start + frames]] = True
-        found = RefinedFrames(
+        refined = RefinedFrames(
             image_px=np.full((frames, 33, 2), np.nan, np.float32),
             depth_px=np.full((frames, 33), np.nan, np.float32),
             world_m=np.full((frames, 33, 3), np.nan, np.float32),
@@ -112,7 +112,7 @@ class Refiner:
         def settle(number: int, looking: Future[Pose | None] | None) -> None:
             pose = None if looking is None else looking.result()
             if pose is not None:
-                _write(found, number, pose)
+                _write(refined, number, pose)
                 if start + number in kept:
                     numbers.append(start + number)
                     masks.append(_silhouette(pose, video))
@@ -134,17 +134,17 @@ class Refiner:
                 settle(*waiting.popleft())
         while waiting:
             settle(*waiting.popleft())
-        self._fill(found, times_s, first, rois, between)
+        self._fill(refined, times_s, first, rois, between)
         if not masks:
-            return found
+            return refined
         return RefinedFrames(
-            **vars(found)
+            **vars(refined)
             | {"silhouette_frames": np.array(numbers, np.intp), "silhouettes": np.stack(masks)}
         )
 
     def _fill(
         self,
-        found: RefinedFrames,
+        refined: RefinedFrames,
         times_s: NDArray[np.float64],
         first: NDArray[np.bool_],
         rois: Sequence[Roi | None],
@@ -155,8 +155,8 @@ class Refiner:
         sizes_px = [np.nan if roi is None else roi.size_px for roi in rois]
         slow = ~fast_looks(
             times_s[known],
-            found.image_px[known],
-            found.visibility[known],
+            refined.image_px[known],
+            refined.visibility[known],
             np.array(sizes_px)[known],
         )
         numbers = np.array(list(between), np.intp)
@@ -168,14 +168,14 @@ class Refiner:
             if (roi := rois[number]) is not None
         }
         numbers, before = numbers[calm], before[calm]
-        for values in (found.image_px, found.depth_px, found.world_m, found.visibility):
+        for values in (refined.image_px, refined.depth_px, refined.world_m, refined.visibility):
             values[numbers] = on_cubics(times_s, values, ~first)[numbers]
-        np.clip(found.visibility, 0.0, 1.0, out=found.visibility)
-        sure = found.confidence[known]
-        found.confidence[numbers] = np.minimum(sure[before], sure[before + 1])
+        np.clip(refined.visibility, 0.0, 1.0, out=refined.visibility)
+        sure = refined.confidence[known]
+        refined.confidence[numbers] = np.minimum(sure[before], sure[before + 1])
         for number, pose in looking.items():
             if (seen := pose.result()) is not None:
-                _write(found, number, seen)
+                _write(refined, number, seen)
 
     def _look(self, picture: Pixels, roi: Roi) -> Pose | None:
         return self._look_closely(roi.scaled(CLOSE_UP).cut(picture), roi)
@@ -191,12 +191,12 @@ class Refiner:
         return pose if pose.confidence >= FOUND and stayed else None
 
 
-def _write(found: RefinedFrames, number: int, pose: Pose) -> None:
-    found.image_px[number] = pose.image_px[:33]
-    found.depth_px[number] = pose.depth_px
-    found.world_m[number] = pose.world_m
-    found.visibility[number] = pose.visibility * pose.presence
-    found.confidence[number] = pose.confidence
+def _write(refined: RefinedFrames, number: int, pose: Pose) -> None:
+    refined.image_px[number] = pose.image_px[:33]
+    refined.depth_px[number] = pose.depth_px
+    refined.world_m[number] = pose.world_m
+    refined.visibility[number] = pose.visibility * pose.presence
+    refined.confidence[number] = pose.confidence
 
 
 def fast_looks(

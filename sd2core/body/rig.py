@@ -88,8 +88,8 @@ class KeypointSpace:
             else:
                 row = anchor.at
                 if mirrored:
-                    there = vertices[row] * np.array([-1.0, 1.0, 1.0])
-                    row = int(np.argmin(((vertices - there) ** 2).sum(axis=1)))
+                    opposite = vertices[row] * np.array([-1.0, 1.0, 1.0])
+                    row = int(np.argmin(((vertices - opposite) ** 2).sum(axis=1)))
                 self.base_m[number] = vertices[row]
                 self.directions_m[:, number] = directions[:, row]
 

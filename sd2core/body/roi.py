@@ -128,9 +128,9 @@ def roi_path(sightings: Sightings, times_s: Floats) -> Floats:
     and after.
     """
     path = np.full((len(times_s), 4), np.nan)
-    found = np.isfinite(sightings.rois[:, 0])
+    sighted = np.isfinite(sightings.rois[:, 0])
     # Stretches of sightings in which the person was never lost.
-    for start, stop in runs(found):
+    for start, stop in runs(sighted):
         frames = sightings.frames[start:stop]
         times = times_s[frames]
         rois = sightings.rois[start:stop].copy()

@@ -134,14 +134,14 @@ def shape_of_outlines(
         ]
         return float(_OUTLINE_WEIGHT * (1.0 - np.mean(shares)) + 0.5 * (steps**2).sum())
 
-    found = minimize(
+    result = minimize(
         loss,
         np.zeros(len(space)),
         method="Powell",
         options={"maxfev": _TRIALS, "xtol": 0.05, "ftol": 1e-3},
         bounds=[(-2.5, 2.5)] * len(space),
     )
-    return shaped(found.x)
+    return shaped(result.x)
 
 
 def silhouette(

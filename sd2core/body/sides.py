@@ -65,58 +65,58 @@ def find_side_swaps(read: Read, frames: int) -> dict[str, NDArray[np.bool_]]:
     return swapped
 
 
-def undo_side_swaps(found: RawTrack) -> tuple[RawTrack, dict[str, NDArray[np.bool_]]]:
+def undo_side_swaps(track: RawTrack) -> tuple[RawTrack, dict[str, NDArray[np.bool_]]]:
     """Undo swaps of left and right: of head and trunk, of the arms, of the legs, or of all.
 
     Those sides are chosen that make the motion smooth (the sum of accelerations) and are likely, by
     dynamic programming over both sides of each frame. Returns the track, and per part the frames
     that were changed, (T,).
     """
-    swaps = {part: np.zeros(len(found.times_s), bool) for part in SIDED_PARTS}
-    rows = np.flatnonzero(found.present)
+    swaps = {part: np.zeros(len(track.times_s), bool) for part in SIDED_PARTS}
+    rows = np.flatnonzero(track.present)
     if len(rows) < 3:
-        return found, swaps
-    scale = pixels_per_metre(found)[rows, None]
-    odds = np.clip(swap_odds(found)[rows] - _RARER, -_SURE, _SURE)
+        return track, swaps
+    scale = pixels_per_metre(track)[rows, None]
+    odds = np.clip(swap_odds(track)[rows] - _RARER, -_SURE, _SURE)
     for number, (part, members) in enumerate(SIDED_PARTS.items()):
         alone = -_ODDS_M2 * len(members) * odds[:, number]
-        swaps[part][rows] = _cheapest(_motion_cost(found, rows, scale, members), alone)
-        found = swap_sides(found, part, swaps[part])
-    return found, swaps
+        swaps[part][rows] = _cheapest(_motion_cost(track, rows, scale, members), alone)
+        track = swap_sides(track, part, swaps[part])
+    return track, swaps
 
 
-def swap_sides(found: RawTrack, part: str, frames: NDArray[np.bool_]) -> RawTrack:
+def swap_sides(track: RawTrack, part: str, frames: NDArray[np.bool_]) -> RawTrack:
     """Swap left and right of one of :data:`SIDED_PARTS` in some frames (T,)."""
     members = list(SIDED_PARTS[part])
     order = np.arange(len(LANDMARKS))
     order[members] = _PARTNERS[members]
-    return found.picked(order, frames)
+    return track.picked(order, frames)
 
 
 # -- What the network says -------------------------------------------------------------------------
 
 
-def swap_odds(found: RawTrack) -> Floats:
+def swap_odds(track: RawTrack) -> Floats:
     """Log odds that each of :data:`SIDED_PARTS` is mirrored, (T, 3); 0 without a person."""
-    odds = np.zeros((len(found.times_s), len(SIDED_PARTS)))
-    rows = np.flatnonzero(found.present)
-    breaks = np.flatnonzero(np.diff(found.times_s[rows]) > _LONGEST_GAP_S) + 1
+    odds = np.zeros((len(track.times_s), len(SIDED_PARTS)))
+    rows = np.flatnonzero(track.present)
+    breaks = np.flatnonzero(np.diff(track.times_s[rows]) > _LONGEST_GAP_S) + 1
     for stretch in np.split(rows, breaks):
         if len(stretch) > 1:
-            odds[stretch] = _odds(_bundled(), found, stretch)
+            odds[stretch] = _odds(_bundled(), track, stretch)
     return odds
 
 
-def _odds(network: Network, found: RawTrack, rows: NDArray[np.intp]) -> Floats:
+def _odds(network: Network, track: RawTrack, rows: NDArray[np.intp]) -> Floats:
     """Log odds (N, 3) of frames that follow one another closely."""
-    times_s = found.times_s[rows]
+    times_s = track.times_s[rows]
     place = np.arange(len(rows), dtype=np.float64)
     seen = free_of_place(
         Seen(
-            found.image_px[rows].astype(np.float64),
-            found.depth_px[rows].astype(np.float64),
-            found.world_m[rows].astype(np.float64),
-            found.visibility[rows].astype(np.float64),
+            track.image_px[rows].astype(np.float64),
+            track.depth_px[rows].astype(np.float64),
+            track.world_m[rows].astype(np.float64),
+            track.visibility[rows].astype(np.float64),
             np.ones(len(rows)),
         )
     )
@@ -143,12 +143,12 @@ def likely_swaps(network: Network, seen: Seen) -> NDArray[np.float32]:
 
     The mean over the stretch, its mirror image, and both played backwards.
     """
-    told = []
+    odds = []
     for view in (seen, mirrored(seen)):
         scale = scale_of(view)
-        told.append(network(features(view, scale)))
-        told.append(network(features(backwards(view), scale))[::-1])
-    return np.mean(told, axis=0, dtype=np.float32)
+        odds.append(network(features(view, scale)))
+        odds.append(network(features(backwards(view), scale))[::-1])
+    return np.mean(odds, axis=0, dtype=np.float32)
 
 
 @lru_cache(maxsize=1)
@@ -168,7 +168,7 @@ def load_sides(path: Path | None = None) -> Network:
 
 
 def _motion_cost(
-    found: RawTrack, rows: NDArray[np.intp], scale: Floats, members: tuple[int, ...]
+    track: RawTrack, rows: NDArray[np.intp], scale: Floats, members: tuple[int, ...]
 ) -> Floats:
     """Squared distances (m²) of landmarks from smooth paths, for each choice of sides.
 
@@ -177,8 +177,8 @@ def _motion_cost(
     cost = np.zeros((2, 2, 2, len(rows) - 2))
     for landmark in members:
         pair = (landmark, MIRRORED[landmark])
-        sides = [place_m(found, rows, scale, each) for each in pair]
-        cost += _bends(found.times_s[rows], np.stack(sides))
+        sides = [place_m(track, rows, scale, each) for each in pair]
+        cost += _bends(track.times_s[rows], np.stack(sides))
     switch = np.abs(np.diff(np.indices((2, 2, 2)), axis=0)).sum(axis=0)  # (a, b, c)
     return np.asarray(cost + 0.5 * len(members) * _SWITCH_M**2 * switch[..., None])
 

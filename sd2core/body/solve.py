@@ -160,8 +160,8 @@ class Objective:
             0.5 * (values[1:] + values[:-1])
             for values in (evidence.velocity_mps, evidence.velocity_sd_mps)
         )
-        standing = evidence.standing_sd_mps
-        standing_sd_mps = np.repeat(np.maximum(standing[1:], standing[:-1]), 3, axis=1)
+        sd_mps = evidence.standing_sd_mps
+        standing_sd_mps = np.repeat(np.maximum(sd_mps[1:], sd_mps[:-1]), 3, axis=1)
         self._held_per_m = 1.0 / (standing_sd_mps * self._step_s[:, None])  # (T - 1, 12)
         heads, index = rig.skeleton.heads_m, rig.skeleton.index
         self._arm_m = float(
@@ -327,10 +327,10 @@ def _size_error(evidence: Evidence) -> tuple[Floats, Floats]:
     Independent errors and one of the size, which all landmarks share, have the covariance
     1 + s² u uᵀ; the root of its inverse is 1 - share · u uᵀ / |u|².
     """
-    there = np.isfinite(evidence.slopes_sd)[..., None]
-    slopes = np.where(there, evidence.slopes, 0.0)
-    middle = slopes.sum(axis=1, keepdims=True) / np.maximum(there.sum(axis=1, keepdims=True), 1)
-    change = np.where(there, slopes - middle, 0.0) / evidence.slopes_sd[..., None]
+    known = np.isfinite(evidence.slopes_sd)[..., None]
+    slopes = np.where(known, evidence.slopes, 0.0)
+    middle = slopes.sum(axis=1, keepdims=True) / np.maximum(known.sum(axis=1, keepdims=True), 1)
+    change = np.where(known, slopes - middle, 0.0) / evidence.slopes_sd[..., None]
     change = change.reshape(len(change), -1, 1)
     length = np.linalg.norm(change, axis=1, keepdims=True)
     share = 1.0 - 1.0 / np.sqrt(1.0 + (evidence.size_sd * length) ** 2)
@@ -437,14 +437,14 @@ def _descend(objective: Objective, pose: Pose, *, robust: bool, tick: Callable[[
         now, normal = objective.normal(pose, trust)
         for _ in range(6):
             tried = objective.moved(pose, normal.step(damping))
-            found = objective.residuals(tried)
-            then = cost(weighted(found, trust))
+            tried_residuals = objective.residuals(tried)
+            then = cost(weighted(tried_residuals, trust))
             if then <= now:
                 break
             damping = max(damping, 1e-4) * 10.0
         else:
             return pose
-        pose, residuals = tried, found
+        pose, residuals = tried, tried_residuals
         damping = max(damping / 10.0, 1e-6)
         if now - then < _CONVERGED * now:
             break

@@ -18,7 +18,7 @@ from sd2core.body.blazepose import (
     PoseDetector,
     PoseLandmarker,
 )
-from sd2core.body.identity import Looks, Trail
+from sd2core.body.identity import Appearance, Trail
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.people import SeenPerson, chosen_people, find_people, of_two
 from sd2core.body.people_following import Doubt, PeopleFollower, Sight, Stretch, assigned
@@ -50,7 +50,7 @@ def stretch(
         trail = trail.followed(roi, time_s)
     return Stretch(
         trail,
-        Looks(looks_of(clothes)),
+        Appearance(looks_of(clothes)),
         numbers=np.rint(times / STEP_S).astype(int).tolist(),
         times_s=times.tolist(),
         rois=[roi_numbers(roi) for roi in rois],

@@ -381,7 +381,7 @@ class TestMotion:
             monkeypatch.setattr(owner, name, watching)
 
         watched(TrackInParts, "part")
-        watched(RefinedStretches, "found")
+        watched(RefinedStretches, "raw_track")
         watched(LiftedInParts, "part")
         watched(LiftedInParts, "_sampled")
         watched(fit_windows.Windows, "poses")
@@ -392,7 +392,7 @@ class TestMotion:
         mesh = motion.mesh("low")
         for start in range(0, 400, 50):
             mesh.read(start, start + 50)
-        assert set(longest) == {"part", "found", "_sampled", "poses", "evidence_of"}
+        assert set(longest) == {"part", "raw_track", "_sampled", "poses", "evidence_of"}
         # A part, and what around it matters.
         around = max(30, Lifter.load().network.reach + 3)
         assert max(longest.values()) <= 50 + 2 * around

@@ -12,7 +12,7 @@ from filmed_people import CAMERA, Picture, empty_room, film, person_at
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2core.body.identity import ALIKE, Looks, Signature, Trail, alike, similarity
+from sd2core.body.identity import ALIKE, Appearance, Signature, Trail, alike, similarity
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.landmarks import find_landmarks
 from sd2core.body.person_selection import Rectangle, Start
@@ -82,10 +82,10 @@ class TestTrail:
         np.testing.assert_array_equal(again.velocity, trail.velocity)
 
 
-class TestLooks:
+class TestAppearance:
     def test_a_person_is_known_from_every_side_that_was_seen(self) -> None:
         front, back = looks_of(1), looks_of(2)
-        person = Looks(front)
+        person = Appearance(front)
         for share in np.linspace(0.0, 1.0, 60, dtype=np.float32):
             person.learn((1 - share) * front + share * back)
         for _ in range(60):
@@ -96,7 +96,7 @@ class TestLooks:
         assert person.likeness(looks_of(3)) < 0.5
 
     def test_what_covers_a_person_for_a_moment_is_not_learnt(self) -> None:
-        person = Looks(looks_of(1))
+        person = Appearance(looks_of(1))
         for looks in [looks_of(1)] * 15 + [looks_of(2)] * 4 + [looks_of(1)] * 15:
             person.learn(looks)
         assert person.likeness(looks_of(2)) < ALIKE
@@ -123,7 +123,7 @@ class TestLooks:
     def test_what_is_seen_later_is_learnt_and_what_is_hidden_kept(self) -> None:
         upper = looks_of(1)
         upper[4:] = 0.0
-        person = Looks(upper)
+        person = Appearance(upper)
         person.learn(looks_of(1))
         for _ in range(60):
             person.learn(upper)
