@@ -80,7 +80,7 @@ class A121Source(Source):
             with contextlib.suppress(OSError):  # it has ended; its answer is missing below
                 self._input.write(settings.encode() + b"\n")
                 self._input.flush()
-            self._head, self.delay_s = self._described(self._told(), session)
+            self._head, self.delay_s = self._described(self._next_message(), session)
         except BaseException:
             self.close()
             raise
@@ -97,7 +97,7 @@ class A121Source(Source):
         while len(read := self._output.read(a121_client.HEAD.size)) == a121_client.HEAD.size:
             failed, saturated, time_s, received_s = a121_client.HEAD.unpack(read)
             if failed:
-                self._told()
+                self._next_message()
             if len(content := self._output.read(size)) < size:
                 break
             first_s = time_s if first_s is None else first_s
@@ -138,30 +138,30 @@ class A121Source(Source):
         stop.wait()
         end_beside(self._process, _END_S)
 
-    def _told(self) -> dict[str, Any]:
+    def _next_message(self) -> dict[str, Any]:
         """A line of JSON of the process; Sd2Error if it says that something failed."""
         line = self._output.readline()
-        told: dict[str, Any] = json.loads(line) if line else {"failed": "it ended at once"}
-        if "failed" in told:
+        message: dict[str, Any] = json.loads(line) if line else {"failed": "it ended at once"}
+        if "failed" in message:
             raise Sd2Error(
-                f"Acconeer's exploration tool cannot measure ({told['failed']})",
+                f"Acconeer's exploration tool cannot measure ({message['failed']})",
                 "an A121 that it finds",
                 _INSTALL,
             )
-        return told
+        return message
 
-    def _described(self, told: dict[str, Any], session: Path | None) -> tuple[GrowingHead, float]:
+    def _described(self, setup: dict[str, Any], session: Path | None) -> tuple[GrowingHead, float]:
         """Head of the frames, and the delay of half a burst of sweeps."""
         named = "the usual session" if session is None else session.name
         with errors_in(session or Path(named)):
-            if not told["frame_rate_hz"]:
+            if not setup["frame_rate_hz"]:
                 raise Sd2Error("The session states no frame rate", "frame_rate")
             radar = a121_radar(
-                tuple(told["ranges_m"]),
-                max(PULSE_WIDTHS_M[one] for one in told["profiles"]),
-                told["sweeps"],
-                told["sweep_s"],
-                1.0 / told["frame_rate_hz"],
+                tuple(setup["ranges_m"]),
+                max(PULSE_WIDTHS_M[one] for one in setup["profiles"]),
+                setup["sweeps"],
+                setup["sweep_s"],
+                1.0 / setup["frame_rate_hz"],
             )
         head = GrowingHead(
             radar=radar,
@@ -174,4 +174,4 @@ class A121Source(Source):
             ),
             start_unix_s=0.0,
         )
-        return head, 0.5 * told["sweeps"] * told["sweep_s"]
+        return head, 0.5 * setup["sweeps"] * setup["sweep_s"]

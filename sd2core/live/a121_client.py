@@ -88,8 +88,8 @@ def _wait_for_end(stop: threading.Event) -> None:
     stop.set()
 
 
-def _say(out: BinaryIO, **told: Any) -> None:
-    out.write(json.dumps(told).encode() + b"\n")
+def _say(out: BinaryIO, **fields: Any) -> None:
+    out.write(json.dumps(fields).encode() + b"\n")
     out.flush()
 
 

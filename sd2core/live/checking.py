@@ -235,20 +235,20 @@ def _agreement(seen: Sequence[Seen], moved: Sequence[Moved]) -> Answer:
         _series([(one.time_s, one.growth_hz) for one in moved]),
     )
     numbers = {"correlation": likeness, "video_late_s": lag_s}
-    told = f"correlation {likeness:.2f}".replace("-", "−")
+    value = f"correlation {likeness:.2f}".replace("-", "−")
     if abs(likeness) < _LIKENESS:
         words = (
-            f"Radar and video cannot be compared ({told}; {_LIKENESS:g} is needed): walk towards"
+            f"Radar and video cannot be compared ({value}; {_LIKENESS:g} is needed): walk towards"
             " both, and away again, a few times."
         )
     elif likeness < 0:
         words = (
-            f"The radar's sign is wrong: what it sees come nearer shrinks in the video ({told})."
+            f"The radar's sign is wrong: what it sees come nearer shrinks in the video ({value})."
             " Set the sign of the radar, or swap I and Q."
         )
     else:
         order = "after" if lag_s > 0 else "before"
-        words = f"What comes nearer by the radar grows in the video ({told}), which is"
+        words = f"What comes nearer by the radar grows in the video ({value}), which is"
         words += f" {abs(lag_s):.2f} s {order} the radar."
         if abs(lag_s) > _CLOCK_S:
             delay = "camera" if lag_s > 0 else "radar"
@@ -260,12 +260,12 @@ def _series(values: list[tuple[float, float]]) -> NDArray[Any]:
     """Times and values without what is shorter than a quarter of a second, (2, n)."""
     from scipy.ndimage import median_filter
 
-    found = np.array(values, dtype=np.float64).reshape(-1, 2).T
-    if found.shape[1] < 2:
-        return found
-    step_s = float(np.median(np.diff(found[0])))
-    found[1] = median_filter(found[1], size=2 * round(0.5 * _SMOOTHED_S / step_s) + 1)
-    return found
+    series = np.array(values, dtype=np.float64).reshape(-1, 2).T
+    if series.shape[1] < 2:
+        return series
+    step_s = float(np.median(np.diff(series[0])))
+    series[1] = median_filter(series[1], size=2 * round(0.5 * _SMOOTHED_S / step_s) + 1)
+    return series
 
 
 def _likeness(radar: NDArray[Any], video: NDArray[Any]) -> tuple[float, float]:
@@ -277,9 +277,9 @@ def _likeness(radar: NDArray[Any], video: NDArray[Any]) -> tuple[float, float]:
     ours = np.interp(times_s, *radar)
     if len(ours) < 2 or not ours.std():
         return 0.0, 0.0
-    found = [(0.0, 0.0)]
+    by_lag = [(0.0, 0.0)]
     for lag_s in np.arange(-_LAG_S, _LAG_S + 0.5 * _STEP_S, _STEP_S):
         theirs = np.interp(times_s + lag_s, *video)
         if theirs.std():
-            found.append((float(np.corrcoef(ours, theirs)[0, 1]), float(lag_s)))
-    return max(found, key=lambda one: abs(one[0]))
+            by_lag.append((float(np.corrcoef(ours, theirs)[0, 1]), float(lag_s)))
+    return max(by_lag, key=lambda one: abs(one[0]))

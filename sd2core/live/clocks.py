@@ -112,9 +112,9 @@ class Clocks:
         except (KeyError, TypeError, ValueError) as error:
             raise Sd2Error(f"{path} has no {error}", "clocks that `sd2 record` wrote") from error
 
-    def write(self, folder: Path, **told: Any) -> None:
+    def write(self, folder: Path, **facts: Any) -> None:
         """Write it, with what else is told of the clocks."""
-        about = {"format": "sd2-clocks", "version": 1, **vars(self), **told}
+        about = {"format": "sd2-clocks", "version": 1, **vars(self), **facts}
         atomic_write_json(folder / CLOCKS_NAME, about)
 
     def recording_s(self, monotonic_s: float) -> float:
@@ -154,8 +154,8 @@ def correct_drift(radar: Path, line: ClockLine) -> None:
     note = f"Times are the radar's, made {line.drift_ppm:+.1f} millionths longer by its arrivals."
     with atomic_write(radar / INDEX_NAME) as stream:
         stream.write(entries.tobytes())
-    told = head.model_copy(update={"notes": (*head.notes, note)})
-    atomic_write_text(radar / HEAD_NAME, told.model_dump_json(indent=2) + "\n")
+    corrected = head.model_copy(update={"notes": (*head.notes, note)})
+    atomic_write_text(radar / HEAD_NAME, corrected.model_dump_json(indent=2) + "\n")
 
 
 def arrival_line(radar: Path, rate: float | None = None) -> ClockLine:

@@ -20,9 +20,9 @@ class Counts:
     not_shown: int = 0  # stored, not in the live map: the caller was too slow
 
     @classmethod
-    def of(cls, told: Mapping[str, Any]) -> Self:
+    def of(cls, message: Mapping[str, Any]) -> Self:
         """Numbers that ``sd2 listen --json`` tells."""
-        return cls(**{one.name: int(told[one.name]) for one in fields(cls)})
+        return cls(**{one.name: int(message[one.name]) for one in fields(cls)})
 
     @property
     def whole(self) -> bool:
@@ -42,5 +42,5 @@ class Counts:
     @property
     def missing(self) -> str:
         """Frames that the recording lacks, or that lack something; empty if none do."""
-        told = {"dropped": self.dropped, "lost": self.lost, "damaged": self.damaged}
-        return ", ".join(f"{number:,} {what}" for what, number in told.items() if number)
+        losses = {"dropped": self.dropped, "lost": self.lost, "damaged": self.damaged}
+        return ", ".join(f"{number:,} {what}" for what, number in losses.items() if number)

@@ -150,11 +150,11 @@ class Film:
             self._reader.join(_END_S)  # all that was told is heard
         self._process.stdout.close()
 
-    def _send(self, told: Any) -> None:
+    def _send(self, order: Any) -> None:
         assert self._process.stdin is not None
         # Where the process has ended, what it told before says whether that was right.
         with contextlib.suppress(OSError, ValueError):
-            self._process.stdin.write(json.dumps(told) + "\n")
+            self._process.stdin.write(json.dumps(order) + "\n")
             self._process.stdin.flush()
 
     def _hear(self) -> bool:
@@ -165,19 +165,19 @@ class Film:
             if self._process.wait() and self._error is None:
                 self._error = Sd2Error("The process that films was stopped from outside")
             return False
-        told = json.loads(line)
-        match told.pop("event"):
+        message = json.loads(line)
+        match message.pop("event"):
             case "camera":
-                self.about, self.delay_s = told["about"], told["delay_s"]
-                self.simulated = told["simulated"]
+                self.about, self.delay_s = message["about"], message["delay_s"]
+                self.simulated = message["simulated"]
             case "filmed":
-                picture = told.pop("picture", None)
-                self.filmed = Filmed(**told)
+                picture = message.pop("picture", None)
+                self.filmed = Filmed(**message)
                 self._preview = picture or self._preview
             case "ended":
                 self._has_ended.set()
             case "failed":
-                self._error = Sd2Error(**told)
+                self._error = Sd2Error(**message)
         return True
 
     def _hear_all(self) -> None:
@@ -201,8 +201,8 @@ def main() -> int:
 
 
 def _failed(error: Sd2Error | OSError) -> int:
-    told = error if isinstance(error, Sd2Error) else Sd2Error(str(error))
-    _tell("failed", **told.arguments)
+    failure = error if isinstance(error, Sd2Error) else Sd2Error(str(error))
+    _tell("failed", **failure.arguments)
     return 1
 
 
@@ -242,11 +242,11 @@ class _Filming:
     def _take_orders(self) -> None:
         reading = threading.Thread(target=self._take_pictures, daemon=True)
         for line in sys.stdin:
-            told = json.loads(line)
+            order = json.loads(line)
             with self._lock:
-                self._is_filming = told is not None
+                self._is_filming = order is not None
                 self._dropped = 0 if self._is_filming else self._dropped
-                self._waiting.put(None if told is None else Path(told))
+                self._waiting.put(None if order is None else Path(order))
             if reading.ident is None:  # a file is played from here on
                 reading.start()
         self._stop.set()
@@ -314,10 +314,10 @@ class _Video:
             self._filmed.put_back += 1
 
     def _tell_progress(self, picture: NDArray[np.uint8] | None) -> None:
-        told: dict[str, Any] = asdict(self._filmed)
+        progress: dict[str, Any] = asdict(self._filmed)
         if picture is not None:
-            told["picture"] = preview_of(picture)
-        _tell("filmed", **told)
+            progress["picture"] = preview_of(picture)
+        _tell("filmed", **progress)
 
 
 def preview_of(picture: NDArray[np.uint8]) -> str:

@@ -52,12 +52,12 @@ def prompted_span(
         for one in suggest_spans(doppler, options)
         if min(one.end_s, end_s) - max(one.start_s, begin_s) >= options.min_duration_s
     ]
-    found = Span(1, TRACK, begin_s, end_s, label, note=NO_MOTION)
+    span = Span(1, TRACK, begin_s, end_s, label, note=NO_MOTION)
     if not motions:
-        return found
+        return span
     first_s, last_s = motions[0].start_s, motions[-1].end_s
     return replace(
-        found,
+        span,
         start_s=first_s if first_s >= prompt_s else begin_s,
         end_s=min(last_s, end_s),
         note="",

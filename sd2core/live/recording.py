@@ -100,12 +100,12 @@ class GrowingRecording:
         if self._head is None:
             return
         for name in ("radar", "word", "full_scale_known", "simulated", "replayed"):
-            there, given = getattr(self._head, name), getattr(head, name)
-            if there != given:
-                found = f"{name} of {self.folder} is {there}"
+            existing, given = getattr(self._head, name), getattr(head, name)
+            if existing != given:
+                message = f"{name} of {self.folder} is {existing}"
                 if name == "radar":
-                    found = f"{self.folder} is of another radar or configuration: {there}"
-                raise Sd2Error(found, f"to continue it, {given}", "Give another folder as --out")
+                    message = f"{self.folder} is of another radar or configuration: {existing}"
+                raise Sd2Error(message, f"to continue it, {given}", "Give another folder as --out")
 
     def time_of(self, time_s: float, head: GrowingHead) -> float:
         """Time in the recording of a frame of this session, see :meth:`append`.

@@ -265,14 +265,14 @@ class Dca1000Source:
 
     def silence(self) -> str:
         """What to check when nothing comes."""
-        there = f"{self.address}:{self.port}"
+        address = f"{self.address}:{self.port}"
         if self.assembler.counts.received:
             return (
-                f"Packets come no longer to {there}, or make no whole frame. Check that the radar"
+                f"Packets come no longer to {address}, or make no whole frame. Check that the radar"
                 f" still runs, and runs with {self._setup_path.name}."
             )
         return (
-            f"Nothing comes to {there}. Check that the radar runs and the DCA1000 was told to"
+            f"Nothing comes to {address}. Check that the radar runs and the DCA1000 was told to"
             " record, that it sends to an address of this computer (as a rule 192.168.33.30; then"
             f" say --dca1000 192.168.33.30) and to port {self.port}, and that no firewall is in"
             " between."
@@ -327,12 +327,12 @@ class Dca1000Source:
 
 def _listening_socket(address: str, port: int) -> socket.socket:
     """UDP socket on an address; Sd2Error if it is not to be had."""
-    found = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    listener = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
-        found.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SOCKET_BYTES)
-        found.bind((address, port))
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SOCKET_BYTES)
+        listener.bind((address, port))
     except (OSError, OverflowError, TypeError, ValueError) as error:  # the last two for odd names
-        found.close()
+        listener.close()
         place = f"{address}:{port}"
         number = error.errno if isinstance(error, OSError) else None
         if number == errno.EADDRINUSE:
@@ -349,4 +349,4 @@ def _listening_socket(address: str, port: int) -> socket.socket:
             " otherwise",
             "Give the network card that address, or name the one that it has",
         ) from error
-    return found
+    return listener

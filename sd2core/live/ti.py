@@ -97,8 +97,8 @@ class TiSource(Dca1000Source):
         from importlib.metadata import version
 
         head = super().head(start_unix_s)
-        told = f"The board was set up with {self._setup_path.name} by xwr {version('xwr')}."
-        return head.model_copy(update={"notes": (*head.notes, told)})
+        note = f"The board was set up with {self._setup_path.name} by xwr {version('xwr')}."
+        return head.model_copy(update={"notes": (*head.notes, note)})
 
     def run(self, take: Take, stop: threading.Event) -> None:
         """Start card and board, and receive packets until ``stop`` is set."""
@@ -125,12 +125,12 @@ class TiSource(Dca1000Source):
         self._close()
 
     @contextlib.contextmanager
-    def _answering(self, found: str, remedy: str) -> Iterator[None]:
+    def _answering(self, message: str, remedy: str) -> Iterator[None]:
         try:
             yield
         except (OSError, self._capture.DCAError, self._radar.XWRError) as error:
             why = " ".join(str(error).split()) or type(error).__name__
-            raise Sd2Error(f"{found} ({why})", "board and card as docs say", remedy) from error
+            raise Sd2Error(f"{message} ({why})", "board and card as docs say", remedy) from error
 
 
 def commands_of(setup: Path) -> list[str]:
