@@ -61,12 +61,12 @@ def gain_of(gains: Gains, seed: int = 0) -> Gain:
 def adjusted(values: Sequence[float]) -> list[float]:
     """Adjust p values of several tests, by Holm's method (Scand. J. Statist. 6, 1979)."""
     order = np.argsort(values)
-    found = [0.0] * len(values)
+    result = [0.0] * len(values)
     largest = 0.0
     for rank, place in enumerate(order.tolist()):
         largest = max(largest, min(1.0, (len(values) - rank) * values[place]))
-        found[place] = largest
-    return found
+        result[place] = largest
+    return result
 
 
 def _drawn(own: NDArray[np.float64], times: int, rng: np.random.Generator) -> NDArray[np.float64]:

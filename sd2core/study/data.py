@@ -115,21 +115,21 @@ def _study_data_of(plan_text: str) -> StudyData:
             f"No frame is labelled {', '.join(strange)}", f"some of {', '.join(sorted(names))}"
         )
     seen = _of_the_classes(merged(sets), plan)
-    found = [
+    moves = [
         Movement(clip, take)
         for clip, take in zip(seen.clips, takes, strict=True)
         if (clip.label != UNKNOWN).any()
     ]
-    first = seen_first(one.clip for one in found)
-    filmed = [one for one in found if one.take is not None and (plan.placements or first(one.clip))]
+    first = seen_first(one.clip for one in moves)
+    filmed = [one for one in moves if one.take is not None and (plan.placements or first(one.clip))]
     others: list[Movement] = []
-    people = {one.clip.subject for one in found}
+    people = {one.clip.subject for one in moves}
     for path in plan.video:
         for one in _filmed(Path(path), plan, seen):
             (filmed if one.clip.subject in people else others).append(one)
     return StudyData(
         replace(seen, clips=()),
-        tuple(one for one in found if first(one.clip)),
+        tuple(one for one in moves if first(one.clip)),
         tuple(filmed),
         tuple(others),
         None if pairs is None else replace(pairs, takes=()),
@@ -248,14 +248,14 @@ def _clips(pairs: PairSet, plan: StudyPlan) -> ClipSet:
     return clips_of_pairs(pairs, pairs.kind, names=names)
 
 
-def _of_the_classes(found: ClipSet, plan: StudyPlan) -> ClipSet:
+def _of_the_classes(known: ClipSet, plan: StudyPlan) -> ClipSet:
     """Keep the classes of the plan that occur; frames of others are unknown."""
-    there = {found.classes[n] for clip in found.clips for n in np.unique(clip.label) if n >= 0}
+    occurring = {known.classes[n] for clip in known.clips for n in np.unique(clip.label) if n >= 0}
     given: Mapping[str, str] = {**plan.classes, **{one: one for one in plan.classes.values()}}
-    names = [given.get(one, _NEITHER) if plan.classes else one for one in found.classes]
+    names = [given.get(one, _NEITHER) if plan.classes else one for one in known.classes]
     kept = tuple(dict.fromkeys(
-        name for one, name in zip(found.classes, names, strict=True)
-        if name != _NEITHER and one in there
+        name for one, name in zip(known.classes, names, strict=True)
+        if name != _NEITHER and one in occurring
     ))  # fmt: skip
     if len(kept) < 2:
         raise Sd2Error(
@@ -263,15 +263,15 @@ def _of_the_classes(found: ClipSet, plan: StudyPlan) -> ClipSet:
             "two or more",
             "Label pairs with `sd2 pairs label`, recordings in the window",
         )
-    clips = _renumbered(replace(found, classes=tuple(names)), kept)
-    return replace(found, classes=kept, clips=tuple(clips))
+    clips = _renumbered(replace(known, classes=tuple(names)), kept)
+    return replace(known, classes=kept, clips=tuple(clips))
 
 
-def _renumbered(found: ClipSet, classes: Sequence[str]) -> list[Clip]:
+def _renumbered(known: ClipSet, classes: Sequence[str]) -> list[Clip]:
     """Give frames the numbers of other classes; those of none are unknown."""
-    numbers = [classes.index(one) if one in classes else UNKNOWN for one in found.classes]
+    numbers = [classes.index(one) if one in classes else UNKNOWN for one in known.classes]
     table = np.array([*numbers, UNKNOWN], np.int8)
-    return [replace(clip, label=table[clip.label]) for clip in found.clips]
+    return [replace(clip, label=table[clip.label]) for clip in known.clips]
 
 
 def _check_alike(path: Path, more: ClipSet, seen: ClipSet) -> None:

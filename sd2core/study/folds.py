@@ -107,16 +107,16 @@ def share_of(
     for one in movements:
         for start, stop, number in gesture_runs(one.clip.label, UNKNOWN):
             found_runs.setdefault(number, []).append(one.part(slice(start, stop)))
-    found = []
+    drawn = []
     for number, own in sorted(found_runs.items()):
         order = np.random.default_rng([seed, number]).permutation(len(own))
         left = max(1, round(share * sum(len(one.clip) for one in own)))
         for one in (own[place] for place in order):
             if left <= 0:
                 break
-            found.append(one if len(one.clip) <= left else one.part(slice(left)))
-            left -= len(found[-1].clip)
-    return found
+            drawn.append(one if len(one.clip) <= left else one.part(slice(left)))
+            left -= len(drawn[-1].clip)
+    return drawn
 
 
 def _whole(

@@ -148,10 +148,10 @@ class StudyPlan(Section):
 
 def study_text(plan: StudyPlan, folder: Path) -> str:
     """Write a plan as TOML, without what is as by default; paths in it stay as they are."""
-    told = plan.model_dump(mode="json", exclude_defaults=True)
-    sections = {name: told.pop(name) for name in ("classes", "denoiser") if name in told}
-    learners = told.pop("classifiers", [])
-    lines = toml_lines({"format": plan.format, "version": plan.version, **told}, folder)
+    settings = plan.model_dump(mode="json", exclude_defaults=True)
+    sections = {name: settings.pop(name) for name in ("classes", "denoiser") if name in settings}
+    learners = settings.pop("classifiers", [])
+    lines = toml_lines({"format": plan.format, "version": plan.version, **settings}, folder)
     for name, content in sections.items():
         lines += section_lines(name, content, folder)
     for one in learners:

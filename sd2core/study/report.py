@@ -53,16 +53,16 @@ class Finding:
 
 def findings_of(results: Results) -> list[Finding]:
     """Return all gains, by share and condition."""
-    found = []
+    findings = []
     for share in sorted(results.plan.shares):
         for added in results.plan.wanted:
             frames, whole = (_gain(results, added, share, measure) for measure in (0, 1))
             if frames is not None and whole is not None:
-                found.append(Finding(added, share, frames, whole, frames.p))
-    tests = [number for number, one in enumerate(found) if one.added != "radar"]
-    for number, p in zip(tests, adjusted([found[one].frames.p for one in tests]), strict=True):
-        found[number] = replace(found[number], p=p)
-    return found
+                findings.append(Finding(added, share, frames, whole, frames.p))
+    tests = [number for number, one in enumerate(findings) if one.added != "radar"]
+    for number, p in zip(tests, adjusted([findings[one].frames.p for one in tests]), strict=True):
+        findings[number] = replace(findings[number], p=p)
+    return findings
 
 
 def write_report(results: Results, folder: Path) -> str:
@@ -71,9 +71,9 @@ def write_report(results: Results, folder: Path) -> str:
     Returns the conclusion.
     """
     findings = findings_of(results)
-    said = conclusion(results, findings)
+    verdict = conclusion(results, findings)
     totals = totals_of(results)
-    atomic_write_text(folder / "study.md", page(results, findings, said, totals))
+    atomic_write_text(folder / "study.md", page(results, findings, verdict, totals))
     runs = [{**one.to_json(), "scores": None} for one in results.runs]
     content = {
         "format": FORMAT,
@@ -82,7 +82,7 @@ def write_report(results: Results, folder: Path) -> str:
         "radar": results.kind,
         "classes": list(results.classes),
         "takes": results.takes,
-        "conclusion": said,
+        "conclusion": verdict,
         "findings": [asdict(one) for one in findings],
         "curve": [
             {"added": name, "title": TITLES[name], "share": share, **_summary(values)}
@@ -100,20 +100,20 @@ def write_report(results: Results, folder: Path) -> str:
     note = {"study": results.plan.title}
     save_figure(draw_curve(results), folder / "curve.png", note)
     save_figure(draw_confusions(results, totals), folder / "confusion.png", note)
-    return said
+    return verdict
 
 
 def totals_of(results: Results) -> dict[str, list[Score]]:
     """Return scores with all real data, of every seed, by condition and by classifier."""
     largest = max(results.plan.shares)
-    found: dict[str, dict[int, Score]] = {}
+    totals: dict[str, dict[int, Score]] = {}
     for run in results.runs:
         if run.task.share == largest:
             for name, one in run.scores.items():
-                own = found.setdefault(name, {})
+                own = totals.setdefault(name, {})
                 seed = run.task.seed
                 own[seed] = own[seed] + one if seed in own else one
-    return {name: list(own.values()) for name, own in found.items()}
+    return {name: list(own.values()) for name, own in totals.items()}
 
 
 def conclusion(results: Results, findings: Sequence[Finding]) -> str:
@@ -124,7 +124,7 @@ def conclusion(results: Results, findings: Sequence[Finding]) -> str:
     sure = [one for one in own if one.frames.certain and one.p < 0.05]
     helped = [one for one in sure if one.frames.certain > 0]
     harmed = [one for one in sure if one.frames.certain < 0]
-    said = []
+    parts = []
     if helped:
         best = max(helped, key=lambda one: one.frames.mean)
         low, high = (100.0 * value for value in best.frames.over_people)
@@ -133,24 +133,24 @@ def conclusion(results: Results, findings: Sequence[Finding]) -> str:
             people = "of other people it says nothing"
         elif low > 0:
             people = "also counting that people differ"
-        said.append(
+        parts.append(
             f"It helped in {len(helped)} of {len(own)} comparisons, most"
             f" {_maps(best.added)} at {best.share:.0%} of the"
             f" {results.kind} radar's data: {_points(best.frames)} of the frames; {people}."
         )
     if harmed:
         worst = min(harmed, key=lambda one: one.frames.mean)
-        said.append(
+        parts.append(
             f"It harmed in {len(harmed)}, most {_maps(worst.added)} at"
             f" {worst.share:.0%}: {_points(worst.frames)}."
         )
     rest = len(own) - len(sure)
     if rest:
-        said.append(
-            f"{'In' if said else 'Nothing is certain: in'} {rest} of {len(own)} the difference may"
+        parts.append(
+            f"{'In' if parts else 'Nothing is certain: in'} {rest} of {len(own)} the difference may"
             " be chance."
         )
-    return " ".join(said)
+    return " ".join(parts)
 
 
 def _maps(added: str) -> str:
@@ -160,18 +160,18 @@ def _maps(added: str) -> str:
 def _best(results: Results) -> str:
     """Say which of several classifiers finds most."""
     first = results.plan.classifiers[0].title
-    found = {
+    recall = {
         first if name in TITLES else name: 100.0 * np.mean([one.mean_recall for one in own])
         for name, own in totals_of(results).items()
     }
-    if len(found) < 2:
+    if len(recall) < 2:
         return ""
-    best = max(found, key=lambda name: found[name])
-    return f" Of {len(found)} classifiers {best} finds most, {found[best]:.1f} % of the frames."
+    best = max(recall, key=lambda name: recall[name])
+    return f" Of {len(recall)} classifiers {best} finds most, {recall[best]:.1f} % of the frames."
 
 
 def page(
-    results: Results, findings: Sequence[Finding], said: str, totals: dict[str, list[Score]]
+    results: Results, findings: Sequence[Finding], verdict: str, totals: dict[str, list[Score]]
 ) -> str:
     """Return the page in Markdown.
 
@@ -180,7 +180,7 @@ def page(
     results : Results
     findings : sequence of Finding
         Of :func:`findings_of`.
-    said : str
+    verdict : str
         Of :func:`conclusion`.
     totals : dict of str to list of Score
         Of :func:`totals_of`.
@@ -193,7 +193,7 @@ def page(
     chance = f"{1 / len(results.classes):.0%}"
     parts = [
         f"# {plan.title}",
-        f"**{said}**",
+        f"**{verdict}**",
         f"A {results.kind} radar; {people}; classes {', '.join(results.classes)}, by chance"
         f" {chance}. {_folds_in_words(results)}",
         "## Found",
@@ -294,14 +294,14 @@ def draw_curve(results: Results) -> Figure:
     given = sorted(results.plan.shares)
     for number, name in enumerate((REAL, *results.plan.wanted)):
         values = {share: _values(results, name, share, 0) for share in given}
-        there = [share for share in given if values[share]]
-        if not there:
+        shares = [share for share in given if values[share]]
+        if not shares:
             continue
-        found = [gain_of(values[share]) for share in there]
-        middle = 100.0 * np.array([one.mean for one in found])
-        ends = 100.0 * np.array([one.over_takes for one in found]).T
+        gains = [gain_of(values[share]) for share in shares]
+        middle = 100.0 * np.array([one.mean for one in gains])
+        ends = 100.0 * np.array([one.over_takes for one in gains]).T
         away = np.abs(ends - middle)
-        places = 100.0 * np.array(there) * (1.0 + 0.02 * (number - 2))
+        places = 100.0 * np.array(shares) * (1.0 + 0.02 * (number - 2))
         axes.errorbar(
             places, middle, away, label=TITLES[name], color=_COLOURS[number % len(_COLOURS)],
             marker="o", markersize=4, capsize=2, linewidth=1.2,
@@ -390,8 +390,8 @@ def _spread(values: Sequence[float], digits: int) -> str:
 
 
 def _summary(values: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
-    found = gain_of(values)
-    return {"mean": found.mean, "over_takes": found.over_takes}
+    gain = gain_of(values)
+    return {"mean": gain.mean, "over_takes": gain.over_takes}
 
 
 def _gain(results: Results, added: str, share: float, measure: int) -> Gain | None:
@@ -403,7 +403,7 @@ def _values(
     results: Results, name: str, share: float, measure: int, minus: str | None = None
 ) -> dict[str, NDArray[np.float64]]:
     """Mean over folds and draws for every take that has such a score, by person."""
-    found: dict[str, dict[str, list[float]]] = {}
+    by_person: dict[str, dict[str, list[float]]] = {}
     for run in results.runs:
         if run.task.share != share:
             continue
@@ -411,11 +411,11 @@ def _values(
             value = scores[measure]
             if value is not None:
                 less = 0.0 if minus is None else run.takes[minus][take][measure] or 0.0
-                own = found.setdefault(results.subject_of[take], {})
+                own = by_person.setdefault(results.subject_of[take], {})
                 own.setdefault(take, []).append(value - less)
     return {
         who: np.array([np.mean(values) for values in takes.values()])
-        for who, takes in found.items()
+        for who, takes in by_person.items()
     }
 
 

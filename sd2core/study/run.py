@@ -146,9 +146,9 @@ def _made(
                 done += 1
                 progress(done, total)
     subject_of = {one.title: one.clip.subject for one in data.real}
-    found = tuple(run for run in runs.values() if run is not None)
+    complete = tuple(run for run in runs.values() if run is not None)
     classes, others = data.known.classes, len(data.others)
-    return Results(plan, data.kind, classes, subject_of, others, found, data.lost_frames)
+    return Results(plan, data.kind, classes, subject_of, others, complete, data.lost_frames)
 
 
 def _learn(place: Path, plan: StudyPlan, data: StudyData, task: Task) -> None:

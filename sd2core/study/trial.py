@@ -69,8 +69,8 @@ class Run:
         return {
             **asdict(self.task),
             "real_frames": self.real_frames,
-            "takes": {name: dict(found) for name, found in self.takes.items()},
-            "scores": {name: found.to_json() for name, found in self.scores.items()},
+            "takes": {name: dict(by_take) for name, by_take in self.takes.items()},
+            "scores": {name: score.to_json() for name, score in self.scores.items()},
             "missing": dict(self.missing),
         }
 
@@ -78,7 +78,7 @@ class Run:
     def from_json(cls, content: Mapping[str, Any]) -> Run:
         """Parse :meth:`to_json`; raises KeyError, TypeError or ValueError."""
         takes = {
-            name: {take: (found[0], found[1]) for take, found in own.items()}
+            name: {take: (pair[0], pair[1]) for take, pair in own.items()}
             for name, own in content["takes"].items()
         }
         scores = {name: Score.from_json(one) for name, one in content["scores"].items()}
@@ -126,7 +126,7 @@ def run_task(plan_text: str, denoiser: str | None, task: Task) -> Run:
         if group.get(one.clip.key, one.clip.subject) == task.fold.video
     ]
     model, reason = _denoiser(plan, data, denoiser)
-    found: dict[str, dict[str, Score]] = {}
+    scores: dict[str, dict[str, Score]] = {}
     missing: dict[str, str] = {}
     learner = plan.classifiers[0]
     describe = _kept(plan_text, learner)
@@ -139,17 +139,17 @@ def run_task(plan_text: str, denoiser: str | None, task: Task) -> Run:
         if condition != REAL and not added:
             missing[condition] = "the data hold no such maps to add"
             continue
-        found[condition] = _judged(learner, plan, data, real, added, judged, task.seed, describe)
+        scores[condition] = _judged(learner, plan, data, real, added, judged, task.seed, describe)
     if task.share == max(plan.shares):
         for other in plan.classifiers[1:]:
-            found[other.title] = _judged(
+            scores[other.title] = _judged(
                 other, plan, data, real, [], judged, task.seed, _kept(plan_text, other)
             )
     return Run(
         task,
         sum(int((one.clip.label >= 0).sum()) for one in real),
-        {name: {title: _of_take(one) for title, one in own.items()} for name, own in found.items()},
-        {name: reduce(add, own.values()) for name, own in found.items()},
+        {name: {key: _of_take(one) for key, one in own.items()} for name, own in scores.items()},
+        {name: reduce(add, own.values()) for name, own in scores.items()},
         missing,
     )
 
@@ -204,20 +204,20 @@ def _judged(
     scores_of = learnt(learner, known, own, added, plan.added_weight, seed, describe)
     late_s = 0.0 if learner.model == "ridge" else learner.delay_s
     background = known.classes.index(BACKGROUND) if BACKGROUND in known.classes else None
-    found: dict[str, Score] = {}
+    scores: dict[str, Score] = {}
     for one in judged:
         answers = scores_of(one.clip).argmax(axis=1)
         rate_hz = known.frame_rate_hz
         this = score([one.clip.label], [answers], known.classes, rate_hz, background, late_s)
-        found[one.title] = found[one.title] + this if one.title in found else this
-    return found
+        scores[one.title] = scores[one.title] + this if one.title in scores else this
+    return scores
 
 
-def _of_take(found: Score) -> tuple[float, float | None]:
-    whole = int(found.gestures.sum())
+def _of_take(result: Score) -> tuple[float, float | None]:
+    whole = int(result.gestures.sum())
     return (
-        mean_recall(found.frames),
-        float(np.trace(found.gestures)) / whole if whole else None,
+        mean_recall(result.frames),
+        float(np.trace(result.gestures)) / whole if whole else None,
     )
 
 

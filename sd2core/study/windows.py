@@ -77,8 +77,8 @@ def _described(windows: Features, half: int, lags: Sequence[int]) -> Features:
     """Describe windows (n, frames, mean velocity, three others and shares), (n, numbers)."""
     base, columns, moves = windows[..., :4], windows[..., 4:], windows[..., 0]
     spectrum = np.zeros((len(windows), _HARMONICS))
-    found = np.abs(np.fft.rfft(moves, 2 * half, axis=1))[:, :_HARMONICS]
-    spectrum[:, : found.shape[1]] = found / np.sqrt(2 * half)
+    magnitudes = np.abs(np.fft.rfft(moves, 2 * half, axis=1))[:, :_HARMONICS]
+    spectrum[:, : magnitudes.shape[1]] = magnitudes / np.sqrt(2 * half)
     alike = np.zeros((len(windows), len(lags)))
     for number, lag in enumerate(lags):
         if moves.shape[1] > lag:
