@@ -152,7 +152,7 @@ def _known_files() -> dict[str, Path]:
 
 
 def _read_header(path: Path) -> tuple[ModelCard, Shapes]:
-    told, shapes = read_header(path, _EXPECTED)
-    if told.get("format") == "sd2-classifier":
+    header, shapes = read_header(path, _EXPECTED)
+    if header.get("format") == "sd2-classifier":
         raise Sd2Error(f"{path} is a classifier", "a denoiser", "Use it with `sd2 classify apply`")
-    return ModelCard.from_json(told, path), shapes
+    return ModelCard.from_json(header, path), shapes

@@ -130,9 +130,9 @@ def fit_median(
         candidate = MedianDenoiser(bins, frames=frames, width=width)
         cross, power = 0.0, 0.0
         for one, target in zip(inputs[::stride], targets[::stride], strict=True):
-            found = candidate(torch.from_numpy(one)[None])[0].numpy()[:, counted].astype(np.float64)
-            cross += float((found * target[:, counted]).sum())
-            power += float((found**2).sum())
+            clean = candidate(torch.from_numpy(one)[None])[0].numpy()[:, counted].astype(np.float64)
+            cross += float((clean * target[:, counted]).sum())
+            power += float((clean**2).sum())
         # With the best factor cross / power the squared error falls by cross² / power.
         gained = cross**2 / power if power > 0 else 0.0
         if best is None or gained > best[0]:

@@ -144,11 +144,11 @@ class KnownMovements:
             off = np.abs(_velocities(mixed, axis) - seen) * moving
             return np.stack([cells, *off.sum(axis=2)])
 
-        found = {trust: errors(trust) for trust in _TRUSTS}
-        none = found[0.0]
+        by_trust = {trust: errors(trust) for trust in _TRUSTS}
+        none = by_trust[0.0]
 
         def loss(trust: float) -> float:
-            change = found[trust] - none
+            change = by_trust[trust] - none
             counted = np.where(change > 0.0, _HARM * change, change).sum(axis=1)
             return float((counted / np.maximum(none.sum(axis=1), 1e-12)).sum())
 
@@ -203,5 +203,5 @@ def _velocities(energies: NDArray[np.float32], axis: VelocityAxis) -> NDArray[np
     They are 0 where the frame is empty.
     """
     frames = energies.reshape(-1, axis.bins)
-    found = [np.nan_to_num(of(frames, axis)) for of in (peak_velocity_mps, mean_velocity_mps)]
-    return np.stack(found).reshape(2, *energies.shape[:-1])
+    velocities = [np.nan_to_num(of(frames, axis)) for of in (peak_velocity_mps, mean_velocity_mps)]
+    return np.stack(velocities).reshape(2, *energies.shape[:-1])

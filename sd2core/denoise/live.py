@@ -246,14 +246,14 @@ class TrainedDenoiser:
             )
         if note:
             notes.append(note)
-        told = {
+        about = {
             "model": card.model,
             "name": card.name,
             "title": card.title,
             "trained_on": card.trained_on,
             "data": card.about.get("data"),
         }
-        meta: dict[str, Any] = {"denoiser": told, "input": doppler.meta, "version": __version__}
+        meta: dict[str, Any] = {"denoiser": about, "input": doppler.meta, "version": __version__}
         if "sensor" in doppler.meta:
             meta["sensor"] = doppler.meta["sensor"]
         if notes:
@@ -312,14 +312,14 @@ class LiveDenoiser:
             return _summed(
                 live.advance(one, present) for live, one in zip(self._live(each), each, strict=True)
             )
-        there = Presence.of(present, len(energies)).present
+        mask = Presence.of(present, len(energies)).present
         answers = np.zeros((len(energies), self._trained.card.axis.bins), np.float32)
         if self._causal is None:
             for frame, values in enumerate(energies):
-                answers[frame] = self.step(values, bool(there[frame]))
+                answers[frame] = self.step(values, bool(mask[frame]))
             return answers
         begins = 0
-        for start, stop in runs(there):
+        for start, stop in runs(mask):
             if start > begins:
                 self.reset()
             answers[start:stop] = self._run(self._causal, energies[start:stop])

@@ -75,10 +75,10 @@ def velocity_error(
         estimate_mps, target_mps = estimate_mps[frames], target_mps[frames]
     judged = ~np.isnan(target_mps)
     target = target_mps[judged]
-    found = estimate_mps[judged]
-    empty = np.isnan(found)
-    found = np.where(empty, 0.0, found)
-    error = found - target
+    estimate = estimate_mps[judged]
+    empty = np.isnan(estimate)
+    estimate = np.where(empty, 0.0, estimate)
+    error = estimate - target
     if not len(error):
         nan = float("nan")
         return VelocityError(nan, nan, nan, nan, nan, nan, 0, int((~judged).sum()), 0)
@@ -88,7 +88,7 @@ def velocity_error(
         sd_absolute_mps=float(np.abs(error).std()),
         bias_mps=float(error.mean()),
         rmse_mps=float(np.sqrt((error**2).mean())),
-        correlation=_correlation(found, target),
+        correlation=_correlation(estimate, target),
         frames=len(error),
         empty_target=int((~judged).sum()),
         empty_estimate=int(empty.sum()),
@@ -158,22 +158,22 @@ def map_error(
     """
     if estimate.shape != target.shape:
         raise Sd2Error(f"The maps are of shape {estimate.shape} and {target.shape}", "the same")
-    found, wanted = (
+    answer, wanted = (
         np.delete(values, list(null_bins), axis=1).astype(np.float64)
         for values in (estimate, target)
     )
-    total, energy = float(wanted.sum()), float(found.sum())
+    total, energy = float(wanted.sum()), float(answer.sum())
 
     def relative_l1(estimated: NDArray[np.float64]) -> float:
         difference = float(np.abs(estimated - wanted).sum())
         without_target = float("inf") if difference > 0 else 0.0
         return difference / total if total > 0 else without_target
 
-    relative = relative_l1(found)
-    shape = relative_l1(found * (total / energy)) if energy > 0 and total > 0 else relative
-    found, wanted = compression.compress(found), compression.compress(wanted)
-    rmse = float(np.sqrt(((found - wanted) ** 2).mean())) if found.size else float("nan")
-    return MapError(relative, shape, rmse, _correlation(found.ravel(), wanted.ravel()))
+    relative = relative_l1(answer)
+    shape = relative_l1(answer * (total / energy)) if energy > 0 and total > 0 else relative
+    answer, wanted = compression.compress(answer), compression.compress(wanted)
+    rmse = float(np.sqrt(((answer - wanted) ** 2).mean())) if answer.size else float("nan")
+    return MapError(relative, shape, rmse, _correlation(answer.ravel(), wanted.ravel()))
 
 
 def stands_out(

@@ -186,13 +186,13 @@ def _built(
 ) -> Denoiser:
     from sd2core.denoise.model import Corrected, TwoNetworks
 
-    found = entry.made
+    make = entry.made
     several = {} if name in FILTERS else {"parts": 0 if more else parts, "more": more}
     chosen = {**entry.options, **given}
     corrects, also_live = chosen.pop("skip", False), chosen.pop("live", False)
 
     def made(**other: Any) -> Denoiser:
-        network: Denoiser = found(bins, **several, **entry.fixed, **{**chosen, **other})
+        network: Denoiser = make(bins, **several, **entry.fixed, **{**chosen, **other})
         return Corrected(network, parts) if corrects else network
 
     whole = made()
@@ -281,17 +281,17 @@ def check_option(what: str, option: str, value: Any, known: Mapping[str, Any], m
             f"The {what} has no option {option!r}",
             f"one of {', '.join(known)}" if known else "no options",
         )
-    found = f"{what}: {option} is {value!r}"
+    message = f"{what}: {option} is {value!r}"
     if isinstance(known[option], bool):
         if not isinstance(value, bool):
-            raise Sd2Error(found, "true or false")
+            raise Sd2Error(message, "true or false")
     elif isinstance(known[option], int):
         if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-            raise Sd2Error(found, f"a whole number, 1 to {most}")
+            raise Sd2Error(message, f"a whole number, 1 to {most}")
     elif isinstance(value, bool) or not isinstance(value, int | float):
-        raise Sd2Error(found, "a number")
+        raise Sd2Error(message, "a number")
     elif option in ("dt_min", "dt_max"):
         if not 1e-6 <= value <= 10:
-            raise Sd2Error(found, "a step from 1e-6 to 10")
+            raise Sd2Error(message, "a step from 1e-6 to 10")
     elif not 0 <= value < 1:
-        raise Sd2Error(found, "a share from 0 to below 1")
+        raise Sd2Error(message, "a share from 0 to below 1")

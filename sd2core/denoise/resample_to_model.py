@@ -128,12 +128,12 @@ def stretches(doppler: DopplerMap, frame_rate_hz: float) -> list[tuple[int, int]
 
     ``frame_rate_hz`` is the rate of the model.
     """
-    there = Presence.of(doppler.present, len(doppler.timebase)).present
-    return clips(doppler.times_s, there, frame_rate_hz)
+    present = Presence.of(doppler.present, len(doppler.timebase)).present
+    return clips(doppler.times_s, present, frame_rate_hz)
 
 
 def clips(
-    times_s: NDArray[np.float64], there: NDArray[np.bool_], frame_rate_hz: float
+    times_s: NDArray[np.float64], present: NDArray[np.bool_], frame_rate_hz: float
 ) -> list[tuple[int, int]]:
     """Half-open runs of marked frames between which no time is missing.
 
@@ -141,11 +141,11 @@ def clips(
     """
     longest_s = _BREAK_FRAMES * max(Timebase(times_s).frame_duration_s, 1 / frame_rate_hz)
     breaks = np.flatnonzero(np.diff(times_s) > longest_s) + 1
-    found: list[tuple[int, int]] = []
-    for start, stop in runs(there):
+    pieces: list[tuple[int, int]] = []
+    for start, stop in runs(present):
         edges = [start, *breaks[(breaks > start) & (breaks < stop)].tolist(), stop]
-        found += pairwise(edges)
-    return found
+        pieces += pairwise(edges)
+    return pieces
 
 
 def is_regular(times_s: NDArray[np.float64], frame_rate_hz: float) -> bool:

@@ -20,25 +20,25 @@ def normalise(signal: Tensor) -> tuple[Tensor, Tensor]:
     The signal is handed on beside the result: where it is used again, as a residual, both
     derivatives are then summed without another copy.
     """
-    normed, signal = _Normalise.apply(signal)
-    return normed, signal
+    normalised, signal = _Normalise.apply(signal)
+    return normalised, signal
 
 
 class _Normalise(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, signal: Tensor) -> tuple[Tensor, Tensor]:
-        normed = signal - signal.mean(0)
-        scale = normed.square().mean(0).add_(SMALLEST_VARIANCE).rsqrt_()
-        normed *= scale
-        ctx.save_for_backward(normed, scale)
-        return normed, signal.view_as(signal)
+        normalised = signal - signal.mean(0)
+        scale = normalised.square().mean(0).add_(SMALLEST_VARIANCE).rsqrt_()
+        normalised *= scale
+        ctx.save_for_backward(normalised, scale)
+        return normalised, signal.view_as(signal)
 
     @staticmethod
     def backward(ctx: Any, gradient: Tensor, passed: Tensor) -> Tensor:
-        normed, scale = ctx.saved_tensors
-        back = gradient * normed
+        normalised, scale = ctx.saved_tensors
+        back = gradient * normalised
         along = back.mean(0)
-        torch.addcmul(gradient, normed, along, value=-1.0, out=back)
+        torch.addcmul(gradient, normalised, along, value=-1.0, out=back)
         back -= gradient.mean(0)
         return torch.addcmul(passed, back, scale, out=back)
 

@@ -61,10 +61,10 @@ class Texture:
         mean, power = (values[shows & known].astype(np.float64) for values in (means, radar))
         groups = np.array_split(np.argsort(mean), _GROUPS)
         level = np.array([mean[one].mean() for one in groups])
-        found = np.array([power[one].mean() for one in groups])
+        powers = np.array([power[one].mean() for one in groups])
         # Relative errors count.
-        rows = np.stack([np.ones_like(level), level], axis=1) / found[:, None]
-        floor, gain = np.linalg.lstsq(rows, np.ones_like(found))[0].clip(min=0.0).tolist()
+        rows = np.stack([np.ones_like(level), level], axis=1) / powers[:, None]
+        floor, gain = np.linalg.lstsq(rows, np.ones_like(powers))[0].clip(min=0.0).tolist()
         near, far = _change(radar, 1), _change(radar, _APART)
         if not (floor + gain > 0 and slope > 0 and 0 < far < 1):
             return None
@@ -146,7 +146,7 @@ def _fluctuations(
     seed: Sequence[int], first: int, frames: int, bins: int, persistence: float
 ) -> NDArray[np.float64]:
     """Normal numbers (frames, bins), correlated from frame to frame, anew in every block."""
-    found = []
+    blocks = []
     for block in range(first // _BLOCK, -(-(first + frames) // _BLOCK)):
         rng = np.random.default_rng([*seed, block])
         rows = min(_BLOCK, first + frames - block * _BLOCK)
@@ -154,9 +154,9 @@ def _fluctuations(
         values[1:] *= np.sqrt(1.0 - persistence**2)
         for frame in range(1, rows):
             values[frame] += persistence * values[frame - 1]
-        found.append(values)
+        blocks.append(values)
     start = first % _BLOCK
-    return np.concatenate(found)[start : start + frames] if found else np.zeros((0, bins))
+    return np.concatenate(blocks)[start : start + frames] if blocks else np.zeros((0, bins))
 
 
 def _logistic(levels: NDArray[np.float64], shows: NDArray[np.bool_]) -> tuple[float, float]:

@@ -79,8 +79,8 @@ def read_header(path: Path, expected: str) -> tuple[dict[str, Any], Shapes]:
         raise _cut_short(path, size, 8 + length)
     try:
         content = json.loads(header)
-        told = content.pop("__metadata__", {})
-        if not isinstance(told, Mapping) or _KEY not in told:
+        metadata = content.pop("__metadata__", {})
+        if not isinstance(metadata, Mapping) or _KEY not in metadata:
             raise Sd2Error(
                 f"{path} is a safetensors file of another program: it does not say how its"
                 " weights are to be used",
@@ -88,8 +88,8 @@ def read_header(path: Path, expected: str) -> tuple[dict[str, Any], Shapes]:
             )
         shapes = {name: list(map(int, entry["shape"])) for name, entry in content.items()}
         end = max((int(entry["data_offsets"][1]) for entry in content.values()), default=0)
-        told = json.loads(told[_KEY])
-        if not isinstance(told, dict):
+        description = json.loads(metadata[_KEY])
+        if not isinstance(description, dict):
             raise ValueError("not an object")
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, RecursionError) as error:
         raise Sd2Error(f"{path}: its header is damaged ({error!r})", expected) from error
@@ -101,7 +101,7 @@ def read_header(path: Path, expected: str) -> tuple[dict[str, Any], Shapes]:
             f"{8 + length + end:,} bytes, as its header says",
             "Copy or train it again",
         )
-    return told, shapes
+    return description, shapes
 
 
 def format_of(path: Path) -> str:
@@ -205,9 +205,9 @@ def _cut_short(path: Path, size: int, expected: int) -> Sd2Error:
     )
 
 
-def _compare_shapes(path: Path, name: str, found: Shapes, wanted: Shapes, expected: str) -> None:
-    missing = [key for key in wanted if key not in found]
-    unknown = [key for key in found if key not in wanted]
+def _compare_shapes(path: Path, name: str, shapes: Shapes, wanted: Shapes, expected: str) -> None:
+    missing = [key for key in wanted if key not in shapes]
+    unknown = [key for key in shapes if key not in wanted]
     if missing or unknown:
         which = f"lacks {missing[0]}" if missing else f"has {unknown[0]} in addition"
         raise Sd2Error(
@@ -216,8 +216,8 @@ def _compare_shapes(path: Path, name: str, found: Shapes, wanted: Shapes, expect
             expected,
         )
     for key, shape in wanted.items():
-        if found[key] != shape:
+        if shapes[key] != shape:
             raise Sd2Error(
-                f"{path}: {key} is of shape {tuple(found[key])}",
+                f"{path}: {key} is of shape {tuple(shapes[key])}",
                 f"{tuple(shape)}, as its options say",
             )
