@@ -75,7 +75,7 @@ class DenoiserLoop(Loop):
         self._squares = torch.tensor(squares, dtype=torch.float64, device=self._device)
         self._line_squares, self._line_segments = squares, self.position.segments
         self._kept_s = self.position.elapsed_s
-        self._found: Validation | None = None
+        self._validation: Validation | None = None
 
     def run(self) -> Outcome:
         """Train until the end, or until an order to stop or to cancel."""
@@ -106,7 +106,7 @@ class DenoiserLoop(Loop):
 
     def after_step(self) -> Outcome | None:
         """Say, check, keep and obey what is due."""
-        position, said = self.position, self._writer.say
+        position, say = self.position, self._writer.say
         word, self._share = self._ranks.agreed(self._control.word(), self.share_done)
         over = self.steps is None and self._share >= 1.0
         ends = self.epoch_ends or over
@@ -119,13 +119,13 @@ class DenoiserLoop(Loop):
         if word == "pause" and not over:
             word = self._pause()
         if word == "cancel":
-            said("cancelling")
+            say("cancelling")
             return "cancelled"
         if over:
             self._keep()
             return "finished"
         if word == "stop":
-            said("stopping")
+            say("stopping")
             self._keep()
             if position.best is None:
                 self._keep_what_there_is()
@@ -136,23 +136,23 @@ class DenoiserLoop(Loop):
 
     def check(self) -> dict[str, Any] | None:
         """Errors on the people who are kept out to choose by; None if the run is cancelled."""
-        found = validate(self._network, self._exam, lambda: self._control.word() != "cancel")
-        if found is None:
+        validation = validate(self._network, self._exam, lambda: self._control.word() != "cancel")
+        if validation is None:
             return None
-        if not math.isfinite(found.rmse):
+        if not math.isfinite(validation.rmse):
             raise _diverged(self.position.steps_done)
-        self._found = found
+        self._validation = validation
         by_rmse = self._config.training.select_by == "rmse"
         return {
-            "score": found.rmse if by_rmse else found.mae_mps,
-            "validation_rmse": found.rmse,
-            "validation_mae_mps": found.mae_mps,
+            "score": validation.rmse if by_rmse else validation.mae_mps,
+            "validation_rmse": validation.rmse,
+            "validation_mae_mps": validation.mae_mps,
         }
 
     def keep_best(self) -> None:
         """Write the model that is to be used."""
-        assert self._found is not None
-        self._write_best(self._found, self.position.epoch + 1)
+        assert self._validation is not None
+        self._write_best(self._validation, self.position.epoch + 1)
 
     def end_epoch(self) -> bool | None:
         """Say the errors of the epoch as well, and count those of the next from zero."""
@@ -161,14 +161,14 @@ class DenoiserLoop(Loop):
         best = super().end_epoch()
         if best is None:
             return None
-        assert self._found is not None
+        assert self._validation is not None
         self._writer.say(
             "epoch",
             epoch=position.epoch,
             step=position.steps_done,
             train_rmse=math.sqrt(position.squares / max(1, position.segments)),
-            validation_rmse=self._found.rmse,
-            validation_mae_mps=self._found.mae_mps,
+            validation_rmse=self._validation.rmse,
+            validation_mae_mps=self._validation.mae_mps,
             best=best,
             processor_s=time.process_time(),
             **self._times(),
@@ -224,16 +224,16 @@ class DenoiserLoop(Loop):
         It is no epoch's, so the position does not know of it: a resumed run ends as it
         would have ended without the stop.
         """
-        found = validate(self._network, self._exam)
-        if found is not None and math.isfinite(found.rmse):
-            self._write_best(found, self.position.epoch)
+        validation = validate(self._network, self._exam)
+        if validation is not None and math.isfinite(validation.rmse):
+            self._write_best(validation, self.position.epoch)
 
-    def _write_best(self, found: Validation, epoch: int) -> None:
+    def _write_best(self, validation: Validation, epoch: int) -> None:
         if self._ranks.leads:
             other = self._network.live
             apart = other is not None and other is not self._network
             live = validate(other, self._exam) if apart else None
-            self._save_best(found, live, epoch)
+            self._save_best(validation, live, epoch)
 
     def _set_state(self, state: State) -> None:
         if self._ranks.leads:

@@ -239,11 +239,11 @@ class _Truth:
 def _estimated(
     model: TrainedDenoiser, pairs: PairSet, progress: Progress, done: int, total: int
 ) -> Energies:
-    found = []
+    estimates = []
     for number, take in enumerate(pairs.takes):
         progress(done + number, total)
-        found.append(model.denoise_values(take.inputs(model.card.parts)))
-    return np.concatenate(found)
+        estimates.append(model.denoise_values(take.inputs(model.card.parts)))
+    return np.concatenate(estimates)
 
 
 def _report(name: str, card: ModelCard, estimate: Energies, truth: _Truth) -> Report:

@@ -101,7 +101,7 @@ class Learner(nn.Module):
         velocities = torch.as_tensor(self._exam.axis.centres_mps, dtype=torch.float32)
         velocities = velocities.to(answers.device)[self._counted]
         power = 1 / self._exam.scaling.target.exponent
-        found, wanted = (
+        estimate, wanted = (
             values.float().clamp(min=0.0)[..., self._counted] ** power
             for values in (answers, targets)
         )
@@ -110,10 +110,10 @@ class Learner(nn.Module):
         def mean_of(energies: torch.Tensor) -> torch.Tensor:
             return (energies * velocities).sum(dim=-1) / (energies.sum(dim=-1) + 1e-3)
 
-        strongest = found.amax(dim=-1, keepdim=True) + 1e-3
+        strongest = estimate.amax(dim=-1, keepdim=True) + 1e-3
         errors = {
-            "mean": (mean_of(found), mean_of(wanted)),
-            "peak": (mean_of((found / strongest) ** _SHARP), velocities[wanted.argmax(dim=-1)]),
+            "mean": (mean_of(estimate), mean_of(wanted)),
+            "peak": (mean_of((estimate / strongest) ** _SHARP), velocities[wanted.argmax(dim=-1)]),
         }
         off = sum(
             nn.functional.smooth_l1_loss(*pair, beta=0.1, reduction="none")

@@ -112,12 +112,12 @@ class Loop(ABC):
         True if it is the best; None if the check was given up, and the epoch goes on.
         """
         position = self.position
-        found = self.check()
-        if found is None:
+        scores = self.check()
+        if scores is None:
             return None
-        best = position.best is None or bool(found["score"] < position.best["score"])
+        best = position.best is None or bool(scores["score"] < position.best["score"])
         if best:
-            position.best = {"epoch": position.epoch + 1, **found}
+            position.best = {"epoch": position.epoch + 1, **scores}
             self.keep_best()
         position.epochs_since_best = 0 if best else position.epochs_since_best + 1
         position.epoch, position.step = position.epoch + 1, 0

@@ -18,13 +18,13 @@ Device = Literal["cpu", "cuda"]
 
 def device_of(machine: MachineConfig) -> Device:
     """Device to compute on. Raises Sd2Error if a GPU is asked for and there are too few."""
-    found = torch.cuda.device_count() if torch.cuda.is_available() else 0
-    if machine.device == "cpu" or (machine.device == "auto" and not found):
+    gpus = torch.cuda.device_count() if torch.cuda.is_available() else 0
+    if machine.device == "cpu" or (machine.device == "auto" and not gpus):
         return "cpu"
-    if found < machine.devices:
+    if gpus < machine.devices:
         raise Sd2Error(
             f"machine.device is {machine.device!r} with {machine.devices} devices, and torch"
-            f" {torch.__version__} finds {found} GPUs",
+            f" {torch.__version__} finds {gpus} GPUs",
             "as many as are asked for",
             "Leave it to the program (--device auto), or train on the CPU (--device cpu)",
         )

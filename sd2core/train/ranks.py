@@ -36,9 +36,9 @@ class Ranks:
         """Values of the first process in all processes; else they would wait for each other."""
         if self.count == 1:
             return values
-        told = [*values]
-        torch.distributed.broadcast_object_list(told)
-        return tuple(told)
+        shared = [*values]
+        torch.distributed.broadcast_object_list(shared)
+        return tuple(shared)
 
     def together(self, module: nn.Module, device: torch.device) -> nn.Module:
         """Module whose gradients are those of all processes' shares together."""

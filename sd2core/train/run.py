@@ -138,7 +138,7 @@ def carry_out(
             Batches(order, data.training, rank, ranks.count),
             validator,
             start or Checkpoint({}, {}, Position(), {"data_digest": digest, "threads": threads}),
-            lambda found, live, epoch: facts.save(folder.best, network, found, live, epoch),
+            lambda best, live, epoch: facts.save(folder.best, network, best, live, epoch),
             ranks,
             mixed=precision == "bf16-mixed",
         )
@@ -254,21 +254,21 @@ class _Facts:
     known: KnownMovements | None
 
     def save(
-        self, path: Path, network: Denoiser, found: Validation, live: Validation | None, epoch: int
+        self, path: Path, network: Denoiser, best: Validation, live: Validation | None, epoch: int
     ) -> None:
         training = network.training
         try:
-            save_model(path, TrainedDenoiser(network, self.card(found, live, epoch)))
+            save_model(path, TrainedDenoiser(network, self.card(best, live, epoch)))
         finally:
             network.train(training)
 
-    def card(self, found: Validation, live: Validation | None, epoch: int) -> ModelCard:
+    def card(self, best: Validation, live: Validation | None, epoch: int) -> ModelCard:
         config, pairs, split = self.config, self.data.pairs, self.data.split
         name = config.model.name
         scaling = self.scaling
         # Here, because only the best epochs need it.
         held_out, axis, known = self.data.validation, pairs.axis, self.known
-        answers, radar = found.answers, held_out.targets
+        answers, radar = best.answers, held_out.targets
         if known is not None:
             maps = held_out.inputs[..., : held_out.inputs.shape[-1] - scaling.more]
             whole = whole_map(maps, axis.bins)
@@ -294,7 +294,7 @@ class _Facts:
                 "data": self._data_words(),
                 "command": self.command,
                 "metrics": {
-                    **_errors("validation", found),
+                    **_errors("validation", best),
                     **({} if live is None else _errors("live_validation", live)),
                     "epoch": epoch,
                 },
@@ -325,16 +325,16 @@ class _Facts:
 
     def _limits(self) -> str:
         stores = self.data.pairs.provenance.get("mixed", [self.data.pairs.provenance])
-        said = [
+        sentences = [
             f"Knows movements like those of {len(self.data.split.training)} people"
             f"{_named('movements', map(_movements, stores))}"
             f"{_named('before', map(_radar, stores))}."
         ]
         if self.data.pairs.kind == "simulated":
-            said.append("Learnt from a simulated radar; nothing is said about a real one.")
+            sentences.append("Learnt from a simulated radar; nothing is said about a real one.")
         if self.data.split.by_take:
-            said.append("Validated on other minutes of the same people, not on other people.")
-        return " ".join(said)
+            sentences.append("Validated on other minutes of the same people, not on other people.")
+        return " ".join(sentences)
 
 
 def _named(what: str, words: Iterable[str]) -> str:
@@ -358,6 +358,6 @@ def _radar(store: Mapping[str, Any]) -> str:
     return f"{name} with surfaces and noise drawn" if name and drawn else name
 
 
-def _errors(name: str, found: Validation) -> dict[str, float | None]:
-    mae_mps = found.mae_mps if math.isfinite(found.mae_mps) else None
-    return {f"{name}_rmse": found.rmse, f"{name}_mae_mps": mae_mps}
+def _errors(name: str, validation: Validation) -> dict[str, float | None]:
+    mae_mps = validation.mae_mps if math.isfinite(validation.mae_mps) else None
+    return {f"{name}_rmse": validation.rmse, f"{name}_mae_mps": mae_mps}

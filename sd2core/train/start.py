@@ -224,6 +224,6 @@ def _note_failure(folder: TrainingFolder, writer: ProgressWriter, error: BaseExc
         remedy = "Choose a smaller batch or a smaller model"
         error = Sd2Error("There is not enough memory for this", remedy=remedy)
     elif not isinstance(error, Sd2Error):
-        found = f"This should not happen ({type(error).__name__}: {error})"
-        error = Sd2Error(found, remedy=f"Please report it, with {folder.log.name}")
+        message = f"This should not happen ({type(error).__name__}: {error})"
+        error = Sd2Error(message, remedy=f"Please report it, with {folder.log.name}")
     _say_end(folder, writer, "failed", {}, error.arguments)

@@ -81,7 +81,7 @@ def validate(
     training = model.training
     model.eval()
     squares, cells = 0.0, 0
-    found = []
+    batches = []
     bins = validator.axis.bins
     nulled = [number for number in range(bins) if number not in validator.counted]
     try:
@@ -96,10 +96,10 @@ def validate(
                 cells += difference.numel()
                 energies = validator.scaling.target.expand(answer.cpu().numpy())
                 energies[..., nulled] = 0.0
-                found.append(energies)
+                batches.append(energies)
     finally:
         model.train(training)
-    answers = np.concatenate(found)
+    answers = np.concatenate(batches)
     peaks_mps = peak_velocity_mps(answers.reshape(-1, bins), validator.axis)
     error = velocity_error(peaks_mps, validator.peaks_mps)
     return Validation((squares / cells) ** 0.5, error.mae_mps, answers)
