@@ -123,9 +123,9 @@ def write_index(folder: Path) -> None:
     """Write ``index.csv`` and ``index.json`` of all cut-outs in a folder."""
     entries = []
     for path in sorted(folder.glob(f"*/{_DETAILS}")):
-        found = _read(path)
-        if found is not None:
-            entries.append({"folder": path.parent.name, **found})
+        details = _read(path)
+        if details is not None:
+            entries.append({"folder": path.parent.name, **details})
     if not entries:
         return
     table = io.StringIO()
@@ -222,22 +222,22 @@ def _put(made: Path, path: Path) -> None:
 def _state(path: Path, described: dict[str, Any]) -> State:
     if not path.exists():
         return "new"
-    found = _read(path / _DETAILS)
-    if found is None or not all((path / name).exists() for name in found["files"]):
+    details = _read(path / _DETAILS)
+    if details is None or not all((path / name).exists() for name in details["files"]):
         return "other"
-    known = json.loads(json.dumps(described)) | {"files": found["files"]}
-    return "same" if found == known else "other"
+    known = json.loads(json.dumps(described)) | {"files": details["files"]}
+    return "same" if details == known else "other"
 
 
 def _read(path: Path) -> dict[str, Any] | None:
     try:
-        found = read_json(path)
+        details = read_json(path)
     except Sd2Error:
         return None
-    ours = isinstance(found, dict) and found.get("format") == FORMAT
-    if not ours or not {"span", "frames", "files"} <= found.keys():
+    ours = isinstance(details, dict) and details.get("format") == FORMAT
+    if not ours or not {"span", "frames", "files"} <= details.keys():
         return None
-    if isinstance(found["frames"], list):  # half-open, in cut-outs of before
-        first, stop = found["frames"]
-        found["frames"] = asdict(ShownFrames(first, stop - 1, stop - first))
-    return found
+    if isinstance(details["frames"], list):  # half-open, in cut-outs of before
+        first, stop = details["frames"]
+        details["frames"] = asdict(ShownFrames(first, stop - 1, stop - first))
+    return details

@@ -72,14 +72,14 @@ class CutSource:
         """Return the content of ``span.json``; the same for the same source and span."""
         first, stop = self.frames_of(span)
         frames, video, mesh = span.frames(self.timebase), self.video, self.mesh_of(span)
-        told = asdict(span)
+        span_fields = asdict(span)
         if not span.person:  # as before there were scenes: those that are written stay the same
-            del told["person"]
+            del span_fields["person"]
         return {
             "format": FORMAT,
             "version": VERSION,
             "program": f"SD² Studio {__version__}",
-            "span": told,
+            "span": span_fields,
             "frames": frames and asdict(frames),
             "zero_s": self.zero_s(span),
             "frame_times_s": (self.timebase.times_s[first:stop] - self.zero_s(span)).tolist(),
