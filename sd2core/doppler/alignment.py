@@ -73,8 +73,8 @@ class Alignment:
     def checked(self) -> Alignment:
         """Return the alignment itself; Sd2Error if there is no clear peak."""
         if self.problem:
-            found, _, more = self.problem.rstrip(".").partition(". ")
-            raise Sd2Error(found, "one clear peak", more or "Align by hand")
+            sentence, _, more = self.problem.rstrip(".").partition(". ")
+            raise Sd2Error(sentence, "one clear peak", more or "Align by hand")
         return self
 
 

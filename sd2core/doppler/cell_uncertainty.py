@@ -181,7 +181,7 @@ class _Piece:
         """Shares of each path on the fine axis (limbs, n, parts); deviations in bins (n, limbs)."""
         counts, known = self._counts, self._known
         frames = self._last - self._first
-        found = []
+        by_path = []
         for path in counts.paths(self._sensor):
             fine = np.zeros((len(known.limbs), frames, self._axis.parts))
             sigma_bins = np.zeros((frames, len(known.limbs)))
@@ -192,8 +192,8 @@ class _Piece:
                 target = slice(low - self._first, high - self._first)
                 fine[:, target] = self._counted(block, rows, path)
                 sigma_bins[target] = counts.sigma_bins(block, rows, path)
-            found.append((fine, sigma_bins))
-        return found
+            by_path.append((fine, sigma_bins))
+        return by_path
 
     def _counted(self, block: Block, rows: slice, path: EchoPath) -> NDArray[np.float64]:
         """Shares of some of a block's frames on the fine axis, (limbs, n, parts)."""

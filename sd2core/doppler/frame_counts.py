@@ -226,8 +226,8 @@ class FrameCounts:
         if path.wall is not None:
             mask, quality = self._seen_twice(block, rows, path.wall, path.ends_m, mask, quality)
         facing = mask is None and quality == "facing"
-        found = self._scatterers(block, rows, mask, facing, parts, moving)
-        return replace(found, path=path), quality
+        scatterers = self._scatterers(block, rows, mask, facing, parts, moving)
+        return replace(scatterers, path=path), quality
 
     def _seen_twice(
         self,

@@ -455,10 +455,10 @@ class VisibilityMasks:
     ) -> None:
         """Set ``visible`` of the needed vertices to 0 where another body hides them."""
         wall = None if other is self._prepared else self._wall
-        first, there = view.first, other.mesh.presence.present
+        first, present = view.first, other.mesh.presence.present
         for start, stop, hiding in other.hiding(first, first + len(visible), wall):
             rows = slice(start - first, stop - first)
-            asked = needed[rows] & there[start:stop, None]
+            asked = needed[rows] & present[start:stop, None]
             view.rows(rows).hide(hiding, asked, visible[rows])
 
     def _test_body(

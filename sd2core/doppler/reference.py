@@ -64,7 +64,7 @@ def _on_path(
     middles = [_middle(body) for body in mesh.bodies]
     things = mesh.surroundings
     for column, moving in enumerate(zip(*walks, strict=True)):
-        there = [bool(body.presence.present[start + column]) for body in mesh.bodies]
+        present = [bool(body.presence.present[start + column]) for body in mesh.bodies]
         for number, (body, (velocities, points)) in enumerate(
             zip(mesh.bodies, moving, strict=True)
         ):
@@ -77,7 +77,7 @@ def _on_path(
             others = [
                 (its_points.T, faces)
                 for other, (_, its_points) in enumerate(moving)
-                if other != number and there[other]
+                if other != number and present[other]
                 if (faces := mesh.bodies[other].faces) is not None
             ]
             around = others if things is None else [things.surface, *others]

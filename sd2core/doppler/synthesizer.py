@@ -215,9 +215,9 @@ class Synthesizer:
         self.left_out = tuple(left_out)
         share_bytes = memory_budget_bytes // len(mesh.bodies)
         like = () if blocks_of is None else blocks_of._bodies
-        found = (one.prepared.shared(mesh, options) for one in like)
+        shared = (one.prepared.shared(mesh, options) for one in like)
         self.prepared: PreparedMesh = next(
-            (one for one in found if one is not None), None
+            (one for one in shared if one is not None), None
         ) or PreparedMesh(mesh, options, ByteBudget(share_bytes), block_frames)
         self._frames = FrameCounts(self.prepared)
         # One for each body of the scene, this one first; each counts its own.
@@ -428,8 +428,8 @@ class Synthesizer:
                 notes.append(f"Nobody hides anybody else in visibility {quality}.")
         for person, one in zip(self.mesh.persons, self._bodies, strict=True):
             several = bool(self.mesh.others)
-            said = _body_notes(one.prepared, sensor, start, stop, several=several)
-            notes += [f"{person}: {note}" if several else note for note in said]
+            own_notes = _body_notes(one.prepared, sensor, start, stop, several=several)
+            notes += [f"{person}: {note}" if several else note for note in own_notes]
         return notes
 
     def _described(self) -> list[dict[str, Any]]:
