@@ -93,12 +93,12 @@ def difference_of(
     times_s = one.times_s + minuend.offset_s - subtrahend.offset_s
     clock = other.timebase
     frames = np.array([clock.frame_at(time_s) for time_s in times_s])
-    there = np.array([clock.covers(time_s) for time_s in times_s])
+    covered = np.array([clock.covers(time_s) for time_s in times_s])
     if one.present is not None:
-        there &= one.present
+        covered &= one.present
     if other.present is not None:
-        there &= other.present[frames]
-    known = np.repeat(there[None], one.axis.bins, axis=0)
+        covered &= other.present[frames]
+    known = np.repeat(covered[None], one.axis.bins, axis=0)
     for doppler in (one, other):
         known[[*doppler.null_bins, *doppler.unseen_bins]] = False
     theirs = other.values[:, frames]
@@ -297,15 +297,15 @@ def _draw_lanes(
     in_per_s: float,
 ) -> None:
     """Draw spans as boxes with a colour and a hatch per label, and names where they fit."""
-    looks = _looks(labels, lanes)
+    styles = _styles(labels, lanes)
     for at, (_, spans) in enumerate(lanes):
         top = len(lanes) - 1 - at
         for name in dict.fromkeys(span.label for span in spans):
             here = [span for span in spans if span.label == name]
             wide = [span for span in here if span.duration_s * in_per_s >= _NARROW_IN]
             narrow = [span for span in here if span.duration_s * in_per_s < _NARROW_IN]
-            look, plain = looks[name], {"facecolor": looks[name]["edgecolor"], "linewidth": 0}
-            for some, how in ((wide, {"linewidth": 0.8, **look}), (narrow, plain)):
+            style, plain = styles[name], {"facecolor": styles[name]["edgecolor"], "linewidth": 0}
+            for some, how in ((wide, {"linewidth": 0.8, **style}), (narrow, plain)):
                 if some:
                     stretches = [(span.start_s, span.duration_s) for span in some]
                     axes.broken_barh(stretches, (top + 0.08, 0.84), **how)
@@ -342,8 +342,8 @@ def add_key(figure: Figure, lanes: Sequence[tuple[str, Sequence[Span]]], labels:
 
     # A name that begins with an underscore would be left out.
     patches = [
-        Patch(label=f" {name}" if name.startswith("_") else name, linewidth=0.8, **look)
-        for name, look in _looks(labels, lanes).items()
+        Patch(label=f" {name}" if name.startswith("_") else name, linewidth=0.8, **style)
+        for name, style in _styles(labels, lanes).items()
     ]
     key = figure.legend(
         handles=patches, loc="outside lower center", ncols=min(len(patches), 6), fontsize=7,
@@ -353,7 +353,7 @@ def add_key(figure: Figure, lanes: Sequence[tuple[str, Sequence[Span]]], labels:
         text.set_parse_math(False)
 
 
-def _looks(
+def _styles(
     labels: Labels, lanes: Sequence[tuple[str, Sequence[Span]]]
 ) -> dict[str, dict[str, Any]]:
     """Colour and hatch of every label in view: never the colour alone."""
@@ -361,13 +361,13 @@ def _looks(
 
     known = {one.name: one.colour for one in labels.label_set.labels}
     used = {span.label for _, row in lanes for span in row}
-    looks = {}
+    styles = {}
     for number, name in enumerate([*known, *sorted(used - known.keys())]):
         colour = known.get(name, _FREE_COLOUR)
         if name in used:
-            looks[name] = {
+            styles[name] = {
                 "facecolor": to_rgba(colour, 0.35),
                 "edgecolor": colour,
                 "hatch": _HATCHES[number % len(_HATCHES)],
             }
-    return looks
+    return styles

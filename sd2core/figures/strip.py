@@ -210,18 +210,18 @@ class Body:
         """Who is there at a frame of the strip's clock, None if nobody is."""
         time_s = source.clock.time_of(frame)
         each = () if source.mesh is None else source.mesh.bodies
-        there = [(mesh, at) for mesh in each if (at := mesh.person_at(time_s)) is not None]
-        if not there:
+        shown = [(mesh, at) for mesh in each if (at := mesh.person_at(time_s)) is not None]
+        if not shown:
             return None
-        vertices = [np.asarray(mesh.frame(number), np.float64) for mesh, number in there]
+        vertices = [np.asarray(mesh.frame(number), np.float64) for mesh, number in shown]
         colours = np.tile(rgb(_PLAIN), (sum(map(len, vertices)), 1))
         if options.colour == "velocity":
-            velocity = [_velocity(mesh, number, source.sensor) for mesh, number in there]
+            velocity = [_velocity(mesh, number, source.sensor) for mesh, number in shown]
             colours = velocity_colours(np.concatenate(velocity), options.v_max_mps)
         firsts = np.cumsum([0, *map(len, vertices)]).tolist()
         faces = [
             mesh.faces + first
-            for (mesh, _), first in zip(there, firsts, strict=False)
+            for (mesh, _), first in zip(shown, firsts, strict=False)
             if mesh.faces is not None
         ]
         return cls(
