@@ -114,14 +114,14 @@ class Mounting:
         """
         centre = self.weights @ self.vertices_m
         rest, arm = self.vertices_m - centre, self.position_m - centre
-        there = mesh.presence.present
+        present = mesh.presence.present
         position_m = np.empty((mesh.frame_count, 3))
         rotation = np.empty((mesh.frame_count, 3, 3))
         for start in range(0, mesh.frame_count, _READ_FRAMES):
             stop = min(start + _READ_FRAMES, mesh.frame_count)
             whole = mesh.read(start, stop)
             block = whole[:, self.rows].astype(np.float64)  # (t, n, 3)
-            block[~there[start:stop]] = self.vertices_m
+            block[~present[start:stop]] = self.vertices_m
             missing = np.flatnonzero(~np.isfinite(block).all(axis=(1, 2)))
             for number in missing.tolist():
                 refuse_missing(whole[number : number + 1], start + number, mesh.source)
@@ -134,7 +134,7 @@ class Mounting:
             position_m[start:stop] = middle + turns @ arm
             rotation[start:stop] = turns @ self.rotation
             progress(stop, mesh.frame_count)
-        return RigidPath(mesh.timebase, position_m, rotation, there)
+        return RigidPath(mesh.timebase, position_m, rotation, present)
 
 
 def mounted(mesh: MeshSequence, at: str | int, up: Vector = UP) -> Mounting:

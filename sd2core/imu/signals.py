@@ -123,8 +123,8 @@ class RigidPath:
     @property
     def stretches(self) -> list[tuple[int, int]]:
         """Half-open runs of frames on end that are long enough to be differentiated."""
-        found = clips(self.timebase.times_s, self.present, self.timebase.frames_per_s)
-        return [(start, stop) for start, stop in found if stop - start >= MIN_FRAMES]
+        pieces = clips(self.timebase.times_s, self.present, self.timebase.frames_per_s)
+        return [(start, stop) for start, stop in pieces if stop - start >= MIN_FRAMES]
 
 
 def usual_cutoff_hz(frames_per_s: float) -> float:
@@ -296,7 +296,7 @@ def _quaternions(rotation: Floats) -> Floats:
     """Unit quaternions (T, 4), the real part last, without jumps between q and -q."""
     from scipy.spatial.transform import Rotation
 
-    found = Rotation.from_matrix(rotation).as_quat()
-    same = (found[1:] * found[:-1]).sum(axis=1) >= 0
-    found[1:] *= np.cumprod(np.where(same, 1.0, -1.0))[:, None]
-    return np.asarray(found)
+    quaternions = Rotation.from_matrix(rotation).as_quat()
+    same = (quaternions[1:] * quaternions[:-1]).sum(axis=1) >= 0
+    quaternions[1:] *= np.cumprod(np.where(same, 1.0, -1.0))[:, None]
+    return np.asarray(quaternions)

@@ -91,8 +91,8 @@ def _heading(path: Path, lines: Iterable[bytes]) -> tuple[str, str, Iterator[tup
             if len(line) > _LONGEST_HEADING:
                 break
             return rate, line, (one for one in numbered if not one[1].startswith("#"))
-        if found := _RATE.fullmatch(line.encode()):
-            rate = found[1].decode()
+        if match := _RATE.fullmatch(line.encode()):
+            rate = match[1].decode()
     raise Sd2Error(f"{path} has no heading", EXPECTED, "Name the columns in the first line")
 
 
@@ -110,12 +110,12 @@ def _texts(path: Path, lines: Iterable[bytes]) -> Iterator[tuple[int, str]]:
 
 
 def _columns_of(path: Path, titles: Sequence[str]) -> list[Column]:
-    found: dict[tuple[str, str], Column] = {}
+    columns: dict[tuple[str, str], Column] = {}
     for number, title in enumerate(titles):
         column = column_of(number, title)
         if column is None:
             continue
-        before = found.setdefault((column.quantity, column.axis), column)
+        before = columns.setdefault((column.quantity, column.axis), column)
         if before is not column:
             raise Sd2Error(
                 f"{path} has two columns {column.quantity} {column.axis}".rstrip()
@@ -123,7 +123,7 @@ def _columns_of(path: Path, titles: Sequence[str]) -> list[Column]:
                 "one sensor per file",
                 "Leave the other columns out",
             )
-    missing = [f"{quantity}_{axis}" for quantity, axis in AXES if (quantity, axis) not in found]
+    missing = [f"{quantity}_{axis}" for quantity, axis in AXES if (quantity, axis) not in columns]
     if missing:
         shown = ", ".join(titles)[:200]
         raise Sd2Error(
@@ -131,8 +131,8 @@ def _columns_of(path: Path, titles: Sequence[str]) -> list[Column]:
             EXPECTED,
             "Name the columns so",
         )
-    time = found.get(("time", ""))
-    return [found[one] for one in AXES] + ([time] if time else [])
+    time = columns.get(("time", ""))
+    return [columns[one] for one in AXES] + ([time] if time else [])
 
 
 def _factors(path: Path, columns: list[Column], given: dict[str, str]) -> NDArray[np.float64]:
