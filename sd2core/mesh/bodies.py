@@ -90,14 +90,14 @@ class Body:
     def words(self) -> str:
         """Text such as ``anna of anna.npz, moved by x 0.8, y 0, z 0 m, 2 s later``."""
         x, y, z = self.moved_m
-        told = [f"{self.person} of {self.file_name}" if self.person else self.file_name]
+        parts = [f"{self.person} of {self.file_name}" if self.person else self.file_name]
         if any(self.moved_m):
-            told.append(f"moved by x {x:g}, y {y:g}, z {z:g} m")
+            parts.append(f"moved by x {x:g}, y {y:g}, z {z:g} m")
         if self.turn_deg:
-            told.append(f"turned by {self.turn_deg:g}°")
+            parts.append(f"turned by {self.turn_deg:g}°")
         if self.start_s:
-            told.append(f"{abs(self.start_s):g} s {'later' if self.start_s > 0 else 'earlier'}")
-        return ", ".join(told)
+            parts.append(f"{abs(self.start_s):g} s {'later' if self.start_s > 0 else 'earlier'}")
+        return ", ".join(parts)
 
 
 def persons_of(names: Iterable[str]) -> tuple[str, ...]:

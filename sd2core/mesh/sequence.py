@@ -161,12 +161,12 @@ class MeshSequence:
 
     def __repr__(self) -> str:
         faces = "no triangles" if self.faces is None else f"{len(self.faces):,} triangles"
-        said = [
+        parts = [
             f"{self.vertex_count:,} vertices, {faces}",
             self.timebase.words,
             *([self.source] if self.source else []),
         ]
-        return f"<MeshSequence {' · '.join(said)}>"
+        return f"<MeshSequence {' · '.join(parts)}>"
 
     @property
     def frame_count(self) -> int:

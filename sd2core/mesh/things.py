@@ -233,7 +233,7 @@ class Surroundings:
         """
         things, walls = [asdict(one) for one in self.things], [asdict(one) for one in self.walls]
         every = {"things": things, "walls": walls}
-        return {name: found for name, found in every.items() if found}
+        return {name: entries for name, entries in every.items() if entries}
 
 
 def before_wall(wall: Wall, vertices_m: NDArray[np.float64], faces: NDArray[np.int32]) -> Surface:
