@@ -121,11 +121,11 @@ def body_doppler(
     times_s = np.arange((frames - 1) * choices.moments + 1) / (FRAMES_PER_S * choices.moments)
     mesh = driven.mesh(times_s + place.offset_s, choices.resolution)
     maker, sensor = Synthesizer(mesh, choices.synthesis), VirtualSensor(place.position_m)
-    found = synthetic_map(maker, sensor, limbs=choices.limbs, progress=progress)
-    every, limbs = choices.moments, found.limbs
+    doppler = synthetic_map(maker, sensor, limbs=choices.limbs, progress=progress)
+    every, limbs = choices.moments, doppler.limbs
     return replace(
-        found,
-        values=found.values[:, ::every],
+        doppler,
+        values=doppler.values[:, ::every],
         timebase=Timebase(times_s[::every]),
         limbs=None if limbs is None else limbs.of_frames(slice(None, None, every)),
     )
@@ -206,19 +206,19 @@ def _write(
         if key in writer.done:
             continue
         progress(done)
-        found = body_doppler(one, choices, place)
+        doppler = body_doppler(one, choices, place)
         radar = radar_doppler(stretch, synthesis.axis, choices.target)
         radar[:, list(synthesis.null_bins)] = 0.0
         writer.append(
             Take(
                 subject=key.subject,
                 name=key.name,
-                synthetic=np.ascontiguousarray(found.values.T),
+                synthetic=np.ascontiguousarray(doppler.values.T),
                 radar=radar,
                 times_s=one.clip.times_s,
                 label=np.zeros(stretch.frame_count, np.int8),
                 sensor_position_m=np.array(place.position_m),
-                limbs=found.limbs,
+                limbs=doppler.limbs,
             )
         )
     made.places[person] = place

@@ -67,7 +67,7 @@ def estimate_place(seen: Sequence[Seen]) -> RadarPlace:
             )
             for start_m in _STARTS_M
         ),
-        key=lambda found: float(found.fun),
+        key=lambda minimum: float(minimum.fun),
     )
     if not -best.fun >= _MIN_CORRELATION:
         return RadarPlace(correlation=before, correlation_before=before)
@@ -80,7 +80,7 @@ def _correlation(seen: Sequence[Seen], place: Floats) -> float:
     if (np.abs(place) > [*_FARTHEST_M, _LATEST_S]).any():
         return -1.0
     position_m = np.array([place[0], place[1], 0.0])
-    found, truth = [], []
+    body_mps, truth = [], []
     for one in seen:
         if len(one.times_s) < 4:
             continue
@@ -92,11 +92,11 @@ def _correlation(seen: Sequence[Seen], place: Floats) -> float:
         known = np.isfinite(one.velocity_mps)
         known &= (moved_s - step_s >= one.times_s[0]) & (moved_s + step_s <= one.times_s[-1])
         moved_s = moved_s[known]
-        found.append((curve(moved_s - step_s) - curve(moved_s + step_s)) / (2.0 * step_s))
+        body_mps.append((curve(moved_s - step_s) - curve(moved_s + step_s)) / (2.0 * step_s))
         truth.append(one.velocity_mps[known])
-    if sum(map(len, found)) < 3:
+    if sum(map(len, body_mps)) < 3:
         return -1.0
-    both = np.concatenate(found), np.concatenate(truth)
+    both = np.concatenate(body_mps), np.concatenate(truth)
     if min(float(np.ptp(values)) for values in both) < 1e-9:
         return -1.0
     return float(np.corrcoef(*both)[0, 1])

@@ -86,7 +86,7 @@ def make_recording_pairs(
     channels = [one.channel_in_words for one in opened]
     writer: PairWriter | None = None
     first: tuple[Path, float, bool] | None = None
-    found: dict[str, tuple[int, int]] = {}
+    by_subject: dict[str, tuple[int, int]] = {}
     left_out_s = 0.0
     damaged: dict[str, int] = {}
     for number, (recording, subject) in enumerate(named):
@@ -122,11 +122,11 @@ def make_recording_pairs(
         for take in takes:
             if TakeKey(take.subject, take.name, 0) not in writer.done:
                 writer.append(take)
-        count, frames = found.get(subject, (0, 0))
-        found[subject] = (
+        count, frames = by_subject.get(subject, (0, 0))
+        by_subject[subject] = (
             count + len(takes), frames + sum(len(take.times_s) for take in takes),
         )  # fmt: skip
-    return PairsMade(found, left_out_s, damaged)
+    return PairsMade(by_subject, left_out_s, damaged)
 
 
 def named_recordings(
@@ -206,11 +206,11 @@ def _takes(
 ) -> tuple[list[Take], float]:
     """Stretches with a person and a radar frame, cut into takes; and the time left out."""
     times_s = synthetic.timebase.times_s
-    there = on_clock(radar.shifted(recording.radar_offset_s), synthetic.timebase)
-    seen = Presence.of(there.present, len(times_s)).present
+    aligned = on_clock(radar.shifted(recording.radar_offset_s), synthetic.timebase)
+    seen = Presence.of(aligned.present, len(times_s)).present
     if synthetic.present is not None:
         seen &= synthetic.present
-    target = there.values.T.copy()  # (frames, bins)
+    target = aligned.values.T.copy()  # (frames, bins)
     target[:, list(synthetic.null_bins)] = 0.0
     label = frame_labels(recording, labels, times_s)
     rate_hz = synthetic.timebase.frames_per_s
