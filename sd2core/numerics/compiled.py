@@ -174,8 +174,8 @@ def kernels_compiled() -> tuple[int, int]:
     """Number of kernels whose machine code is on disk, and of all."""
     directory = cache_directory()
     # Numba keeps an index for each.
-    there = sum(1 for _ in directory.rglob("*.nbi")) if directory else 0
-    return there, sum(_source(name).count(b"\n@compiled") for name in KERNEL_MODULES)
+    on_disk = sum(1 for _ in directory.rglob("*.nbi")) if directory else 0
+    return on_disk, sum(_source(name).count(b"\n@compiled") for name in KERNEL_MODULES)
 
 
 def _source(module: str) -> bytes:

@@ -55,8 +55,8 @@ class MapAccuracy:
         if self.body is None:
             return words
         parts = {"body": self.body, "arithmetic": self.arithmetic}
-        told = [f"{name} {percent(of)[:-2]}" for name, of in parts.items() if of is not None]
-        return f"{words} ({', '.join(told)})"
+        details = [f"{name} {percent(of)[:-2]}" for name, of in parts.items() if of is not None]
+        return f"{words} ({', '.join(details)})"
 
 
 def percent(share: float) -> str:
