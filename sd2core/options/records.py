@@ -147,8 +147,8 @@ class OptionRecord:
         return hash(tuple(getattr(self, one.name) for one in fields(self)))
 
     def __repr__(self) -> str:
-        said = ", ".join(f"{name}={value!r}" for name, value in vars(self).items())
-        return f"{type(self).__name__}({said})"
+        values = ", ".join(f"{name}={value!r}" for name, value in vars(self).items())
+        return f"{type(self).__name__}({values})"
 
 
 _make_dataclass(OptionRecord)
@@ -294,11 +294,11 @@ def check(record: OptionRecord) -> None:
         if option.place.one_of and (is_given or option.place.needed):
             known = rivals.setdefault(option.place.one_of, [])
             known += [option] * is_given
-    for name, found in rivals.items():
-        if len(found) > 1:
-            first, second = (one.flags[0] for one in found[:2])
+    for name, given in rivals.items():
+        if len(given) > 1:
+            first, second = (one.flags[0] for one in given[:2])
             raise OptionError(f"{first} is given with {second}", "one of them")
-        if not found:
+        if not given:
             every = [one.flags[0] for one in options_of(type(record)) if one.place.one_of == name]
             raise OptionError(f"None of {', '.join(every)} is given", "one of them")
 
@@ -325,8 +325,8 @@ def words_of(command: str, record: OptionRecord, named: Collection[str] = ()) ->
     arguments: list[str] = []
     words: list[str] = []
     for option in options_of(type(record)):
-        found = option.written(option.of(record), always=option.name in named)
-        (arguments if option.place.argument else words).extend(found)
+        written = option.written(option.of(record), always=option.name in named)
+        (arguments if option.place.argument else words).extend(written)
     return [*command.split(), *arguments, *words]
 
 
@@ -345,12 +345,12 @@ def _options(kind: type, section: str = "") -> Iterator[Option]:
         choices = get_args(plain) if get_origin(plain) is Literal else ()
         factory = ready[name].default_factory
         default = ready[name].default if factory is MISSING else factory()
-        said = [found[name] for found in map(_documented, kind.__mro__) if name in found]
-        if not said:
+        descriptions = [texts[name] for texts in map(_documented, kind.__mro__) if name in texts]
+        if not descriptions:
             raise Sd2Error(
                 f"The docstring of {kind.__name__} says nothing of {name}", "words on each option"
             )
-        called, words = said[0]
+        called, words = descriptions[0]
         if _is_said(default, choices):
             text = str(default) if choices else f"{default:g}"
             words = words.replace("{default}", text)
@@ -384,25 +384,25 @@ def _is_said(default: Any, choices: tuple[Any, ...]) -> bool:
 def _declared(kind: type) -> dict[str, Group | None]:
     """The fields, own ones first, and the heading of each."""
     own, group = get_annotations(kind), vars(kind).get("GROUP")
-    found = dict.fromkeys((one.name for one in fields(kind) if one.name in own), group)
+    headings = dict.fromkeys((one.name for one in fields(kind) if one.name in own), group)
     for base in kind.__bases__:
         if is_dataclass(base):
             for name, nearer in _declared(base).items():
-                found.setdefault(name, nearer or group)
-    return found
+                headings.setdefault(name, nearer or group)
+    return headings
 
 
 @cache
 def _documented(kind: Any) -> Mapping[str, tuple[str | None, str]]:
     """What a value is called, and the words, of the fields that a docstring speaks of."""
     _, _, text = cleandoc(kind.__doc__ or "").partition("Parameters\n----------\n")
-    found: dict[str, tuple[str | None, str]] = {}
+    texts: dict[str, tuple[str | None, str]] = {}
     for block in re.split(r"\n(?=\S)", text.partition("\n\n")[0]):
         head, _, body = block.partition("\n")
         names, _, called = map(str.strip, head.partition(" : "))
         for name in names.split(", "):
-            found[name] = called or None, " ".join(body.split())
-    return found
+            texts[name] = called or None, " ".join(body.split())
+    return texts
 
 
 def _unwrapped(hint: Any) -> tuple[Any, list[Any]]:
