@@ -65,7 +65,7 @@ def read_take_labels(path: Path) -> list[TakeLabel]:
                 f"{path} has the columns {', '.join(names)}"[:300],
                 "times in start_s and end_s, in seconds, and each column once",
             )
-    found = []
+    labels = []
     for number, cells in enumerate(rows, start=2):
         if not any(cells):
             continue
@@ -75,14 +75,14 @@ def read_take_labels(path: Path) -> list[TakeLabel]:
                 raise ValueError("more columns than the heading")
             subject, take, label = (row.get(name, "").strip() for name in _NEEDED)
             start_s, end_s = float(row.get("start_s") or 0.0), float(row.get("end_s") or math.inf)
-            found.append(TakeLabel(subject, take, label, start_s, end_s))
+            labels.append(TakeLabel(subject, take, label, start_s, end_s))
         except ValueError as error:
             raise Sd2Error(f"{path}: line {number} is {cells!r:.200}", _EXPECTED) from error
         except Sd2Error as error:
             raise error.within(f"{path}: line {number}") from error
-    if not found:
+    if not labels:
         raise Sd2Error(f"{path} has no row", "one for each label")
-    return found
+    return labels
 
 
 def label_pairs(path: Path, rows: Sequence[TakeLabel]) -> dict[str, int]:
@@ -120,8 +120,8 @@ def labelled(pairs: PairSet, rows: Sequence[TakeLabel]) -> PairSet:
     return replace(pairs, labels=labels, takes=takes)
 
 
-def _together(there: Sequence[str], rows: Sequence[TakeLabel]) -> tuple[str, ...]:
-    labels = tuple(dict.fromkeys([*there, *(row.label for row in rows)]))
+def _together(existing: Sequence[str], rows: Sequence[TakeLabel]) -> tuple[str, ...]:
+    labels = tuple(dict.fromkeys([*existing, *(row.label for row in rows)]))
     if len(labels) > np.iinfo(np.int8).max:
         raise Sd2Error(f"There are {len(labels)} labels", f"up to {np.iinfo(np.int8).max}")
     return labels

@@ -24,9 +24,9 @@ def agreed(each: Sequence[NDArray[np.integer]]) -> NDArray[np.int8]:
     Each has labels of their own. Where nothing is labelled of one, another's label holds; where two
     are labelled differently, it is :data:`UNKNOWN`.
     """
-    found = np.maximum.reduce(each)
-    differ = np.logical_or.reduce([(one > 0) & (one != found) for one in each])
-    return np.where(differ, UNKNOWN, found).astype(np.int8)
+    label = np.maximum.reduce(each)
+    differ = np.logical_or.reduce([(one > 0) & (one != label) for one in each])
+    return np.where(differ, UNKNOWN, label).astype(np.int8)
 
 
 def check_labels(label: NDArray[np.integer], count: int, title: str, remedy: str = "") -> None:

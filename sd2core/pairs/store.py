@@ -382,13 +382,13 @@ def _reopened(path: Path, header: dict[str, Any]) -> Any:
     if not is_pair_store(path):
         raise Sd2Error(f"{path} is there and holds no pairs", "a new or empty folder")
     group = open_group(path, "r+")
-    there = dict(group.attrs)
+    attributes = dict(group.attrs)
     # Labels may have been put on it since (:mod:`sd2core.pairs.labelling`).
-    there["labels"] = there.get("labels", [])[: len(header["labels"])]
+    attributes["labels"] = attributes.get("labels", [])[: len(header["labels"])]
     for name, value in header.items():
-        if there.get(name, []) != value:
+        if attributes.get(name, []) != value:
             raise Sd2Error(
-                f"{path} was begun with {name} {there.get(name)}",
+                f"{path} was begun with {name} {attributes.get(name)}",
                 f"{value}, as it is asked for now",
                 "Go on with the same settings, or choose another folder",
             )
