@@ -60,13 +60,13 @@ class BodyExtent:
 
         Raises Sd2Error if no frame has a person.
         """
-        there = np.flatnonzero(mesh.presence.present)
-        if not len(there):
+        valid = np.flatnonzero(mesh.presence.present)
+        if not len(valid):
             raise Sd2Error(
                 f"{mesh.source or 'The mesh'} has a person in no frame",
                 "a person to place sensors around",
             )
-        picked = there[np.linspace(0, len(there) - 1, min(len(there), _SAMPLED_FRAMES)).astype(int)]
+        picked = valid[np.linspace(0, len(valid) - 1, min(len(valid), _SAMPLED_FRAMES)).astype(int)]
         stride = -(-mesh.vertex_count // _SAMPLED_VERTICES)
         middle, low, high = np.empty((3, len(picked), 3))
         sampled = len(range(0, mesh.vertex_count, stride))
