@@ -81,7 +81,10 @@ def judge_rate(step_s: float, *, of_a_mesh: bool = False) -> list[Finding]:
 
 
 def judge_clock(
-    times_s: NDArray[np.float64], there: NDArray[np.bool_] | None = None, *, of_a_mesh: bool = False
+    times_s: NDArray[np.float64],
+    present: NDArray[np.bool_] | None = None,
+    *,
+    of_a_mesh: bool = False,
 ) -> list[Finding]:
     """Findings on the rate of frames and on gaps between them.
 
@@ -89,7 +92,7 @@ def judge_clock(
     ----------
     times_s : float64 array, shape (T,)
         Increasing.
-    there : bool array, shape (T,), optional
+    present : bool array, shape (T,), optional
         Frames with somebody: time without anybody is no gap.
     of_a_mesh : bool
         True where options of a mesh can put it right.
@@ -100,8 +103,8 @@ def judge_clock(
     usual_s = float(np.median(steps_s))
     findings = judge_rate(usual_s, of_a_mesh=of_a_mesh)
     gaps = steps_s > max(_GAP_STEPS * usual_s, _GAP_S)
-    if there is not None:
-        gaps &= there[1:] & there[:-1]
+    if present is not None:
+        gaps &= present[1:] & present[:-1]
     count = int(gaps.sum())
     if count and not findings:
         worst = int(np.argmax(np.where(gaps, steps_s, 0.0)))

@@ -14,7 +14,7 @@ _LOST_SHARE = 0.01
 def judge_map(
     values: NDArray[np.floating],
     times_s: NDArray[np.float64],
-    there: NDArray[np.bool_] | None = None,
+    present: NDArray[np.bool_] | None = None,
     *,
     measured: bool = True,
 ) -> list[Finding]:
@@ -24,15 +24,15 @@ def judge_map(
     ----------
     values : float array, shape (bins, frames)
     times_s : float64 array, shape (frames,)
-    there : bool array, shape (frames,), optional
+    present : bool array, shape (frames,), optional
         False where there is nobody by the map's own word.
     measured : bool
         True for a radar's map: noise fills each of its frames, which a computed one may lack.
     """
-    findings = judge_clock(times_s, there)
+    findings = judge_clock(times_s, present)
     empty = ~values.any(axis=0)
-    if there is not None:
-        empty &= there
+    if present is not None:
+        empty &= present
     count = int(empty.sum())
     if count == values.shape[1]:
         findings.append(
