@@ -70,9 +70,9 @@ class PlugIn(Generic[Kind]):
             raise Sd2Error(f"{self.words} cannot be loaded ({cause})", "", self._remedy) from error
         version = getattr(sys.modules[self.entry.module], "SD2_PLUGIN_API", None)
         if version != SD2_PLUGIN_API:
-            found = "does not say its version" if version is None else f"is of version {version!r}"
+            state = "does not say its version" if version is None else f"is of version {version!r}"
             expected = f"SD2_PLUGIN_API = {SD2_PLUGIN_API} in its module"
-            raise Sd2Error(f"{self.words} {found}", expected, self._remedy)
+            raise Sd2Error(f"{self.words} {state}", expected, self._remedy)
         return self._checked(made, self.group.kind)
 
     def use(self, act: Callable[[Kind], Any], expected: Any) -> Any:
@@ -127,8 +127,8 @@ class Group(Generic[Kind]):
 
     def names(self) -> list[str]:
         """Names of all that are not built in; nothing is imported."""
-        found = dict.fromkeys(one.name for one in self.entries)
-        return [name for name in found if name not in self.built_in]
+        names = dict.fromkeys(one.name for one in self.entries)
+        return [name for name in names if name not in self.built_in]
 
     def loaded(self) -> Iterator[tuple[PlugIn[Kind], Kind | Sd2Error]]:
         """All that are installed, each with what it is, or why it cannot be used."""
@@ -140,8 +140,8 @@ class Group(Generic[Kind]):
 
     def package_of(self, name: str) -> str:
         """Package that has what is called so; empty for what is built in."""
-        found = None if name in self.built_in else self.find(name)
-        return "" if found is None else found.package
+        plug_in = None if name in self.built_in else self.find(name)
+        return "" if plug_in is None else plug_in.package
 
     def check_installed(self, name: str, package: str, source: object) -> None:
         """Raise Sd2Error if what a file needs is of a package that is not installed."""
@@ -157,8 +157,8 @@ class Group(Generic[Kind]):
 def _installed(group: Group[Any]) -> tuple[PlugIn[Any], ...]:
     from importlib.metadata import entry_points
 
-    found = [PlugIn(group, entry) for entry in entry_points(group=f"sd2_studio.{group.name}")]
-    return tuple(sorted(found, key=lambda one: (one.name, one.package)))
+    plug_ins = [PlugIn(group, entry) for entry in entry_points(group=f"sd2_studio.{group.name}")]
+    return tuple(sorted(plug_ins, key=lambda one: (one.name, one.package)))
 
 
 def forget() -> None:
