@@ -152,8 +152,8 @@ class CommandFolder(RunFolder):
         for path in (self.description, self.output, self._launched, *self._of_yesterday):
             path.unlink(missing_ok=True)
         write_control(self.control, "run")
-        told = {"started_unix_s": time.time(), "arguments": list(arguments), **about}
-        self._describe("starting", **told)
+        facts = {"started_unix_s": time.time(), "arguments": list(arguments), **about}
+        self._describe("starting", **facts)
         process = launch([*command, str(self.path), *arguments], self.output, environment)
         self._note_launch(process)
         return process
@@ -189,8 +189,8 @@ class CommandFolder(RunFolder):
 
     # The process has a file of its own, so that neither overwrites what the other notes.
     def _note_launch(self, process: ProcessId) -> None:
-        told = {"process": asdict(process), "window": asdict(ProcessId.current())}
-        atomic_write_text(self._launched, json.dumps(told) + "\n")
+        launched = {"process": asdict(process), "window": asdict(ProcessId.current())}
+        atomic_write_text(self._launched, json.dumps(launched) + "\n")
 
     def _read_launch(self, part: str) -> ProcessId | None:
         try:
@@ -211,6 +211,6 @@ def commands_in(place: Path) -> list[CommandFolder]:
     """Folders of commands in a folder, the newest first."""
     if not place.is_dir():
         return []
-    found = [CommandFolder(path) for path in place.iterdir() if path.is_dir()]
-    known = [one for one in found if one.exists]
+    folders = [CommandFolder(path) for path in place.iterdir() if path.is_dir()]
+    known = [one for one in folders if one.exists]
     return sorted(known, key=lambda one: one.facts.get("started_unix_s", 0.0), reverse=True)

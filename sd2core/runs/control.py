@@ -98,9 +98,9 @@ def stop_signals() -> Iterator[threading.Event]:
     An exception in the midst of anything, as Ctrl-C raises, may be lost in a library, or end the
     process with the signal although it was caught.
     """
-    told = threading.Event()
+    stopped = threading.Event()
     with signals_kept():
         if threading.current_thread() is threading.main_thread():
             for number in (signal.SIGTERM, signal.SIGINT):
-                signal.signal(number, lambda *_: told.set())
-        yield told
+                signal.signal(number, lambda *_: stopped.set())
+        yield stopped

@@ -60,11 +60,11 @@ class ProgressTail:
         try:
             with open_regular(self._path) as stream:
                 stream.seek(self._offset)
-                found = [event for line in whole_lines(stream) if (event := _parsed(line))]
+                events = [event for line in whole_lines(stream) if (event := _parsed(line))]
                 self._offset = stream.tell()
         except (OSError, Sd2Error):  # not there yet, discarded, or no file
             return []
-        return found
+        return events
 
 
 def read_events(path: Path) -> list[Event]:
