@@ -63,16 +63,16 @@ class Step(NamedTuple):
 def plan_steps(path: Path, duration_s: float, half_base_m: float) -> list[Step]:
     """Steps, left and right in turn, wherever standing still would leave a foot behind."""
     steps: list[Step] = []
-    standing = [_foothold(path, 0.0, side, half_base_m) for side in (0, 1)]
+    footholds = [_foothold(path, 0.0, side, half_base_m) for side in (0, 1)]
     start_s, side = 0.0, 0
     while start_s < duration_s:
         # A foot stands from its landing until it is lifted again: two steps later.
         middle_s = start_s + _SWING_S + 0.5 * (2 * _STEP_S - _SWING_S)
         place, yaw = _foothold(path, middle_s, side, half_base_m)
-        before, yaw_before = standing[side]
+        before, yaw_before = footholds[side]
         if np.hypot(*(place - before)) > 0.015 or abs(yaw - yaw_before) > 3.0:
             steps.append(Step(side, start_s, start_s + _SWING_S, place, yaw))
-            standing[side] = (place, yaw)
+            footholds[side] = (place, yaw)
             start_s += _STEP_S
         else:
             # Whatever foot has to go first may go at any time.

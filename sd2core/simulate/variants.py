@@ -219,7 +219,7 @@ def _take(
     """See a movement by the synthetic map and by the simulated radar."""
     mesh, synthesis = movement.mesh, options.synthesis
     sensor = aimed_at(VirtualSensor(movement.position_m), _middle_m(mesh))
-    found = synthetic_map(Synthesizer(mesh, synthesis), sensor, limbs=options.limbs)
+    doppler = synthetic_map(Synthesizer(mesh, synthesis), sensor, limbs=options.limbs)
     # Echoes of a rough surface depend little on how finely it is cut (decision 26).
     radar = radar_target(
         coarser(mesh),
@@ -232,13 +232,13 @@ def _take(
     return Take(
         movement.key.subject,
         movement.key.name,
-        np.ascontiguousarray(found.values.T),
+        np.ascontiguousarray(doppler.values.T),
         radar,
         mesh.times_s - mesh.times_s[0],
         np.array([labels.index(one) if one else UNKNOWN for one in movement.labels], np.int8),
         np.array(movement.position_m),
         0,
-        found.limbs,
+        doppler.limbs,
     )
 
 
@@ -273,7 +273,7 @@ def mirrored_label(label: str) -> str:
     >>> mirrored_label("left-to-right"), mirrored_label("SwipeLeft"), mirrored_label("upright")
     ('right-to-left', 'SwipeRight', 'upright')
     """
-    return _SIDE.sub(lambda found: _OTHER_SIDE[found[0]], label)
+    return _SIDE.sub(lambda match: _OTHER_SIDE[match[0]], label)
 
 
 def _middle_m(mesh: MeshSequence) -> tuple[float, float, float]:

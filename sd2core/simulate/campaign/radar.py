@@ -211,7 +211,7 @@ def _echoes(scene: MeshScene, frame: int) -> tuple[Echoes, NDArray[np.int32]]:
     range_m, rate_mps = np.empty(count), np.empty(count)
     antenna = np.vstack([scene.sensor.position_m, sensor_axes(scene.sensor)])
     beam = beam_tables(scene.sensor)
-    found = facet_echoes(
+    size = facet_echoes(
         position,
         velocity,
         mesh.faces,
@@ -230,17 +230,17 @@ def _echoes(scene: MeshScene, frame: int) -> tuple[Echoes, NDArray[np.int32]]:
         rate_mps,
         amplitude,
     )
-    return Echoes(range_m[:found], rate_mps[:found], amplitude[:, :found]), rows[:found]
+    return Echoes(range_m[:size], rate_mps[:size], amplitude[:, :size]), rows[:size]
 
 
 def _phasors(turns: Floats, count: int, first: Floats) -> NDArray[np.complex128]:
     """exp(2 pi j (first + k turns)) for k below ``count``, (count, n)."""
-    found = np.empty((count, len(turns)), np.complex128)
-    found[0] = np.exp(2j * np.pi * (first - np.rint(first)))
+    phasors = np.empty((count, len(turns)), np.complex128)
+    phasors[0] = np.exp(2j * np.pi * (first - np.rint(first)))
     step = np.exp(2j * np.pi * turns)
     for k in range(1, count):
-        np.multiply(found[k - 1], step, out=found[k])
-    return found
+        np.multiply(phasors[k - 1], step, out=phasors[k])
+    return phasors
 
 
 def _received(

@@ -234,12 +234,12 @@ class TakeMaker:
             return self._mesh(FITTED, shape, transforms, true.times_s)
         drawn = self._errors.draw(rng)
         drawn = drawn.scaled(float(rng.uniform(*self._campaign.error_sizes)))
-        found = drawn.shape(shape)
+        wrong_shape = drawn.shape(shape)
         held = drawn.transforms(
-            self._space.skeleton(shape), transforms, self._space.skeleton(found)
+            self._space.skeleton(shape), transforms, self._space.skeleton(wrong_shape)
         )
-        fitted = self._mesh(FITTED, found, held, true.times_s)
-        wrong = self._mesh(TRUE, found, held, true.times_s)
+        fitted = self._mesh(FITTED, wrong_shape, held, true.times_s)
+        wrong = self._mesh(TRUE, wrong_shape, held, true.times_s)
         low, medium = (self._bodies[resolution][0] for resolution in (TRUE, FITTED))
         sizes = limb_errors(true, wrong, vertex_limbs(low))
         # A fit is right about its errors on average, and about a clip's to half as much again.
@@ -257,13 +257,13 @@ class TakeMaker:
         return MeshSequence(vertices, body.faces, Timebase(times_s), source="simulated body")
 
 
-def limb_errors(true: MeshSequence, found: MeshSequence, limbs: NDArray[np.uint8]) -> Floats:
+def limb_errors(true: MeshSequence, fitted: MeshSequence, limbs: NDArray[np.uint8]) -> Floats:
     """Errors of limbs' velocities, m/s: along the camera's line of sight and across, (2, L).
 
     Root mean squares over a clip of two meshes of the same vertices, whose limbs are given, (V,).
     """
     places_m = np.asarray(true.vertices, np.float64)
-    off_mps = np.gradient(np.asarray(found.vertices, np.float64) - places_m, true.times_s, axis=0)
+    off_mps = np.gradient(np.asarray(fitted.vertices, np.float64) - places_m, true.times_s, axis=0)
     line = places_m / np.linalg.norm(places_m, axis=2, keepdims=True)
     along = np.einsum("tvk,tvk->tv", off_mps, line) ** 2
     across = 0.5 * ((off_mps**2).sum(axis=2) - along)
