@@ -355,8 +355,7 @@ class _Opened:
         mesh, making = self._mesh, self._making
         if making.tolerance is None:
             return Synthesizer(mesh, making.synthesis), {}
-        places = range(1 + len(places_of(self.recording, making)))
-        sensors = [self._sensor(place) for place in places]
+        sensors = list(map(self._sensor, range(1 + len(places_of(self.recording, making)))))
         frames = mesh.frame_count * len(sensors)
         placed = choose_for_places(
             mesh, spread(sensors), frames, making.tolerance, making.synthesis
