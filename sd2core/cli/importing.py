@@ -465,7 +465,7 @@ def _relink(options: Relink) -> int:
     if options.json:
         print_json(
             {
-                "found": {role: str(path) for role, path in result.found.items()},
+                "found": {role: str(path) for role, path in result.paths.items()},
                 "ambiguous": {
                     role: [str(path) for path in paths] for role, paths in result.ambiguous.items()
                 },
@@ -473,13 +473,13 @@ def _relink(options: Relink) -> int:
             }
         )
     else:
-        for role, path in result.found.items():
+        for role, path in result.paths.items():
             print(f"{role}: found at {path}")
         for role, paths in result.ambiguous.items():
             print(f"{role}: several files fit equally well, so none was taken:")
             print(*(f"  {path}" for path in paths), sep="\n")
         for role in result.missing:
             print(f"{role}: {sought[role].name} is not under {options.folder}")
-        if not (result.found or result.ambiguous or result.missing):
+        if not (result.paths or result.ambiguous or result.missing):
             print("No file of this recording is missing.")
     return 1 if result.ambiguous or result.missing else 0

@@ -349,12 +349,12 @@ class Recording:
         """
         missing = self.missing()
         relinked = find_again(missing, Path(folder), progress)
-        moved = {str(missing[role]): path for role, path in relinked.found.items()}
-        for role in relinked.found.keys() & set(ROLES):
-            setattr(self, role, relinked.found[role])
-        self.bodies = _with_paths(self.bodies, relinked.found.get)
+        moved = {str(missing[role]): path for role, path in relinked.paths.items()}
+        for role in relinked.paths.keys() & set(ROLES):
+            setattr(self, role, relinked.paths[role])
+        self.bodies = _with_paths(self.bodies, relinked.paths.get)
         self.things = _with_files(self.things, lambda path: moved.get(path, path))
-        if relinked.found and (self.folder / FILE_NAME).exists():
+        if relinked.paths and (self.folder / FILE_NAME).exists():
             self.save()
         return relinked
 
@@ -442,10 +442,10 @@ class Recording:
     def divergence(self, theirs: Recording) -> Divergence:
         """Compare with the same recording as it is on disk by now."""
         mine = self.state()
-        there = theirs.state()
+        stored = theirs.state()
         if self.labels_elsewhere:  # this one writes no labels
-            there = replace(there, labels=mine.labels)
-        return Divergence(self._base or mine, mine, there)
+            stored = replace(stored, labels=mine.labels)
+        return Divergence(self._base or mine, mine, stored)
 
     def _check_unchanged(self) -> None:
         if self._base is None:
@@ -460,9 +460,9 @@ class Recording:
         if digests_of(own_files) == self._digests:
             return
         theirs = open_recording(self.folder)
-        found = self.divergence(theirs)
-        if found.changes:
-            raise SavedElsewhereError(theirs, found)
+        divergence = self.divergence(theirs)
+        if divergence.changes:
+            raise SavedElsewhereError(theirs, divergence)
         self.accept(theirs)  # with fields that only a later version knows
 
     @property

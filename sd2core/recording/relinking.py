@@ -54,7 +54,7 @@ def _is_mesh(role: Role) -> bool:
 class Relinked:
     """Result of a search for files, by role."""
 
-    found: dict[Role, Path]  # new paths
+    paths: dict[Role, Path]  # new paths
     ambiguous: dict[Role, tuple[Path, ...]]  # candidates that fit equally well; nothing was changed
     missing: tuple[Role, ...]  # no name under the folder fits
 
@@ -71,7 +71,7 @@ def find_again(missing: Mapping[Role, Path], folder: Path, progress: Progress) -
     folders = {path.parent.name for role, path in missing.items() if is_many(role, path)}
     names = {path.name for path in missing.values()}
     candidates = paths_named(names | folders, folder, progress)
-    found: dict[Role, Path] = {}
+    paths: dict[Role, Path] = {}
     ambiguous: dict[Role, tuple[Path, ...]] = {}
     for role, path in missing.items():
         # Files of a pattern are found by their folder, unless it is one file's own name.
@@ -86,11 +86,11 @@ def find_again(missing: Mapping[Role, Path], folder: Path, progress: Progress) -
             if parts == max(agreement)
         ]
         if len(best) == 1:
-            found[role] = best[0] / rest
+            paths[role] = best[0] / rest
         elif best:
             ambiguous[role] = tuple(sorted(best))
-    left = tuple(role for role in missing if role not in found and role not in ambiguous)
-    return Relinked(found, ambiguous, left)
+    left = tuple(role for role in missing if role not in paths and role not in ambiguous)
+    return Relinked(paths, ambiguous, left)
 
 
 def is_many(role: Role, path: Path) -> bool:

@@ -448,7 +448,7 @@ class DocumentModel(QObject):
         if self.recording is None:
             return None
         relinked = self.recording.relink(folder)
-        if relinked.found:
+        if relinked.paths:
             if self.content is not None and self.content.saved:
                 self.tell_saved()
             self._start(self.recording, [])

@@ -328,7 +328,7 @@ class TestRelink:
         read = open_recording(made.folder)
         assert set(read.missing()) == {"video", "mesh", "faces", "radar"}
         result = read.relink(tmp_path)
-        assert set(result.found) == {"video", "mesh", "faces", "radar"}
+        assert set(result.paths) == {"video", "mesh", "faces", "radar"}
         assert not result.missing
         again = open_recording(made.folder)
         assert not again.missing()
@@ -348,7 +348,7 @@ class TestRelink:
         assert read.missing() == {"thing 2": chair, "thing 3": chair}
         assert read.things_there == (box,)
         found = tmp_path / "store" / "chair.obj"
-        assert read.relink(tmp_path / "store").found == {"thing 2": found, "thing 3": found}
+        assert read.relink(tmp_path / "store").paths == {"thing 2": found, "thing 3": found}
         again = open_recording(made.folder)
         assert not again.missing()
         assert [one.shape for one in again.things] == ["box", str(found), str(found)]
@@ -361,7 +361,7 @@ class TestRelink:
         (tmp_path / "here").mkdir()
         monkeypatch.chdir(tmp_path / "here")
         unsaved = Recording(Path(), video=files / "walk.mkv")
-        assert unsaved.relink(tmp_path).found == {"video": tmp_path / "disk" / "walk.mkv"}
+        assert unsaved.relink(tmp_path).paths == {"video": tmp_path / "disk" / "walk.mkv"}
         assert not list((tmp_path / "here").iterdir())
 
     def test_the_longest_common_path_wins(self, files: Path, tmp_path: Path) -> None:
@@ -371,7 +371,7 @@ class TestRelink:
             (tmp_path / "disk" / name / "walk.mkv").write_text(name)
         (files / "walk.mkv").unlink()
         result = made.relink(tmp_path / "disk")
-        assert result.found == {"video": tmp_path / "disk" / "one" / "walk.mkv"}
+        assert result.paths == {"video": tmp_path / "disk" / "one" / "walk.mkv"}
         assert made.mesh == files / "walk.npz"
 
     def test_equally_good_files_are_named_and_left_alone(self, files: Path, tmp_path: Path) -> None:
@@ -384,7 +384,7 @@ class TestRelink:
         (files / "walk.mkv").unlink()
         (files / "walk.npz").unlink()
         result = made.relink(tmp_path / "disk")
-        assert not result.found
+        assert not result.paths
         assert result.ambiguous == {"video": candidates}
         assert result.missing == ("mesh",)
         assert content(made) == before
@@ -392,7 +392,7 @@ class TestRelink:
     def test_the_folder_itself_may_be_what_is_missing(self, files: Path, tmp_path: Path) -> None:
         made = make(files)
         (files / "capture").rename(tmp_path / "capture")
-        assert made.relink(tmp_path / "capture").found == {"radar": tmp_path / "capture"}
+        assert made.relink(tmp_path / "capture").paths == {"radar": tmp_path / "capture"}
 
     def test_a_file_is_no_folder(self, files: Path) -> None:
         with pytest.raises(Sd2Error, match="is not a folder"):
@@ -440,7 +440,7 @@ class TestPattern:
         (files / "frames").rename(tmp_path / "frames")
         (tmp_path / "other" / "frames").mkdir(parents=True)
         assert made.missing()
-        assert made.relink(tmp_path).found == {"mesh": tmp_path / "frames" / "*.obj"}
+        assert made.relink(tmp_path).paths == {"mesh": tmp_path / "frames" / "*.obj"}
 
     def test_is_not_copied(self, made: Recording, tmp_path: Path) -> None:
         with pytest.raises(Sd2Error, match="Give their folder"):
@@ -477,7 +477,7 @@ def test_a_file_with_brackets_in_its_name_moves_like_any_other(files: Path, tmp_
     (tmp_path / "disk" / "walk 1.mkv").write_text("another")
     video.rename(tmp_path / "disk" / video.name)
     assert made.missing() == {"video": video}
-    assert made.relink(tmp_path / "disk").found == {"video": tmp_path / "disk" / video.name}
+    assert made.relink(tmp_path / "disk").paths == {"video": tmp_path / "disk" / video.name}
     copied = made.save_as(tmp_path / "copy", copy=True)
     assert content(copied)["video"] == video.name
 
@@ -700,7 +700,7 @@ def test_bodies_go_with_a_copy_and_are_found_again(tmp_path: Path) -> None:
     (tmp_path / "anna.npz").rename(tmp_path / "elsewhere" / "anna.npz")
     lost = open_recording(made.folder)
     assert lost.missing() == {"body 2": tmp_path / "anna.npz"}
-    assert lost.relink(tmp_path / "elsewhere").found.keys() == {"body 2"}
+    assert lost.relink(tmp_path / "elsewhere").paths.keys() == {"body 2"}
     again = open_recording(made.folder)
     assert not again.missing()
     assert again.bodies[0].moved_m == (1, 0, 0)
