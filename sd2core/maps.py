@@ -107,7 +107,7 @@ class LimbMaps:
     @property
     def by_person(self) -> tuple[LimbMaps, ...]:
         """Those of each person, without the name; of one alone these themselves."""
-        found = []
+        result = []
         for number, person in enumerate(self.persons):
             rows = [row for row, one in enumerate(self.parts) if one.rpartition(OF)[0] == person]
             moves = self.kinematics
@@ -115,8 +115,8 @@ class LimbMaps:
                 moves = moves[number * len(JOINTS) : (number + 1) * len(JOINTS)]
                 moves = None if np.isnan(moves).any() else moves
             names = (self.parts[row].rpartition(OF)[2] for row in rows)
-            found.append(LimbMaps(tuple(names), self.values[rows], moves))
-        return tuple(found) or (self,)
+            result.append(LimbMaps(tuple(names), self.values[rows], moves))
+        return tuple(result) or (self,)
 
     @property
     def persons(self) -> tuple[str, ...]:
@@ -148,7 +148,7 @@ class LimbMaps:
             return np.concatenate([one.inputs(parts) for one in self.by_person], axis=1)
         if tuple(parts) == (KINEMATICS,):
             return np.ascontiguousarray(self._moving().T)
-        found = []
+        energies = []
         for part in parts:
             rows = [
                 number
@@ -159,8 +159,8 @@ class LimbMaps:
                 raise Sd2Error(
                     f"The limb maps have no part {part!r}", f"some of {', '.join(self.parts)}"
                 )
-            found.append(self.values[rows].sum(axis=0))
-        return np.ascontiguousarray(np.concatenate(found).T)
+            energies.append(self.values[rows].sum(axis=0))
+        return np.ascontiguousarray(np.concatenate(energies).T)
 
     def _moving(self) -> NDArray[np.float32]:
         """The map, and kinematics below it."""
@@ -303,14 +303,14 @@ class DopplerMap:
 
     def __repr__(self) -> str:
         emptied = len(self.null_bins)
-        said = [
+        parts = [
             f"{self.kind}, {self.axis.words}",
             self.timebase.words,
             *([self.unit] if self.unit else []),
             *([f"{emptied} bins emptied"] if emptied else []),
             *(["by parts of the body"] if self.limbs is not None else []),
         ]
-        return f"<DopplerMap {' · '.join(said)}>"
+        return f"<DopplerMap {' · '.join(parts)}>"
 
     def of_person(self, person: str) -> DopplerMap:
         """Return the map of one person of a scene of several, less what the others hide.

@@ -58,9 +58,9 @@ class ProcessId:
     @classmethod
     def current(cls) -> Self:
         """Identity of the calling process."""
-        found = cls.of(os.getpid())
-        assert found is not None
-        return found
+        process = cls.of(os.getpid())
+        assert process is not None
+        return process
 
     @property
     def is_alive(self) -> bool:

@@ -151,11 +151,11 @@ class RadarConfig:
 
     def as_dict(self) -> dict[str, Any]:
         """Fields as JSON holds them, without those that describe a plain FMCW radar as such."""
-        told = asdict(self)
+        content = asdict(self)
         for name, plain in (("sampling", "real"), ("transmitters", 1), ("ranges_m", ())):
-            if told[name] == plain:
-                del told[name]
-        return told
+            if content[name] == plain:
+                del content[name]
+        return content
 
     @property
     def is_continuous(self) -> bool:
