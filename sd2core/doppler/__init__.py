@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 from sd2core.doppler.options import PRESETS, SynthesisOptions
 
 if TYPE_CHECKING:
-    from sd2core.doppler.synthesizer import FrameScattering, Stretch, Synthesizer
+    from sd2core.doppler.synthesizer import FrameScattering, MapFrames, Synthesizer
 
-__all__ = ["PRESETS", "FrameScattering", "Stretch", "SynthesisOptions", "Synthesizer"]
+__all__ = ["PRESETS", "FrameScattering", "MapFrames", "SynthesisOptions", "Synthesizer"]
 
 
 def __getattr__(name: str) -> Any:

@@ -38,7 +38,7 @@ from sd2core.version import __version__
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class MapFrames:
     """Consecutive frames of a synthetic Doppler map."""
 
     values: NDArray[np.float32]  # (bins, n)
@@ -384,7 +384,7 @@ class Synthesizer:
         stretch = self.stretch(sensor, start, stop, visibility, progress, parts)
         return self.as_map(stretch, sensor, start)
 
-    def as_map(self, stretch: Stretch, sensor: VirtualSensor, start: int = 0) -> DopplerMap:
+    def as_map(self, stretch: MapFrames, sensor: VirtualSensor, start: int = 0) -> DopplerMap:
         """Doppler map of frames that were counted with their shares, as :meth:`map` gives it."""
         assert stretch.visible_share is not None
         assert stretch.beyond_share is not None
@@ -453,7 +453,7 @@ class Synthesizer:
         parts: VertexParts | None = None,
         *,
         shares: bool = True,
-    ) -> Stretch:
+    ) -> MapFrames:
         """Doppler values of some frames.
 
         They equal these columns of the whole map: smoothing over time also uses the frames
@@ -488,7 +488,7 @@ class Synthesizer:
         each = [one._summed(its, sensor, (start, stop), part, shares) for one, its, part in bodies]
         return replace(each[0] if len(each) == 1 else self._joined(each), processor_s=processor_s)
 
-    def _joined(self, each: list[Stretch]) -> Stretch:
+    def _joined(self, each: list[MapFrames]) -> MapFrames:
         """Sum of the stretches of all bodies."""
         members = np.array([[body.represented_count] for body in self.mesh.bodies], np.float64)
         visible = beyond = None
@@ -499,7 +499,7 @@ class Synthesizer:
             beyond = (outside / np.maximum(seen.sum(axis=0), 1)).astype(np.float32)
         limbs = [one.limbs for one in each if one.limbs is not None]
         qualities = {one.quality for one in each}
-        return Stretch(
+        return MapFrames(
             np.asarray(np.sum([one.values for one in each], axis=0), np.float32),
             np.sum([one.raw for one in each], axis=0),
             visible,
@@ -515,8 +515,8 @@ class Synthesizer:
         frames: tuple[int, int],
         parts: VertexParts | None,
         shares: bool,
-    ) -> Stretch:
-        """Stretch of this body alone, among the others, once it is counted."""
+    ) -> MapFrames:
+        """Those of this body alone, among the others, once it is counted."""
         options, times_s, (start, stop) = self.options, self.mesh.times_s, frames
         counts, totals, first, last = counted.counts, counted.totals, counted.start, counted.stop
 
@@ -536,7 +536,7 @@ class Synthesizer:
         nobody = ~self.mesh.presence.present[first:last]
         counts.visible[nobody] = counts.beyond[nobody] = 0
         visible, beyond = counts.visible[inside], counts.beyond[inside]
-        return Stretch(
+        return MapFrames(
             values.astype(np.float32),
             raw[:, inside],
             (visible / self.mesh.represented_count).astype(np.float32) if shares else None,

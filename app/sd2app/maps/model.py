@@ -38,7 +38,7 @@ from sd2app.session.tasks import ListedRunner
 from sd2core.cli.synth import Synth
 from sd2core.doppler.body_error import body_error
 from sd2core.doppler.options import PRESETS
-from sd2core.doppler.synthesizer import FrameScattering, Stretch, Synthesizer
+from sd2core.doppler.synthesizer import FrameScattering, MapFrames, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.options.records import words_of
@@ -293,7 +293,7 @@ class SynthesisModel(QObject):
         limbs = part.limbs if synthesizers.limbs else None
         # What is smoothed no more needs no values before.
         raw, (visible, beyond) = np.empty((0, 0)), part.shares
-        stretch = Stretch(part.values, raw, visible, beyond, maker.options.visibility, limbs)
+        stretch = MapFrames(part.values, raw, visible, beyond, maker.options.visibility, limbs)
         made = maker.as_map(stretch, self._sensor)
         error = body_error(maker, self._sensor)
         meta = made.meta | ({} if error is None else {"body_error_l1": error})
