@@ -125,7 +125,7 @@ class _Run:
         self._scheduler = scheduler
         self._folder = graph.folder
         self._begun_s = time.monotonic()
-        self._said_s = float("-inf")
+        self._reported_s = float("-inf")
         self._workers = -1
         self._driver: Driver | None = None
 
@@ -186,8 +186,8 @@ class _Run:
             self._workers = workers
             self._lines.say("workers", workers=workers)
         now_s = time.monotonic()
-        if now_s - self._said_s >= _LINE_EVERY_S:
-            self._said_s = now_s
+        if now_s - self._reported_s >= _LINE_EVERY_S:
+            self._reported_s = now_s
             last = self._driver.last
             self._lines.say(
                 "progress",

@@ -220,10 +220,10 @@ def _card(
     best_at: int,
     closed_form: bool,
 ) -> ClassifierCard:
-    training_said = {**chosen.to_json(), "options": {**options(chosen.model), **own}}
+    training_options = {**chosen.to_json(), "options": {**options(chosen.model), **own}}
     if closed_form:  # There are no steps.
         used = ("model", "features", "delay_s", "options", "noisy_share", "seed")
-        training_said = {name: training_said[name] for name in used}
+        training_options = {name: training_options[name] for name in used}
     return ClassifierCard(
         chosen.model,
         {**options(chosen.model), **own},
@@ -231,7 +231,7 @@ def _card(
         known.classes,
         tuple(dict.fromkeys(clip.kind for clip in training)),
         delay_frames,
-        about={**(about or {}), "best_step": best_at, "training": training_said},
+        about={**(about or {}), "best_step": best_at, "training": training_options},
     )
 
 

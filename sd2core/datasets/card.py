@@ -453,8 +453,8 @@ def _axes(card: dict[str, Any]) -> str:
 
 def _made(card: dict[str, Any]) -> str:
     rows = [
-        (kind, way, f"{count:,}") for kind, found_counts in card["how"].items()
-        for way, count in found_counts.items()
+        (kind, way, f"{count:,}") for kind, counts in card["how"].items()
+        for way, count in counts.items()
     ]  # fmt: skip
     typed = card["provenance"].get("command")
     command = f"\n\n```\n{typed}\n```" if typed else ""

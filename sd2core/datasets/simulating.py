@@ -88,11 +88,11 @@ def simulated_map(
     start_s = mesh.timebase.start_s
     # As a capture says it, whose clock begins with its first frame.
     times_s = radar_times_s(mesh.timebase, simulation.radar)
-    there_s = (times_s - times_s[0]) + start_s
+    mesh_s = (times_s - times_s[0]) + start_s
     clock = mesh.timebase if frames is None else Timebase(mesh.times_s[slice(*frames)])
     # With a neighbour on each side, so that the nearest is among them.
-    first = max(int(np.searchsorted(there_s, clock.start_s)) - 1, 0)
-    stop = min(int(np.searchsorted(there_s, clock.times_s[-1])) + 1, len(there_s))
+    first = max(int(np.searchsorted(mesh_s, clock.start_s)) - 1, 0)
+    stop = min(int(np.searchsorted(mesh_s, clock.times_s[-1])) + 1, len(mesh_s))
     options = SignalOptions(seed=seed_of(mesh, sensor, simulation), link=LinkBudget())
     maps = []
     for low in range(first, stop, _BLOCK_FRAMES):
@@ -110,7 +110,7 @@ def simulated_map(
         )
         block = doppler_map(capture, axis=axis, clutter=CLUTTER)
         meta = _of_all_frames(block.meta, capture.meta["simulation"])
-        maps.append(replace(block, timebase=Timebase(there_s[low:high]), meta=meta))
+        maps.append(replace(block, timebase=Timebase(mesh_s[low:high]), meta=meta))
     return on_clock(joined(maps), clock)
 
 

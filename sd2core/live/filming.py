@@ -281,7 +281,7 @@ class _Video:
             self._file, camera.rate_hz, camera.size_px, crf=_CRF, preset=_PRESET, grows=True
         )
         self._filmed = Filmed()
-        self._told_s = self._looked_s = 0.0
+        self._reported_s = self._looked_s = 0.0
 
     def add(self, picture: NDArray[np.uint8], taken_s: float, dropped: int) -> None:
         """Encode a picture, and tell now and then what there is."""
@@ -295,8 +295,8 @@ class _Video:
         if now_s > self._looked_s + _LOOK_S:
             self._looked_s = now_s
             self._look()
-        if now_s > self._told_s + _TELL_S:
-            self._told_s = now_s
+        if now_s > self._reported_s + _TELL_S:
+            self._reported_s = now_s
             self._tell_progress(picture if self._previews else None)
 
     def close(self, dropped: int) -> None:

@@ -88,8 +88,8 @@ def _cover(recording: Recording, progress: Progress) -> bool:
                 times_s=clock.times_s, crf=_CRF, preset=_PRESET, comment=HEADS_COVERED,
             )  # fmt: skip
             with open_video(part) as written:
-                found_s = written.timebase.times_s
-            if len(found_s) != len(clock) or np.abs(found_s - clock.times_s).max() > _SAME_S:
+                written_s = written.timebase.times_s
+            if len(written_s) != len(clock) or np.abs(written_s - clock.times_s).max() > _SAME_S:
                 raise Sd2Error(f"{part} has other times than {video.path}", "the same times")
     recording.save()
     return True

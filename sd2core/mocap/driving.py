@@ -164,10 +164,10 @@ class Puppet:
         evidence = evidence_of_points(clip.times_s, points_m, sd_m)
         start = initial_pose(rig, points_m, trust)
         pose = solve(rig, evidence, start, lambda done: tick())
-        found_m = rig.keypoints.positions(rig.transforms(*pose))
-        residual_m = np.linalg.norm(found_m - points_m, axis=-1)
+        posed_m = rig.keypoints.positions(rig.transforms(*pose))
+        residual_m = np.linalg.norm(posed_m - points_m, axis=-1)
         return DrivenClip(
-            self, clip, pose, found_m, np.where(np.isfinite(sd_m), residual_m, np.nan)
+            self, clip, pose, posed_m, np.where(np.isfinite(sd_m), residual_m, np.nan)
         )
 
 

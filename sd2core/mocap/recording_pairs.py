@@ -282,11 +282,11 @@ def on_clock(radar: DopplerMap, timebase: Timebase) -> DopplerMap:
 
 
 def _nearest(
-    times_s: NDArray[np.float64], there_s: NDArray[np.float64]
+    times_s: NDArray[np.float64], other_s: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Nearest moments of another clock, and whether they are as near as its frames are."""
-    right = np.clip(np.searchsorted(there_s, times_s), 0, len(there_s) - 1)
+    right = np.clip(np.searchsorted(other_s, times_s), 0, len(other_s) - 1)
     left = np.maximum(right - 1, 0)
-    nearest = np.where(times_s - there_s[left] <= np.abs(there_s[right] - times_s), left, right)
-    spacing_s = float(np.median(np.diff(there_s))) if len(there_s) > 1 else 0.0
-    return nearest, np.abs(there_s[nearest] - times_s) <= 0.75 * spacing_s
+    nearest = np.where(times_s - other_s[left] <= np.abs(other_s[right] - times_s), left, right)
+    spacing_s = float(np.median(np.diff(other_s))) if len(other_s) > 1 else 0.0
+    return nearest, np.abs(other_s[nearest] - times_s) <= 0.75 * spacing_s

@@ -351,7 +351,7 @@ def _options(kind: type, section: str = "") -> Iterator[Option]:
                 f"The docstring of {kind.__name__} says nothing of {name}", "words on each option"
             )
         called, words = descriptions[0]
-        if _is_said(default, choices):
+        if _ends_with_default(default, choices):
             text = str(default) if choices else f"{default:g}"
             words = words.replace("{default}", text)
             if not re.search(r"\(default|default\)", words):
@@ -375,7 +375,7 @@ def _note(notes: list[Any], kind: type[Note]) -> Note | None:
     return next((note for note in notes if isinstance(note, kind)), None)
 
 
-def _is_said(default: Any, choices: tuple[Any, ...]) -> bool:
+def _ends_with_default(default: Any, choices: tuple[Any, ...]) -> bool:
     """True if the words of an option end with its default."""
     number = isinstance(default, int | float) and not isinstance(default, bool)
     return number or (bool(choices) and default in choices)

@@ -103,12 +103,12 @@ def share_of(
     """
     if BACKGROUND in known.classes:
         return _whole(known, movements, share, seed)
-    found_runs: dict[int, list[Movement]] = {}
+    runs_of: dict[int, list[Movement]] = {}
     for one in movements:
         for start, stop, number in gesture_runs(one.clip.label, UNKNOWN):
-            found_runs.setdefault(number, []).append(one.part(slice(start, stop)))
+            runs_of.setdefault(number, []).append(one.part(slice(start, stop)))
     drawn = []
-    for number, own in sorted(found_runs.items()):
+    for number, own in sorted(runs_of.items()):
         order = np.random.default_rng([seed, number]).permutation(len(own))
         left = max(1, round(share * sum(len(one.clip) for one in own)))
         for one in (own[place] for place in order):

@@ -69,7 +69,7 @@ class DenoiserLoop(Loop):
         if start.moments:
             set_moments(self._optimiser, start.moments)
         self._pace = Throughput()
-        self._share, self._rate, self._said_s = 0.0, 0.0, -math.inf
+        self._share, self._rate, self._reported_s = 0.0, 0.0, -math.inf
         squares = self.position.squares
         # On the device: nothing waits for it between the lines of progress.
         self._squares = torch.tensor(squares, dtype=torch.float64, device=self._device)
@@ -110,7 +110,7 @@ class DenoiserLoop(Loop):
         word, self._share = self._ranks.agreed(self._control.word(), self.share_done)
         over = self.steps is None and self._share >= 1.0
         ends = self.epoch_ends or over
-        if ends or time.monotonic() - self._said_s >= _LINE_S:
+        if ends or time.monotonic() - self._reported_s >= _LINE_S:
             self._say_step()
         if ends and word != "cancel":
             self.end_epoch()
@@ -185,7 +185,7 @@ class DenoiserLoop(Loop):
         # Sums of floating-point numbers: the difference of equal ones may be a hair below 0.
         since = max(0.0, squares - self._line_squares)
         self._line_squares, self._line_segments = squares, position.segments
-        self._said_s = time.monotonic()
+        self._reported_s = time.monotonic()
         self._writer.say(
             "step",
             epoch=position.epoch + 1,
