@@ -77,7 +77,7 @@ def choose(
         budget positive; or when the options take Vid2Doppler's velocities.
     """
     started = time.perf_counter()
-    check_wish(tolerance, budget_ms)
+    check_request(tolerance, budget_ms)
     if survey is None:
         survey = survey_scene(mesh, sensor, check_options(mesh, options), progress)
     tried: dict[AccuracyPlan, Errors] = {}
@@ -119,7 +119,7 @@ def check_options(mesh: MeshSequence, options: SynthesisOptions | None) -> Synth
     return options
 
 
-def check_wish(tolerance: float | None, budget_ms: float | None = None) -> None:
+def check_request(tolerance: float | None, budget_ms: float | None = None) -> None:
     """Raise Sd2Error unless one of the two is given, and can be wished for."""
     if (tolerance is None) == (budget_ms is None):
         raise Sd2Error(

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.accuracy.choosing import check_options, check_wish, choose
+from sd2core.accuracy.choosing import check_options, check_request, choose
 from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.sample import take_sample
 from sd2core.accuracy.survey import survey_scene
@@ -93,7 +93,7 @@ def choose_for_places(
     Sd2Error
         For a tolerance out of bounds, or options that take Vid2Doppler's velocities.
     """
-    check_wish(tolerance)
+    check_request(tolerance)
     options = check_options(mesh, options)
     search = PlanSearch(mesh, places, tolerance, options)
     if frames < _MIN_FRAMES:

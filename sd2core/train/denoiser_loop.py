@@ -60,7 +60,7 @@ class DenoiserLoop(Loop):
             patience=training.early_stopping_epochs,
         )
         self._config, self._folder, self._writer, self._control = config, folder, writer, control
-        self._network, self._batches, self._exam = learner.network, batches, validator
+        self._network, self._batches, self._validator = learner.network, batches, validator
         self._about, self._save_best = start.about, save_best
         self._ranks, self._mixed = ranks, mixed
         self._device = validator.inputs.device
@@ -136,7 +136,7 @@ class DenoiserLoop(Loop):
 
     def check(self) -> dict[str, Any] | None:
         """Errors on the people who are kept out to choose by; None if the run is cancelled."""
-        validation = validate(self._network, self._exam, lambda: self._control.word() != "cancel")
+        validation = validate(self._network, self._validator, lambda: self._control.word() != "cancel")
         if validation is None:
             return None
         if not math.isfinite(validation.rmse):
@@ -224,7 +224,7 @@ class DenoiserLoop(Loop):
         It is no epoch's, so the position does not know of it: a resumed run ends as it
         would have ended without the stop.
         """
-        validation = validate(self._network, self._exam)
+        validation = validate(self._network, self._validator)
         if validation is not None and math.isfinite(validation.rmse):
             self._write_best(validation, self.position.epoch)
 
@@ -232,7 +232,7 @@ class DenoiserLoop(Loop):
         if self._ranks.leads:
             other = self._network.live
             apart = other is not None and other is not self._network
-            live = validate(other, self._exam) if apart else None
+            live = validate(other, self._validator) if apart else None
             self._save_best(validation, live, epoch)
 
     def _set_state(self, state: State) -> None:
