@@ -136,7 +136,9 @@ class DenoiserLoop(Loop):
 
     def check(self) -> dict[str, Any] | None:
         """Errors on the people who are kept out to choose by; None if the run is cancelled."""
-        validation = validate(self._network, self._validator, lambda: self._control.word() != "cancel")
+        validation = validate(
+            self._network, self._validator, lambda: self._control.word() != "cancel"
+        )
         if validation is None:
             return None
         if not math.isfinite(validation.rmse):

@@ -29,7 +29,7 @@ class Learner(nn.Module):
         super().__init__()
         device = validator.inputs.device
         self.network = network.to(device)
-        self._exam = validator
+        self._validator = validator
         self._range_factor = config.data.range_factor
         self._velocity_weight = config.training.velocity_weight
         # Not buffers: they belong to no checkpoint, and need not be broadcast.
@@ -55,7 +55,7 @@ class Learner(nn.Module):
         inputs, targets = self._inputs[rows], self._targets[rows]
         if self._range_factor > 1.0:
             # (g·x / r)^p = g^p · (x / r)^p: gains are as well applied to compressed values.
-            scaling = self._exam.scaling
+            scaling = self._validator.scaling
             energies = inputs.shape[-1] - scaling.more
             gains = (batch.gain**scaling.input.exponent)[:, None, None]
             inputs = torch.cat([inputs[..., :energies] * gains, inputs[..., energies:]], dim=-1)
@@ -98,9 +98,9 @@ class Learner(nn.Module):
         The peak of an answer is its mean velocity with the eighth power of the amplitude, which
         has a slope.
         """
-        velocities = torch.as_tensor(self._exam.axis.centres_mps, dtype=torch.float32)
+        velocities = torch.as_tensor(self._validator.axis.centres_mps, dtype=torch.float32)
         velocities = velocities.to(answers.device)[self._counted]
-        power = 1 / self._exam.scaling.target.exponent
+        power = 1 / self._validator.scaling.target.exponent
         estimate, wanted = (
             values.float().clamp(min=0.0)[..., self._counted] ** power
             for values in (answers, targets)
