@@ -119,9 +119,8 @@ class Pool:
             return Ending(tasks, killed=True)
         except (OSError, CancelledError):  # the scheduler or the result is gone
             return Ending(tasks)
-        except Exception as failure:
-            error = failure
-        message = f"The worker cannot run it ({type(error).__name__}: {error})"
+        except Exception as error:
+            message = f"The worker cannot run it ({type(error).__name__}: {error})"
         failed = Outcome(error=Sd2Error(message).arguments)
         return Ending(tasks, [failed] * len(tasks))
 

@@ -267,9 +267,7 @@ class _Run:
                         stream.write((json.dumps(row, ensure_ascii=False) + "\n").encode())
 
     def _end(self, outcome: str, error: Sd2Error | None) -> dict[str, Any]:
-        error_fields = None
         if error is not None:
-            error_fields = error.arguments
             self._log(str(error))
         export = self._graph.plan.export
         dataset = None if export is None else dataset_path(self._folder, export)
@@ -278,7 +276,7 @@ class _Run:
             **self._counts(),
             "report": str(self._folder.report),
             "dataset": str(dataset) if dataset is not None and dataset.exists() else None,
-            "error": error_fields,
+            "error": None if error is None else error.arguments,
         }
         # The pace of other machines is of no use here.
         if self._driver is not None and self._scheduler is None:

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from sd2core.classify.data import UNKNOWN
 from sd2core.errors import Sd2Error
 
+ClassNumbers = NDArray[np.integer]
 Confusion = NDArray[np.int64]
 """(true classes, found classes) of frames or gestures."""
 
 
-def confusion_of(
-    truth: NDArray[np.integer], answer: NDArray[np.integer], classes: int
-) -> Confusion:
+def confusion_of(truth: ClassNumbers, answer: ClassNumbers, classes: int) -> Confusion:
     """Compute the confusion matrix; unknown frames do not count."""
     if truth.shape != answer.shape:
         raise Sd2Error(f"{len(answer)} answers for {len(truth)} frames", "one for each")
@@ -112,8 +111,8 @@ class Score:
 
 
 def score(
-    truths: Sequence[NDArray[np.integer]],
-    answers: Sequence[NDArray[np.integer]],
+    truths: Sequence[ClassNumbers],
+    answers: Sequence[ClassNumbers],
     classes: tuple[str, ...],
     frame_rate_hz: float,
     background: int | None,
@@ -152,7 +151,7 @@ def score(
     return Score(classes, frames, gestures, np.array(latencies), missed)
 
 
-def gesture_runs(truth: NDArray[np.integer], background: int | None) -> list[tuple[int, int, int]]:
+def gesture_runs(truth: ClassNumbers, background: int | None) -> list[tuple[int, int, int]]:
     """Find runs of frames of one gesture: half-open ranges with the class."""
     begins = np.flatnonzero(np.diff(truth, prepend=truth[:1] - 1))
     stops = np.append(begins, len(truth))[1:]

@@ -179,9 +179,7 @@ def _read_map(path: Path, label_file: Path | None) -> tuple[DopplerMap, Labels, 
 def _sensor(meta: dict[str, Any]) -> VirtualSensor:
     """Return the sensor that a map names; otherwise the camera."""
     sensor = meta.get("sensor")
-    if not isinstance(sensor, dict):
-        return VirtualSensor()
-    return VirtualSensor.from_dict(sensor)
+    return VirtualSensor.from_dict(sensor) if isinstance(sensor, dict) else VirtualSensor()
 
 
 # -- Pairs: synthetic Doppler beside a radar's, take by take -------------------------------------

@@ -74,9 +74,8 @@ class Station:
         return JointRecording(recording, film, reception, delays_s, self._placements)
 
     def _opened_source(self) -> Reception:
-        if (reception := self._reception) is not None and (
-            reception.is_over or reception.source.head(0.0).replayed
-        ):
+        reception = self._reception
+        if reception is not None and (reception.is_over or reception.source.head(0.0).replayed):
             self._close_source()
         if self._reception is None:
             self._reception = Reception(self._open_source())
