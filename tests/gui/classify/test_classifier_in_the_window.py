@@ -24,7 +24,7 @@ from sd2app.labels.timeline import LabelTimeline
 from sd2app.suggestions.feature import SuggestionBar
 from sd2app.widgets.chart import ChartView
 from sd2app.widgets.inputs import Choice, NumberBox, TypedLine
-from sd2app.widgets.model_menu import ModelCardDialog
+from sd2app.widgets.model_menu import ModelButton, ModelCardDialog
 from sd2core.classify.defaults import WIDTH, pace_kind
 from sd2core.classify.files import user_classifiers_folder
 from sd2core.files.resources import resource_path
@@ -44,7 +44,7 @@ def classified(window, fake_classes, qtbot):
     """The window on the ball, which approaches and recedes once a second; nothing is marked."""
     c = models_of(window)
     (path,) = fake_classes.cards
-    window.features.classify._classifiers.use(path)
+    window.features.classify.drop_of(path).run()
     qtbot.waitUntil(lambda: c.classify.track.complete and not c.classify.busy, timeout=10_000)
     for _ in range(2):
         key(window, "N")
@@ -88,11 +88,9 @@ def test_a_file_is_chosen_and_the_strip_appears(window, fake_classes, qtbot, mon
     assert not strip.isVisible()
     key(window, "I", SHIFT)
     assert strip.isVisible()
-    window.features.classify._classifiers.fill()
-    entries = {
-        action.text().replace("&", "").split("\t")[0]: action
-        for action in window.features.classify._classifiers.actions()
-    }
+    menu = strip.findChild(ModelButton).menu()
+    menu.aboutToShow.emit()
+    entries = {action.text().replace("&", "").split("\t")[0]: action for action in menu.actions()}
     assert entries["waves"].isChecked()
     entries["No model"].trigger()
     assert not strip.isVisible()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from answering import once_asked, press_when_ready
 from dropping import drop
-from finding import words_in
+from finding import button_of, words_in
 from grey_video import FRAMES, RATE, write_video
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage
@@ -21,11 +21,13 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QLabel,
     QMenu,
+    QSlider,
     QToolButton,
     QWidget,
 )
 from window_models import models_of
 
+from sd2app.commands.feature import CommandWindow
 from sd2app.foreign_mesh.dialog import MeshDialog
 from sd2app.foreign_mesh.model import MeshPreview, is_foreign
 from sd2app.palette import palette_for
@@ -119,9 +121,10 @@ def test_people_are_listed_and_chosen_and_frames_stepped_through(qtbot, dialog) 
     assert preview.read_as.person == "8"
     # It has nobody in the middle of the video: it is seen in the middle of where it has somebody.
     assert (preview.frame, preview.someone) == (SHORT // 2, True)
-    dialog._slider.slider.setFocus()
+    slider = dialog.findChild(QSlider)
+    slider.setFocus()
     for _ in range(SHORT // 2):
-        QTest.keyClick(dialog._slider.slider, Qt.Key.Key_Right)
+        QTest.keyClick(slider, Qt.Key.Key_Right)
     settle(qtbot, preview)
     assert (preview.frame, preview.someone) == (SHORT, False)
     assert "The mesh has nobody in this frame." in words_in(dialog, "warning") or preview.offers
@@ -158,7 +161,7 @@ def test_what_is_turned_and_its_focal_length_are_seen_at_once(qtbot, dialog) -> 
 
 
 def test_what_cannot_be_read_so_cannot_be_taken(qtbot, dialog) -> None:
-    preview, take = dialog.preview, dialog._take
+    preview, take = dialog.preview, button_of(dialog, "Take")
     assert take.isEnabled()
     preview.set_faces(preview.recording.video)
     settle(qtbot, preview)
@@ -205,7 +208,7 @@ def test_taken_in_the_window_it_is_made_smooth_and_undone(labelled, qtbot, files
     def take(dialog: MeshDialog) -> None:
         settle(qtbot, dialog.preview)
         choose(qtbot, dialog, "How the mesh is turned", 1)
-        qtbot.mouseClick(dialog._take, LEFT)
+        qtbot.mouseClick(button_of(dialog, "Take"), LEFT)
 
     once_asked(MeshDialog, take)
     window.action("add").trigger()
@@ -218,22 +221,20 @@ def test_taken_in_the_window_it_is_made_smooth_and_undone(labelled, qtbot, files
     commands = window.features.commands
     record = commands.forms.record
     assert (record.mesh, record.turn, record.video) == (mesh, "x180", c.document.recording.video)
-    start = next(one for one in commands._window.findChildren(QToolButton) if one.text() == "Start")
-    qtbot.mouseClick(start, LEFT)
+    runs = window.findChild(CommandWindow)
+    qtbot.mouseClick(button_of(runs, "Start"), LEFT)
     qtbot.waitUntil(lambda: c.document.mesh not in (taken, before), timeout=120_000)
     assert c.document.undo_stack.undoText() == "Make mesh smooth"
     assert c.document.recording.mesh == record.out
     assert c.document.mesh.uncertainty is not None
     assert not window.action("refine_mesh").isEnabled()
-    again = next(
-        one for one in commands._window.findChildren(QToolButton) if one.text() == "Take the mesh"
-    )
+    again = button_of(runs, "Take the mesh")
     assert not again.isVisible()
     c.document.undo_stack.undo()
     assert again.isVisible()
     qtbot.mouseClick(again, LEFT)
     qtbot.waitUntil(lambda: c.document.recording.mesh == record.out, timeout=20_000)
-    commands._window.close()
+    runs.close()
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow)
     qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
@@ -253,7 +254,7 @@ def test_files_that_were_open_lately_are_read_as_then_and_nobody_is_asked(
     def take(dialog: MeshDialog) -> None:
         settle(qtbot, dialog.preview)
         choose(qtbot, dialog, "How the mesh is turned", 1)
-        qtbot.mouseClick(dialog._take, LEFT)
+        qtbot.mouseClick(button_of(dialog, "Take"), LEFT)
 
     once_asked(MeshDialog, take)
     with qtbot.waitSignal(c.document.opened, timeout=30_000):

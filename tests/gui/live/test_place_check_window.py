@@ -56,9 +56,10 @@ def test_what_cannot_be_recorded_cannot_be_copied_as_a_command(parent, tmp_path)
     setup = ListenSetup(Settings.forgetful(), parent)
     dialog = ListenDialog(setup, parent)
     copy = button_of(dialog, "Copy command")
+    begin = button_of(dialog, "Record")
     for way in ("test", "replay"):  # of which no capture is chosen
         setup.choose("way", way)
-        assert copy.isEnabled() == (not setup.problem) == dialog._begin.isEnabled()
+        assert copy.isEnabled() == (not setup.problem) == begin.isEnabled()
     assert not copy.isEnabled()
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from answering import answer, once_asked
+from finding import words_in
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -103,8 +104,8 @@ def test_a_protocol_is_made_out_of_the_papers(parent, qtbot, monkeypatch, tmp_pa
         QTest.keyClick(choice, Qt.Key.Key_Up)
         assert not _named(dialog, NumberBox, "random order").isEnabled()
         _type(dialog.findChild(QPlainTextEdit), "You are filmed.")
-        assert dialog._draft.problem == ""
-        assert dialog._draft.summary.startswith("8 takes, about 1 minute ")
+        assert words_in(dialog, "warning") == []
+        assert any(one.startswith("8 takes, about 1 minute ") for one in words_in(dialog, "muted"))
         _click(dialog, "Save…")
 
     once_asked(ProtocolDialog, lambda dialog: _closing_on_failure(dialog, fill))
@@ -136,16 +137,17 @@ def test_what_cannot_be_saved_is_said(dialog, line: str, typed: str, words: str)
     _type(field, typed)
     if not typed:
         QTest.keyClick(field, Qt.Key.Key_Delete)
-    assert words in dialog._draft.problem
+    assert words in words_in(dialog, "warning")[0]
     assert not save.isEnabled()
 
 
 def test_a_gesture_without_an_instruction_is_named_by_its_row(dialog) -> None:
     _click(dialog, "Add")
     _write(dialog.findChild(CellTable), "wave")
-    assert dialog._draft.problem == "Gesture 5: instruction is '' (a text that is not blank)."
+    problem = "Gesture 5: instruction is '' (a text that is not blank)."
+    assert words_in(dialog, "warning") == [problem]
     _click(dialog, "Remove")
-    assert dialog._draft.problem == ""
+    assert words_in(dialog, "warning") == []
 
 
 def test_changes_are_not_lost_without_a_question(dialog, qtbot, tmp_path: Path) -> None:
@@ -157,8 +159,7 @@ def test_changes_are_not_lost_without_a_question(dialog, qtbot, tmp_path: Path) 
     assert dialog.isVisible()
     answer(qtbot, "Discard", asked)
     _click(dialog, "The paper's")
-    assert dialog._draft.value("title") == read_protocol(PAPER).title
-    assert not dialog._draft.modified
+    assert _named(dialog, TypedLine, "Title").text() == read_protocol(PAPER).title
     _click(dialog, "Cancel")
     assert len(asked) == 2  # nothing to lose
     assert not dialog.isVisible()
