@@ -87,21 +87,21 @@ def _aligned(recording: Recording, options: Align) -> dict[str, Any]:
     try:
         if options.by_arrival:
             return entry | _by_arrival(recording, options)
-        found = _found(recording, options.within)
-        if options.save and not found.problem:
-            recording.radar_offset_s = found.offset_s
+        alignment = _alignment(recording, options.within)
+        if options.save and not alignment.problem:
+            recording.radar_offset_s = alignment.offset_s
             recording.save()
             entry["saved"] = True
     except Sd2Error as error:
         return entry | {"problem": str(error)}
     return entry | {
-        "problem": found.problem,
-        "offset_s": found.offset_s,
-        "confidence": found.confidence,
-        "correlation": found.peak,
+        "problem": alignment.problem,
+        "offset_s": alignment.offset_s,
+        "confidence": alignment.confidence,
+        "correlation": alignment.peak,
         "curve": {
-            "offset_s": found.offsets_s.round(3).tolist(),
-            "correlation": found.correlation.round(4).tolist(),
+            "offset_s": alignment.offsets_s.round(3).tolist(),
+            "correlation": alignment.correlation.round(4).tolist(),
         },
     }
 
@@ -128,7 +128,7 @@ def _by_arrival(recording: Recording, options: Align) -> dict[str, Any]:
     }
 
 
-def _found(recording: Recording, within_s: float | None) -> Alignment:
+def _alignment(recording: Recording, within_s: float | None) -> Alignment:
     from sd2core.cli.recording_maps import maps_of
     from sd2core.doppler.alignment import WITHIN_S, align
 

@@ -151,11 +151,11 @@ def _load(path: Path, options: CompareMeshes) -> MeshSequence:
     if is_recording(path):
         mesh = open_recording(path).load_mesh()
         return mesh.body(options.person) if mesh.others else mesh
-    told: dict[str, Any] = mesh_reading(options).options() | {"faces": options.faces}
+    hints: dict[str, Any] = mesh_reading(options).options() | {"faces": options.faces}
     if is_estimate(path):
-        return load_mesh(path, **told)
+        return load_mesh(path, **hints)
     mesh = load_mesh(path)
-    general = {name: told[name] for name in ("frames_per_s", "scale", "faces") if told.get(name)}
+    general = {name: hints[name] for name in ("frames_per_s", "scale", "faces") if hints.get(name)}
     if general and own_resolution(mesh) is None:
         return load_mesh(path, **general)
     return mesh

@@ -138,7 +138,7 @@ def _export(options: Export) -> int:
     wanted = dataset_options(options, spans, provenance)
     making = _making(options, wanted.kinds)
     sources = gather(options.inputs, making, subjects=options.subjects, label_files=options.labels)
-    for remark in (said for one in sources for said in one.remarks):
+    for remark in (text for one in sources for text in one.remarks):
         print(f"sd2: {remark}", file=sys.stderr)
     if options.dry_run:
         return _dry_run(options, sources, wanted, making)

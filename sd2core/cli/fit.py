@@ -194,20 +194,20 @@ def _fit_people(options: Fit) -> None:
 
     assert options.out is not None
     choices, begun_s = _choices(options), time.perf_counter()
-    numbers = () if options.people == ALL else tuple(map(int, options.people))
+    wanted = () if options.people == ALL else tuple(map(int, options.people))
     meshes, summaries = [], []
     with ExitStack() as stack:
         report = _lines(options) if options.progress_json else _bars(stack)
-        people = people_to_fit(options.video, numbers, choices, report, options.models)
-        found = [each.number for each in people]
-        outs = meshes_of(options.out, found)
+        people = people_to_fit(options.video, wanted, choices, report, options.models)
+        numbers = [each.number for each in people]
+        outs = meshes_of(options.out, numbers)
         stopped = any(mesh.with_name(mesh.name + PARTIAL).exists() for mesh in outs)
         for mesh in outs:
             refuse_existing(mesh, options.overwrite or (stopped and not options.restart))
 
         def report_of(number: int) -> FitReport:
             return (
-                _lines(options, number, found)
+                _lines(options, number, numbers)
                 if options.progress_json
                 else _bars(stack, f", person {number}")
             )

@@ -63,24 +63,22 @@ def guide(
         )
     with contextlib.ExitStack() as stack:
         stack.callback(lock.release, delete=True)
-        there = [path.stem for path in folder.glob(f"*{SUFFIX}") if is_recording(path)]
+        done = [path.stem for path in folder.glob(f"*{SUFFIX}") if is_recording(path)]
         consent = Consent(folder, protocol.consent_text)
-        session = Session(protocol, there, consent.agreements)
+        session = Session(protocol, done, consent.agreements)
         telling = _Telling(session, consent, as_json=as_json)
         telling.begin(folder)
         if protocol.video != "keep":
-            takes = [
-                folder / f"{take.name}{SUFFIX}" for take in session.takes if take.name in there
-            ]
+            takes = [folder / f"{take.name}{SUFFIX}" for take in session.takes if take.name in done]
             telling.hidden(
                 protocol.video, [one.stem for one in takes if _hides(one, protocol.video)]
             )
         with (
-            stop_signals() as told,
+            stop_signals() as stop,
             pressed_keys() as key,
             contextlib.closing(_Takes(session, folder, open_take, telling)) as recorder,
         ):
-            while session.phase != "over" and not told.is_set() and _press(session, consent, key()):
+            while session.phase != "over" and not stop.is_set() and _press(session, consent, key()):
                 recorder.leave()
                 session.advance(time.monotonic())
                 telling.step()
@@ -208,12 +206,12 @@ class _Takes:
 
 def _losses(recording: JointRecording) -> list[str]:
     """What went wrong, in sentences."""
-    found = recording.listening.doubts(at_end=True)
+    losses = recording.listening.doubts(at_end=True)
     if missing := recording.listening.counts.missing:
-        found.append(f"Of the radar: {missing}.")
+        losses.append(f"Of the radar: {missing}.")
     if dropped := recording.film.filmed.dropped:
-        found.append(f"Of the camera: {counted(dropped, 'picture')} dropped.")
-    return found
+        losses.append(f"Of the camera: {counted(dropped, 'picture')} dropped.")
+    return losses
 
 
 class _Telling:
@@ -221,7 +219,7 @@ class _Telling:
 
     def __init__(self, session: Session, consent: Consent, *, as_json: bool) -> None:
         self._session, self._consent, self._as_json = session, consent, as_json
-        self._said: tuple[Any, ...] = ()
+        self._state: tuple[Any, ...] = ()
 
     def begin(self, folder: Path) -> None:
         """Say what is to be recorded, and the keys."""
@@ -252,10 +250,10 @@ class _Telling:
         """Say what is to be done, where that has changed or another second has passed."""
         session, left_s = self._session, self._session.left_s(time.monotonic())
         left = None if left_s is None else math.ceil(left_s)
-        said = (session.phase, session.take, left)
-        if said == self._said:
+        state = (session.phase, session.take, left)
+        if state == self._state:
             return
-        is_new, self._said = said[:2] != self._said[:2], said
+        is_new, self._state = state[:2] != self._state[:2], state
         take = session.take
         if self._as_json:
             asked = None if take is None else session.protocol.gesture(take.gesture)
@@ -310,8 +308,8 @@ class _Telling:
                 doubts=losses,
             )
             return
-        found = span.note or "motion"
-        print(f"  {take.name}: {found} from {span.start_s:.2f} to {span.end_s:.2f} s", flush=True)
+        motion = span.note or "motion"
+        print(f"  {take.name}: {motion} from {span.start_s:.2f} to {span.end_s:.2f} s", flush=True)
         for loss in losses:
             print(f"sd2: {take.name}: {loss}", file=sys.stderr, flush=True)
 

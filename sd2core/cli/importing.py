@@ -401,8 +401,8 @@ def _body(text: str) -> Body:
             raise Sd2Error(f"{path} holds no mesh", "a recording with one")
         path, person, reading = of.mesh, person or of.subject, of.mesh_reading.options()
         faces = faces or of.faces
-    told = None if faces is None else str(faces)
-    return Body(str(path), (x, y, z), turn_deg, start_s, person, reading, told)
+    faces_path = None if faces is None else str(faces)
+    return Body(str(path), (x, y, z), turn_deg, start_s, person, reading, faces_path)
 
 
 def _wall(text: str) -> Wall:

@@ -120,23 +120,23 @@ def _imu(options: Imu) -> None:
             progress=progress,
         )
     write_signals(options.out, signals)
-    told = signals_data(signals)
+    summary = signals_data(signals)
     if options.json:
-        print_json({"file": str(options.out), **told, **signals.meta})
+        print_json({"file": str(options.out), **summary, **signals.meta})
         return
-    unknown = told["samples"] - told["known_samples"]
+    unknown = summary["samples"] - summary["known_samples"]
     who = [name for name in ("at", "person") if name in signals.meta]
     print_facts(
         f"{options.out} (simulated)",
         {
             "at": " of ".join(str(signals.meta[name]) for name in who),
             "axes": str(signals.meta["axes"]),
-            "samples": f"{told['samples']:,} at {options.rate:g} Hz"
+            "samples": f"{summary['samples']:,} at {options.rate:g} Hz"
             + (f", of which {unknown:,} without a body are empty" if unknown else ""),
             "low pass": f"{signals.meta['cutoff_hz']:g} Hz, of a mesh with"
             f" {signals.meta['frames_per_s']:.4g} frames/s",
-            "acceleration": f"up to {told['largest_acceleration_mps2']:.1f} m/s², with gravity",
-            "turn rate": f"up to {told['largest_turn_rate_radps']:.2f} rad/s",
+            "acceleration": f"up to {summary['largest_acceleration_mps2']:.1f} m/s², with gravity",
+            "turn rate": f"up to {summary['largest_turn_rate_radps']:.2f} rad/s",
         },
     )
 

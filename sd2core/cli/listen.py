@@ -144,11 +144,11 @@ def follow(
     """
     from sd2core.cli.keys import pressed_keys
 
-    with stop_signals() as told, pressed_keys() as key:
+    with stop_signals() as stopped, pressed_keys() as key:
         listening.start()
         end_s = math.inf if seconds is None else time.monotonic() + seconds
         try:
-            while not (listening.is_over or told.is_set() or key() in ("q", "Q")):
+            while not (listening.is_over or stopped.is_set() or key() in ("q", "Q")):
                 if time.monotonic() >= end_s:
                     break
                 status.show(listening.next_column(_WAIT_S))
@@ -169,7 +169,7 @@ class Status:
         self._first_s: float | None = None
         self._loudest = 0.0
         self._shown_s = time.monotonic()
-        self._said: set[str] = set()
+        self._printed: set[str] = set()
         self.more: Callable[[], Mapping[str, Any]] = dict  # what else is told with every line
         self.nothing = "No frame came, and nothing was written."
         self.each_time: Callable[[], object] = dict  # called with every column, and between them
@@ -277,13 +277,13 @@ class Status:
 
     def _newest(self) -> dict[str, Any]:
         """Numbers of frames, and the newest column in words."""
-        told: dict[str, Any] = dict(vars(self._listening.counts))
+        data: dict[str, Any] = dict(vars(self._listening.counts))
         if (column := self._column) is not None:
-            told["time_s"], told["level_db"] = column.time_s, column.level_db
+            data["time_s"], data["level_db"] = column.time_s, column.level_db
             if column.label is not None:
-                told["label"] = column.label.name
-                told["probability"] = column.label.probability
-        return told
+                data["label"] = column.label.name
+                data["probability"] = column.label.probability
+        return data
 
     def _warn_of_doubts(self) -> None:
         for doubt in self._listening.doubts(at_end=False):
@@ -292,8 +292,8 @@ class Status:
     def _warn_once(self, sentence: str) -> None:
         """Print a sentence to standard error, unless it was, with other numbers."""
         words = re.sub(r"[\d.,]+", "", sentence)
-        if words not in self._said:
-            self._said.add(words)
+        if words not in self._printed:
+            self._printed.add(words)
             if self._is_line:
                 print()
             self._warn(sentence)

@@ -113,9 +113,9 @@ class Label(Json):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for said in self.take:
-            if "=" not in said:
-                raise OptionError(f"--take is {said}", "SUBJECT/TAKE=FILE")
+        for text in self.take:
+            if "=" not in text:
+                raise OptionError(f"--take is {text}", "SUBJECT/TAKE=FILE")
 
 
 class Vary(MadePairs, Subjects, RadarChoice):
@@ -172,8 +172,8 @@ def _label(options: Label) -> None:
             f"{take.subject}/{take.name}": Timebase(arrays["times_s"][take.rows])
             for take in facts.takes
         }
-    for said in options.take:
-        name, _, file = said.partition("=")
+    for text in options.take:
+        name, _, file = text.partition("=")
         if name not in clocks:
             raise Sd2Error(f"{options.pairs} has no take {name}", f"one of {', '.join(clocks)}")
         subject, _, take = name.rpartition("/")

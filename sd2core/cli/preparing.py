@@ -143,11 +143,11 @@ def _fetch(source: Path | None, *, if_missing: bool) -> None:
 
     if if_missing:
         try:
-            there = [landmark_models(download=False, model=model) for model in LANDMARKERS]
+            models = [landmark_models(download=False, model=model) for model in LANDMARKERS]
         except Sd2Error:
             pass
         else:
-            print(f"The landmark models are in {there[0].detector.parent}")
+            print(f"The landmark models are in {models[0].detector.parent}")
             return
     with progress_bar("Fetching the landmark models", unit="B") as progress:
         folder = fetch_models(progress, source=source)
@@ -171,19 +171,19 @@ def remove_caches(*, ask: bool) -> None:
     """
     from sd2core.cli.batch import bytes_words
 
-    found = caches()
-    if not found:
+    paths = caches()
+    if not paths:
         print("There are no caches")
         return
-    print_rows([("size", "cache"), *((bytes_words(size_bytes(one)), str(one)) for one in found)])
+    print_rows([("size", "cache"), *((bytes_words(size_bytes(one)), str(one)) for one in paths)])
     if ask and not sys.stdin.isatty():
         raise Sd2Error("Nothing was removed: there is no terminal to ask on", remedy="Add --yes")
     if ask and input("Remove them? They are made again when needed. [y/N] ").lower() != "y":
         print("Nothing was removed")
         return
-    for path in found:
+    for path in paths:
         remove(path)
-    if left := [str(path) for path in found if path.exists()]:
+    if left := [str(path) for path in paths if path.exists()]:
         raise Sd2Error(
             f"{', '.join(left)} could not be removed",
             remedy="Close the program, and do it with the rights of who installed it",

@@ -96,17 +96,17 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
     from sd2core.io.radar.points import COLUMNS_OPTION, holds_unnamed_columns, looks_like_points
     from sd2core.io.radar.stored_arrays import array_names
 
-    told = given(options, DESCRIPTION)
-    of_points = looks_like_points(path) and not told.keys() & {"axes", "carrier_hz"}
-    if "columns" in told or of_points or path.suffix.lower() in TEXT_SUFFIXES:
-        _describe_points(path, told, as_json=as_json)
+    entries = given(options, DESCRIPTION)
+    of_points = looks_like_points(path) and not entries.keys() & {"axes", "carrier_hz"}
+    if "columns" in entries or of_points or path.suffix.lower() in TEXT_SUFFIXES:
+        _describe_points(path, entries, as_json=as_json)
         return
 
     if not is_describable(path):
         raise Sd2Error(
             f"{path} cannot be described", "a .npy, .h5, .mat or .sigmf-meta of radar samples"
         )
-    if not told and holds_unnamed_columns(path):
+    if not entries and holds_unnamed_columns(path):
         if not sys.stdin.isatty():
             raise Sd2Error(
                 f"{path} may hold points, or samples of a radar",
@@ -115,21 +115,21 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
         prompt = f"{DESCRIPTION['columns'].words}; nothing if these are samples"
         print(f"columns ({prompt}): ", end="", file=sys.stderr, flush=True)
         if answer := sys.stdin.readline().strip():
-            told["columns"] = tuple(one.strip() for one in answer.split(","))
-            _describe_points(path, told, as_json=as_json)
+            entries["columns"] = tuple(one.strip() for one in answer.split(","))
+            _describe_points(path, entries, as_json=as_json)
             return
-    told = _told_by_sigmf(path) | told
+    entries = _entries_of_sigmf(path) | entries
     if len(names := array_names(path)) > 1:
-        _ask_for("dataset", told, f" ({', '.join(names[:9])})")
-    if "axes" not in told:
-        axes, shape = plain_axes(path, told.get("dataset"))
+        _ask_for("dataset", entries, f" ({', '.join(names[:9])})")
+    if "axes" not in entries:
+        axes, shape = plain_axes(path, entries.get("dataset"))
         if axes is None:
-            _ask_for("axes", told, f" (the shape is {shape})")
+            _ask_for("axes", entries, f" (the shape is {shape})")
         else:
-            told["axes"] = axes
-    _ask(told)
+            entries["axes"] = axes
+    _ask(entries)
     with faults_in(f"The description of {path}", "all that its radar needs"):
-        description = RadarDescription.model_validate(told)
+        description = RadarDescription.model_validate(entries)
     capture = capture_of(path, description)
     written = write_description(description, path)
     shown = describe_capture(path, capture)
@@ -138,7 +138,7 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
     show(shown, as_json=as_json)
 
 
-def _describe_points(path: Path, told: dict[str, Any], *, as_json: bool) -> None:
+def _describe_points(path: Path, entries: dict[str, Any], *, as_json: bool) -> None:
     from sd2core.cli.info.description import describe_radar, show
     from sd2core.io.radar.described import write_description
     from sd2core.io.radar.points import (
@@ -148,22 +148,22 @@ def _describe_points(path: Path, told: dict[str, Any], *, as_json: bool) -> None
         read_points,
     )
 
-    foreign = told.keys() - {"columns", "dataset", "frame_repetition_s", "sign"}
+    foreign = entries.keys() - {"columns", "dataset", "frame_repetition_s", "sign"}
     if foreign:
         raise Sd2Error(
             f"{DESCRIPTION[min(foreign)].flags[0]} is given for a table of points",
             "--columns, --dataset, --frame-repetition-s and --sign",
         )
-    if "columns" not in told and (before := points_description(path)) is not None:
-        told = before.model_dump(exclude_defaults=True) | told
-    if "columns" not in told:
+    if "columns" not in entries and (before := points_description(path)) is not None:
+        entries = before.model_dump(exclude_defaults=True) | entries
+    if "columns" not in entries:
         try:
-            told["columns"] = column_names(path, told.get("dataset"))
+            entries["columns"] = column_names(path, entries.get("dataset"))
         except Sd2Error as error:
             if not sys.stdin.isatty():
                 raise
-            _ask_for("columns", told, f"; {error.found}")
-    description = described_points(path, told)
+            _ask_for("columns", entries, f"; {error.found}")
+    description = described_points(path, entries)
     read_points(path, description)
     written = write_description(description, path)
     shown = describe_radar(path)
@@ -171,50 +171,50 @@ def _describe_points(path: Path, told: dict[str, Any], *, as_json: bool) -> None
     show(shown, as_json=as_json)
 
 
-def _told_by_sigmf(path: Path) -> dict[str, Any]:
+def _entries_of_sigmf(path: Path) -> dict[str, Any]:
     from sd2core.io.radar.sigmf import DATA, META, read_sigmf_meta
 
     if path.suffix.lower() not in (META, DATA):
         return {}
     meta = read_sigmf_meta(path)
-    told = {"carrier_hz": meta.carrier_hz, "sample_rate_hz": meta.sample_rate_hz}
-    return {name: value for name, value in told.items() if value is not None}
+    entries = {"carrier_hz": meta.carrier_hz, "sample_rate_hz": meta.sample_rate_hz}
+    return {name: value for name, value in entries.items() if value is not None}
 
 
-def _ask(told: dict[str, Any]) -> None:
+def _ask(entries: dict[str, Any]) -> None:
     """Ask on a terminal for entries that are missing; Sd2Error elsewhere."""
     needed = ["carrier_hz"]
-    if "slope_hz_per_s" not in told:
+    if "slope_hz_per_s" not in entries:
         needed.append("bandwidth_hz")
-    if "stream" in told["axes"]:
+    if "stream" in entries["axes"]:
         needed += ["sample_rate_hz", "samples_per_chirp", "chirps_per_frame"]
-    elif "frame" not in told["axes"]:
+    elif "frame" not in entries["axes"]:
         needed += ["chirp_repetition_s", "chirps_per_frame"]
     else:
         needed += ["chirp_repetition_s", "frame_repetition_s"]
-    if "range_start_m" in told or "range_step_m" in told:
+    if "range_start_m" in entries or "range_step_m" in entries:
         needed += ["range_start_m", "range_step_m"]
     for name in needed:
-        _ask_for(name, told)
+        _ask_for(name, entries)
     # Known only now: a continuous wave has no rate within a chirp.
-    if told.get("bandwidth_hz") != 0 and "range_step_m" not in told:
-        _ask_for("sample_rate_hz", told)
+    if entries.get("bandwidth_hz") != 0 and "range_step_m" not in entries:
+        _ask_for("sample_rate_hz", entries)
 
 
-def _ask_for(name: str, told: dict[str, Any], about: str = "") -> None:
-    if name in told:
+def _ask_for(name: str, entries: dict[str, Any], about: str = "") -> None:
+    if name in entries:
         return
     entry = DESCRIPTION[name]
     assert entry.read is not None
     if not sys.stdin.isatty():
         missing = f"{entry.flags[0]} is missing: {entry.words}{about}"
         raise Sd2Error(missing, "it as an option, or a terminal to ask on")
-    while name not in told:
+    while name not in entries:
         print(f"{name} ({entry.words}){about}: ", end="", file=sys.stderr, flush=True)
         answer = sys.stdin.readline()
         if not answer:
             raise Sd2Error(f"{name} was not answered", entry.words)
         try:
-            told[name] = entry.read(answer.strip())
+            entries[name] = entry.read(answer.strip())
         except (ValueError, argparse.ArgumentTypeError) as error:
             print(f"  {error}", file=sys.stderr)

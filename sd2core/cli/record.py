@@ -150,7 +150,7 @@ def _check(options: Record, choice: CameraChoice) -> int:
     from sd2core.live.radars import open_radar
 
     seconds = options.seconds or _CHECK_S
-    with contextlib.ExitStack() as stack, stop_signals() as told, pressed_keys() as key:
+    with contextlib.ExitStack() as stack, stop_signals() as stop, pressed_keys() as key:
         source = open_radar(options.radar, options.setup)
         stack.callback(source.close)
         camera = choice.open()
@@ -159,31 +159,31 @@ def _check(options: Record, choice: CameraChoice) -> int:
             print(f"{camera.about}\n{source.about}\n  {seconds:g} s: walk towards both, and away.")
         radar, begin_s = source.head(0.0).radar, time.monotonic()
         shown: Any = None
-        told_findings = 0
+        printed = 0
 
         def follow(looked: Looked) -> None:
-            nonlocal shown, told_findings
+            nonlocal shown, printed
             if key().lower() == "q":
-                told.set()
+                stop.set()
             if not options.previews:
                 return
             if looked.picture is not None and looked.picture is not shown:
                 shown = looked.picture
                 print_event("preview", picture=preview_of(looked.picture))
             passed_s = time.monotonic() - begin_s
-            if passed_s >= (told_findings + 1) * _FINDINGS_S:
-                told_findings += 1
+            if passed_s >= (printed + 1) * _FINDINGS_S:
+                printed += 1
                 left_s = max(math.ceil(seconds - passed_s), 1)
                 findings = check_place(radar, looked.seen, looked.moved)
-                print_event("findings", left_s=left_s, **_found(findings))
+                print_event("findings", left_s=left_s, **_data(findings))
 
         delays_s = _delays_s(options, camera, source)
-        looked = look(source, camera, delays_s, seconds, told, follow)
+        looked = look(source, camera, delays_s, seconds, stop, follow)
     findings = check_place(radar, looked.seen, looked.moved)
     if options.previews:
-        print_event("findings", left_s=0, **_found(findings))
+        print_event("findings", left_s=0, **_data(findings))
     elif options.json:
-        print_json(_found(findings))
+        print_json(_data(findings))
     else:
         for one in findings:
             print(f"  {'ok   ' if one.passed else 'WRONG'}  {one.sentence}")
@@ -193,13 +193,13 @@ def _check(options: Record, choice: CameraChoice) -> int:
     return 0 if all(one.passed for one in findings) else 1
 
 
-def _found(findings: list[Answer]) -> dict[str, Any]:
+def _data(findings: list[Answer]) -> dict[str, Any]:
     """Findings, and the place that follows from them, for other programs."""
     from sd2core.live.checking import found_place
 
     place = found_place(findings)
-    told = {"findings": [vars(one) for one in findings]}
-    return told | {"place": None if place is None else vars(place)}
+    data = {"findings": [vars(one) for one in findings]}
+    return data | {"place": None if place is None else vars(place)}
 
 
 def _guide(options: Record, choice: CameraChoice) -> None:

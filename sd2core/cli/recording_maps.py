@@ -21,8 +21,8 @@ MAP_NAMES: tuple[MapName, ...] = get_args(MapName)
 
 def usual_maps(recording: Recording) -> tuple[MapName, ...]:
     """Maps that a recording has without a model: of its mesh and of its radar."""
-    there: dict[MapName, object] = {"synthetic": recording.mesh, "radar": recording.radar}
-    return tuple(name for name, part in there.items() if part is not None)
+    parts: dict[MapName, object] = {"synthetic": recording.mesh, "radar": recording.radar}
+    return tuple(name for name, part in parts.items() if part is not None)
 
 
 def parsed_maps(text: str) -> tuple[MapName, ...]:
@@ -78,10 +78,10 @@ def maps_of(
 def _denoiser_of(recording: Recording, mesh: MeshSequence) -> Path:
     from sd2core.datasets.recording_sources import denoiser_of
 
-    if (found := denoiser_of(recording, mesh)) is None:
+    if (model := denoiser_of(recording, mesh)) is None:
         raise Sd2Error(
             f"{recording.title} is set to be shown without a denoiser",
             "a model, for its denoised map",
             "Choose one in the window, or leave the denoised map out",
         )
-    return found
+    return model

@@ -43,16 +43,16 @@ def _refine(options: Refine) -> None:
     from sd2core.cli.reading import mesh_and_its_sensor
     from sd2core.io.mesh import save_mesh
 
-    mesh, _ = mesh_and_its_sensor(_told_by_video(options))
+    mesh, _ = mesh_and_its_sensor(_filled_by_video(options))
     with progress_bar("Finding the jitter") as progress:
         smooth = refined(mesh.body(), progress)
     with progress_bar("Writing the mesh") as progress:
         save_mesh(smooth, options.out, progress)
     assert smooth.uncertainty is not None
-    there = smooth.presence.present
+    present = smooth.presence.present
     known = {
-        "along_mps": float(np.median(smooth.uncertainty.along_mps[there])),
-        "across_mps": float(np.median(smooth.uncertainty.across_mps[there])),
+        "along_mps": float(np.median(smooth.uncertainty.along_mps[present])),
+        "across_mps": float(np.median(smooth.uncertainty.across_mps[present])),
     }
     if options.json:
         made = {"out": str(options.out), "frames": smooth.frame_count, "velocity_sigma": known}
@@ -68,7 +68,7 @@ def _refine(options: Refine) -> None:
         print(f"note: {note}")
 
 
-def _told_by_video(options: Refine) -> Refine:
+def _filled_by_video(options: Refine) -> Refine:
     """What the video says of an estimator's file, where it is not typed."""
     from sd2core.io.mesh_models import is_estimate
     from sd2core.io.video import open_video

@@ -21,7 +21,7 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
     With ``--json`` or ``--progress-json`` standard output has the error as well. Returns 0, or the
     handler's code; 1 for an error; 2 for what was typed wrong; 130 when interrupted.
     """
-    told = {"--json", "--progress-json"}.intersection(arguments)
+    flags = {"--json", "--progress-json"}.intersection(arguments)
     try:
         options = parser.parse_args(attach_negative_values(arguments))
         with output_folders(options):
@@ -42,11 +42,11 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
             raise
         if isinstance(error, OSError) and not error.filename and error.errno and _output_fails():
             _discard_output()
-            error, told = Sd2Error(f"The output cannot be written ({error.strerror})"), set()
+            error, flags = Sd2Error(f"The output cannot be written ({error.strerror})"), set()
         explained = explanation(error)
         print(f"sd2: {explained}", file=sys.stderr)
-        if told:
-            _tell_programs(explained, as_line="--json" not in told)
+        if flags:
+            _tell_programs(explained, as_line="--json" not in flags)
         return 2 if isinstance(error, UsageError) else 1
 
 

@@ -96,8 +96,8 @@ def _strip(options: Strip) -> None:
 
 
 def _rows(source: StripSource) -> list[str]:
-    there = {"video": source.video, "mesh": source.mesh}
-    return [row for row, part in there.items() if part is not None]
+    parts = {"video": source.video, "mesh": source.mesh}
+    return [row for row, part in parts.items() if part is not None]
 
 
 def _source(options: Strip, stack: ExitStack) -> StripSource:

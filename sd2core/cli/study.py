@@ -78,13 +78,13 @@ def make_study(plan: StudyPlan, options: Running) -> None:
     with _events() if options.progress_json else progress_bar("Studying", "run") as progress:
         results = run_study(plan, processes=workers, scheduler=options.scheduler, progress=progress)
     tell_lost(results.lost_frames)
-    said = write_report(results, Path(plan.out))
+    summary = write_report(results, Path(plan.out))
     if options.progress_json:
         print_event("written", folder=plan.out)
     elif options.json:
-        print_json({"out": plan.out, "conclusion": said, "findings": len(findings_of(results))})
+        print_json({"out": plan.out, "conclusion": summary, "findings": len(findings_of(results))})
     else:
-        print(f"{said}\n\nWrote {Path(plan.out) / 'study.md'}")
+        print(f"{summary}\n\nWrote {Path(plan.out) / 'study.md'}")
 
 
 @contextmanager

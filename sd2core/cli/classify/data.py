@@ -131,13 +131,13 @@ def _of_dataset(path: Path, maps: Sequence[MapName] | None) -> list[ClipSet]:
     from sd2core.datasets.reading import open_dataset
 
     with open_dataset(path) as dataset:
-        there = dataset.header.kinds
+        kinds = dataset.header.kinds
         wanted: list[MapKind] = []
         for name in maps or ("synthetic", "radar"):
-            found = [kind for kind in there if name == ("radar" if kind in _RADARS else kind)]
-            if not found and maps is not None:
-                raise Sd2Error(f"{path} holds no {name} maps", f"one of {', '.join(there)}")
-            wanted += found
+            matching = [kind for kind in kinds if name == ("radar" if kind in _RADARS else kind)]
+            if not matching and maps is not None:
+                raise Sd2Error(f"{path} holds no {name} maps", f"one of {', '.join(kinds)}")
+            wanted += matching
         return [clips_of_dataset(dataset, kind) for kind in wanted]
 
 
@@ -174,15 +174,15 @@ def _single(
         subject = one.subject or recording.person
         made = maps_of(recording, names, axis=axis)
         maps_and_labels = [(subject, doppler, labels) for doppler in made.values()]
-    found: list[ClipSet] = []
+    clip_sets: list[ClipSet] = []
     for subject, doppler, own in maps_and_labels:
-        rate_hz = found[0].frame_rate_hz if found else frame_rate_hz
-        found.append(
+        rate_hz = clip_sets[0].frame_rate_hz if clip_sets else frame_rate_hz
+        clip_sets.append(
             clips_of_map(
                 doppler, own, subject=subject, movement=one.path.stem, frame_rate_hz=rate_hz
             )
         )
-    return found
+    return clip_sets
 
 
 def _of_persons(

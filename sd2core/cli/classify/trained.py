@@ -14,7 +14,7 @@ from sd2core.cli.labels.suggest import (
     map_and_clock,
     span_cells,
     spans_data,
-    write_found,
+    write_spans,
 )
 from sd2core.cli.output import counted, print_json, print_rows, progress_bar
 from sd2core.cli.recording_maps import parsed_maps
@@ -101,28 +101,28 @@ def _eval(options: Evaluate) -> None:
     maps = parsed_maps(options.maps)
     known = clips_of(options.data, maps, options.denoiser)
     clips = _judged(known, classifier.card, options)
-    found = judge(classifier, clips, known)
+    score = judge(classifier, clips, known)
     subjects = list(dict.fromkeys(clip.subject for clip in clips))
     learnt = set(classifier.card.about.get("split", {}).get("training", ())) & set(subjects)
-    told = {
+    data = {
         "model": str(options.classifier),
         "maps": list(known.kinds),
         "subjects": subjects,
         "learnt_from": sorted(learnt),
-        **found.to_json(),
-        **found.summary(),
+        **score.to_json(),
+        **score.summary(),
     }
     if options.json:
-        print_json(told)
+        print_json(data)
     else:
-        _say(found, known, subjects, sorted(learnt))
+        _say(score, known, subjects, sorted(learnt))
     if options.figure is not None:
         from sd2core.classify.confusion_figure import confusion_figure
         from sd2core.classify.metrics import shares
 
         figure = confusion_figure(
-            [shares(found.frames), shares(found.gestures)],
-            found.classes,
+            [shares(score.frames), shares(score.gestures)],
+            score.classes,
             ["frames", "gestures"],
             f"{options.classifier.stem} on {' and '.join(known.kinds)} maps",
         )
@@ -145,23 +145,23 @@ def _judged(known: ClipSet, card: ClassifierCard, options: Evaluate) -> tuple[Cl
     return clips if options.placements == "all" else tuple(c for c in clips if c.placement == 0)
 
 
-def _say(found: Score, known: ClipSet, subjects: list[str], learnt: list[str]) -> None:
+def _say(score: Score, known: ClipSet, subjects: list[str], learnt: list[str]) -> None:
     from sd2core.classify.metrics import shares
 
     print(f"Evaluated on {' and '.join(known.kinds)} maps of {', '.join(subjects)}")
     if learnt:
         print(f"It was trained on {', '.join(learnt)}: this does not show how it does for others.")
-    for what, matrix in (("frames", found.frames), ("gestures", found.gestures)):
-        rows = [(what, *(f"taken for {name}" for name in found.classes), "in all")]
-        for name, row, counts in zip(found.classes, shares(matrix), matrix, strict=True):
+    for what, matrix in (("frames", score.frames), ("gestures", score.gestures)):
+        rows = [(what, *(f"taken for {name}" for name in score.classes), "in all")]
+        for name, row, counts in zip(score.classes, shares(matrix), matrix, strict=True):
             cells = ["–" if value != value else f"{100 * value:.1f} %" for value in row]
             rows.append((name, *cells, f"{counts.sum():,}"))
         print()
-        print_rows(rows, right=range(1, len(found.classes) + 2))
-    print(f"\nMean recall of frames {100 * found.mean_recall:.1f} %")
-    if found.latency_s == found.latency_s:
+        print_rows(rows, right=range(1, len(score.classes) + 2))
+    print(f"\nMean recall of frames {100 * score.mean_recall:.1f} %")
+    if score.latency_s == score.latency_s:
         print(
-            f"A gesture is recognised after {found.latency_s:.2f} s (median), {found.missed} never"
+            f"A gesture is recognised after {score.latency_s:.2f} s (median), {score.missed} never"
         )
 
 
@@ -197,7 +197,7 @@ def _apply(options: Apply) -> None:
     spans = predicted_spans(
         probabilities, doppler.timebase, card.classes, chosen, present=doppler.present
     )
-    lost = write_found(options, spans, clock)
+    lost = write_spans(options, spans, clock)
     if options.probabilities is not None:
         with atomic_write(options.probabilities) as stream:
             np.savez_compressed(

@@ -144,13 +144,13 @@ def _arrays(path: Path, kind: Kind, stack: ExitStack) -> tuple[Sequence[Any], ra
 
 
 def _verified(path: Path, arrays: Sequence[Any], rows: range | None) -> dict[str, Any]:
-    found = []
+    damage = []
     with progress_bar("Verifying", "row") as progress:
         for array in arrays:
-            found += array.damage("values", rows, progress)
-    if found:
+            damage += array.damage("values", rows, progress)
+    if damage:
         raise Sd2Error(
-            f"{path} is damaged: {'; '.join(map(str, found))}",
+            f"{path} is damaged: {'; '.join(map(str, damage))}",
             "chunks as they were written",
             "The rest can be read. Copy it again from where it came",
         )

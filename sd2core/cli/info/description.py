@@ -206,23 +206,23 @@ def describe_imu(path: Path) -> Description:
     from sd2core.plausibility.samples import judge_inertial
 
     signals = read_signals(path)
-    told = signals_data(signals)
+    summary = signals_data(signals)
     data = {
         "kind": "imu",
         "path": str(path),
-        **told,
+        **summary,
         "rate_hz": signals.rate_hz,
         "start_s": float(signals.times_s[0]),
         "end_s": float(signals.times_s[-1]),
         "meta": signals.meta,
     }
-    unknown = told["samples"] - told["known_samples"]
+    unknown = summary["samples"] - summary["known_samples"]
     facts = {
-        "samples": f"{told['samples']:,} at {signals.rate_hz:.4g} Hz,"
+        "samples": f"{summary['samples']:,} at {signals.rate_hz:.4g} Hz,"
         f" from {signals.times_s[0]:.3f} to {signals.times_s[-1]:.3f} s"
         + (f"; {unknown:,} are empty" if unknown else ""),
-        "acceleration": f"up to {told['largest_acceleration_mps2']:.1f} m/s²",
-        "turn rate": f"up to {told['largest_turn_rate_radps']:.2f} rad/s",
+        "acceleration": f"up to {summary['largest_acceleration_mps2']:.1f} m/s²",
+        "turn rate": f"up to {summary['largest_turn_rate_radps']:.2f} rad/s",
         "at": str(signals.meta.get("at", "")),
         "axes": str(signals.meta.get("axes", "")),
     }
@@ -331,8 +331,8 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
 
 def _people(bodies: Any) -> str:
     """Persons of a scene as a map's provenance tells of them."""
-    told = bodies if isinstance(bodies, list) else []
-    return ", ".join(str(one.get("person") if isinstance(one, dict) else one) for one in told)
+    people = bodies if isinstance(bodies, list) else []
+    return ", ".join(str(one.get("person") if isinstance(one, dict) else one) for one in people)
 
 
 def _limbs(limbs: LimbMaps | None) -> str:

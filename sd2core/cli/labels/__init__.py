@@ -118,9 +118,9 @@ def _convert(options: Convert) -> None:
       sd2 labels convert labels.json --out labels.txt --to audacity --fps 30
       sd2 labels convert walk.eaf --out labels.json
     """
-    there = check_label_output(options.out)
+    digest = check_label_output(options.out)
     labels, clock = read_named(options)
-    lost = write(options.out, labels, clock, options.to, over=there)
+    lost = write(options.out, labels, clock, options.to, over=digest)
     if options.json:
         print_json({"path": str(options.out), "spans": len(labels.spans), "not_kept": lost})
         return
@@ -155,7 +155,7 @@ def _statistics(options: Statistics) -> None:
     if options.json:
         print_json({"labels": _statistics_of(labels, clock)})
     elif options.csv:
-        print(statistics_text(statistics_rows(_found(labels, clock))), end="")
+        print(statistics_text(statistics_rows(_in_use(labels, clock))), end="")
     else:
         _print_statistics(labels, clock)
 
@@ -163,18 +163,18 @@ def _statistics(options: Statistics) -> None:
 def _print_statistics(labels: Labels, clock: Timebase | None) -> None:
     from sd2core.labels.statistics import HEADINGS, statistics_rows
 
-    rows = [HEADINGS, *statistics_rows(_found(labels, clock))]
+    rows = [HEADINGS, *statistics_rows(_in_use(labels, clock))]
     print_rows(rows, right=range(1, len(HEADINGS)))
 
 
 def _statistics_of(labels: Labels, clock: Timebase | None) -> dict[str, dict[str, Any]]:
-    described = {one.label: asdict(one) for one in _found(labels, clock)}
+    described = {one.label: asdict(one) for one in _in_use(labels, clock)}
     for one in described.values():
         del one["label"]
     return described
 
 
-def _found(labels: Labels, clock: Timebase | None) -> list[LabelStatistics]:
+def _in_use(labels: Labels, clock: Timebase | None) -> list[LabelStatistics]:
     """Statistics of the labels in use: files of other programs bring no set of their own."""
     from sd2core.labels.statistics import label_statistics
 

@@ -53,15 +53,15 @@ def _agree(options: Agree) -> None:
     clock = clock_of(options, options.a, options.b)
     a, b = labels_at(options.a, clock), labels_at(options.b, clock)
     clock = needed(with_rate(options, clock, a, b), "Comparing labels")
-    found = agreement(a, b, clock, min_iou=options.min_iou, track=options.track)
+    result = agreement(a, b, clock, min_iou=options.min_iou, track=options.track)
     if options.json:
-        print_json(_data(found))
+        print_json(_data(result))
     else:
-        _print(found)
+        _print(result)
 
 
-def _print(found: Agreement) -> None:
-    frames, spans = found.frames, found.spans
+def _print(result: Agreement) -> None:
+    frames, spans = result.frames, result.spans
     rows: list[tuple[str, ...]] = [("frames", "kappa", "same", "by chance")]
     rows.append(("all labels", *_kappa(frames.overall)))
     rows += [(label, *_kappa(kappa)) for label, kappa in frames.of_label.items()]
@@ -110,8 +110,8 @@ def _print(found: Agreement) -> None:
             print(f"only in {which}: {span.id} {span.label} {span.start_s:.3f}–{span.end_s:.3f} s")
 
 
-def _data(found: Agreement) -> dict[str, Any]:
-    frames, spans = found.frames, found.spans
+def _data(result: Agreement) -> dict[str, Any]:
+    frames, spans = result.frames, result.spans
     return {
         "frames": frames.overall.frames,
         "overall": _kappa_data(frames.overall),

@@ -55,7 +55,7 @@ def _set(options: Set) -> None:
     from sd2core.labels.field_edits import set_label_set
     from sd2core.labels.label_set import GESTURES
 
-    there = {
+    digests = {
         path: check_label_output(path) for path in (options.export, options.out) if path is not None
     }
     labels, clock = read_named(options)
@@ -64,7 +64,7 @@ def _set(options: Set) -> None:
         usual = options.use == "usual"
         other = GESTURES if usual else files.read_label_set(Path(options.use))
         labels = set_label_set(labels, other).labels
-        lost = write(options.out, labels, clock, over=there[options.out])
+        lost = write(options.out, labels, clock, over=digests[options.out])
         written.append(options.out)
     if options.export is not None:
         files.write_label_set(options.export, labels.label_set)

@@ -137,15 +137,15 @@ def _title(name: str, doppler: DopplerMap) -> str:
 def _strongest(doppler: DopplerMap) -> float:
     import numpy as np
 
-    told = np.delete(doppler.values, doppler.null_bins, axis=0)
-    return float(told.max(initial=0.0)) or 1.0
+    values = np.delete(doppler.values, doppler.null_bins, axis=0)
+    return float(values.max(initial=0.0)) or 1.0
 
 
 def _nothing_to_cut(path: Path, labels: Labels, wanted: tuple[str, ...]) -> Sd2Error:
-    there = sorted({span.label for span in labels.decided})
-    if wanted and there:
+    known = sorted({span.label for span in labels.decided})
+    if wanted and known:
         return Sd2Error(
-            f"{path} has no span of {' or '.join(wanted)}", f"one of {', '.join(there)}"
+            f"{path} has no span of {' or '.join(wanted)}", f"one of {', '.join(known)}"
         )
     suggested = len(labels.spans) - len(labels.decided)
     return Sd2Error(

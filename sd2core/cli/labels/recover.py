@@ -58,12 +58,12 @@ def _recover(options: Recover) -> None:
     """
     from sd2core.labels.recovery import offers_in, recovery_folder
 
-    found = offers_in(recovery_folder(), declined=True)
-    offers = found.offers
+    unsaved = offers_in(recovery_folder(), declined=True)
+    offers = unsaved.offers
     if options.recording is not None:
         path = options.recording.resolve()
         offers = tuple(one for one in offers if one.recording == path)
-    for note in found.notes:
+    for note in unsaved.notes:
         print(note, file=sys.stderr)
     if options.out is not None:
         _write(options.out, options, offers)

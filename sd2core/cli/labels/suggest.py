@@ -74,7 +74,7 @@ def _suggest(options: Suggest) -> None:
     spans = suggest_spans(doppler, options, label=options.label)
     energy_db = motion_energy_db(doppler)
     loudest_db = float(max((value for value in energy_db.tolist() if value == value), default=0.0))
-    lost = write_found(options, spans, clock)
+    lost = write_spans(options, spans, clock)
     if options.json:
         print_json(
             {
@@ -103,7 +103,7 @@ def _suggest(options: Suggest) -> None:
     print_lost(lost)
 
 
-def write_found(options: SearchedMap, spans: tuple[Span, ...], clock: Timebase) -> list[str]:
+def write_spans(options: SearchedMap, spans: tuple[Span, ...], clock: Timebase) -> list[str]:
     """Write spans to the file of ``--out``, where one is named; return what it cannot hold."""
     from sd2core.labels.spans import Labels, LabelTrack
     from sd2core.labels.suggest import TRACK

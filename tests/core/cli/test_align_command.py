@@ -76,7 +76,7 @@ def test_what_another_saved_while_it_was_aligned_is_kept(
         theirs.save()
         return SimpleNamespace(problem="", offset_s=0.5)
 
-    monkeypatch.setattr(align, "_found", found)
+    monkeypatch.setattr(align, "_alignment", found)
     outcome = sd2("align", folder, "--save", "--json")
     assert outcome.code == 1
     (entry,) = json.loads(outcome.out)["recordings"]
