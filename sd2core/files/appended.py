@@ -26,10 +26,10 @@ class AppendedFile:
     def is_there(self) -> bool:
         """True while its path leads to it."""
         try:
-            there = self._path.stat()
+            status = self._path.stat()
         except OSError:
             return False
-        return os.path.samestat(there, os.fstat(self._stream.fileno()))
+        return os.path.samestat(status, os.fstat(self._stream.fileno()))
 
     def put_back(self) -> None:
         """Write what it holds to its path again, unless it is there, and append to that."""

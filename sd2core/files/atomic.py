@@ -146,8 +146,8 @@ def _full_disk(error: BaseException | None) -> int | None:
         if isinstance(error, OSError) and error.errno is None:
             if _SHORT_WRITE.fullmatch(words := str(error)):
                 return errno.ENOSPC
-            if (found := next((one for one in DISK_FULL if os.strerror(one) in words), 0)) != 0:
-                return found
+            if (number := next((one for one in DISK_FULL if os.strerror(one) in words), 0)) != 0:
+                return number
         error = error.__cause__ or error.__context__
     return None
 

@@ -86,10 +86,10 @@ def cached_digest(path: Path) -> str:
         return file_digest(path)
     place = _place(path)
     digests = Digests(*_kept(place))
-    found = digests.of(path)
+    digest = digests.of(path)
     content = {"files": digests.files, "digests": digests.digests}
     keep_text(place, json.dumps(content) + "\n")
-    return found
+    return digest
 
 
 def _tree(path: Path) -> Iterable[Path]:

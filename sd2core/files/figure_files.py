@@ -58,13 +58,13 @@ def save_figure(
 
     check_figure(path)
     kind = path.suffix.lower()
-    told: dict[str, Any] = {"dpi": pixels_per_inch or "figure"}
+    settings: dict[str, Any] = {"dpi": pixels_per_inch or "figure"}
     if provenance is not None:
-        told["metadata"] = _metadata(kind, provenance)
+        settings["metadata"] = _metadata(kind, provenance)
     # In memory first: on a full disk Matplotlib fails with an error of its own.
     drawn = io.BytesIO()
     with rc_context(None if provenance is None else _RULES):
-        figure.savefig(drawn, format=kind[1:], **told)
+        figure.savefig(drawn, format=kind[1:], **settings)
     with atomic_write(path) as stream:
         stream.write(drawn.getbuffer())
 

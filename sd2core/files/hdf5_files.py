@@ -64,12 +64,12 @@ def member_of(file: Any, path: Path, name: str) -> Any:
         return None
     if not isinstance(link, h5py.HardLink):
         raise Sd2Error(f"{name} of {path} is a link to elsewhere", f"{name} in the file itself")
-    found = file[name]
-    if isinstance(found, h5py.Dataset):
-        if found.external or found.is_virtual:
+    member = file[name]
+    if isinstance(member, h5py.Dataset):
+        if member.external or member.is_virtual:
             raise Sd2Error(f"{name} of {path} lies in another file", f"{name} in the file itself")
-        _check_array(found, path, name)
-    return found
+        _check_array(member, path, name)
+    return member
 
 
 def text_of(array: Any, path: Path, name: str) -> str:
@@ -98,8 +98,8 @@ def text_of(array: Any, path: Path, name: str) -> str:
         at, end = 16, size
         heap = head + _exactly(stream, address + 16, max(size - 16, 0), place)
     while at + 16 <= end:
-        found, _, _, stored = struct.unpack_from("<HHIQ", heap, at)
-        if found == number and found:
+        index, _, _, stored = struct.unpack_from("<HHIQ", heap, at)
+        if index == number and index:
             if length > stored or at + 16 + length > end:
                 break
             return heap[at + 16 : at + 16 + length].decode("utf-8", "replace")
@@ -109,8 +109,8 @@ def text_of(array: Any, path: Path, name: str) -> str:
 
 def _exactly(stream: BinaryIO, start: int, count: int, place: str) -> bytes:
     """Bytes at a place in a file; Sd2Error if they are not all there."""
-    there = stream.seek(0, os.SEEK_END)
-    if start + count > there:
+    size = stream.seek(0, os.SEEK_END)
+    if start + count > size:
         raise Sd2Error(
             f"{place} lies beyond the end of the file", "a whole file", "Copy or download it again"
         )

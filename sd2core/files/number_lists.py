@@ -17,7 +17,7 @@ def parse_numbers(text: str) -> tuple[float, ...]:
 
     Raises Sd2Error for anything else, and for more than 10,000 numbers.
     """
-    found: list[float] = []
+    numbers: list[float] = []
     for part in text.replace("−", "-").split(","):
         words = part.split(":")
         try:
@@ -28,8 +28,8 @@ def parse_numbers(text: str) -> tuple[float, ...]:
             raise Sd2Error(
                 f"{part.strip()!r} is not a number", "numbers such as 1, 2.5 or -60:60:30"
             )
-        found += values if len(values) == 1 else _range(part, *values)
-    return tuple(found)
+        numbers += values if len(values) == 1 else _range(part, *values)
+    return tuple(numbers)
 
 
 def parse_interval(text: str) -> tuple[float, float]:

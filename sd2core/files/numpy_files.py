@@ -37,9 +37,9 @@ class NpzArrays(Mapping[str, NDArray[Any]]):
         entry = self._entries[name]
         with self.archive.open(entry) as stream:
             shape, _, dtype = read_array_header(stream)
-            there = entry.file_size - stream.tell()
-        if math.prod(shape) * dtype.itemsize > there:
-            raise ValueError(f"{name} declares {dtype} of shape {shape}, in {there:,} bytes")
+            stored = entry.file_size - stream.tell()
+        if math.prod(shape) * dtype.itemsize > stored:
+            raise ValueError(f"{name} declares {dtype} of shape {shape}, in {stored:,} bytes")
         with self.archive.open(entry) as stream:
             return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
 

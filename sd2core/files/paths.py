@@ -83,17 +83,17 @@ def is_absolute(stored: str) -> bool:
 
 def paths_named(names: set[str], folder: Path, progress: Progress) -> dict[str, list[Path]]:
     """Files and folders of these names below ``folder``."""
-    found: dict[str, list[Path]] = {}
+    paths: dict[str, list[Path]] = {}
     root = plain_path(folder)
     if root.name in names:
-        found.setdefault(root.name, []).append(root)
+        paths.setdefault(root.name, []).append(root)
     for searched, (where, folders, files) in enumerate(os.walk(root)):
         progress(searched, 0)
         for name in names.intersection(folders) | names.intersection(files):
-            found.setdefault(name, []).append(Path(where, name))
+            paths.setdefault(name, []).append(Path(where, name))
         # A Zarr array is one thing made of countless files.
         folders[:] = [name for name in folders if not name.endswith(".zarr")]
-    return found
+    return paths
 
 
 def common_suffix_length(a: Path, b: Path) -> int:

@@ -38,10 +38,10 @@ def parse_quantity(text: str, unit: str) -> float:
     (2.5, 2.5)
     """
     kind, examples, factors = _KINDS.get(unit, ("a number", "a number such as 2.5", {unit: 1.0}))
-    found = _NUMBER.fullmatch(text.replace("−", "-"))
-    if found is None or found[2] not in {"", *factors}:
+    match = _NUMBER.fullmatch(text.replace("−", "-"))
+    if match is None or match[2] not in {"", *factors}:
         raise Sd2Error(f"“{text.strip()}” is not {kind}", examples)
-    value = float(found[1].replace(",", ".")) * factors.get(found[2], 1.0)
+    value = float(match[1].replace(",", ".")) * factors.get(match[2], 1.0)
     if not math.isfinite(value):
         raise Sd2Error(f"“{text.strip()}” is not {kind}", examples)
     # Without the digits that only the factor brings in.

@@ -126,11 +126,11 @@ class StoredArray:
             return np.asarray(self._array[key])
         except Exception as error:  # a damaged chunk fails in the codec's own ways
             self._refuse(self.damage("values", _rows(key, self.shape)))
-            raise unreadable(self.path, f"{self.name} ({_said(error)})") from error
+            raise unreadable(self.path, f"{self.name} ({_error_text(error)})") from error
 
-    def _refuse(self, found: tuple[Damage, ...]) -> None:
-        if found:
-            raise unreadable(self.path, found)
+    def _refuse(self, damage: tuple[Damage, ...]) -> None:
+        if damage:
+            raise unreadable(self.path, damage)
 
     def damage(
         self, depth: Depth, rows: range | None = None, progress: Progress = silent
@@ -142,7 +142,7 @@ class StoredArray:
         step = self.chunks[0]
         sizes = zip(self.shape[1:], self.chunks[1:], strict=True)
         across = [range(-(-size // chunk)) for size, chunk in sizes]
-        found: list[Damage] = []
+        damage: list[Damage] = []
         kind = _PackedChunkFiles if self.path.is_file() else _ChunkFiles
         with kind(self.path) as files:
             for number in range(rows.start // step, -(-rows.stop // step)):
@@ -151,9 +151,9 @@ class StoredArray:
                 for place in itertools.product(*across):
                     reason = self._reason(files, (number, *place), depth)
                     if reason is not None:
-                        found.append(Damage(self.name, start, stop, self._unit, reason))
+                        damage.append(Damage(self.name, start, stop, self._unit, reason))
                         break
-        return tuple(found)
+        return tuple(damage)
 
     def _reason(self, files: _ChunkFiles, place: tuple[int, ...], depth: Depth) -> str | None:
         """What is wrong with a chunk; None: nothing."""
@@ -175,7 +175,7 @@ class StoredArray:
         except DamagedChunkError as error:
             return f"{key}: {error}"
         except Exception as error:  # a damaged zip fails in many ways, too
-            return f"{key}: {_said(error)}"
+            return f"{key}: {_error_text(error)}"
         if summed and crc32c(content[:-4]).to_bytes(4, "little") != content[-4:]:
             return f"{key} does not have its checksum"
         return self._undecodable(place, key) if depth == "values" else None
@@ -184,7 +184,7 @@ class StoredArray:
         try:
             self._array.blocks[place]
         except Exception as error:  # as in __getitem__
-            return f"{key}: {_said(error)}"
+            return f"{key}: {_error_text(error)}"
         return None
 
 
@@ -202,10 +202,10 @@ class _ChunkFiles:
 
     def size(self, key: str) -> int | None:
         try:
-            found = os.stat(f"{self._folder}/{key}")
+            status = os.stat(f"{self._folder}/{key}")
         except OSError:
             return None
-        return found.st_size if stat.S_ISREG(found.st_mode) else None
+        return status.st_size if stat.S_ISREG(status.st_mode) else None
 
     def read(self, key: str, most: int = -1) -> bytes:
         with (self._folder / key).open("rb") as file:
@@ -316,12 +316,12 @@ def array_names(path: Path) -> list[str]:
     """Names of the arrays in a store."""
     if path.is_file():
         with open_zip(path) as archive:
-            found = [Path(name) for name in archive.namelist()]
+            files = [Path(name) for name in archive.namelist()]
     else:
-        found = [file.relative_to(path) for file in path.glob("*/*") if file.is_file()]
+        files = [file.relative_to(path) for file in path.glob("*/*") if file.is_file()]
     return sorted(
         str(one.parent)
-        for one in found
+        for one in files
         if len(one.parts) == 2 and one.name in ("zarr.json", ".zarray")
     )
 
@@ -389,21 +389,21 @@ def _refuse_unsafe(array: Any, path: Path, name: str) -> None:
         )
 
 
-def unreadable(path: Path, found: str | Iterable[Damage]) -> Sd2Error:
+def unreadable(path: Path, damage: str | Iterable[Damage]) -> Sd2Error:
     """Error that names what of a store cannot be read."""
-    what = found if isinstance(found, str) else "; ".join(map(str, found))
+    what = damage if isinstance(damage, str) else "; ".join(map(str, damage))
     return Sd2Error(f"{path} cannot be read: {what}", "chunks as they were written", COPY_AGAIN)
 
 
 def _no_group(path: Path, error: Exception) -> Sd2Error:
     return Sd2Error(
-        f"{path} cannot be read as a Zarr group ({_said(error)})",
+        f"{path} cannot be read as a Zarr group ({_error_text(error)})",
         "a complete Zarr store",
         COPY_AGAIN,
     )
 
 
-def _said(error: BaseException) -> str:
+def _error_text(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"[:200]
 
 

@@ -28,7 +28,7 @@ _DEEPEST = 100
 """Lists and tables that may stand in each other; Python itself gives up before a thousand."""
 _LONG_NUMBER = re.compile(r"[0-9](?:[0-9_]{300,}|x[0-9a-fA-F_]{250,})")
 """A whole number that no float holds."""
-_LONGEST_FOUND = 60
+_LONGEST_VALUE = 60
 _LONGEST_LINE_BYTES = 1 << 20
 OPEN_WITH_WRITER = "Open it with the version of SD² Studio that wrote it"
 _REMEDY = "Correct it with a text editor, or copy it again"
@@ -175,8 +175,8 @@ def errors_in(place: str | Path, remedy: str = _REMEDY) -> Iterator[None]:
     try:
         yield
     except Sd2Error as error:
-        told = error.within(place)
-        raise Sd2Error(told.found, told.expected, told.remedy or remedy) from error
+        named = error.within(place)
+        raise Sd2Error(named.found, named.expected, named.remedy or remedy) from error
 
 
 @contextmanager
@@ -219,9 +219,9 @@ def check_version(content: Any, file: Path, form: str, newest: int) -> None:
     ------
     Sd2Error
     """
-    found = content.get("format") if isinstance(content, dict) else None
-    if found != form:
-        raise Sd2Error(f"{file} has the format {found!r}", f"the format {form!r}")
+    actual = content.get("format") if isinstance(content, dict) else None
+    if actual != form:
+        raise Sd2Error(f"{file} has the format {actual!r}", f"the format {form!r}")
     version = content.get("version")
     if isinstance(version, bool) or not isinstance(version, int) or not 1 <= version <= newest:
         raise Sd2Error(
@@ -270,9 +270,9 @@ def first_fault(error: ValidationError) -> str:
         return f"{where} is missing"
     if first["type"] in UNKNOWN_KEY:
         return f"{where} is nothing that this version knows"
-    found = repr(first["input"])
-    found = found if len(found) <= _LONGEST_FOUND else f"{found[:_LONGEST_FOUND]}…"
-    return f"{where} is {found} ({first['msg']})"
+    value = repr(first["input"])
+    value = value if len(value) <= _LONGEST_VALUE else f"{value[:_LONGEST_VALUE]}…"
+    return f"{where} is {value} ({first['msg']})"
 
 
 def _parsed(form: str, text: str, place: str | Path, expected: str, remedy: str) -> Any:
