@@ -149,7 +149,7 @@ def simulated_capture(
                 "source": Path(source).name,
                 "sensor": sensor.as_dict(),
                 **(how or {}),
-                "options": _told(options),
+                "options": _option_entries(options),
                 "first_frame_s": float(times_s[0]),
                 "frame_time": "middle of the burst of chirps",
                 **levels,
@@ -160,14 +160,14 @@ def simulated_capture(
     )
 
 
-def _told(options: SignalOptions) -> dict[str, Any]:
+def _option_entries(options: SignalOptions) -> dict[str, Any]:
     """Options for the provenance; JSON has no infinity."""
-    told = asdict(options)
+    entries = asdict(options)
     if options.link is None:
-        del told["link"]
-        return told | {"snr_db": options.snr_db if math.isfinite(options.snr_db) else None}
-    del told["snr_db"], told["peak_share"]
-    return told
+        del entries["link"]
+        return entries | {"snr_db": options.snr_db if math.isfinite(options.snr_db) else None}
+    del entries["snr_db"], entries["peak_share"]
+    return entries
 
 
 def check_converter(config: RadarConfig) -> None:

@@ -230,7 +230,7 @@ def paths(
     axes = sensor_axes(sensor)
     centre = np.asarray(sensor.position_m)
     transmitters = _with_image(Antenna(centre, axes), options.mirror)
-    found = []
+    per_receiver = []
     by_way_of = {wall: Mirror.of(wall) for wall in walls}
     for place in centre + offsets @ axes:
         receivers = _with_image(Antenna(place, axes), options.mirror)
@@ -240,8 +240,8 @@ def paths(
         out, back = transmitters[0], receivers[0]
         for wall, mirror in by_way_of.items():
             ways[wall] = [(out.mirrored(mirror), back), (out, back.mirrored(mirror))]
-        found.append(ways)
-    return found
+        per_receiver.append(ways)
+    return per_receiver
 
 
 def _with_image(antenna: Antenna, mirror: Mirror | None) -> list[Antenna]:

@@ -173,15 +173,15 @@ def range_doppler(
 
 def limits(config: RadarConfig) -> dict[str, float]:
     """Limits of a radar in velocity and, if it has any, range, for provenance and read-outs."""
-    found = {
+    result = {
         "wavelength_m": config.wavelength_m,
         "v_max_mps": config.v_max_mps,
         "velocity_resolution_mps": config.velocity_resolution_mps,
     }
     if not config.is_continuous:
-        found["range_resolution_m"] = config.range_resolution_m
-        found["range_max_m"] = config.range_max_m
-    return found
+        result["range_resolution_m"] = config.range_resolution_m
+        result["range_max_m"] = config.range_max_m
+    return result
 
 
 def weights_of(axis: VelocityAxis, chain: FrameChain) -> NDArray[np.float32]:

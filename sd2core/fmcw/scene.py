@@ -118,10 +118,10 @@ class MeshScene:
     def seen(self, time_s: float) -> dict[Wall | None, NDArray[np.bool_] | None]:
         """Masks of the facets that nothing hides: directly, and by way of each wall."""
         direct = self.visible(time_s)
-        found: dict[Wall | None, NDArray[np.bool_] | None] = {None: direct}
+        masks: dict[Wall | None, NDArray[np.bool_] | None] = {None: direct}
         for wall in self.walls:
-            found[wall] = self._seen_by_way_of(wall, time_s, direct)
-        return found
+            masks[wall] = self._seen_by_way_of(wall, time_s, direct)
+        return masks
 
     def _seen_by_way_of(
         self, wall: Wall, time_s: float, direct: NDArray[np.bool_] | None
@@ -144,14 +144,14 @@ class MeshScene:
     def _others_before(self, time_s: float) -> list[Surface]:
         """Surfaces of the others that may hide some of this one at an instant."""
         place_m = np.asarray(self.sensor.position_m, np.float64)
-        own, found = None, []
+        own, surfaces = None, []
         for other in self.others:
             if other.is_present(time_s):
                 own = _box(self.surface(time_s)) if own is None else own
                 surface = other.surface(time_s)
                 if may_hide(_box(surface), own, place_m):
-                    found.append(surface)
-        return found
+                    surfaces.append(surface)
+        return surfaces
 
     def surface(self, time_s: float) -> Surface:
         """Vertices (V, 3) and faces in the mesh frame nearest to an instant."""

@@ -87,10 +87,10 @@ def simulate_radar(
     # by a 2^9th of a count of 16 bits.
     real = config.sampling == "real"
     signal = store(shape, np.float32 if real else np.complex64, memory_bytes)
-    there = np.array([scene.is_present(time_s) for time_s in times_s.tolist()])
+    present = np.array([scene.is_present(time_s) for time_s in times_s.tolist()])
     power, peak = _fill(scene, times_s, scene.static(options.reflectors), signal, progress)
     samples = store(shape, np.uint16 if real else np.complex64, memory_bytes)
-    mean_power = float(power[there].mean()) if there.any() else 0.0
+    mean_power = float(power[present].mean()) if present.any() else 0.0
     levels = digitise(
         signal, peak, mean_power, config, options, samples, lambda: progress(count, count), start
     )
@@ -109,7 +109,7 @@ def simulate_radar(
             **({} if mesh.surroundings is None else mesh.surroundings.as_dict()),
             **({"bodies": list(mesh.persons)} if mesh.others else {}),
         },
-        nobody=runs(~there),
+        nobody=runs(~present),
     )
 
 
@@ -126,13 +126,13 @@ def _fill(
 
     def fill(frame: int, ticket: Ticket) -> None:
         ticket.advance(0)
-        found = scene.frame(float(times_s[frame]), lambda: ticket.advance(0))
-        power[frame] = np.mean(np.square(np.abs(found)))
-        found += static
+        beat = scene.frame(float(times_s[frame]), lambda: ticket.advance(0))
+        power[frame] = np.mean(np.square(np.abs(beat)))
+        beat += static
         if (shadow := scene.shadow(float(times_s[frame]))) is not None:
-            found -= shadow
-        peak[frame] = np.abs(found).max()
-        signal[frame] = found
+            beat -= shadow
+        peak[frame] = np.abs(beat).max()
+        signal[frame] = beat
         ticket.advance(1)
 
     run_jobs([partial(fill, frame) for frame in range(frames)], frames, progress)

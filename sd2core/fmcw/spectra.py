@@ -69,9 +69,9 @@ def frame_spectra(
     def signal(time_s: float) -> BeatSignal:
         return scene.frame(time_s)
 
-    found: Iterable[BeatSignal]
-    found = map(signal, times.tolist()) if threads == 1 else workers().map(signal, times.tolist())
-    return signal_spectra(np.stack(list(found)), config, axis=axis, processing=processing)
+    beats: Iterable[BeatSignal]
+    beats = map(signal, times.tolist()) if threads == 1 else workers().map(signal, times.tolist())
+    return signal_spectra(np.stack(list(beats)), config, axis=axis, processing=processing)
 
 
 def signal_spectra(

@@ -199,8 +199,8 @@ def _transform(
         )
     plan = plans[key]
     plan.setpts(along_chirps, along_samples)
-    found: NDArray[np.complex128] = plan.execute(np.ascontiguousarray(strengths))
-    return found.reshape(len(strengths), *shape)
+    transforms: NDArray[np.complex128] = plan.execute(np.ascontiguousarray(strengths))
+    return transforms.reshape(len(strengths), *shape)
 
 
 def turns_of(echoes: Echoes, config: RadarConfig) -> Turns:

@@ -190,16 +190,16 @@ class WaveScene:
         As if there were no body; see :meth:`shadow`. Things are rough, whatever the body's surface
         is: a large smooth plane would echo in one direction only.
         """
-        found = self.silence()
+        signal = self.silence()
         if reflectors:
             for receiver, ways in enumerate(self.paths):
                 parts = [
                     self._points(reflectors, *pair) for pairs in ways.values() for pair in pairs
                 ]
-                found[receiver] = self.sampled(direct(_joined(parts), self.config))
+                signal[receiver] = self.sampled(direct(_joined(parts), self.config))
         if self._pieces is not None:
-            found += self._of_pieces(self._pieces.seen[None])
-        return found
+            signal += self._of_pieces(self._pieces.seen[None])
+        return signal
 
     def shadow(self, time_s: float) -> BeatSignal | None:
         """Beat signal of what bodies hide of things in the frame around a time; None if nothing.
@@ -235,7 +235,7 @@ class WaveScene:
 
     def _of_pieces(self, chosen: NDArray[np.bool_]) -> BeatSignal:
         """Beat signal of some pieces of things that are seen, (receivers, chirps, samples)."""
-        pieces, found = self._pieces, self.silence()
+        pieces, signal = self._pieces, self.silence()
         assert pieces is not None
         corners, faces, phases = pieces.corners_m, pieces.faces, pieces.phases
         still = np.zeros_like(corners)
@@ -245,8 +245,8 @@ class WaveScene:
                 for wall, pairs in ways.items()
                 for out, back in pairs
             ]
-            found[receiver] = self.sampled(nufft(_joined(parts), self.config))
-        return found
+            signal[receiver] = self.sampled(nufft(_joined(parts), self.config))
+        return signal
 
     def _signal(
         self,
@@ -291,7 +291,7 @@ class WaveScene:
         # Interpolated motion has every chirp's own corners.
         turning = phases is None and self.wave.motion == "constant"
         amplitude = np.empty((3 if turning else 1, count), np.complex128)
-        found = facet_echoes(
+        facing = facet_echoes(
             position_m,
             velocity_mps,
             faces,
@@ -310,10 +310,10 @@ class WaveScene:
             rate_mps,
             amplitude,
         )
-        strength = amplitude[:, :found] * (out.gain * back.gain)
+        strength = amplitude[:, :facing] * (out.gain * back.gain)
         if phases is not None:
-            strength *= phases[index[:found]]
-        return Echoes(range_m[:found], rate_mps[:found], strength)
+            strength *= phases[index[:facing]]
+        return Echoes(range_m[:facing], rate_mps[:facing], strength)
 
     def _points(self, reflectors: tuple[Reflector, ...], out: Antenna, back: Antenna) -> Echoes:
         position = np.array([reflector.position_m for reflector in reflectors])
