@@ -95,7 +95,7 @@ def _clipped_bounds(a: NDArray[Any], near: float, bounds: NDArray[Any]) -> bool:
     ``a`` holds the corners' x, y, z per row in the view's frame; ``bounds``
     receives xmin, xmax, ymin, ymax of x/z and y/z. False: no such part.
     """
-    found = False
+    exists = False
     for corner in range(3):
         other = (corner + 1) % 3
         z0, z1 = a[corner, 2], a[other, 2]
@@ -110,13 +110,13 @@ def _clipped_bounds(a: NDArray[Any], near: float, bounds: NDArray[Any]) -> bool:
                 s = (near - z0) / (z1 - z0)
                 px = (a[corner, 0] + s * (a[other, 0] - a[corner, 0])) / near
                 py = (a[corner, 1] + s * (a[other, 1] - a[corner, 1])) / near
-            if not found:
+            if not exists:
                 bounds[0] = bounds[1] = px
                 bounds[2] = bounds[3] = py
-                found = True
+                exists = True
             bounds[0], bounds[1] = min(bounds[0], px), max(bounds[1], px)
             bounds[2], bounds[3] = min(bounds[2], py), max(bounds[3], py)
-    return found
+    return exists
 
 
 @compiled
@@ -129,7 +129,7 @@ def _proposed(  # type: ignore[no-untyped-def]
     Nearly every vertex fails some condition, but not a predictable one:
     without branches, the compiler judges all lanes at once.
     """
-    found = np.int32(0)
+    bits = np.int32(0)
     first = np.uint64(begin)  # unsigned, so that no index is looked at for being negative
     for lane in range(LANES):
         at = first + np.uint64(lane)
@@ -139,8 +139,8 @@ def _proposed(  # type: ignore[no-untyped-def]
         within = (px >= left) & (px <= right) & (py >= top) & (py <= bottom)
         within &= (wa >= least) & (wb >= least) & (wc >= least)
         within &= (sorted_depth[at] >= nearest) & (v != i) & (v != j) & (v != k)
-        found |= np.int32(within) << np.int32(lane)
-    return found
+        bits |= np.int32(within) << np.int32(lane)
+    return bits
 
 
 @compiled
@@ -299,15 +299,15 @@ def search_view(  # type: ignore[no-untyped-def]
         for row in range(r0, r1 + 1):
             first, last = start[row * columns + c0 + 1], start[row * columns + c1 + 2]
             for begin in range(first, last, LANES):
-                found = _proposed(
+                bits = _proposed(
                     sorted_x, sorted_y, sorted_depth, order, begin,
                     x0, y0, x1, y1, x2, y2, left, right, top, bottom, least, nearest, i, j, k,
                 )  # fmt: skip
-                if found == 0:
+                if bits == 0:
                     continue
                 for at in range(begin, begin + LANES):
                     v = order[at]
-                    if found >> (at - begin) & 1 and hides(
+                    if bits >> (at - begin) & 1 and hides(
                         x, y, z, i, j, k, v, g[0, v], g[1, v], g[2, v], contact
                     ):
                         # Nothing more can be behind a triangle here.

@@ -33,14 +33,14 @@ def resample_mesh(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[Mes
     frames = np.searchsorted(own, times_s, side="right").clip(1, max(len(own) - 1, 1)) - 1
     following = (frames + 1).clip(max=len(own) - 1)
     # Between two frames there is a person where both of them have one.
-    there = presence.present[frames] & presence.present[following] & within
+    present = presence.present[frames] & presence.present[following] & within
 
     def made(rows: NDArray[np.intp]) -> NDArray[Any]:
         ends = frames[rows]
         low = int(max(presence.first[ends].min(), ends.min() - 1))
         high = int(min(presence.last[ends].max(), ends.max() + 2)) + 1
         block = mesh.read(low, high).astype(np.float64)
-        found = np.empty((len(rows), mesh.vertex_count, 3))
+        vertices = np.empty((len(rows), mesh.vertex_count, 3))
         for at, (time_s, frame) in enumerate(
             zip(times_s[rows].tolist(), ends.tolist(), strict=True)
         ):
@@ -49,8 +49,8 @@ def resample_mesh(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[Mes
             inside = min(max(time_s, float(own[begin])), float(own[end - 1]))
             first, weights = cubic_weights(own[begin:end], inside, frame - begin)
             first += begin - low
-            found[at] = np.tensordot(weights, block[first : first + len(weights)], 1)
-        return found
+            vertices[at] = np.tensordot(weights, block[first : first + len(weights)], 1)
+        return vertices
 
     known = None if mesh.uncertainty is None else mesh.uncertainty.of_frames(nearest)
     shape = len(times_s), mesh.vertex_count, 3
@@ -62,7 +62,7 @@ def resample_mesh(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[Mes
             shape, mesh.vertices.dtype, lambda rows: read_frames(mesh, nearest[rows])
         ),
         timebase=Timebase(times_s),
-        present=there if interpolated else presence.present[nearest] & within,
+        present=present if interpolated else presence.present[nearest] & within,
         uncertainty=known,
         others=(),
     ), interpolated

@@ -61,9 +61,9 @@ def encloses(faces: NDArray[np.int32]) -> bool:
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
     edges = edges[edges[:, 0] != edges[:, 1]]
     vertices = int(edges.max(initial=0)) + 1
-    there = np.sort(edges[:, 0] * vertices + edges[:, 1])
-    back = np.sort(edges[:, 1] * vertices + edges[:, 0])
-    return bool((there == back).all() and (there[1:] != there[:-1]).all())
+    forward = np.sort(edges[:, 0] * vertices + edges[:, 1])
+    backward = np.sort(edges[:, 1] * vertices + edges[:, 0])
+    return bool((forward == backward).all() and (forward[1:] != forward[:-1]).all())
 
 
 @compiled
