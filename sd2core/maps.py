@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.files.numpy_files import open_npz_file
-from sd2core.files.texts import OPEN_WITH_WRITER, check_meta
+from sd2core.files.texts import check_version
 from sd2core.mesh.presence import Presence, checked, runs
 from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, PARTS, QUANTITIES, WHOLE
 from sd2core.numerics.map_accuracy import MapAccuracy
@@ -535,7 +535,7 @@ class DopplerMap:
             from sd2core.options.declared import MapMeta, check_record  # loads pydantic
 
             meta = json.loads(str(arrays["meta"]))
-            check_meta(meta, path, "sd2-doppler-map", FORMAT_VERSION, remedy=OPEN_WITH_WRITER)
+            check_version(meta, path, "sd2-doppler-map", FORMAT_VERSION, oldest=0)
             check_record(MapMeta, meta["provenance"], f"{path}: its provenance")
             axis = VelocityAxis(len(arrays["velocity_mps"]), float(meta["v_max_mps"]))
             if not np.allclose(axis.centres_mps, arrays["velocity_mps"], atol=1e-6):

@@ -23,7 +23,7 @@ from sd2core.body.refining import RefinedFrames
 from sd2core.body.roi import Sightings
 from sd2core.body.track import PER_FRAME, Landmarks, LandmarkTrack, parts
 from sd2core.files.atomic import atomic_write
-from sd2core.files.texts import check_meta
+from sd2core.files.texts import check_version
 from sd2core.io.video import VideoReader
 from sd2core.timebase import Timebase
 
@@ -77,7 +77,7 @@ def load_track(path: Path | str) -> LandmarkTrack:
     """Read a file of :func:`save_track`; Sd2Error if it is missing, damaged or newer."""
     path = Path(path)
     arrays, meta = read_arrays(path)
-    check_meta(meta, path, FORMAT, VERSION, oldest=1)
+    check_version(meta, path, FORMAT, VERSION)
     try:
         frames = len(arrays["times_s"])
         track = LandmarkTrack(

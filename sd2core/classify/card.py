@@ -26,9 +26,7 @@ class ClassifierCard(NetworkCard):
     ``model`` is a name of :data:`sd2core.classify.defaults.MODELS`.
     """
 
-    KIND = CardKind(
-        FORMAT, 2, "classifier", "a classifier", "a classifier written by `sd2 classify train`"
-    )
+    KIND = CardKind(FORMAT, 2, "classifier", "a classifier written by `sd2 classify train`")
 
     features: Features  # its input, and the maps that it is computed from
     classes: tuple[str, ...]  # in the order of its answers; at least two

@@ -12,7 +12,7 @@ from pydantic import TypeAdapter
 
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
-from sd2core.files.texts import damage_in
+from sd2core.files.texts import check_version, damage_in
 from sd2core.io.kinds import DATASET_FORMAT
 from sd2core.maps import MapKind
 from sd2core.mesh.vertex_parts import QUANTITIES
@@ -135,16 +135,9 @@ _HEADER = TypeAdapter(Header)
 
 def check_format(entry: Any, path: Path) -> None:
     """Refuse a file that is no data set, or of a later version."""
-    stored_format = entry.get("format") if isinstance(entry, dict) else None
-    if stored_format != FORMAT:
+    if not isinstance(entry, dict) or entry.get("format") != FORMAT:
         raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
-    version = entry.get("version")
-    if not isinstance(version, int) or not 1 <= version <= VERSION:
-        raise Sd2Error(
-            f"{path} is a data set of version {version!r}",
-            f"a version from 1 to {VERSION}",
-            "Open it with the version of SD² Studio that wrote it, or a later one",
-        )
+    check_version(entry, path, FORMAT, VERSION)
 
 
 def format_of(path: Path) -> FileFormat:

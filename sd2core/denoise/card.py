@@ -51,9 +51,7 @@ class ModelCard(NetworkCard):
     ``model`` is a name of :data:`sd2core.denoise.registry.MODELS` or ``FILTERS``.
     """
 
-    KIND = CardKind(
-        "sd2-denoiser", VERSION, "model", "a denoiser", "a model file written by `sd2 train`"
-    )
+    KIND = CardKind("sd2-denoiser", VERSION, "model", "a model file written by `sd2 train`")
 
     scaling: Scaling
     axis: VelocityAxis

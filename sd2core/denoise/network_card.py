@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from sd2core.errors import Sd2Error
-from sd2core.files.texts import damage_in
+from sd2core.files.texts import check_version, damage_in
 from sd2core.options.bounds import FRAME_RATE_HZ
 from sd2core.sensor import VelocityAxis
 
@@ -21,7 +21,6 @@ class CardKind(NamedTuple):
     format: str
     version: int  # The latest, which is written.
     noun: str  # As in "The model's frame rate".
-    one: str  # As in "a denoiser up to version 2".
     written: str  # What such a file is, and which command writes it.
 
 
@@ -85,14 +84,7 @@ class NetworkCard:
         kind = cls.KIND
         where = f"The {kind.noun}" if path is None else str(path)
         with damage_in(where, kind.written):
-            if content["format"] != kind.format or not isinstance(content["version"], int):
-                raise ValueError(f"format {content['format']!r}")
-            if content["version"] > kind.version:
-                raise Sd2Error(
-                    f"{where} is of version {content['version']}",
-                    f"{kind.one} up to version {kind.version}",
-                    "Use the version of SD² Studio that made it, or a newer one",
-                )
+            check_version(content, where, kind.format, kind.version)
             common = {
                 "model": str(content["model"]),
                 "options": dict(content["options"]),

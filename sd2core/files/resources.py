@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.errors import Sd2Error
-from sd2core.files.texts import OPEN_WITH_WRITER, check_meta
+from sd2core.files.texts import check_version
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -82,7 +82,7 @@ def open_bundled_arrays(
 
     with open_npz_file(path, what, f"a file written by `{command}`") as data:
         meta = json.loads(str(data["meta"]))
-        check_meta(meta, path, kind, version, remedy=OPEN_WITH_WRITER)
+        check_version(meta, path, kind, version, oldest=0)
         if meta.get("version", 0) < oldest:
             raise Sd2Error(
                 f"{path} is of format {kind!r} version {meta.get('version')}",

@@ -30,7 +30,7 @@ _LONG_NUMBER = re.compile(r"[0-9](?:[0-9_]{300,}|x[0-9a-fA-F_]{250,})")
 """A whole number that no float holds."""
 _LONGEST_VALUE = 60
 _LONGEST_LINE_BYTES = 1 << 20
-OPEN_WITH_WRITER = "Open it with the version of SD² Studio that wrote it"
+OPEN_WITH_WRITER = "Open it with the version of SD² Studio that wrote it, or a later one"
 _REMEDY = "Correct it with a text editor, or copy it again"
 
 _MARKS = (
@@ -201,65 +201,41 @@ def damage_in(place: str | Path, expected: str = "") -> Iterator[None]:
         raise Sd2Error(f"{place}: its description is damaged ({error!r})", expected) from error
 
 
-def check_version(content: Any, file: Path, form: str, newest: int) -> None:
-    """Refuse the content of a file of another format, or of a version that is not known.
+def check_version(
+    content: Any,
+    place: Path | str,
+    form: str,
+    newest: int,
+    *,
+    oldest: int = 1,
+    remedy: str = OPEN_WITH_WRITER,
+) -> None:
+    """Refuse the content of a file of another format, or of a version that is not read.
 
     Parameters
     ----------
     content : object
-        As parsed; anything but a dict has no format.
-    file : Path
+        As parsed; anything but a mapping has no format.
+    place
         For the error.
     form : str
         Wanted value of ``format``.
-    newest : int
-        Largest ``version`` that is read; the least is 1.
+    newest, oldest : int
+        Values of ``version`` that are read; it is 0 where there is none.
+    remedy : str
+        What to do about another version.
 
     Raises
     ------
     Sd2Error
     """
-    actual = content.get("format") if isinstance(content, dict) else None
-    if actual != form:
-        raise Sd2Error(f"{file} has the format {actual!r}", f"the format {form!r}")
-    version = content.get("version")
-    if isinstance(version, bool) or not isinstance(version, int) or not 1 <= version <= newest:
-        raise Sd2Error(
-            f"{file} is of version {version!r}",
-            f"a version from 1 to {newest}",
-            "Open it with the version of SD² Studio that wrote it, or a later one",
-        )
-
-
-def check_meta(
-    meta: Mapping[str, Any],
-    place: str | Path,
-    form: str,
-    newest: int,
-    *,
-    oldest: int = 0,
-    remedy: str = "",
-) -> None:
-    """Refuse metadata of another format, or of a version that is not read.
-
-    Parameters
-    ----------
-    meta : Mapping
-        With ``format`` and ``version``; 0 where it has none.
-    place, remedy
-        For the error.
-    form : str
-        Wanted format.
-    newest, oldest : int
-        Versions that are read.
-    """
-    version = meta.get("version", 0)
-    if meta.get("format") != form or not oldest <= version <= newest:
-        raise Sd2Error(
-            f"{place} is of format {meta.get('format')!r} version {meta.get('version')}",
-            f"{form!r} up to version {newest}",
-            remedy,
-        )
+    stored = content if isinstance(content, Mapping) else {}
+    if stored.get("format") != form:
+        raise Sd2Error(f"{place} has the format {stored.get('format')!r}", f"the format {form!r}")
+    version = stored.get("version", 0)
+    if isinstance(version, bool) or not isinstance(version, int) or not oldest <= version <= newest:
+        known = f"version {newest}" if oldest == newest else f"a version from {oldest} to {newest}"
+        raise Sd2Error(f"{place} is of version {version!r}", known, remedy)
 
 
 def first_fault(error: ValidationError) -> str:

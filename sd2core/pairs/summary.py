@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import open_regular
 from sd2core.files.stores import read_attributes
-from sd2core.files.texts import first_fault, parse_json, whole_lines
+from sd2core.files.texts import check_version, first_fault, parse_json, whole_lines
 from sd2core.options.bounds import (
     BINS,
     COORDINATE_M,
@@ -154,10 +154,7 @@ def pair_facts(path: Path) -> PairFacts:
             "a folder made by `sd2 simulate campaign` or `sd2 pairs`",
         )
     header = read_attributes(path)
-    if header.get("version") != VERSION:
-        raise Sd2Error(
-            f"{path} is of version {header.get('version')}", f"version {VERSION}", REMAKE
-        )
+    check_version(header, path, FORMAT, VERSION, oldest=VERSION, remedy=REMAKE)
     if header.get("kind") not in get_args(PairKind):
         raise Sd2Error(
             f"{path}: its kind is {header.get('kind')!r}", f"one of {get_args(PairKind)}", REMAKE

@@ -30,7 +30,7 @@ from sd2core.body.shape import BodyShape
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.resources import resource_path
-from sd2core.files.texts import check_meta, read_json
+from sd2core.files.texts import check_version, read_json
 from sd2core.simulate.campaign.posture import Group, all_groups, change_posture, posture
 
 FORMAT = "sd2-fit-errors"
@@ -109,7 +109,7 @@ class FitErrors:
         path = resource_path(RESOURCE) if path is None else Path(path)
         try:
             content = read_json(path, _EXPECTED)
-            check_meta(content, path, FORMAT, VERSION)
+            check_version(content, path, FORMAT, VERSION)
             groups: dict[Group, GroupErrors] = {
                 name: GroupErrors(
                     **{key: np.array(one[key], np.float64) for key in ("gain", "bias", "spread")},

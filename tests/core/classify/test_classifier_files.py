@@ -99,7 +99,7 @@ def test_a_denoiser_is_no_classifier_and_the_other_way_round(model: Path) -> Non
     ("change", "words"),
     [
         (lambda card: card.update(version=99), "of version 99"),
-        (lambda card: card.update(format="other"), "damaged"),
+        (lambda card: card.update(format="other"), "has the format 'other'"),
         (lambda card: card.pop("classes"), "damaged"),
         (lambda card: card.update(classes=["a"]), "The classes are a"),
         (lambda card: card.update(classes=["a", "a", "b"]), "The classes are a, a, b"),

@@ -11,7 +11,7 @@ import pytest
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import VARIABLE
 from sd2core.files.texts import (
-    check_meta,
+    check_version,
     parse_json,
     parse_toml,
     read_content,
@@ -86,19 +86,25 @@ def test_a_number_that_no_float_holds_is_refused_with_its_line(digits: str) -> N
     [
         ({"format": "cups", "version": 2}, 0, None),
         ({"format": "cups"}, 0, None),  # written before there were versions
-        ({"format": "cups"}, 1, "'cups' version None"),
-        ({"format": "cups", "version": 3}, 0, "'cups' version 3"),
-        ({"format": "jugs", "version": 1}, 0, "'jugs' version 1"),
-        ({}, 0, "None version None"),
+        ({"format": "cups"}, 1, "is of version 0"),
+        ({"format": "cups", "version": 3}, 0, "is of version 3"),
+        ({"format": "cups", "version": "2"}, 0, "is of version '2'"),
+        ({"format": "cups", "version": True}, 0, "is of version True"),
+        ({"format": "jugs", "version": 1}, 0, "has the format 'jugs'"),
+        ([], 0, "has the format None"),
     ],
 )
 def test_metadata_of_a_known_version_pass_and_others_are_named(
-    meta: dict[str, object], oldest: int, found: str | None
+    meta: object, oldest: int, found: str | None
 ) -> None:
     if found is None:
-        check_meta(meta, "shelf.npz", "cups", 2, oldest=oldest)
+        check_version(meta, "shelf.npz", "cups", 2, oldest=oldest)
         return
     with pytest.raises(Sd2Error) as refused:
-        check_meta(meta, "shelf.npz", "cups", 2, oldest=oldest, remedy="Wash up")
-    assert refused.value.found == f"shelf.npz is of format {found}"
-    assert (refused.value.expected, refused.value.remedy) == ("'cups' up to version 2", "Wash up")
+        check_version(meta, "shelf.npz", "cups", 2, oldest=oldest, remedy="Wash up")
+    assert refused.value.found == f"shelf.npz {found}"
+    expected = {
+        "is": (f"a version from {oldest} to 2", "Wash up"),
+        "has": ("the format 'cups'", ""),
+    }
+    assert (refused.value.expected, refused.value.remedy) == expected[found.split()[0]]
