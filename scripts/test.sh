@@ -18,9 +18,10 @@ if [ -w /dev/shm ] && [ "$(df --output=avail /dev/shm | tail -n 1)" -gt $ROOM_KB
     export TMPDIR=/dev/shm
 fi
 pytest=".venv/bin/python -m pytest"
+# One more than there are cores, as tests wait a sixth of their time, for files and for events.
 # Neighbours stay together, so that what a file shares is made once; a worker that has nothing
 # left takes half of what another has still to do.
-side_by_side="-n logical --maxprocesses 4 --dist worksteal"
+side_by_side="-n $(($(getconf _NPROCESSORS_ONLN) + 1)) --maxprocesses 4 --dist worksteal"
 # Only these are read for the second part.
 on_display=$(grep -rl --include='test_*.py' 'pytest\.mark\.gl' tests)
 expression=$1

@@ -166,6 +166,7 @@ print(resident_mb() - before_mb - sum(map(len, kept)) / 1e6)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="of the GNU C library")
 def test_memory_that_threads_have_freed_goes_back_to_the_system() -> None:
     def left_mb(wish: str) -> float:

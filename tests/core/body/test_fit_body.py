@@ -283,6 +283,7 @@ def test_a_stopped_fit_goes_on(
     np.testing.assert_array_equal(again.turns, whole.turns)
 
 
+@pytest.mark.slow
 def test_stature_sets_the_scale(scene: Scene, fitted: BodyFit) -> None:
     half = fit_body(scene.track, CAMERA, stature_m=0.5 * scene.shape.stature_m, lift=scene.lift)
     np.testing.assert_allclose(half.keypoints_m, 0.5 * fitted.keypoints_m, atol=0.03)

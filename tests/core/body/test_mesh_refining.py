@@ -148,6 +148,7 @@ def test_the_uncertainty_is_as_large_as_the_errors() -> None:
         assert 0.5 < ours / found < 2.0, known.limbs[limb]
 
 
+@pytest.mark.slow
 def test_a_calm_mesh_stays_as_it_is() -> None:
     true = swipes()
     smooth = refined(true)

@@ -163,6 +163,7 @@ def test_other_classes_or_axes_are_not_judged(known: ClipSet) -> None:
         judge(made.classifier, (), known)
 
 
+@pytest.mark.slow
 def test_a_classifier_in_closed_form_is_sure_of_what_it_was_fitted_to(known: ClipSet) -> None:
     """With fewer references than frames, more, and again: the same, and better than chance."""
     found = []

@@ -65,6 +65,7 @@ def test_a_folder_of_recordings_becomes_a_data_set_with_card_and_sheet(
     assert json.loads(sd2("info", out, "--json").out)["segments"] == 15
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("without_sheet")
 def test_limb_maps_are_exported_on_request(sd2: Sd2, tmp_path: Path) -> None:
     octahedron = recording(tmp_path / "anna.sd2", radar=False).folder
@@ -204,6 +205,7 @@ def test_what_cannot_be_is_explained(
     assert message in told.err
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("without_sheet")
 def test_inertial_sensors_are_exported_on_request(sd2: Sd2, tmp_path: Path) -> None:
     octahedron = recording(tmp_path / "anna.sd2", radar=False).folder

@@ -61,6 +61,7 @@ def test_each_gets_a_mesh(video: Path, sd2: Sd2, tmp_path: Path) -> None:
     assert "two-1.npz exists" in again.err
 
 
+@pytest.mark.slow
 def test_nobody_is_fitted_where_one_is_missing(video: Path, sd2: Sd2, tmp_path: Path) -> None:
     outcome = sd2("fit", video, "--people", "1,9", "--out", tmp_path / "two.npz")
     assert outcome.code == 1

@@ -13,6 +13,7 @@ FULL = Path("/dev/full")
 REPOSITORY = Path(__file__).resolve().parents[3]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.skipif(not FULL.exists(), reason="needs /dev/full")
 @pytest.mark.parametrize("buffered", [True, False])
 def test_a_full_disk_is_said_once(plate: Path, buffered: bool) -> None:

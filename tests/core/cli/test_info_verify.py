@@ -80,6 +80,7 @@ def test_no_length_of_a_chunk_of_an_old_mesh_ends_the_command(sd2: Sd2, old_mesh
         assert "frames 150 to 299 of vertices" in told.out
 
 
+@pytest.mark.slow
 def test_an_old_mesh_is_verified_as_far_as_it_can_be(sd2: Sd2, old_mesh: Path) -> None:
     told = sd2("info", old_mesh, "--verify")
     assert told.code == 0

@@ -311,6 +311,7 @@ def moving_recording(tmp_path: Path, moving: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_figure_of_maps_with_labels(sd2: Sd2, moving_recording: Path, tmp_path: Path) -> None:
     out = tmp_path / "swing.svg"
     assert "synthetic" in sd2("labels", "figure", moving_recording, "--out", out).out

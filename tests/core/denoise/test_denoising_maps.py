@@ -132,6 +132,7 @@ def test_several_frames_at_once_are_those_one_by_one(name: str, short_chunks: No
     )
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", WINDOWED)
 def test_live_windows_answer_for_the_newest_frame(name: str) -> None:
     denoiser, values = trained(name), energies(80)

@@ -47,6 +47,7 @@ def test_answers_add_up(name: str, parts: tuple[str, ...]) -> None:
     assert told[-1] == (90, 90)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("parts", INPUTS)
 def test_live_frames_and_long_files_too(tmp_path: Path, parts: tuple[str, ...]) -> None:
     model, (both, _) = trained("s4", parts=parts), scene()

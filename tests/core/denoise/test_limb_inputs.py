@@ -120,6 +120,7 @@ def test_chunks_equal_the_whole(name: str) -> None:
         )
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", ["s4", "unet"])
 def test_live_and_whole_maps(name: str) -> None:
     model, doppler = trained(name, parts=PARTS), split_map(90)

@@ -97,6 +97,7 @@ def test_nobody_is_hidden_by_who_is_away() -> None:
     np.testing.assert_allclose(parts.shown("person 1").sum(axis=0), ~there, rtol=1e-6)
 
 
+@pytest.mark.slow
 @given(
     x=some.floats(-0.9, 0.9),
     z=some.floats(-1.4, 1.4),

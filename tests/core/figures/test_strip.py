@@ -85,6 +85,7 @@ def test_approaching_is_red_and_receding_is_blue(source, ball) -> None:
     assert blue > 2000
 
 
+@pytest.mark.slow
 def test_everybody_of_a_scene_is_drawn_while_they_are_there(source, ball) -> None:
     receding = np.asarray(ball.vertices)[::-1] + np.float32([0.6, 0.0, 0.0])
     there = np.arange(12) < 8

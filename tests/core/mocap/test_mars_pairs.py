@@ -133,6 +133,7 @@ def test_a_given_place_is_used(folders: list[Path], tmp_path: Path) -> None:
     assert (_mean_mps(take.synthetic)[2:-3] < 0.95 * SPEED_MPS).all()
 
 
+@pytest.mark.slow
 def test_nulled_bins_are_empty_in_both(folders: list[Path], tmp_path: Path) -> None:
     choices = MarsChoices()
     nulled = (14, 15, 16, 19)

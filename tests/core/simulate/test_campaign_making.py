@@ -223,6 +223,7 @@ def test_who_stops_leaves_no_process_behind(tmp_path: Path) -> None:
     assert len(read_pairs(out).takes) == 1
 
 
+@pytest.mark.slow
 def test_other_places_see_the_same_take(whole: Path, tmp_path: Path) -> None:
     out = tmp_path / "places.zarr"
     several = Campaign(SHORT.seed, SHORT.take_seconds, 2, target=SHORT.target)

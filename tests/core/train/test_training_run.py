@@ -200,6 +200,7 @@ class TestLearning:
         assert not same(tmp_path / "a", tmp_path / "c")
         assert not same(tmp_path / "a", tmp_path / "balanced")
 
+    @pytest.mark.slow
     def test_kinematics_are_learnt_from(self, tmp_path: Path) -> None:
         """Half of the segments are mirrored, by the seed; the mean velocity counts if asked to."""
         pairs = write_pairs(tmp_path / "split.zarr", limbs=True, null_bins=(3,))

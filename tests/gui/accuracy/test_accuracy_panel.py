@@ -120,6 +120,7 @@ def test_a_preset_and_the_number_box_set_the_tolerance(panel, window, fake, qtbo
     assert models_of(window).document.undo_stack.count() == 0
 
 
+@pytest.mark.slow
 def test_a_tolerance_that_no_plan_holds_is_said(panel, window, fake, qtbot):
     fake.holds = False
     qtbot.mouseClick(button(panel, "0.5 %"), Qt.MouseButton.LeftButton)
@@ -223,6 +224,7 @@ def test_a_click_uses_a_point_until_the_tolerance_rules_again(plot, panel, windo
     assert trade.in_use.plan == EXACT
 
 
+@pytest.mark.slow
 def test_a_click_moves_nothing_and_text_and_plot_name_one_cost(plot, panel, window, qtbot):
     def settled():
         for _ in range(5):

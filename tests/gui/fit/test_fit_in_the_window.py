@@ -184,6 +184,7 @@ def three_people(monkeypatch) -> list[Portrait]:
     return people
 
 
+@pytest.mark.slow
 def test_who_is_ticked_makes_a_scene(made, qtbot, video, three_people) -> None:
     window = made("--body")
     show(window, qtbot, video)

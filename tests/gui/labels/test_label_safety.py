@@ -430,6 +430,7 @@ class TestOtherEditsAfterACrash:
         assert self.state(window)[1] == edited[1]
         assert self.state(window)[2] is None
 
+    @pytest.mark.slow
     def test_what_was_saved_or_taken_back_is_not_offered(self, on, qtbot, recording_copy) -> None:
         window, edited = self.edited(on, qtbot, recording_copy)
         qtbot.keyClick(window, Qt.Key.Key_S, CONTROL)

@@ -52,6 +52,7 @@ def colour_of(view):
     return int(np.ptp(image.pixelColor(x, y).getRgb()[:3]))
 
 
+@pytest.mark.slow
 def test_what_is_not_known_has_no_colour_until_a_key_gives_it(fitted, qtbot, tmp_path):
     c, view = models_of(fitted), fitted.findChildren(HeatmapView)[0]
     assert c.trade.in_use.body > 0.2, "so badly known that no key is needed"

@@ -108,6 +108,7 @@ def test_a_click_in_the_table_shows_that_joint(compared, qtbot):
     assert np.abs(compared.model.curve(0)[1]).max() < 0.1  # it is the right one that swings
 
 
+@pytest.mark.slow
 def test_a_click_in_the_curves_moves_the_clock(compared, empty_window, qtbot):
     curves = compared.findChild(JointCurves)
     place = QPoint(round(curves.scale.x_of(0.6)), curves.height() // 2)
@@ -139,6 +140,7 @@ def test_it_follows_the_sensor(compared, empty_window, qtbot):
     qtbot.waitUntil(lambda: compared.model.comparison.sensor == sensor, timeout=20_000)
 
 
+@pytest.mark.slow
 def test_each_mesh_is_drawn_in_its_own_colour(compared, qtbot):
     def tinted(picture) -> tuple[int, int]:
         image = picture.grab().toImage()

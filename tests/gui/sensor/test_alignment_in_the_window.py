@@ -81,6 +81,7 @@ def button(dialog: AlignmentDialog, text: str) -> QPushButton:
     )
 
 
+@pytest.mark.slow
 def test_the_command_looks_as_far_and_keeps_what_it_finds(window, qtbot, motion):
     motion(1.5, 60.0)
 
@@ -130,6 +131,7 @@ def test_cancel_changes_nothing(window, qtbot, motion):
     assert models.document.undo_stack.count() == steps
 
 
+@pytest.mark.slow
 def test_what_repeats_itself_cannot_be_applied(window, qtbot, motion):
     motion(1.0, 2.0)
 

@@ -103,6 +103,7 @@ def test_every_larger_dialog_has_help() -> None:
     assert named | panels == set(HELP)
 
 
+@pytest.mark.slow
 def test_help_in_a_dialog_that_waits_can_be_read(window, manual) -> None:
     labels = window.features.labels
     groups = [SpanGroup("all", labels.model.labels.spans)]

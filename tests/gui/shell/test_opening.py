@@ -192,6 +192,7 @@ def test_a_recording_whose_fit_was_stopped_is_opened_itself(empty_window, qtbot,
     assert c.document.recording.folder == recording_copy
 
 
+@pytest.mark.slow
 def test_hovering_says_what_a_drop_would_do(empty_window, qtbot, small_recording, tmp_path):
     c = models_of(empty_window)
     video, mesh = small_recording / "video.mp4", small_recording / "mesh.npz"

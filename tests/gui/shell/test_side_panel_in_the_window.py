@@ -140,6 +140,7 @@ def test_it_stands_beside_scene_and_maps_and_shows_every_icon(sized, size) -> No
             assert place_of(panel_of(window, other)).right() < side.left()
 
 
+@pytest.mark.slow
 def test_words_below_the_icons_stand_clear_of_the_frame(sized) -> None:
     window = sized(1280, 720)
     for name in NAMES:

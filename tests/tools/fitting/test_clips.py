@@ -174,6 +174,7 @@ def test_a_pattern_covers_half_the_shirt(pattern: str) -> None:
     assert 0.4 < (shirt[:, 1] > 0.5).mean() < 0.6
 
 
+@pytest.mark.slow
 def test_the_cameras_noise_is_that_of_its_seed() -> None:
     body = Body.load("low")
     drawer = Renderer(body, studio=Studio(noise=0.01))
