@@ -148,7 +148,6 @@ class TestWhichPerson:
         middle = track.image_px[:, TORSO, 0].mean(axis=1)
         np.testing.assert_allclose(middle[[0, 20]], [70, 250], atol=8)  # the blue one
 
-    @pytest.mark.slow
     def test_the_larger_one_by_default(self, models: LandmarkModels, tmp_path: Path) -> None:
         room = person_at(empty_room(), 90, red=True)
         small = cv2.resize(person_at(empty_room(), 0), None, fx=0.6, fy=0.6)
