@@ -83,10 +83,7 @@ def open_bundled_arrays(
     with open_npz_file(path, what, f"a file written by `{command}`") as data:
         meta = json.loads(str(data["meta"]))
         check_version(meta, path, kind, version, oldest=0)
-        if meta.get("version", 0) < oldest:
-            raise Sd2Error(
-                f"{path} is of format {kind!r} version {meta.get('version')}",
-                f"version {oldest} or later",
-                f"Make it anew with `{command}`",
-            )
+        # What wrote a later one opens it; an earlier one is to be made anew.
+        anew = f"Make it anew with `{command}`"
+        check_version(meta, path, kind, version, oldest=oldest, remedy=anew)
         yield meta, data

@@ -21,7 +21,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.files.limits import open_regular
 from sd2core.files.numpy_files import open_npz_file
-from sd2core.files.texts import errors_in, lines_of
+from sd2core.files.texts import check_version, errors_in, lines_of
 from sd2core.imu.signals import InertialSignals
 from sd2core.imu.tables import AccelerationUnit, TurnRateUnit, read_table
 
@@ -205,8 +205,8 @@ def _read_npz(path: Path) -> InertialSignals:
         if missing:
             raise Sd2Error(f"{path} has no {', '.join(sorted(missing))}", _EXPECTED_NPZ)
         meta = json.loads(str(data["meta"]))
-        if meta.pop("format") != FORMAT or not 1 <= meta.pop("version") <= VERSION:
-            raise Sd2Error(f"{path} is of another format or a later version", _EXPECTED_NPZ)
+        check_version(meta, path, FORMAT, VERSION)
+        del meta["format"], meta["version"]
         times_s, acceleration, turn_rate = (np.asarray(data[name], np.float64) for name in _ARRAYS)
         with errors_in(path, remedy=""):
             return InertialSignals(times_s, acceleration, turn_rate, meta)

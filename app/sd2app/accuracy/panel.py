@@ -140,12 +140,12 @@ class AccuracyPanel(QWidget):
         self._empty.setVisible(measurement is None)
         self._measure.setText("Measure this scene" if measurement is None else "Measure again")
         self._plot.setVisible(measurement is not None)
-        self._plot.refresh()
         self._source.setVisible(measurement is not None)
         words = ""
         if measurement is not None:
             in_use = self._accuracy.in_use is not None
             words = legend(measurement, self._accuracy.tolerance, in_use=in_use)
+            self._plot.refresh()
         show_words(self._legend, words)
         if measurement is not None:
             here = f"{len(measurement.frames)} frames, {measurement.machine}"

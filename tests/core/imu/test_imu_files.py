@@ -168,6 +168,11 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     np.savez(tmp_path / "mesh.npz", vertices=np.zeros((2, 3, 3)))
     with pytest.raises(Sd2Error, match="has no acceleration_mps2"):
         read_signals(tmp_path / "mesh.npz")
+    arrays = dict.fromkeys(("times_s", "acceleration_mps2", "turn_rate_radps"), np.zeros(3))
+    for meta, words in (('{"format": "sd2-map"}', "the format 'sd2-map'"), ("[]", "format None")):
+        np.savez(tmp_path / "other.npz", **arrays, meta=meta)
+        with pytest.raises(Sd2Error, match=words):
+            read_signals(tmp_path / "other.npz")
     (tmp_path / "motion.sto").write_text("version=1\nendheader\ntime\tknee\n0\t1\n")
     with pytest.raises(Sd2Error, match="no type that is stated"):
         read_signals(tmp_path / "motion.sto")

@@ -119,10 +119,12 @@ def test_space_presses_the_button_that_tab_has_reached_and_plays_elsewhere(windo
 
 @pytest.mark.parametrize("take_away", ["setHidden", "setDisabled"])
 def test_nobody_has_the_keyboard_after_what_had_it_is_gone(window, qtbot, take_away) -> None:
-    walk(window, qtbot)
-    named = {one.toolTip().split(" (")[0]: one for one in window.findChildren(QToolButton)}
-    button = named["One frame on"]
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow, timeout=5000)
+    tools = window.findChildren(QToolButton)
+    button = next(one for one in tools if one.toolTip().startswith("One frame on"))
     button.setFocus()
+    assert QApplication.focusWidget() is button
     getattr(button, take_away)(True)
     try:
         assert QApplication.focusWidget() is None
