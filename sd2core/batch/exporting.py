@@ -149,7 +149,7 @@ def _sources(folder: BatchFolder, export: Exporting) -> Iterator[LazySource]:
 
     opened = lru_cache(maxsize=1)(_Opened)
     for rows in rows_of(folder):
-        parts = _parts(rows[-1]["stop"], export)
+        parts = parts_of(rows[-1]["stop"], export)
         for number, (start, stop) in enumerate(parts):
             name = Path(rows[0]["recording"]).with_suffix("").as_posix()
             if len(parts) > 1:
@@ -161,7 +161,7 @@ def _sources(folder: BatchFolder, export: Exporting) -> Iterator[LazySource]:
             yield LazySource(key, load, partial(str, fingerprint))
 
 
-def _parts(frames: int, export: Exporting) -> list[tuple[int, int]]:
+def parts_of(frames: int, export: Exporting) -> list[tuple[int, int]]:
     """Ranges of frames to cut, which give the segments that the recording gives as a whole."""
     step = export.segment_frames - export.overlap_frames
     length = max(LONGEST_FRAMES // step, 1) * step

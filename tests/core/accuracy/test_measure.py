@@ -14,6 +14,7 @@ from sd2core.accuracy.measuring import measure
 from sd2core.accuracy.plans import AccuracyPlan, compared_plans, wave_plans
 from sd2core.accuracy.results import Measurement
 from sd2core.accuracy.sample import take_sample
+from sd2core.accuracy.survey import scene_facts
 from sd2core.accuracy.trial import Trial
 from sd2core.doppler import PRESETS
 from sd2core.errors import Sd2Error
@@ -73,6 +74,15 @@ def test_expected_counts_are_held_against_expected_counts(scene: MeshSequence) -
     ]
     assert told[0][0] != told[0][1]
     assert told[1][0] == told[1][1]
+
+
+@pytest.mark.parametrize(("depth_m", "spread"), [(0.0, 0.0), (1.0, 0.5)])
+def test_facts_of_a_scene_name_how_far_its_ranges_lie_apart(depth_m: float, spread: float) -> None:
+    """Two small plates, one behind the other: from half a metre before 2 m to half behind."""
+    near, far = (plate((0.0, 0.0, 2.0 + side * depth_m), 0.02, 0.02) for side in (-0.5, 0.5))
+    scene = together(near, far)
+    trial = Trial(scene, CAMERA, PRESETS["paper"], take_sample(scene, PRESETS["paper"], runs=2))
+    assert scene_facts(trial).range_spread == pytest.approx(spread, abs=0.02)
 
 
 def test_each_setting_brings_the_map_nearer(table: Measurement) -> None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from moving_spheres import swinging_sphere
 
 from sd2core.batch.denoising import denoise
+from sd2core.batch.exporting import parts_of
 from sd2core.batch.inputs import mesh_input_of
 from sd2core.batch.synthesis import LONGEST_FRAMES, stretches_of, synthesise
 from sd2core.denoise.files import describe_model, find_model, load_model
@@ -22,6 +23,7 @@ from sd2core.doppler.options import chosen_options
 from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.maps import DopplerMap, joined
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.options.exporting import Exporting
 from sd2core.options.synthesis import Synthesis
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
@@ -42,6 +44,18 @@ def test_stretches_cover_a_clip_once(frames: int, longest: int) -> None:
 def test_ten_minutes_are_one_stretch() -> None:
     assert stretches_of(LONGEST_FRAMES) == [(0, LONGEST_FRAMES)]
     assert len(stretches_of(LONGEST_FRAMES + 1)) == 2
+
+
+@given(st.integers(1, 10**5), st.integers(2, 400), st.floats(0.0, 0.99))
+def test_parts_to_export_give_the_segments_of_the_whole(
+    frames: int, segment: int, overlapping: float
+) -> None:
+    export = Exporting(segment_frames=segment, overlap_frames=int(overlapping * segment))
+    step = segment - export.overlap_frames
+    parts = parts_of(frames, export)
+    starts = [one for start, stop in parts for one in range(start, stop - segment + 1, step)]
+    assert starts == list(range(0, frames - segment + 1, step))
+    assert all(0 <= start < stop <= frames for start, stop in parts)
 
 
 def _mesh(frames: int = 300) -> MeshSequence:

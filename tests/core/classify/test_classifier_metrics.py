@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sd2core.classify.confusion_figure import confusion_figure
 from sd2core.classify.metrics import (
     Score,
     confusion_of,
@@ -29,6 +30,12 @@ def test_a_confusion_matrix_by_hand() -> None:
     np.testing.assert_allclose(recalls(counts), [0.75, 0.5, 0.0])
     assert mean_recall(counts) == pytest.approx(1.25 / 3)
     np.testing.assert_allclose(shares(counts)[0], [0.75, 0.0, 0.25])
+
+
+def test_shares_stand_out_from_their_cells() -> None:
+    figure = confusion_figure([np.array([[0.9, 0.1], [np.nan, 0.0]])], ["left", "right"], [""], "")
+    words = {one.get_text(): one.get_color() for one in figure.axes[0].texts}
+    assert words == {"90 %": "white", "10 %": "black", "–": "black", "0 %": "black"}
 
 
 def test_a_class_that_does_not_occur_is_left_out() -> None:

@@ -76,6 +76,22 @@ def test_half_a_ball_echoes_past_half_a_wall(visibility: Any) -> None:
     np.testing.assert_allclose(scene(half, visibility=visibility).frame(0.1), given)
 
 
+@pytest.mark.parametrize("number", [1, 4])
+def test_things_are_cut_finely_while_there_is_room(number: int) -> None:
+    """Whatever the pieces, their area is that of the things."""
+    walls = [replace(WALL, position_m=(0.0, 20.0, float(place))) for place in range(number)]
+    around = with_things(ball(), walls).surroundings
+    assert around is not None
+
+    def area_m2(corners: Any) -> float:
+        sides = corners[:, 1:] - corners[:, :1]
+        return float(0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum())
+
+    pieces = pieces_of(around, 0.01)
+    assert 10_000 < len(pieces) <= 100_000
+    assert area_m2(pieces) == pytest.approx(area_m2(around.vertices_m[around.faces]))
+
+
 def test_without_things_nothing_is_added() -> None:
     assert not scene().static(()).any()
     beside = Thing("box", (3.0, 0.0, 2.0))

@@ -276,6 +276,22 @@ def test_a_chosen_stretch_of_range_holds_only_its_targets() -> None:
     assert 3.0 - step_m / 2 <= gates_m[-1] <= 3.0 + step_m / 2
 
 
+@given(st.floats(0.0, 3.0), st.floats(0.01, 3.0))
+def test_limits_of_range_choose_among_the_points_of_a_radar_without_a_beat(
+    low_m: float, depth_m: float
+) -> None:
+    points_m = (0.5, 1.0, 1.5, 2.0)
+    config = replace(PAPER_RADAR, sampling="complex", samples_per_chirp=4, ranges_m=points_m)
+    high_m = low_m + depth_m
+    within_m = [one for one in points_m if low_m <= one <= high_m]
+    options = ProcessingOptions(range_m=(low_m, high_m))
+    if within_m:
+        assert FrameChain(config, options).range_m.tolist() == within_m
+    else:
+        with pytest.raises(Sd2Error, match=r"0\.5 m to 2 m"):
+            FrameChain(config, options)
+
+
 def test_the_transmitters_leakage_does_not_count() -> None:
     # A slow drift over every chirp, strong and at zero range.
     drift = np.broadcast_to(0.9 * np.linspace(-1, 1, 128), (1, 1, 64, 128))

@@ -93,6 +93,11 @@ def test_a_regular_clock_is_freed_of_the_containers_rounding(tmp_path: Path) -> 
         np.testing.assert_allclose(reader.timebase.times_s, np.arange(40) / 30, atol=1e-12)
 
 
+def test_also_where_frames_follow_each_other_as_fast_as_milliseconds(tmp_path: Path) -> None:
+    with open_video(write_video(tmp_path / "v.mkv", 40, rate=400)) as reader:
+        np.testing.assert_allclose(reader.timebase.times_s, np.arange(40) / 400, atol=1e-12)
+
+
 def test_first_frame_is_at_zero_when_the_file_starts_later(tmp_path: Path) -> None:
     path = write_video(tmp_path / "v.mkv", 10, times_ms=[500 + 100 * k for k in range(10)])
     with open_video(path) as reader:

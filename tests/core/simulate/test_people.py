@@ -51,6 +51,21 @@ def test_bones_keep_their_lengths_and_feet_stay_on_the_floor(legs: Mode) -> None
     np.testing.assert_allclose(turns @ np.swapaxes(turns, -1, -2), np.eye(3) + 0 * turns, atol=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_the_feet_of_a_walker_stay_below_the_body(seed: int) -> None:
+    """Also where the take begins and ends within a step."""
+    rng = np.random.default_rng(seed)
+    space = ShapeSpace()
+    shape = space.random(rng)
+    skeleton = space.skeleton(shape)
+    deed = Deed("walk", (STYLES["strokes"], STYLES["wave"]), False)
+    transforms = skeleton.transforms(*random_motion(rng, skeleton, shape.stature_m, TIMES, deed))
+    heads = (transforms[..., :3] @ skeleton.heads_m[..., None])[..., 0] + transforms[..., 3]
+    ankles = heads[:, [skeleton.index["foot.L"], skeleton.index["foot.R"]]]
+    away_m = np.linalg.norm((ankles - heads[:, :1])[..., [0, 2]], axis=-1)
+    assert away_m.max() < 0.5
+
+
 def test_a_still_deed_is_still() -> None:
     rng = np.random.default_rng(4)
     space = ShapeSpace()
