@@ -52,6 +52,7 @@ def test_another_body_makes_the_same_turns_with_steps_as_long_as_its_legs(statur
     skeletons = [SPACE.skeleton(BodyShape(own.shape.coefficients, s)) for s in (1.7, stature_m)]
     poses = [own.pose_on(skeleton, skeletons[0], slice(2, 9)) for skeleton in skeletons]
     np.testing.assert_array_equal(poses[0].turns, poses[1].turns)
+    np.testing.assert_allclose(poses[0].translation_m, own.translation_m[2:9])
     points_m = [
         rig.keypoints.positions(rig.transforms(*pose))
         for rig, pose in zip(rigs, poses, strict=True)
