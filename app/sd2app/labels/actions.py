@@ -39,7 +39,7 @@ class LabelActions:
         self._first = menu.addSeparator()
         self._actions: list[QAction] = []
         self._shown: LabelSet | None = None
-        edits.labels.changed.connect(self._follow)
+        edits.labels.choices_changed.connect(self._follow)
         self._follow()
 
     def refresh(self) -> None:

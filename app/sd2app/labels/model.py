@@ -177,6 +177,7 @@ class LabelsModel(QObject):
     """
 
     changed = Signal()  # spans, tracks or the label set
+    choices_changed = Signal()  # tracks or the label set; before the one above
     selection_changed = Signal()  # selected spans, or the track or label for new ones
     marks_changed = Signal()  # marks in progress
 
@@ -287,7 +288,7 @@ class LabelsModel(QObject):
             self.marks_changed.emit()
 
     def _assign(self, labels: Labels) -> None:
-        self.labels = labels
+        before, self.labels = self.labels, labels
         self.arrays = SpanArrays.of(labels)
         names = [track.name for track in self.targets]
         left = tuple(mark for mark in self.marks if mark.track in names)
@@ -296,6 +297,8 @@ class LabelsModel(QObject):
             self.track = names[0] if names else ""
         if labels.label_set.find(self.label) is None and labels.label_set.labels:
             self.label = labels.label_set.labels[0].name
+        if (labels.tracks, labels.label_set) != (before.tracks, before.label_set):
+            self.choices_changed.emit()
         self.changed.emit()
         if dropped:
             self.marks_changed.emit()

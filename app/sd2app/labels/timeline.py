@@ -292,7 +292,7 @@ class TargetLine(QLabel):
         self.setIndent(GUTTER_PX)
         self.setAccessibleName("Track that is marked on")
         self.setToolTip("Click the name of another track to mark on that one")
-        for signal in (labels.changed, labels.selection_changed):
+        for signal in (labels.choices_changed, labels.selection_changed):
             signal.connect(self._follow)
         self._follow()
 

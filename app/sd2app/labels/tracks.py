@@ -133,7 +133,7 @@ class TrackMenu:
         self._group = QActionGroup(menu)
         self._first = menu.addSeparator()
         self._shown: tuple[LabelTrack, ...] = ()
-        labels.changed.connect(self._follow)
+        labels.choices_changed.connect(self._follow)
         labels.selection_changed.connect(self._check)
         self._follow()
 

@@ -44,7 +44,7 @@ class KeyBindings(QObject):
         self._of_labels: dict[str, str] = {}
         self._keys: dict[str, tuple[str, ...]] = {}
         self._follow()
-        labels.changed.connect(self._follow_labels)
+        labels.choices_changed.connect(self._follow_labels)
 
     @property
     def actions(self) -> Sequence[Action]:
