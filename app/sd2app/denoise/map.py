@@ -15,9 +15,8 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import BackgroundModel, LatestRunner, delayed
 from sd2app.background.model_worker.client import RemoteDenoiser, RemoteLive
-from sd2app.maps.partial_map import Part, View
+from sd2app.maps.partial_map import FINAL, Part, PartialMap, View
 from sd2app.maps.quality import Postprocess
-from sd2app.session.content import reference_of
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import Job
@@ -90,7 +89,7 @@ class DenoisedMap(BackgroundModel):
     ) -> None:
         super().__init__(parent)
         self.track, self._synthetic = track, session.maps.synthetic
-        self._view = view
+        self._view, self._partial = view, PartialMap(track)
         self._jobs, self._results = session.jobs, session.results
         self._job: Job | None = None
         self.denoiser: RemoteDenoiser | None = None  # the model in use
@@ -108,16 +107,17 @@ class DenoisedMap(BackgroundModel):
     def _forget(self) -> None:
         self._sensor: object = None  # placement that the synthetic map is of
         self._order: _Order | None = None  # once the synthetic map stands
-        self._made: DopplerMap | None = None
-        self._needs_reference = True
+        self._partial.forget()
         self._restart()
 
     def _restart(self) -> None:
         """Mark all frames as not denoised."""
         frames = self._synthetic.known.size
-        self._shown = np.zeros(frames, bool)  # of the current synthetic map and sensor
         self._wanted = np.ones(frames, bool)  # not asked for since the synthetic map changed there
-        self._strongest = 0.0
+        if self._partial.frames == frames:
+            self._partial.quality[:] = 0  # what is on screen stays until there is better
+        else:
+            self._partial.forget()
         if self._order is not None:
             self._order = _Order()
 
@@ -139,7 +139,7 @@ class DenoisedMap(BackgroundModel):
     @property
     def shows_source(self) -> bool:
         """True if the denoised frames are all of the current synthetic map and sensor."""
-        return bool(self._shown.any())
+        return bool(self._partial.quality.any())
 
     @property
     def keeps_up(self) -> bool:
@@ -168,8 +168,7 @@ class DenoisedMap(BackgroundModel):
         self.denoiser = denoiser
         self.words = words
         self.track.set_status(words)
-        self._needs_reference = True
-        self._made = None
+        self._partial.forget()
         self._restart()
         if denoiser is None:
             self.track.set_map(None)
@@ -224,7 +223,7 @@ class DenoisedMap(BackgroundModel):
         self._again.stop()
         self._follow(sensor)
         self._wanted[:] = True
-        self._shown[:] = False
+        self._partial.quality[:] = 0
         if self.denoiser is None or self._held:
             return
         if swept is not None and swept.denoiser is self.denoiser:
@@ -254,7 +253,7 @@ class DenoisedMap(BackgroundModel):
         if source is None or not self._held:
             return
         if fresh:
-            self._shown[:] = False
+            self._partial.quality[:] = 0
         like = replace(source, kind="denoised", meta={}, uncertainty=None, limbs=None)
         self._paint(values, (start, start + values.shape[1]), like)
         self._publish()
@@ -276,9 +275,7 @@ class DenoisedMap(BackgroundModel):
         """True once no frame is a preview."""
         frames = self._wanted.size
         in_order = self._order is not None and self._order.next >= frames
-        return bool(self._shown.all()) and (
-            in_order or (frames <= AT_ONCE and not self._wanted.any())
-        )
+        return self._partial.full and (in_order or (frames <= AT_ONCE and not self._wanted.any()))
 
     def _restore(self) -> bool:
         """Show the map if it was made before of the same synthetic map, by the same model."""
@@ -286,9 +283,9 @@ class DenoisedMap(BackgroundModel):
         if kept is None:
             return False
         self._stop()
-        self._made = replace(kept, values=kept.values.copy())
-        self._strongest = max(self._strongest, float(kept.values.max(initial=0.0)))
-        self._shown[:], self._wanted[:] = True, False
+        self._begin_like(kept)
+        self._partial.paint(0, kept.values, FINAL)
+        self._wanted[:] = False
         self._order = _Order(self._wanted.size)
         self._publish()
         self._end()
@@ -297,11 +294,11 @@ class DenoisedMap(BackgroundModel):
     # --- denoising ------------------------------------------------------------------------
 
     def _follow(self, sensor: object) -> None:
-        if self._shown.size != self._synthetic.known.size:
+        if self._wanted.size != self._synthetic.known.size:
             self._restart()
         if sensor != self._sensor:
             self._sensor = sensor
-            self._shown[:] = False  # of another place; on screen until there is better
+            self._partial.quality[:] = 0
             self._wanted[:] = True
         self._order = None
 
@@ -360,8 +357,8 @@ class DenoisedMap(BackgroundModel):
     def _end(self) -> None:
         """Everything is denoised: say which frames the model passes through."""
         self._report(0)
-        if self._made is not None and self.track.key is not None:
-            kept = replace(self._made, values=self._made.values.copy())
+        if (shown := self.track.map) is not None and self.track.key is not None:
+            kept = replace(shown, values=shown.values.copy())
             self._results.put(self.track.key, kept, kept.values.nbytes)
         source, movements = self._synthetic.map, self._movements
         if source is not None and movements is not None:
@@ -377,7 +374,7 @@ class DenoisedMap(BackgroundModel):
             self._paint(answer.values, answer.piece, answer.like)
             self._publish()
             # Pieces of a long clip follow each other at once; a short one begins again.
-            if self._shown.size > AT_ONCE:
+            if self._wanted.size > AT_ONCE:
                 self.track.set_status(f"{self.words} · preview")
                 self._go_on()
             elif (self._wanted & self._synthetic.known).any():
@@ -395,36 +392,26 @@ class DenoisedMap(BackgroundModel):
             self._publish()
         self._go_on()
 
-    def _paint(self, values: NDArray[np.float32], piece: View, like: DopplerMap) -> None:
-        """Take over a piece (bins, n); a map like another is begun where there is none."""
-        if self._made is None:
-            source = self._synthetic.map
-            assert source is not None
-            self._made = replace(
-                like,
-                values=np.zeros_like(source.values),
-                timebase=source.timebase,
-                present=source.present,
-                limbs=None,
+    def _begin_like(self, like: DopplerMap) -> None:
+        """Begin a map with the unit and the axis of another where there is none."""
+        source = self._synthetic.map
+        assert source is not None
+        if not self._partial.frames:
+            empty, base = np.zeros_like(source.values), source.timebase
+            self._partial.begin(
+                replace(like, values=empty, timebase=base, present=source.present, limbs=None)
             )
-        inside = slice(*piece)
+
+    def _paint(self, values: NDArray[np.float32], piece: View, like: DopplerMap) -> None:
+        """Take over a piece (bins, n)."""
+        self._begin_like(like)
         if self._texture is not None:
             values = self._texture.drawn(values.T, (TEXTURE_SEED,), piece[0]).T
-        self._made.values[:, inside] = values
-        self._strongest = max(self._strongest, float(values.max(initial=0.0)))
-        self._shown[inside] = self._synthetic.known[inside]
+        known = self._synthetic.known[slice(*piece)]
+        self._partial.paint(piece[0], values, known.astype(np.uint8))
 
     def _publish(self) -> None:
-        if self._made is None:
-            return
-        whole = bool(self._shown.all())
-        if self._needs_reference and self._strongest > 0:
-            # Of the first map that is whole; until then of what there was.
-            self._needs_reference = not whole
-            strongest = reference_of(self._made.values) if whole else self._strongest
-            self.track.set_reference(strongest)
-        key = self._key if self._final else None
-        self.track.set_map(self._made, None if whole else self._shown.copy(), key)
+        self._partial.show(self._key if self._final else None)
 
     def _report(self, left: int) -> None:
         """Report a long clip as a task that can be cancelled."""
@@ -446,7 +433,7 @@ class DenoisedMap(BackgroundModel):
     def _fail(self, words: str) -> None:
         self._stop()
         self.denoiser = None
-        self._made = None
+        self._partial.forget()
         self.track.set_map(None)
         self.failed.emit(words)
 

@@ -17,7 +17,7 @@ from PySide6.QtCore import QObject, Signal, SignalInstance
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.background.latest import Emit, delayed
 from sd2app.background.quoting import quoted
-from sd2app.maps.partial_map import FINAL, Part, PartialMap, View
+from sd2app.maps.partial_map import FINAL, Part, PartialMap, View, empty_map
 from sd2app.maps.quality import (
     CompilerModel,
     MaskPrefetcher,
@@ -194,7 +194,7 @@ class SynthesisModel(QObject):
         except Sd2Error as error:
             self.failed.emit(str(error))
             return
-        self._partial.begin(options, mesh)
+        self._partial.begin(empty_map(options, mesh))
         self._compiler.start()
         self._announce()
         self._follow()

@@ -26,7 +26,7 @@ View = tuple[int, int]
 
 
 class PartialMap:
-    """Map on screen that is filled part by part, each frame with its quality."""
+    """Map on a track that is filled part by part, each frame with its quality."""
 
     def __init__(self, track: MapModel) -> None:
         self._track = track
@@ -42,19 +42,12 @@ class PartialMap:
         self._words: dict[int, str] = {}
         self._needs_reference = True
 
-    def begin(self, options: SynthesisOptions, mesh: MeshSequence) -> None:
-        """Begin an empty map of another mesh."""
+    def begin(self, empty: DopplerMap) -> None:
+        """Begin with a map none of which is computed; its values are filled in place."""
         self.forget()
-        self.quality = np.zeros(mesh.frame_count, np.uint8)
-        self._shares = np.zeros((2, mesh.frame_count), np.float32)
-        self._map = DopplerMap(
-            values=np.zeros((options.axis.bins, mesh.frame_count), np.float32),
-            axis=options.axis,
-            timebase=mesh.timebase,
-            kind="synthetic",
-            null_bins=options.null_bins,
-            present=mesh.presence.measured,
-        )
+        self.quality = np.zeros(len(empty.timebase), np.uint8)
+        self._shares = np.zeros((2, self.frames), np.float32)
+        self._map = empty
 
     @property
     def frames(self) -> int:
@@ -101,36 +94,49 @@ class PartialMap:
         return self.quality.copy() if sensor == self.sensor else np.zeros_like(self.quality)
 
     def take(self, part: Part) -> None:
-        """Paint computed frames; those of another sensor are forgotten.
-
-        The first whole map sets the 0 dB reference.
-        """
+        """Show computed frames; those of another sensor are forgotten."""
         assert self._map is not None
         if part.sensor != self.sensor:
             self.sensor = part.sensor
             self.quality[:] = 0
-        values, limbs = self._map.values, self._map.limbs
-        inside = slice(part.start, part.stop)
-        values[:, inside] = part.values
+        self.paint(part.start, part.values, part.quality)
+        limbs = self._map.limbs
         if part.limbs is None:
             limbs = None
         else:
             if limbs is None or limbs.parts != part.limbs.parts:  # somebody came or went
                 limbs = part.limbs.empty(self.frames)
             limbs.put(part.start, part.limbs)
-        self.quality[inside] = part.quality
         if part.shares is not None:
-            self._shares[:, inside] = part.shares
+            self._shares[:, part.start : part.stop] = part.shares
         if part.quality >= FINAL:
             self._key = part.key
         self._words[part.quality] = part.words
-        if self._needs_reference and self.full:
-            self._needs_reference = False
-            self._track.set_reference(reference_of(values))
         # Others tell by the object that it is another map, though its values are in the same place.
         self._map = replace(self._map, unit=part.unit, limbs=limbs)
-        covered = None if self.full else self.quality > 0
-        self._track.set_map(self._map, covered, self._key if self.final else None)
+        self.show(self._key if self.final else None)
+
+    def paint(
+        self, start: int, values: NDArray[np.float32], quality: int | NDArray[np.uint8]
+    ) -> None:
+        """Fill in frames (bins, n) from ``start`` on, of one quality or each of its own."""
+        assert self._map is not None
+        inside = slice(start, start + values.shape[1])
+        self._map.values[:, inside] = values
+        self.quality[inside] = quality
+
+    def show(self, key: Hashable = None) -> None:
+        """Show on the track what is filled in; ``key`` is that of a final map.
+
+        It sets the 0 dB reference up to the first map that is whole.
+        """
+        if self._map is None:
+            return
+        full, values = self.full, self._map.values
+        if self._needs_reference and values.any():
+            self._needs_reference = not full
+            self._track.set_reference(reference_of(values))
+        self._track.set_map(self._map, None if full else self.quality > 0, key)
 
     def say_quality(self, view: View, final_words: Callable[[], str], compiling: bool) -> None:
         """Write the lowest quality in view on the track; ``final_words`` gives the final one."""
@@ -146,6 +152,18 @@ class PartialMap:
         if compiling:
             words += " · compiling, exact follows"
         self._track.set_status(words)
+
+
+def empty_map(options: SynthesisOptions, mesh: MeshSequence) -> DopplerMap:
+    """Synthetic map of a mesh, all zero."""
+    return DopplerMap(
+        values=np.zeros((options.axis.bins, mesh.frame_count), np.float32),
+        axis=options.axis,
+        timebase=mesh.timebase,
+        kind="synthetic",
+        null_bins=options.null_bins,
+        present=mesh.presence.measured,
+    )
 
 
 def pieces(

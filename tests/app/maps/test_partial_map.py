@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, Part, PartialMap, pieces
+from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, Part, PartialMap, empty_map, pieces
 from sd2app.session.maps import MapModel
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.maps import LimbMaps
@@ -23,7 +23,8 @@ def partial_map(frames):
     times, track = Timebase.regular(frames, 30.0), MapModel("Synthetic")
     mesh = MeshSequence(np.zeros((frames, 3, 3), np.float32), None, times)
     partial = PartialMap(track)
-    partial.begin(SynthesisOptions(axis=VelocityAxis(2, 2.0), null_bins=()), mesh)
+    options = SynthesisOptions(axis=VelocityAxis(2, 2.0), null_bins=())
+    partial.begin(empty_map(options, mesh))
     return partial, track
 
 
@@ -62,6 +63,18 @@ def test_a_new_placement_forgets_the_old_one():
     assert partial.quality.tolist() == [0] * 4 + [ROUGH] * 3 + [0] * 3
     assert not partial.quality_for(here).any()
     np.testing.assert_array_equal(partial.quality_for(there), partial.quality)
+
+
+def test_levels_refer_to_the_first_whole_map_and_until_then_to_what_there_is():
+    (partial, track), here = partial_map(4), VirtualSensor()
+    paint(partial, here, 0, values_of(1, 0.0), ROUGH)
+    assert track.reference == 1.0
+    paint(partial, here, 1, values_of(1, 3.0), ROUGH)
+    assert track.reference == 3.0
+    paint(partial, here, 2, values_of(2, 5.0), ROUGH)
+    assert track.reference == 5.0
+    paint(partial, here, 0, values_of(4, 7.0), FINAL)
+    assert track.reference == 5.0
 
 
 def test_ranks_rise_to_final():
