@@ -127,12 +127,8 @@ def mean_velocity_error(
 
     Parameters
     ----------
-    estimate, target : ndarray, (frames, bins)
-        Energies.
-    axis : VelocityAxis
-        Of both.
-    frames : bool ndarray, (frames,), optional
-        Limits it to some frames; by default all count.
+    estimate, target, axis, frames
+        As for :func:`peak_error`.
     """
     return velocity_error(
         mean_velocity_mps(estimate, axis), mean_velocity_mps(target, axis), frames

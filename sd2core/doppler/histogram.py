@@ -331,14 +331,8 @@ def count_plain(
     ----------
     frames : Frames
         The n frames with all vertices.
-    ends : float64 ndarray, (1 or 2, 3)
-        Of the path, in the frame of the positions.
-    counting : Counting
-        Velocity axis and range law.
-    scatterers : Scatterers
-        Of these frames.
-    into : Counts
-        Written; zero at first.
+    ends, counting, scatterers, into
+        As for :func:`count`.
     bins_of : callable, optional
         ``bins_of(t, sample)`` replaces what :func:`place_in_bins` finds.
     """

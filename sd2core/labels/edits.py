@@ -339,14 +339,8 @@ def overwrite(
 
     Parameters
     ----------
-    labels : Labels
-    timebase : Timebase
-        Of the recording.
-    track : str
-        Name of one of the tracks.
-    start_s, end_s : float
-        In either order; the edges go to the nearest frame edges.
-    label : str
+    labels, timebase, track, start_s, end_s, label
+        As for :func:`create`.
     """
     frames = Frames.of(timebase)
     labels.track(track)

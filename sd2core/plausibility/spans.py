@@ -38,14 +38,12 @@ def are_beyond(
 def judge_spans(
     spans_s: Sequence[tuple[float, float]], start_s: float, end_s: float
 ) -> list[Finding]:
-    """Findings on spans beyond a recording (:func:`are_beyond`).
+    """Findings on spans beyond a recording.
 
     Parameters
     ----------
-    spans_s : sequence of (float, float)
-        Start and end of each.
-    start_s, end_s : float
-        Of the recording.
+    spans_s, start_s, end_s
+        As for :func:`are_beyond`.
 
     Examples
     --------
