@@ -366,7 +366,7 @@ def count(
     scatterers: Scatterers,
     into: Counts,
 ) -> None:
-    """Count frames from ``start`` on, compiled; ``into`` is zero at first.
+    """Count frames from ``start`` on, compiled.
 
     Parameters
     ----------
@@ -376,8 +376,12 @@ def count(
         Of the n frames that are counted; so are mask and ``into``.
     ends : float64 array, shape (1 or 2, 3)
         The sensor, and its image by way of a wall, in the frame of the positions.
+    counting : Counting
+        Velocity axis and range law.
     scatterers : Scatterers
         Normals, areas and area vectors are those of all frames of the paths, in their order.
+    into : Counts
+        Written; zero at first.
     """
     precision = paths.places.dtype
     count_kernel(
