@@ -128,6 +128,7 @@ def test_the_wheel_brings_the_manual_and_no_other_page(wheel: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)  # all kernels are compiled
 def test_the_wheel_works_away_from_the_checkout(installed: Path, away: Path) -> None:
     check(installed, away)
 

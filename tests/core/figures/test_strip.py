@@ -112,6 +112,14 @@ def test_the_body_is_as_large_as_the_camera_sees_it(source, as_dots) -> None:
     assert np.ptp(rows) == pytest.approx(expected, abs=3)
 
 
+def test_dots_are_of_the_side_that_is_seen(source, ball) -> None:
+    """Of a ball of radius r at a distance d that is the share (1 - r / d) / 2."""
+    options = StripOptions(rows=("mesh",), as_dots=True)
+    (axes, *_) = plot_strip(source, [0], options).axes
+    shown = len(axes.collections[0].get_offsets())
+    assert shown / ball.vertex_count == pytest.approx((1 - 0.3 / 3.0) / 2, abs=0.05)
+
+
 def test_the_video_is_shown_frame_by_frame(source) -> None:
     pixels = drawn(source, [2, 10], rows=("video",), whole=True, colour="plain")
     middle = pixels[pixels.shape[0] // 2 + 10]
