@@ -66,7 +66,7 @@ def _scene(name: str, title: str, mesh: MeshSequence, sensor: VirtualSensor) -> 
     print(title, file=sys.stderr)
     tolerances, measured = _tolerances(mesh, sensor), []
     for family in ("histogram", "fmcw"):
-        measurement = measure(mesh, sensor, family=family)  # type: ignore[arg-type]
+        measurement = measure(mesh, sensor, family=family)
         measured.append(_measured(measurement, f"trade-{name}-{family}.png"))
     return filled(
         "accuracy-and-speed-scene.md",

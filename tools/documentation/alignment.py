@@ -137,7 +137,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("pairs", type=Path, nargs="+", metavar="PAIRS")
     options = parser.parse_args()
-    lines = []
+    lines: list[list[str]] = []
     for path in options.pairs:
         pairs = read_pairs(path)
         for subject in pairs.subjects:

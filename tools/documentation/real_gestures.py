@@ -39,7 +39,7 @@ DATA = [SHARED / "radar" / f"kkt_gestures{more}" for more in ("", "_more", "_stu
 SPLITS = 3
 KERNEL = TrainOptions(model="kernel", delay_s=0.9)
 KERNEL_NAME = "kernel, columns, after 0.9 s"
-SPANS = SpanOptions(margin_s=0.5, shortest_s=0.2)
+SPANS = SpanOptions(min_duration_s=0.5, merge_gap_s=0.2)
 IOUS = (0.3, 0.4, 0.5, 0.6, 0.7)
 """Options are chosen by the mean F1 over these: with few files F1 at one of them has steps."""
 AT = IOUS.index(0.5)

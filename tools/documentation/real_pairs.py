@@ -59,7 +59,7 @@ def skeleton_cloud(clip: SkeletonClip) -> MeshSequence:
 
 def changed(**options: object) -> MarsChoices:
     """The default with other options of synthesis."""
-    return replace(DEFAULT, synthesis=replace(DEFAULT.synthesis, **options))  # type: ignore[arg-type]
+    return replace(DEFAULT, synthesis=replace(DEFAULT.synthesis, **options))
 
 
 WAYS = {
@@ -234,7 +234,8 @@ def agreement(stretches: Iterable[MarsStretch]) -> tuple[float, float, float]:
     """
     rng = np.random.default_rng(0)
     drawn = [halves_mps(one, rng) for one in stretches for _ in range(HALVINGS)]
-    halves = np.corrcoef(*map(np.concatenate, zip(*drawn, strict=True)))[0, 1]
+    first, second = map(np.concatenate, zip(*drawn, strict=True))
+    halves = np.corrcoef(first, second)[0, 1]
     whole = 2.0 * halves / (1.0 + halves)
     return float(halves), float(whole), float(np.sqrt(max(whole, 0.0)))
 

@@ -25,7 +25,7 @@ def test_two_who_meet_are_not_exchanged(
     _, people, outcome = told_apart(meeting, clothes, tmp_path / "pair.mp4")
     assert outcome.people == len(people) == 2
     assert outcome.right >= 0.99
-    assert outcome.seen > 0.6 * outcome.looks
+    assert outcome.seen > 0.6 * outcome.observed
 
 
 def test_six_real_people_are_six(shared_data: Path, models: LandmarkModels) -> None:
