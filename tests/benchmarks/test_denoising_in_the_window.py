@@ -10,6 +10,7 @@ import math
 import subprocess
 import sys
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -123,7 +124,7 @@ def test_what_the_way_to_the_process_costs(benchmark, model):
     from sd2core.denoise.files import load_model
 
     process, given = ModelProcess(), a_map()
-    both = {"here": load_model(model), "process": process.load(model)}
+    both: dict[str, Any] = {"here": load_model(model), "process": process.load(model)}
     frame = np.ascontiguousarray(given.values[:, 0])
 
     def best_ms(work, times):

@@ -20,7 +20,6 @@ from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.files.resources import resource_path
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import warm_up
-from sd2core.progress import silent
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
 
@@ -88,7 +87,7 @@ def test_the_estimate_of_choosing(
     choose(mesh, sensor, tolerance=TOLERANCE)
 
     def work() -> float:
-        search = places.PlanSearch(mesh, [sensor], TOLERANCE, PAPER, silent)
+        search = places.PlanSearch(mesh, [sensor], TOLERANCE, PAPER)
         estimated_s = places._CHOOSING_FRAMES * search.reference_s()
         begun_s = time.process_time()
         choose(mesh, sensor, tolerance=TOLERANCE)
