@@ -155,6 +155,13 @@ def test_a_point_cloud_makes_all_maps_count_everything(mesh: MeshSequence) -> No
     assert any("no faces" in note for note in found.notes)
 
 
+def test_surfaces_of_other_vertices_are_named_as_such(mesh: MeshSequence) -> None:
+    vertices = np.asarray(mesh.vertices)
+    doubled = MeshSequence(np.concatenate([vertices, vertices], axis=1), mesh.faces, mesh.timebase)
+    found = compare_meshes([mesh, doubled], ["ours", "doubled"])
+    assert sum("different vertices" in note for note in found.notes) == 1
+
+
 def test_the_sensor_may_be_elsewhere(mesh: MeshSequence) -> None:
     nearer = np.asarray(mesh.vertices) - TIMES[:, None, None] * np.array([0.0, 0.0, 0.2])
     pair = [mesh, changed(mesh, nearer)]

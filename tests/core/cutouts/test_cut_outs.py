@@ -83,8 +83,10 @@ def test_the_mesh_is_of_whom_the_span_names(source, tmp_path) -> None:
         (path,) = cut(duo, tmp_path, replace(WAVE, id=number + 1, person=name))
         found = load_mesh(path / "mesh.zarr").read(0, 10) - source.mesh.read(5, 15)
         np.testing.assert_array_equal(found, float(name == "bert"))
-        said = json.loads((path / "span.json").read_text("utf-8"))["sources"]["mesh"]
-        assert (said == "bert.npz") is (name == "bert")
+        said = json.loads((path / "span.json").read_text("utf-8"))
+        assert (said["sources"]["mesh"] == "bert.npz") is (name == "bert")
+        assert said["span"].get("person", "") == name
+    assert "person" not in said["span"]
 
 
 def test_the_index_lists_all_that_was_ever_cut_into_the_folder(source, tmp_path) -> None:
