@@ -128,12 +128,13 @@ class PartialMap:
     def show(self, key: Hashable = None) -> None:
         """Show on the track what is filled in; ``key`` is that of a final map.
 
-        It sets the 0 dB reference up to the first map that is whole.
+        The first whole map sets the 0 dB reference; so does what there is of it before, unless the
+        user has chosen one.
         """
         if self._map is None:
             return
         full, values = self.full, self._map.values
-        if self._needs_reference and values.any():
+        if self._needs_reference and values.any() and (full or not self._track.by_hand):
             self._needs_reference = not full
             self._track.set_reference(reference_of(values))
         self._track.set_map(self._map, None if full else self.quality > 0, key)

@@ -71,6 +71,9 @@ def test_levels_refer_to_the_first_whole_map_and_until_then_to_what_there_is():
     assert track.reference == 1.0
     paint(partial, here, 1, values_of(1, 3.0), ROUGH)
     assert track.reference == 3.0
+    track.set_reference(8.0, by_hand=True)
+    paint(partial, here, 1, values_of(1, 3.0), ROUGH)
+    assert track.reference == 8.0
     paint(partial, here, 2, values_of(2, 5.0), ROUGH)
     assert track.reference == 5.0
     paint(partial, here, 0, values_of(4, 7.0), FINAL)
