@@ -100,6 +100,11 @@ def test_a_file_of_nothing_known_is_refused_by_name(tmp_path: Path) -> None:
         licences.components([("libstray.so.1", str(stray))], OURS)
 
 
+def test_an_empty_file_holds_no_library(tmp_path: Path) -> None:
+    (tmp_path / "py.typed").touch()
+    assert licences.native("cv2/py.typed", str(tmp_path / "py.typed")) == []
+
+
 def test_an_ffmpeg_that_may_not_be_passed_on_is_refused(tmp_path: Path) -> None:
     library = tmp_path / "libavcodec-0.so.62"
     library.write_bytes(b"libavcodec license: nonfree and unredistributable\0")

@@ -134,6 +134,8 @@ def table() -> list[tuple[re.Pattern[str], dict[str, str]]]:
 
 def holds(path: str, mark: str) -> bool:
     """Whether these words are in a file: some libraries say how they were built."""
+    if not os.path.getsize(path):
+        return False  # it cannot be mapped
     with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
         return content.find(mark.encode()) >= 0
 

@@ -217,6 +217,7 @@ def test_numba_users_beside_us_keep_their_folder() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)  # all kernels are compiled
 def test_kernels_stay_within_their_arrays_when_they_are_compiled(tmp_path: Path) -> None:
     code = "from sd2core.numerics.compiled import warm_up; warm_up()"
     run(code, PACKAGE.parent, NUMBA_BOUNDSCHECK="1", NUMBA_CACHE_DIR=str(tmp_path))

@@ -149,7 +149,7 @@ def test_a_camera_that_is_filmed_has_its_pane(empty_window, qtbot, tmp_path):
     live, video = window.features.live.model, window.findChild(VideoView)
     live.start(ListenRequest(folder, radar="test", camera="test"))
     qtbot.waitUntil(lambda: live.on_screen and live.pictures > 30, timeout=LIMIT_MS)
-    assert video.isVisible()
+    qtbot.waitUntil(video.isVisible, timeout=LIMIT_MS)
     live.stop()
     qtbot.waitUntil(lambda: live.state == "stopped" and window.settled, timeout=LIMIT_MS)
     assert live.on_screen
