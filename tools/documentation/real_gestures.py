@@ -1,4 +1,4 @@
-"""Makes ``real-gestures.md``: ``make real-gestures``, about five minutes.
+"""Makes ``real-gestures.md``: ``make real-gestures``, about twenty minutes.
 
 Suggestions and classifiers on gestures that a real radar saw, on the same five splits of the
 files. Trainings stay in ``build/real-gestures``.
