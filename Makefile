@@ -36,7 +36,7 @@ help:
 	@echo "make denoiser     docs/denoiser.md, trained and measured (an hour and more; after make fitting)"
 	@echo "make range-synthesis  docs/range-synthesis.md, trained (half an hour)"
 	@echo "make classifier   docs/classifier.md, trained (an hour)"
-	@echo "make real-gestures  docs/real-gestures.md: real radar, suggestions and classifiers (five minutes)"
+	@echo "make real-gestures  docs/real-gestures.md: real radar, suggestions and classifiers (twenty minutes)"
 	@echo "make paper        docs/paper.md: the paper's figures and tables (half an hour after make classifier)"
 	@echo "make scale        docs/scale.md, measured (some ten minutes)"
 	@echo "make soak         an hour of use of the window: memory, threads, event loop (MINUTES=60)"

@@ -34,7 +34,6 @@ OLD = {
     "denoiser.md": _SAME,
     "classifier.md": _SAME,
     "studies.md": _SAME,
-    "real-gestures.md": _SAME,
 }
 """Pages that may be older than the program, and why they were not measured anew."""
 
