@@ -128,8 +128,7 @@ class PartialMap:
     def show(self, key: Hashable = None) -> None:
         """Show on the track what is filled in; ``key`` is that of a final map.
 
-        The first whole map sets the 0 dB reference; so does what there is of it before, unless the
-        user has chosen one.
+        The first whole map sets the 0 dB reference, and parts before it where none is set by hand.
         """
         if self._map is None:
             return
