@@ -51,8 +51,8 @@ class Lines:
         units = self.unit if self.unit in ("B", "s") else f"{self.unit}s"
         words = f"{self._what}: {self.n:,} {units}"
         if self.total:
-            share = 100 * self.n // self.total
-            words = f"{self._what}: {self.n:,} of {self.total:,} {units}, {share} %"
+            counted = f"{self.n:,} of {self.total:,} {units}, " if self.unit else ""
+            words = f"{self._what}: {counted}{100 * self.n // self.total} %"
         print(words + (f", {self._more}" if self._more else ""), file=sys.stderr, flush=True)
 
 
@@ -62,4 +62,7 @@ def bar(what: str, unit: str, total: int | None = None) -> AbstractContextManage
         return Lines(what, unit, total)
     from tqdm import tqdm
 
-    return tqdm(desc=what, unit=unit, total=total, file=sys.stderr, leave=False)
+    form = None if unit else "{l_bar}{bar}| [{elapsed}<{remaining}]"
+    return tqdm(
+        desc=what, unit=unit, total=total, file=sys.stderr, leave=False, bar_format=form
+    )

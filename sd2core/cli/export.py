@@ -153,7 +153,7 @@ def _export(options: Export) -> int:
         written = write_dataset(options.out, sources, wanted, steps)
         print_event("progress", done=0, total=0, stage="sheet", left_s=None)
     else:
-        with progress_bar("Exporting", "step") as progress:
+        with progress_bar("Exporting", unit="") as progress:
             written = write_dataset(options.out, sources, wanted, progress)
     if written.added == written.sources:
         keep_pace(making.pace_kind, time.monotonic() - begun_s, written.segments)

@@ -15,7 +15,10 @@ from sd2core.progress import Progress
 
 @contextmanager
 def progress_bar(what: str, unit: str = "frame") -> Iterator[Progress]:
-    """Show a bar on standard error; where that is no terminal, a line every few seconds."""
+    """Show a bar on standard error; where that is no terminal, a line every few seconds.
+
+    Without a unit it shows the share alone: for work of parts that count different things.
+    """
     from sd2core.cli.bars import bar as bar_of
 
     with bar_of(what, unit) as bar:

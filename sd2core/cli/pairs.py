@@ -225,7 +225,7 @@ def _recordings(options: Recordings) -> None:
     from sd2core.mocap.recording_pairs import make_recording_pairs
 
     synthesis = replace(_synthesis(options), **given(options, ("count",)))
-    with progress_bar("Making pairs", "step") as progress:
+    with progress_bar("Making pairs", unit="") as progress:
         made = make_recording_pairs(
             options.recordings,
             options.out,

@@ -61,7 +61,7 @@ def maps_of(
             with progress_bar("Reading the mesh") as progress:
                 mesh = recording.load_mesh(progress)
         model = _denoiser_of(recording, mesh) if "denoised" in names else None
-        with progress_bar("Synthesising") as progress:
+        with progress_bar("Synthesising", unit="") as progress:
             synthetic, denoised = computed_maps(
                 recording, Synthesizer(mesh), recording.sensor, model, progress=progress
             )

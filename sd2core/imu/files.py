@@ -23,7 +23,7 @@ from sd2core.files.limits import open_regular
 from sd2core.files.numpy_files import open_npz_file
 from sd2core.files.texts import check_version, errors_in, lines_of
 from sd2core.imu.signals import InertialSignals
-from sd2core.imu.tables import AccelerationUnit, TurnRateUnit, read_table
+from sd2core.imu.tables import AccelerationUnit, TurnRateUnit, meta_of, read_table, text_of
 
 SUFFIXES = (".csv", ".sto", ".npz")
 FORMAT, VERSION = "sd2-imu", 1
@@ -36,6 +36,7 @@ _EXPECTED_STO = "a .sto that `sd2 imu` wrote"
 _EXPECTED_NPZ = "an .npz that `sd2 imu` wrote"
 _ARRAYS = ("times_s", "acceleration_mps2", "turn_rate_radps")
 _LONGEST_HEADER = 200
+_OF_THE_TABLE = {"DataRate", "DataType", "version", "units", "OpenSimVersion"}
 
 
 def write_signals(path: Path, signals: InertialSignals) -> None:
@@ -107,21 +108,12 @@ def _of_suffix(path: Path, ways: dict[str, Callable[..., Any]]) -> Callable[...,
 def _write_csv(path: Path, signals: InertialSignals) -> None:
     rows = np.column_stack([signals.acceleration_mps2, signals.turn_rate_radps])
     with atomic_write(path) as stream:
-        for name, text in _about(signals):
-            stream.write(f"# {name}: {text}\n".encode())
+        for name, value in signals.meta.items():
+            stream.write(f"# {name}: {text_of(value)}\n".encode())
         stream.write(f"{','.join(_CSV_COLUMNS)}\n".encode())
         for time_s, row in zip(signals.times_s.tolist(), rows.tolist(), strict=True):
             cells = ("" if math.isnan(value) else f"{value:.9g}" for value in row)
             stream.write(f"{time_s:.9f},{','.join(cells)}\n".encode())
-
-
-def _about(signals: InertialSignals) -> list[tuple[str, str]]:
-    """Names and values of the metadata, each of one line."""
-    words = {
-        name: value if isinstance(value, str) else json.dumps(value)
-        for name, value in signals.meta.items()
-    }
-    return [(name, " ".join(text.split())) for name, text in words.items()]
 
 
 # -- OpenSim -------------------------------------------------------------------------------------
@@ -130,7 +122,7 @@ def _about(signals: InertialSignals) -> list[tuple[str, str]]:
 def _write_sto(path: Path, signals: InertialSignals) -> None:
     name = str(signals.meta.get("at", "imu")).replace(" ", "-")
     header = [
-        *(f"{name}={text}" for name, text in _about(signals)),
+        *(f"{name}={text_of(value)}" for name, value in signals.meta.items()),
         f"DataRate={signals.rate_hz:.6f}",
         "DataType=Vec3",
         "version=3",
@@ -174,19 +166,20 @@ def _read_sto(path: Path) -> InertialSignals:
         return InertialSignals(table[:, 0], table[:, 1:4], table[:, 4:], meta)
 
 
-def _sto_header(path: Path, lines: Iterator[str]) -> dict[str, str]:
-    """Axes that the header states; Sd2Error if its table is not of vectors."""
+def _sto_header(path: Path, lines: Iterator[str]) -> dict[str, Any]:
+    """Metadata of the header; Sd2Error if its table is not of vectors."""
     facts: dict[str, str] = {}
     for _ in range(_LONGEST_HEADER):
         line = next(lines, None)
         if line is None or line == "endheader":
             break
         name, _, value = line.partition("=")
-        facts[name] = value
+        if value:
+            facts[name] = value
     if facts.get("DataType") != "Vec3":
         stated = facts.get("DataType", "no type that is stated")[:40]
         raise Sd2Error(f"{path} is a table of {stated}", _EXPECTED_STO)
-    return {"axes": facts["axes"]} if "axes" in facts else {}
+    return meta_of({name: text for name, text in facts.items() if name not in _OF_THE_TABLE})
 
 
 # -- NPZ -----------------------------------------------------------------------------------------

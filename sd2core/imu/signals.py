@@ -84,6 +84,11 @@ class InertialSignals:
                 raise Sd2Error(f"{name} is infinite at {times_s[row]:g} s", "finite values, or NaN")
             object.__setattr__(self, name, values)
 
+    @property
+    def simulated(self) -> bool:
+        """True if they say that no sensor measured them."""
+        return self.meta.get("simulated") is True
+
     def between(self, start: int, stop: int) -> InertialSignals:
         """Samples from one index to another, the last excluded."""
         part = slice(start, stop)

@@ -5,12 +5,13 @@ Titles are those of :mod:`sd2core.io.imu_columns`.
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from array import array
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,7 @@ EXPECTED = (
     " then numbers"
 )
 _WORDS = {"acc": "accelerations", "gyr": "turn rates", "time": "times"}
-_RATE = re.compile(rb"#\s*rate_hz\s*[:=]\s*(\S+)\s*")
+_FACT = re.compile(r"#\s*(\w{1,40})\s*[:=]\s*(.{1,1000})")
 _SLOWEST_HZ, _FASTEST_HZ = 0.5, 50_000.0
 _LONGEST_HEADING = 10_000
 
@@ -43,8 +44,9 @@ def read_table(
 ) -> InertialSignals:
     """Read a table of a real or virtual sensor: separated by commas, semicolons, tabs or spaces.
 
-    Lines that begin with ``#`` are skipped; ``# rate_hz: 100`` among those before the heading
-    stands for a column of times. An empty cell or NaN is a value that is not known.
+    Lines that begin with ``#`` are skipped; those before the heading of the form ``# name: value``
+    are metadata, of which ``# rate_hz: 100`` stands for a column of times. An empty cell or NaN is
+    a value that is not known.
 
     Parameters
     ----------
@@ -63,7 +65,7 @@ def read_table(
     """
     given: dict[str, str] = {"acc": acceleration_unit or "", "gyr": turn_rate_unit or ""}
     with open_regular(path) as stream:
-        rate_text, heading, lines = _heading(path, lines_of(stream))
+        facts, heading, lines = _heading(path, lines_of(stream))
         separator, titles = titles_of(heading)
         columns = _columns_of(path, titles)
         factors = _factors(path, columns, given)
@@ -73,9 +75,9 @@ def read_table(
     if values.shape[1] == 7:
         times_s = values[:, 6]
     else:
-        rate_hz = _rate(path, rate_text) if rate_hz is None else rate_hz
+        rate_hz = _rate(path, facts.get("rate_hz", "")) if rate_hz is None else rate_hz
         times_s = np.arange(len(values)) / _plausible(path, rate_hz)
-    meta = {"source": path.name, "columns": [one.title for one in columns]}
+    meta = {"source": path.name, **meta_of(facts), "columns": [one.title for one in columns]}
     with errors_in(path, remedy=""):
         signals = InertialSignals(times_s, values[:, :3], values[:, 3:6], meta)
     if len(times_s) > 1:
@@ -83,16 +85,36 @@ def read_table(
     return signals
 
 
-def _heading(path: Path, lines: Iterable[bytes]) -> tuple[str, str, Iterator[tuple[int, str]]]:
-    """Rate that a comment states, the heading, and the numbered lines after it."""
-    rate, numbered = "", _texts(path, lines)
+def meta_of(facts: Mapping[str, str]) -> dict[str, Any]:
+    """Metadata of texts as :func:`text_of` writes them."""
+    return {name: _value_of(text) for name, text in facts.items()}
+
+
+def text_of(value: object) -> str:
+    """A value of the metadata in one line, from which it can be read."""
+    plain = isinstance(value, str) and isinstance(_value_of(value), str)
+    return " ".join((str(value) if plain else json.dumps(value)).split())
+
+
+def _value_of(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return text
+
+
+def _heading(
+    path: Path, lines: Iterable[bytes]
+) -> tuple[dict[str, str], str, Iterator[tuple[int, str]]]:
+    """Facts that comments state, the heading, and the numbered lines after it."""
+    facts, numbered = dict[str, str](), _texts(path, lines)
     for _, line in numbered:
         if not line.startswith("#"):
             if len(line) > _LONGEST_HEADING:
                 break
-            return rate, line, (one for one in numbered if not one[1].startswith("#"))
-        if match := _RATE.fullmatch(line.encode()):
-            rate = match[1].decode()
+            return facts, line, (one for one in numbered if not one[1].startswith("#"))
+        if match := _FACT.fullmatch(line):
+            facts[match[1]] = match[2]
     raise Sd2Error(f"{path} has no heading", EXPECTED, "Name the columns in the first line")
 
 

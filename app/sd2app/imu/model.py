@@ -90,6 +90,12 @@ class ImuModel(ReportingModel):
         return None if recording is None else recording.imu
 
     @property
+    def file_words(self) -> str:
+        """What the samples of the file are, in words."""
+        simulated = self.measured is not None and self.measured.simulated
+        return "simulated file" if simulated else "measured"
+
+    @property
     def offset_s(self) -> float:
         """Time on the recording's clock of the first sample of the real sensor."""
         recording = self._document.recording

@@ -22,7 +22,7 @@ def status_parts(model: ImuModel) -> list[str]:
     elif model.current is not None:
         parts.append(model.problem or "being computed…")
     if model.measured is not None and model.file is not None:
-        parts += [f"measured: {model.file.name}", f"from {clock_text(model.offset_s)}"]
+        parts += [f"{model.file_words}: {model.file.name}", f"from {clock_text(model.offset_s)}"]
     return parts
 
 
@@ -32,7 +32,7 @@ def reading_lines(model: ImuModel, time_s: float) -> tuple[str, ...]:
     if model.signals is not None:
         lines += _values_at("simulated", model.signals, time_s)
     if model.measured is not None:
-        lines += _values_at("measured", model.measured, time_s - model.shift_s)
+        lines += _values_at(model.file_words, model.measured, time_s - model.shift_s)
     return (clock_text(time_s), *lines) if lines else ()
 
 

@@ -170,7 +170,7 @@ class InertialTrack(TrackMouse):
         return tuple(QColor(one) for one in (palette.axis_x, palette.axis_y, palette.axis_z))
 
     def _curves(self) -> Iterator[tuple[InertialSignals, float, bool]]:
-        """Signals with what their times are shifted by, and if they were measured."""
+        """Signals with what their times are shifted by, and if they are of a file."""
         model = self._model
         if model.signals is not None:
             yield model.signals, 0.0, False
@@ -232,7 +232,7 @@ class InertialTrack(TrackMouse):
         ]
         if self._model.measured is not None and self._model.signals is not None:
             muted = QColor(self._display.palette.muted)
-            entries.append(("measured", muted, Qt.PenStyle.DashLine))
+            entries.append((self._model.file_words, muted, Qt.PenStyle.DashLine))
         widths = [line_px + to_name_px + metrics.horizontalAdvance(name) for name, *_ in entries]
         width = float(sum(widths) + apart_px * (len(widths) - 1))
         if self.width() - 2 * MARGIN_PX - left - width < 60:
@@ -266,8 +266,8 @@ class InertialTrack(TrackMouse):
         painter.setPen(QPen(QColor(colours.border), 1))
         painter.drawLine(QPointF(plot.left(), y_of(0.0)), QPointF(plot.right(), y_of(0.0)))
         with clipped(painter, plot):
-            for signals, shift_s, measured in reversed(shown):
-                style = Qt.PenStyle.DashLine if measured else Qt.PenStyle.SolidLine
+            for signals, shift_s, of_file in reversed(shown):
+                style = Qt.PenStyle.DashLine if of_file else Qt.PenStyle.SolidLine
                 curves = curve_lines(
                     signals.times_s,
                     getattr(signals, lane.name),

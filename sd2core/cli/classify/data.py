@@ -198,7 +198,7 @@ def _of_persons(
     labels, making = recording.effective_labels(), Making(kinds)
     sources = recording_sources([one.path], [one.subject or recording.person], making)
     for person, lazy in zip(labels.persons, sources, strict=True):
-        with progress_bar("Synthesising") as progress:
+        with progress_bar("Synthesising", unit="") as progress:
             source = lazy.load(progress)
         for doppler in source.maps.values():
             yield source.subject, doppler, labels.of_person(person)

@@ -226,7 +226,7 @@ def describe_imu(path: Path) -> Description:
         "at": str(signals.meta.get("at", "")),
         "axes": str(signals.meta.get("axes", "")),
     }
-    simulated = " (simulated)" if signals.meta.get("simulated") is True else ""
+    simulated = " (simulated)" if signals.simulated else ""
     unlikely = judge_inertial(signals.times_s, signals.acceleration_mps2, signals.turn_rate_radps)
     notes = tuple(map(str, unlikely))
     data["notes"] = list(notes)

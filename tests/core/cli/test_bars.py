@@ -39,6 +39,15 @@ def test_a_line_every_few_seconds(clock: Clock, capsys: pytest.CaptureFixture[st
         assert line.endswith(" %")
 
 
+def test_a_share_alone_of_parts_that_count_different_things(
+    clock: Clock, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with progress_bar("Exporting", unit="") as progress:
+        clock.now_s += 6
+        progress(370, 1000)
+    assert capsys.readouterr().err == "Exporting: 37 %\n"
+
+
 def test_nothing_of_what_is_soon_done(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:
     with progress_bar("Counting") as progress:
         for done in range(10):

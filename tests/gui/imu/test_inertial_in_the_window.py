@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from PySide6.QtWidgets import QApplication, QCheckBox, QFileDialog, QMenu
 from window_models import models_of
 
 from sd2app.dataset_export.dialog import ExportDialog
+from sd2app.imu.text import reading_lines
 from sd2app.imu.track import LANES, InertialTrack
 from sd2app.maps.arrangement import HEADER_PX
 from sd2app.scene.inertial import PLACING_HINT
@@ -274,6 +276,22 @@ def test_a_real_sensors_file_is_opened_beside_what_is_open(
     assert models.document.recording is before
     assert before.imu == path
     assert models.document.undo_stack.undoText() == "Add inertial sensor's file"
+
+
+def test_a_simulated_sensors_file_is_not_called_measured(
+    window, track, qtbot, tmp_path: Path
+) -> None:
+    models, path = models_of(window), tmp_path / "wrist.csv"
+    signals = read_signals(wrist(path))
+    assert not signals.simulated
+    write_signals(path, replace(signals, meta={"at": "left-wrist", "simulated": True}))
+    models.imu.add_file(path)
+    qtbot.waitUntil(lambda: models.imu.measured is not None, timeout=20_000)
+    assert "simulated file: wrist.csv" in track.accessibleName()
+    assert "measured" not in track.accessibleName()
+    lines = reading_lines(models.imu, models.imu.offset_s)
+    assert len(lines) > 1
+    assert not any("measured" in line for line in lines)
 
 
 def test_a_table_of_labels_is_still_one_of_labels(window, tmp_path: Path) -> None:
