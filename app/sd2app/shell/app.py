@@ -104,19 +104,22 @@ def wait_until_settled(application: QApplication, window: MainWindow, limit_s: f
 def _take_screenshot(
     application: QApplication, window: MainWindow, path: Path, limit_s: float
 ) -> int:
-    """Write the window as PNG and close it; returns an exit code, or raises OSError."""
+    """Write the window as PNG and close it; returns an exit code, or raises OSError.
+
+    Of a window in which nothing could be opened there is no picture.
+    """
     settled = wait_until_settled(application, window, limit_s)
     failure = window.messages.text if window.ready else ""
-    is_empty = window.ready and not window.session.has_content()
+    refused = bool(failure) and not window.session.has_content()
     try:
-        write_picture(window, path)
+        if not refused:
+            write_picture(window, path)
+            print(f"Wrote {path}")
     finally:
         window.close()
         application.processEvents()
-    print(f"Wrote {path}")
+    if failure:
+        print(f"sd2: {failure}", file=sys.stderr)
     if not settled:
         print(f"The window got no further for {limit_s:.0f} s; {path} shows it.", file=sys.stderr)
-        return 1
-    if failure:
-        print(failure, file=sys.stderr)
-    return 1 if failure and is_empty else 0
+    return 1 if refused or not settled else 0

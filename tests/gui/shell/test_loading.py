@@ -170,7 +170,11 @@ def test_a_picture_of_what_cannot_be_opened_is_a_failure(
     empty_window.open_paths([note])
     application = QApplication.instance()
     assert app._take_screenshot(application, empty_window, tmp_path / "w.png", limit_s=60) == 1
-    assert "notes.txt" in capsys.readouterr().err
+    told = capsys.readouterr()
+    assert told.err.startswith("sd2: ")
+    assert "notes.txt" in told.err
+    assert told.out == ""
+    assert [*tmp_path.iterdir()] == [note]
 
 
 def test_the_map_of_a_capture_comes_after_the_recording(
