@@ -122,9 +122,12 @@ def _kept_movements(known: ClipSet, clips: Sequence[Clip]) -> set[Movement]:
             count = max(1, len(keys) // 5)
             kept |= {keys[step * len(keys) // count] for step in range(count)}
     if not kept:
+        alone = len(known.subjects) == 1
+        whose = f"There is one subject, {known.subjects[0]}" if alone else "No subject is kept out"
         raise Sd2Error(
-            "There is one subject, and no class of which there are two movements",
-            "two subjects, or two movements of a class",
+            f"{whose}, and no class is in two recordings or takes",
+            "one to learn from and one to check with",
+            "Give one more, of another subject (ben=FILE) or the same",
         )
     return kept
 

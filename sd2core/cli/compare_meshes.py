@@ -48,7 +48,7 @@ class CompareMeshes(Sensor, MeshReading, Figure, Json):
         super().__post_init__()
         labels = self.labels
         if len(labels) != len(self.meshes):
-            raise OptionError(f"{len(labels)} labels for {len(self.meshes)} meshes", "one for each")
+            raise OptionError(f"{len(labels)} names for {len(self.meshes)} meshes", "one for each")
         if len(set(labels)) != len(labels) or not all(labels):
             raise OptionError(
                 f"The labels are {', '.join(labels)}", "different ones", "Give other --names"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from sd2core.cli.command_parser import Subcommands, add_command, command_group
-from sd2core.cli.output import print_facts, print_json, progress_bar
+from sd2core.cli.output import counted, print_facts, print_json, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.bounds import SEED
 from sd2core.options.kinds import Bins, Vector, Words
@@ -189,7 +189,7 @@ def _label(options: Label) -> None:
     if options.json:
         print_json({"pairs": str(options.pairs), "frames_of_label": counts})
         return
-    print_facts(str(options.pairs), {name: f"{count:,} frames" for name, count in counts.items()})
+    print_facts(str(options.pairs), {name: counted(count, "frame") for name, count in counts.items()})
 
 
 def _choices(options: Mars) -> MarsChoices:
@@ -243,13 +243,14 @@ def _recordings(options: Recordings) -> None:
         print_json({"pairs": str(options.out), "subjects": subjects} | lost)
         return
     facts = {
-        name: f"{takes} takes, {frames:,} frames" for name, (takes, frames) in made.subjects.items()
+        name: f"{counted(takes, 'take')}, {counted(frames, 'frame')}"
+        for name, (takes, frames) in made.subjects.items()
     }
     if made.left_out_s > 0:
         facts["left out"] = f"{made.left_out_s:.1f} s without a person or a radar frame"
     if made.damaged:
         facts["damaged"] = ", ".join(
-            f"{count:,} frames of {name}, left out" for name, count in made.damaged.items()
+            f"{counted(count, 'frame')} of {name}, left out" for name, count in made.damaged.items()
         )
     print_facts(str(options.out), facts)
 
@@ -305,7 +306,9 @@ def _vary(options: Vary) -> None:
     if options.json:
         print_json({"pairs": str(options.out), "simulated": True, "takes_of_subject": counts})
         return
-    facts = {"radar": "simulated"} | {name: f"{takes} takes" for name, takes in counts.items()}
+    facts = {"radar": "simulated"} | {
+        name: counted(takes, "take") for name, takes in counts.items()
+    }
     print_facts(str(options.out), facts)
 
 
@@ -346,7 +349,7 @@ def _mars(options: Mars) -> None:
         return
     facts = {"radar": "real"}
     for subject, (takes, frames) in made.subjects.items():
-        line = f"{takes} takes, {frames:,} frames"
+        line = f"{counted(takes, 'take')}, {counted(frames, 'frame')}"
         if subject in made.stature_m:
             line += (
                 f"; a body of {made.stature_m[subject]:.2f} m, its joints"

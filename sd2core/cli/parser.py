@@ -40,7 +40,7 @@ examples:
 
 `sd2 COMMAND --help` explains one command; `sd2 doctor` lists those of plug-ins.
 With --json what went wrong is JSON as well, {{"error": {{"found": …, "expected": …,
-"remedy": …}}}}, and the exit code is 1, or 2 for what was typed wrong.
+"remedy": …}}}}, and the exit code is 1, or 2 where the words are no command.
 """
 
 

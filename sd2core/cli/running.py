@@ -19,7 +19,7 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
     """Parse, call the handler and turn errors into a sentence on standard error.
 
     With ``--json`` or ``--progress-json`` standard output has the error as well. Returns 0, or the
-    handler's code; 1 for an error; 2 for what was typed wrong; 130 when interrupted.
+    handler's code; 1 for an error; 2 where the words are no command; 130 when interrupted.
     """
     flags = {"--json", "--progress-json"}.intersection(arguments)
     try:

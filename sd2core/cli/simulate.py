@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from sd2core.cli.command_parser import Subcommands, add_command, command_group
-from sd2core.cli.output import picked, print_json, progress_bar
+from sd2core.cli.output import counted, picked, print_json, progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.options.bounds import ANY, COUNT
 from sd2core.options.kinds import Count, Positive, Typed, joined, number_reader, vector
@@ -387,7 +387,8 @@ def _campaign(options: SimulateCampaign) -> None:
         )
         return
     print(
-        f"Made {made} takes: {options.out} holds {len(first.takes)} simulated takes of"
-        f" {len(pairs.subjects)} people, {first.frames / first.frame_rate_hz / 60.0:.1f} minutes"
+        f"Made {counted(made, 'take')}: {options.out} holds"
+        f" {counted(len(first.takes), 'simulated take')} of"
+        f" {counted(len(pairs.subjects), 'person', 'people')}, {first.frames / first.frame_rate_hz / 60.0:.1f} minutes"
         + (f", each from {options.sensors} places" if options.sensors > 1 else "")
     )

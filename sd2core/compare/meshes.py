@@ -21,6 +21,7 @@ from sd2core.compare.measures import (
     synthesize_alike,
 )
 from sd2core.errors import Sd2Error
+from sd2core.files.tables import counted
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
@@ -130,7 +131,10 @@ def compare_meshes(
         are too far apart to be of the same person.
     """
     if len(meshes) < 2 or len(labels) != len(meshes):
-        raise Sd2Error(f"{len(meshes)} meshes and {len(labels)} labels", "two meshes at least")
+        raise Sd2Error(
+            f"{counted(len(meshes), 'mesh', 'meshes')} and {counted(len(labels), 'label')}",
+            "two meshes at least",
+        )
     if not 0 <= reference < len(meshes):
         raise Sd2Error(f"reference is {reference}", f"0 to {len(meshes) - 1}")
     sensor = sensor or VirtualSensor()

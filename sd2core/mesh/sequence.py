@@ -215,7 +215,7 @@ class MeshSequence:
             raise Sd2Error(
                 f"{self.source or 'The scene'} shows {' and '.join(names)}{asked}",
                 "one of them by name",
-                "Name one with --person or mesh.body(NAME), for data sets in the labels",
+                "Name one with --person, for data sets in the labels, in Python by mesh.body(NAME)",
             )
         number = names.index(person)
         return replace(self.bodies[number], others=(), person=names[number])

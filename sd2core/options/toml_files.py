@@ -42,6 +42,8 @@ def _in_words(error: ValidationError, text: str, source: str) -> Sd2Error:
         return Sd2Error(f"{where}: {name} is missing", "a value of it", _HINT)
     if kind in UNKNOWN_KEY:
         return Sd2Error(f"{where}: {name} is not known", "a key that has a meaning here", _HINT)
+    if kind in ("dataclass_type", "model_type", "dict_type"):
+        return Sd2Error(f"{where}: {name} is {first['input']!r:.80}", f"a section [{name}]", _HINT)
     message = first["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     if kind == "value_error":
         return Sd2Error(f"{where}: {name}: {message}" if name else f"{where}: {message}", "", _HINT)

@@ -16,6 +16,11 @@ from sd2core.denoise.registry import MODELS, summary
 from sd2core.denoise.weights import format_of
 
 
+_UNITS = {"mps": "m/s", "s": "s", "hz": "Hz", "m": "m"}
+"""Units, by how names of values end."""
+_ABBREVIATIONS = ("mae", "rmse", "ssm")
+
+
 def describe_model_file(path: Path) -> Description:
     """Describe a model file without its weights."""
     if format_of(path) == CLASSIFIER:
@@ -73,10 +78,15 @@ def _axis_facts(card: ModelCard | ClassifierCard) -> dict[str, str]:
 
 def _about(about: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
     for name, value in about.items():
-        label = f"{prefix}{name}".replace("_", " ")
+        stem, _, unit = name.rpartition("_")
+        unit = _UNITS.get(unit, "") if not isinstance(value, Mapping) else ""
+        words = (stem if unit else name).split("_")
+        label = prefix + " ".join(one.upper() if one in _ABBREVIATIONS else one for one in words)
         if isinstance(value, Mapping):
             yield from _about(value, f"{label}, ")
         elif isinstance(value, float):
-            yield label, f"{value:.4g}"
+            yield label, f"{value:.4g} {unit}".rstrip()
+        elif isinstance(value, bool):
+            yield label, "yes" if value else "no"
         elif value is not None and not isinstance(value, list | tuple):
             yield label, str(value)
