@@ -75,7 +75,7 @@ class Timebase:
     @property
     def words(self) -> str:
         """Number, length and rate of the frames: ``450 frames, 15.000 s, 30.00 frames/s``."""
-        return f"{len(self)} frames, {self.pace}"
+        return f"{len(self)} frame{'s' * (len(self) != 1)}, {self.pace}"
 
     @property
     def pace(self) -> str:

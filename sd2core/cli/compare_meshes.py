@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.output import print_json, print_rows, progress_bar
+from sd2core.cli.output import counted, print_json, print_rows, progress_bar
 from sd2core.options.kinds import Words
 from sd2core.options.records import ARGUMENTS, OptionError
 from sd2core.options.shared import Figure, Json, MeshReading, Sensor
@@ -48,7 +48,8 @@ class CompareMeshes(Sensor, MeshReading, Figure, Json):
         super().__post_init__()
         labels = self.labels
         if len(labels) != len(self.meshes):
-            raise OptionError(f"{len(labels)} names for {len(self.meshes)} meshes", "one for each")
+            found = f"{counted(len(labels), 'name')} for {len(self.meshes)} meshes"
+            raise OptionError(found, "one for each")
         if len(set(labels)) != len(labels) or not all(labels):
             raise OptionError(
                 f"The labels are {', '.join(labels)}", "different ones", "Give other --names"
@@ -61,9 +62,12 @@ class CompareMeshes(Sensor, MeshReading, Figure, Json):
         """What the meshes are called."""
         if self.names is not None:
             return list(self.names)
+        folders = [path.parent for path in self.meshes]
         labels = [
-            path.parent.name if path.name in _OWN_NAMES and path.parent.name else path.stem
-            for path in self.meshes
+            folder.name or path.stem
+            if path.name in _OWN_NAMES and folders.count(folder) == 1
+            else path.stem
+            for path, folder in zip(self.meshes, folders, strict=True)
         ]
         return [
             label if labels.count(label) == 1 else str(path)

@@ -41,6 +41,7 @@ def _denoise(options: Denoise) -> None:
     from sd2core.cli.info.model import model_words
     from sd2core.denoise.files import default_name, describe_model, find_model, load_model
     from sd2core.denoise.resample_to_model import check_map
+    from sd2core.files.texts import errors_in
     from sd2core.io.kinds import kind_of
     from sd2core.maps import DopplerMap
 
@@ -57,7 +58,8 @@ def _denoise(options: Denoise) -> None:
     path = find_model(options.model or default_name(limbs=limbs))
     # Before torch is loaded, which takes seconds.
     card = describe_model(path)
-    check_map(doppler, card)
+    with errors_in(options.map):
+        check_map(doppler, card)
     texture = None if options.texture is None else card.needed_texture()
     with progress_bar("Denoising") as progress:
         denoised = load_model(path).denoise(doppler, progress)

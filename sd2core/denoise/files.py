@@ -110,7 +110,9 @@ def find_model(model: Path | str) -> Path:
     if path.is_file():
         return path
     if path.is_dir():
-        raise Sd2Error(f"The model {path} is a folder", _EXPECTED)
+        inside = sorted(path.glob(f"*{SUFFIX}"))
+        remedy = f"It holds {inside[0]}" if inside else ""
+        raise Sd2Error(f"The model {path} is a folder", _EXPECTED, remedy)
     if path.name != str(model) or path.suffix == SUFFIX:
         raise Sd2Error(f"The model file {path} does not exist", _EXPECTED, "Check the path")
     files = _known_files()

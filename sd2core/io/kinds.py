@@ -133,10 +133,11 @@ def _kind_of_folder(folder: Path) -> Kind:
     kind, faults = _kind_by_plug_ins(folder)
     if kind is not None:
         return kind
+    models = sorted(folder.glob("*.safetensors"))
     raise Sd2Error(
         f"The folder {folder} holds nothing that is known",
         "recording.json, zarr.json, radar.npy, or .obj/.ply/.glb files",
-        faults,
+        f"Of the model in it: `sd2 info {models[0]}`" if models else faults,
     )
 
 

@@ -192,8 +192,8 @@ def build_index(path: Path, progress: Progress = silent) -> FrameIndex:
                 missing = int(places[-1]) + 1 - len(places)
                 claimed = claimed or round(seconds * rate)
         notes += _notes_on_gaps(times_s, missing, even=grid is not None)
-        if grid is None:
-            notes += _note_on_end(times_s, seconds)
+        if grid is None or len(keys) == 1:
+            notes += _note_on_end(times_s, seconds, 1 / (rates[0] if rates else 30.0))
     if claimed > len(keys):
         cut = claimed > len(keys) + missing
         notes.append(
@@ -330,8 +330,11 @@ def _notes_on_gaps(times_s: NDArray[np.float64], missing: int, *, even: bool) ->
     return [f"No frame is shown {where}: {why}"]
 
 
-def _note_on_end(times_s: NDArray[np.float64], claimed_s: float) -> list[str]:
-    if len(times_s) < 2 or claimed_s < times_s[-1] + _LONG_STEP * np.median(np.diff(times_s)):
+def _note_on_end(
+    times_s: NDArray[np.float64], claimed_s: float, stated_step_s: float
+) -> list[str]:
+    step_s = np.median(np.diff(times_s)) if len(times_s) > 1 else stated_step_s
+    if claimed_s < times_s[-1] + _LONG_STEP * step_s:
         return []
     return [
         f"The file claims to last {claimed_s:.1f} s; its last frame that decodes is at"

@@ -184,6 +184,7 @@ def _apply(options: Apply) -> None:
     from sd2core.classify.spans import SpanOptions, predicted_spans
     from sd2core.denoise.resample_to_model import check_bins
     from sd2core.files.atomic import atomic_write
+    from sd2core.files.texts import errors_in
 
     if options.out is not None:
         check_label_output(options.out)
@@ -191,7 +192,8 @@ def _apply(options: Apply) -> None:
     card = describe_classifier(options.classifier)
     doppler, clock = map_and_clock(options, card.axis)
     # Before torch is loaded, which takes seconds.
-    check_bins(doppler, card)
+    with errors_in(options.map):
+        check_bins(doppler, card)
     with progress_bar("Classifying") as progress:
         probabilities = load_classifier(options.classifier).probabilities(doppler, progress)
     spans = predicted_spans(

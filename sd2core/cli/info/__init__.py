@@ -52,7 +52,7 @@ def _info(options: Info) -> None:
     sd2 info walk.zarr --verify
     """
     if not options.verify:
-        show(describe(options.path, options), as_json=options.json)
+        show(describe(_installed(options.path), options), as_json=options.json)
         return
     from sd2core.io.kinds import kind_of
 
@@ -61,6 +61,18 @@ def _info(options: Info) -> None:
     description.data["verified"] = verified
     description.facts["verified"] = in_words(verified)
     show(description, as_json=options.json)
+
+
+def _installed(path: Path) -> Path:
+    """File of an installed denoiser that is named in place of a file."""
+    from sd2core.denoise.files import find_model
+
+    if path.exists() or len(path.parts) != 1 or path.suffix:
+        return path
+    try:
+        return find_model(path.name)
+    except Sd2Error:
+        return path
 
 
 def describe(path: Path, options: MeshReading) -> Description:

@@ -30,7 +30,7 @@ class Convert(LabelFile, Overwrite, Json):
     out : FILE
         the file to write
     to : NAME
-        the format of --out, by a name as of --format
+        the format of --out, by a name as of --format; subtitles and label-studio are only read
     """
 
     out: Path

@@ -257,7 +257,7 @@ def write(
     if file_format is None and path.suffix.lower() == ".json":
         files.write_labels(path, labels, timebase=timebase)
         return []
-    clock = needed(timebase, f"A file {path.suffix or path.name}")
+    clock = needed(timebase, str(path))
     return [str(loss) for loss in write_labels(path, labels, clock, file_format)]
 
 

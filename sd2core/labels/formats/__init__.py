@@ -314,6 +314,8 @@ def format_for(path: Path, *, writing: bool) -> LabelFormat:
     if not fitting:
         fitting = [one for one in _plugged_formats() if suffix in one.suffixes]
         by_name = True  # There is no looking into a file for them.
+    if not fitting and path.is_dir():
+        raise Sd2Error(f"{path} is a folder", "a recording, or a file with labels")
     if not fitting:
         usable = all_formats() if writing else readable_formats()
         known = ", ".join(dict.fromkeys(end for one in usable for end in one.suffixes))

@@ -4,6 +4,7 @@ RFC 4180, in UTF-8 without a byte order mark, with these columns::
 
     id,track,overlap,label,start_s,end_s,first_frame,last_frame,frames,note,author,confidence,origin,person
 
+In a ``.tsv`` tabs stand between them.
 ``first_frame`` is the frame shown at ``start_s``, counted from 0, ``last_frame`` the last one of
 the span, and ``frames`` their number; a span outside the video has none. Seconds are exact, and
 are what counts when a file has both. ``end_frame``, in tables of before, is the first one after
@@ -98,8 +99,9 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     held, replaced = hold_texts(labels, _BANNED, FORMAT.title)
     text = io.StringIO(newline="")
     # Texts in quotes keep the spaces around them, whoever reads them.
-    writer = csv.writer(text, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n")
-    text.write(",".join(COLUMNS) + "\n")
+    mark = "\t" if path.suffix.lower() == ".tsv" else ","
+    writer = csv.writer(text, delimiter=mark, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n")
+    text.write(mark.join(COLUMNS) + "\n")
     # Track by track, so that their order comes back.
     by_track = ((track, span) for track in held.tracks for span in held.of_track(track.name))
     for track, span in by_track:

@@ -62,7 +62,7 @@ def test_a_mesh_that_does_not_say_its_rate(
 @pytest.mark.parametrize(
     ("arguments", "found"),
     [
-        (("--names", "one"), "1 names for 2 meshes"),
+        (("--names", "one"), "1 name for 2 meshes"),
         (("--names", "one,one"), "one, one"),
         (("--reference", "third"), "'third'"),
         (("--figure", "pair.bmp"), "pair.bmp"),

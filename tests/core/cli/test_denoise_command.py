@@ -140,3 +140,14 @@ def test_info(sd2: Sd2, model: Path) -> None:
     told = json.loads(sd2("info", model, "--json").out)
     assert told["kind"] == "model"
     assert told["about"]["metrics"]["mae_mps"] == 0.123456
+
+
+def test_info_of_a_denoiser_by_its_name_and_in_its_run(sd2: Sd2, model: Path) -> None:
+    told = sd2("info", "denoiser")
+    assert told.code == 0
+    assert "denoiser.safetensors" in told.out
+    assert "denoiser-nobodys does not exist" in sd2("info", "denoiser-nobodys").err
+    (model.parent / "run").mkdir()
+    inside = model.rename(model.parent / "run" / "best.safetensors")
+    assert f"`sd2 info {inside}`" in sd2("info", inside.parent).err
+    assert "metrics, MAE 0.1235 m/s" in " ".join(sd2("info", inside).out.split())

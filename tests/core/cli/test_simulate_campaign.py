@@ -27,7 +27,7 @@ def test_a_campaign_is_made_and_told(sd2: Sd2, tmp_path: Path) -> None:
     again = sd2("simulate", "campaign", "--out", out, *SHORT)
     assert again.code == 0
     assert "Made 0 takes" in again.out
-    assert "1 simulated takes of 1 people" in again.out
+    assert "1 simulated take of 1 person" in again.out
 
 
 @pytest.mark.parametrize(

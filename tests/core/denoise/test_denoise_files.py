@@ -156,6 +156,8 @@ def test_weights_of_another_program(tmp_path: Path) -> None:
 
 def test_a_folder_and_nothing(tmp_path: Path) -> None:
     refused(tmp_path, "is a folder")
+    (tmp_path / "best.safetensors").touch()
+    refused(tmp_path, r"It holds .*best\.safetensors")
     refused(tmp_path / "missing.safetensors", "does not exist")
 
 

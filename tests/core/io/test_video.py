@@ -221,6 +221,23 @@ def test_a_cut_uneven_video_says_how_long_it_should_last(tmp_path: Path) -> None
         )
 
 
+def test_a_video_cut_to_its_first_frame_says_how_long_it_should_last(tmp_path: Path) -> None:
+    path = write_video(tmp_path / "v.mkv", 90)
+    content = path.read_bytes()
+    with open_video(path) as reader:
+        assert reader.notes == ()
+    for share in range(1, 40):
+        path.write_bytes(content[: share * len(content) // 40])
+        try:
+            with open_video(path) as reader:
+                notes, frames = reader.notes, len(reader)
+        except Sd2Error:
+            continue
+        break
+    assert frames == 1
+    assert notes == ("The file claims to last 3.0 s; its last frame that decodes is at 0.0 s.",)
+
+
 def test_a_late_start_is_no_claim_of_more_frames(tmp_path: Path) -> None:
     path = write_video(tmp_path / "v.mkv", 30, times_ms=[500 + round(k / 0.03) for k in range(30)])
     with open_video(path) as reader:

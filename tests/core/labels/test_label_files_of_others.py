@@ -102,6 +102,12 @@ def test_a_table_as_it_is_documented(tmp_path: Path) -> None:
         "note,author,confidence,origin,person\n"
         '7,"Gestures","exclusive","wave",0.5,1.5,5,14,10,"a ""b""","","","person",""\n'
     )
+    labels = Labels(spans=(Span(7, "Gestures", 0.5, 1.5, "wave", "a,\tb"),))
+    write_labels(tmp_path / "x.tsv", labels, TIMEBASE)
+    heading, row = (tmp_path / "x.tsv").read_text(encoding="utf-8").splitlines()
+    assert heading.split("\t")[:3] == ["id", "track", "overlap"]
+    assert row.startswith('7\t"Gestures"\t')
+    assert read_labels(tmp_path / "x.tsv", TIMEBASE).spans == labels.spans
 
 
 @pytest.mark.parametrize(
