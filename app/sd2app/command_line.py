@@ -13,7 +13,7 @@ from sd2app.displays import has_display, silent_displays
 from sd2app.plain_imports import plain_imports
 from sd2app.system_libraries import explain_missing, missing_libraries
 from sd2core.cli import build_parser, run
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import add_command, in_a_list
 from sd2core.cli.parser import COMMANDS
 from sd2core.errors import Sd2Error
 
@@ -39,7 +39,8 @@ def full_parser(typed: Sequence[str] = ()) -> argparse.ArgumentParser:
     parser, commands = build_parser(_EXAMPLES, typed)
     if typed[:1] in (["-h"], ["--help"]):
         for name, handler in (("open", _open), ("demo", _demo), ("doctor", _doctor)):
-            add_command(commands, name, handler=handler)
+            summary = str(handler.__doc__).partition("\n")[0]
+            commands.add_parser(name, help=in_a_list(summary), add_help=False)
     elif not typed or typed[0] not in COMMANDS:
         _add_window_commands(commands)
     return parser

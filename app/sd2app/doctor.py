@@ -181,7 +181,7 @@ def _gpu() -> Finding:
 def plug_in_findings() -> list[Finding]:
     """Find what other packages add, and what of it cannot be loaded."""
     from sd2core.classify.defaults import CLASSIFIERS
-    from sd2core.cli.parser import COMMAND_PLUG_INS
+    from sd2core.cli.added_commands import COMMAND_PLUG_INS
     from sd2core.denoise.registry import DENOISERS
     from sd2core.io.readers import MESH_FILES, RADAR_FILES
     from sd2core.labels.formats import LABEL_PLUG_INS

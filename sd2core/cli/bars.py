@@ -63,6 +63,4 @@ def bar(what: str, unit: str, total: int | None = None) -> AbstractContextManage
     from tqdm import tqdm
 
     form = None if unit else "{l_bar}{bar}| [{elapsed}<{remaining}]"
-    return tqdm(
-        desc=what, unit=unit, total=total, file=sys.stderr, leave=False, bar_format=form
-    )
+    return tqdm(desc=what, unit=unit, total=total, file=sys.stderr, leave=False, bar_format=form)

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import inspect
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import MISSING, dataclass
 from importlib import import_module
-from typing import Any, NamedTuple, NoReturn, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeAlias, TypeVar
 
 from sd2core.errors import Sd2Error
-from sd2core.files.tables import capitalised
-from sd2core.options.records import Group, Option, OptionRecord, typed_options
-from sd2core.options.shared import ReplacesMaps
 
-Record = TypeVar("Record", bound=OptionRecord)
+if TYPE_CHECKING:  # records take as long to load as all that `sd2 --help` needs
+    from sd2core.options.records import Group, Option, OptionRecord
+
+Record = TypeVar("Record", bound="OptionRecord")
 Handler = TypeVar("Handler", bound=Callable[[Any], int | None])
 Subcommands: TypeAlias = "argparse._SubParsersAction[Any]"
 """Where commands are added to a parser."""
@@ -62,6 +60,8 @@ class CommandParser(argparse.ArgumentParser):
 
 def add_options(parser: argparse._ActionsContainer, kind: type[OptionRecord]) -> None:
     """Add the options of a record to a parser, under their headings."""
+    from sd2core.options.records import typed_options
+
     groups: dict[Group | None, argparse._ActionsContainer] = {None: parser}
     exclusive: dict[str, argparse._ActionsContainer] = {}
     for option in typed_options(kind):
@@ -85,6 +85,8 @@ def _names(option: Option) -> tuple[str, ...]:
 
 def _keywords(option: Option) -> dict[str, Any]:
     """How argparse wants to know an option; in a section what is not typed is None."""
+    from dataclasses import MISSING
+
     place, required, words = option.place, option.default is MISSING, option.words
     if "{radars}" in words:
         from sd2core.radar_profiles import RADARS
@@ -111,7 +113,6 @@ def _keywords(option: Option) -> dict[str, Any]:
     return about
 
 
-@dataclass(frozen=True)
 class AddedCommand:
     """A command of ``sd2`` that another package adds.
 
@@ -123,13 +124,13 @@ class AddedCommand:
         Takes a record of them, and may return an exit code; its docstring is the help.
     """
 
-    options: type[OptionRecord]
-    run: Callable[[Any], int | None]
+    def __init__(self, options: type[OptionRecord], run: Callable[[Any], int | None]) -> None:
+        from sd2core.options.records import OptionRecord
 
-    def __post_init__(self) -> None:
-        if not (isinstance(self.options, type) and issubclass(self.options, OptionRecord)):
-            raise Sd2Error(f"The options of a command are {self.options!r}", "an OptionRecord")
-        add_options(CommandParser(), self.options)  # fails here, and not where all are listed
+        if not (isinstance(options, type) and issubclass(options, OptionRecord)):
+            raise Sd2Error(f"The options of a command are {options!r}", "an OptionRecord")
+        add_options(CommandParser(), options)  # fails here, and not where all are listed
+        self.options, self.run = options, run
 
 
 class Command(NamedTuple):
@@ -157,6 +158,8 @@ def record_of(typed: argparse.Namespace) -> Any:
     """Make the record of the command that was typed."""
     if "record" not in typed:
         return typed
+    from sd2core.options.records import typed_options
+
     kind: type[OptionRecord] = typed.record
     values: dict[str, Any] = {}
     for option in typed_options(kind):
@@ -206,6 +209,11 @@ def add_declared(commands: Subcommands, *modules: str) -> None:
             add(commands)
 
 
+def in_a_list(sentence: str) -> str:
+    """A sentence as a list of commands has it: with a small letter, and no full stop."""
+    return f"{sentence[0].lower()}{sentence[1:].removesuffix('.')}"
+
+
 def add_command(
     commands: Subcommands,
     name: str,
@@ -235,10 +243,15 @@ def add_command(
     description : str
         Text below the summary; that of the docstring follows it.
     """
+    import inspect
+
+    from sd2core.files.tables import capitalised
+    from sd2core.options.shared import ReplacesMaps
+
     text, *lines = re.split(r"\n+ *(?=sd2 )", inspect.getdoc(about or handler) or f"{name}.")
     examples = "\n".join(f"  {line}" for line in lines)
     summary, _, own = text.partition("\n\n")
-    summary = f"{summary[0].lower()}{summary[1:].removesuffix('.')}"
+    summary = in_a_list(summary)
     description = "\n\n".join(filter(None, (description, own)))
     text = f"{capitalised(summary)}."
     parser: CommandParser = commands.add_parser(

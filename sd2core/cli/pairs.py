@@ -189,7 +189,9 @@ def _label(options: Label) -> None:
     if options.json:
         print_json({"pairs": str(options.pairs), "frames_of_label": counts})
         return
-    print_facts(str(options.pairs), {name: counted(count, "frame") for name, count in counts.items()})
+    print_facts(
+        str(options.pairs), {name: counted(count, "frame") for name, count in counts.items()}
+    )
 
 
 def _choices(options: Mars) -> MarsChoices:

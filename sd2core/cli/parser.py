@@ -5,10 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from sd2core.cli.command_parser import AddedCommand, CommandParser, add_command, add_declared
-from sd2core.errors import Sd2Error
-from sd2core.options.records import OptionRecord
-from sd2core.plug_ins import Group, PlugIn
+from sd2core.cli.command_parser import CommandParser, add_declared
 from sd2core.version import __version__
 
 _DESCRIPTION = """\
@@ -81,9 +78,6 @@ COMMANDS = {
 WINDOW_COMMANDS = ("open", "demo", "doctor")
 """Commands that are not the library's; whoever calls :func:`build_parser` adds them."""
 
-COMMAND_PLUG_INS = Group("commands", AddedCommand, (*COMMANDS, *WINDOW_COMMANDS))
-"""Commands of other packages."""
-
 _MODULE_OF = {
     **dict.fromkeys(("import", "set", "relink"), "importing"),
     **dict.fromkeys(("warm-up", "fetch-models"), "preparing"),
@@ -116,41 +110,17 @@ def build_parser(
         return parser, commands
     if name in WINDOW_COMMANDS:
         return parser, commands
-    plug_in = None if name in COMMANDS else COMMAND_PLUG_INS.find(name)
-    if plug_in is not None:
-        _add_named(commands, plug_in)
+    if name in COMMANDS:
+        add_declared(commands, _module_of(name))
         return parser, commands
-    wanted = [name] if name in COMMANDS else COMMANDS
-    modules = (_MODULE_OF.get(one, one.replace("-", "_")) for one in wanted)
-    add_declared(commands, *dict.fromkeys(modules))
-    if name not in COMMANDS and not name.startswith("-"):
-        # Those that can be used; `sd2 doctor` names the others.
-        for usable, added in COMMAND_PLUG_INS.loaded():
-            if isinstance(added, AddedCommand):
-                _add(commands, usable, added)
+    from sd2core.cli.added_commands import add_named, add_usable
+
+    if not add_named(commands, name):
+        add_declared(commands, *dict.fromkeys(map(_module_of, COMMANDS)))
+        if not name.startswith("-"):
+            add_usable(commands)
     return parser, commands
 
 
-def _add_named(commands: argparse._SubParsersAction, plug_in: PlugIn[AddedCommand]) -> None:
-    """Add a command that is typed; one that cannot be used says why, whatever follows it."""
-    try:
-        _add(commands, plug_in, plug_in.load())
-    except Sd2Error as error:
-        refusal = error
-
-        def refuse(options: argparse.Namespace) -> int:
-            raise refusal
-
-        # No word that follows begins with this, so that none is an option.
-        refused = commands.add_parser(plug_in.name, prefix_chars="\0", add_help=False)
-        refused.add_argument("words", nargs="*")
-        refused.set_defaults(handler=refuse)
-
-
-def _add(
-    commands: argparse._SubParsersAction, plug_in: PlugIn[AddedCommand], command: AddedCommand
-) -> None:
-    def handler(options: OptionRecord) -> int | None:
-        return plug_in.use(lambda made: made.run(options), int | None)
-
-    add_command(commands, plug_in.name, options=command.options, handler=handler, about=command.run)
+def _module_of(command: str) -> str:
+    return _MODULE_OF.get(command, command.replace("-", "_"))

@@ -370,6 +370,7 @@ def _campaign(options: SimulateCampaign) -> None:
         )
     pairs = read_pairs(options.out)
     first = pairs.placements(first_only=True)
+    minutes = first.frames / first.frame_rate_hz / 60.0
     if options.json:
         print_json(
             {
@@ -380,7 +381,7 @@ def _campaign(options: SimulateCampaign) -> None:
                 "takes": len(pairs.takes),
                 "made": made,
                 "frames": pairs.frames,
-                "minutes": first.frames / first.frame_rate_hz / 60.0,
+                "minutes": minutes,
                 "placements": options.sensors,
                 "labels": list(pairs.labels),
             }
@@ -389,6 +390,6 @@ def _campaign(options: SimulateCampaign) -> None:
     print(
         f"Made {counted(made, 'take')}: {options.out} holds"
         f" {counted(len(first.takes), 'simulated take')} of"
-        f" {counted(len(pairs.subjects), 'person', 'people')}, {first.frames / first.frame_rate_hz / 60.0:.1f} minutes"
+        f" {counted(len(pairs.subjects), 'person', 'people')}, {minutes:.1f} minutes"
         + (f", each from {options.sensors} places" if options.sensors > 1 else "")
     )

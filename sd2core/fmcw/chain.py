@@ -261,7 +261,7 @@ def _gates(config: RadarConfig, options: ProcessingOptions) -> slice:
             f" {len(_COSINES[options.window])} hold the transmitter's own leakage",
             f"ranges between {len(_COSINES[options.window]) * step_m:.3g} m"
             f" and {config.range_max_m:.3g} m",
-            "Choose other ranges, or in Python window=\"none\" for a radar with very few samples",
+            'Choose other ranges, or in Python window="none" for a radar with very few samples',
         )
     return slice(first, end)
 

@@ -330,9 +330,7 @@ def _notes_on_gaps(times_s: NDArray[np.float64], missing: int, *, even: bool) ->
     return [f"No frame is shown {where}: {why}"]
 
 
-def _note_on_end(
-    times_s: NDArray[np.float64], claimed_s: float, stated_step_s: float
-) -> list[str]:
+def _note_on_end(times_s: NDArray[np.float64], claimed_s: float, stated_step_s: float) -> list[str]:
     step_s = np.median(np.diff(times_s)) if len(times_s) > 1 else stated_step_s
     if claimed_s < times_s[-1] + _LONG_STEP * step_s:
         return []

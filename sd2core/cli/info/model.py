@@ -15,7 +15,6 @@ from sd2core.denoise.files import describe_model
 from sd2core.denoise.registry import MODELS, summary
 from sd2core.denoise.weights import format_of
 
-
 _UNITS = {"mps": "m/s", "s": "s", "hz": "Hz", "m": "m"}
 """Units, by how names of values end."""
 _ABBREVIATIONS = ("mae", "rmse", "ssm")
