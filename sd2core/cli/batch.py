@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,7 +22,6 @@ from sd2core.errors import Sd2Error
 from sd2core.options.kinds import Count
 from sd2core.options.records import ARGUMENT, OptionError, Place
 from sd2core.options.shared import JsonAndProgress
-from sd2core.processes import INTERRUPTED
 
 if TYPE_CHECKING:
     from sd2core.batch.estimate import BatchEstimate
@@ -120,6 +118,8 @@ def _run(plan: BatchPlan, options: Batch) -> int:
     elif not options.progress_json:
         _print_end(plan, end)
     if end.interrupted:
+        from sd2core.processes import INTERRUPTED
+
         return INTERRUPTED
     return 1 if end.failed else 0
 
@@ -169,6 +169,8 @@ def _print_end(plan: BatchPlan, end: BatchEnd) -> None:
     )
     if not end.failed:
         return
+    import json
+
     print(f"  {counted(end.failed, 'task')} cannot be done:")
     report = json.loads(Path(facts["report"]).read_text(encoding="utf-8"))
     for failure in report["failures"][:_LISTED_FAILURES]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
@@ -24,6 +25,18 @@ _DECLARED: dict[str, list[Callable[[Subcommands], object]]] = {}
 
 class UsageError(Sd2Error):
     """A command line that cannot be understood."""
+
+
+class HelpFormatter(argparse.RawDescriptionHelpFormatter):
+    """Help as wide as the terminal, which is found without what argparse loads for it."""
+
+    def __init__(self, prog: str) -> None:
+        try:
+            asked = int(os.environ.get("COLUMNS", "0"))
+            columns = asked or os.get_terminal_size().columns
+        except (ValueError, OSError):  # no number; no terminal
+            columns = 0
+        super().__init__(prog, width=(columns or 80) - 2)
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -259,7 +272,7 @@ def add_command(
         help=summary,
         description=f"{text}\n\n{description}".strip(),
         epilog=f"examples:\n{examples}" if examples else None,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=HelpFormatter,
     )
     if options is not None:
         add_options(parser, options)

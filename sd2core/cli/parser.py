@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from sd2core.cli.command_parser import CommandParser, add_declared
+from sd2core.cli.command_parser import CommandParser, HelpFormatter, add_declared
 from sd2core.version import __version__
 
 _DESCRIPTION = """\
@@ -99,7 +99,7 @@ def build_parser(
         prog="sd2",
         description=_DESCRIPTION,
         epilog=_EPILOG.format(examples),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=HelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"SD² Studio {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)

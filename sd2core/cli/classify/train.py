@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -19,7 +17,6 @@ from sd2core.options.bounds import LEARNING_RATE, SEED, STEPS
 from sd2core.options.kinds import Count, Typed
 from sd2core.options.records import Group, OptionRecord, Place, given
 from sd2core.options.shared import JsonAndProgress, KeptOut, Overwrite
-from sd2core.processes import INTERRUPTED
 
 if TYPE_CHECKING:
     from sd2core.classify.training import TrainOptions, Watch
@@ -90,14 +87,18 @@ def _train(options: Train) -> int:
       sd2 classify train set.zarr --maps radar,denoised --out both.safetensors
       sd2 classify train anna=a.sd2 anna=b.sd2 ben=c.sd2 --model s4 --out own.safetensors
     """
-    maps = parsed_maps(options.maps)
+    import json
+    import shlex
+
     from sd2core.classify.defaults import pace_kind
     from sd2core.classify.files import save_classifier
     from sd2core.classify.splitting import split_clips
     from sd2core.classify.training import train
     from sd2core.files.atomic import atomic_write_text
+    from sd2core.processes import INTERRUPTED
     from sd2core.runs.pace import Throughput
 
+    maps = parsed_maps(options.maps)
     known = clips_of(options.data, maps, options.denoiser)
     parts = split_clips(
         known,
