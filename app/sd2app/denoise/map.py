@@ -357,9 +357,10 @@ class DenoisedMap(BackgroundModel):
     def _end(self) -> None:
         """Everything is denoised: say which frames the model passes through."""
         self._report(0)
-        if (shown := self.track.map) is not None and self.track.key is not None:
+        shown, key = self.track.map, self.track.key
+        if shown is not None and key is not None and self._results.get(key) is None:
             kept = replace(shown, values=shown.values.copy())
-            self._results.put(self.track.key, kept, kept.values.nbytes)
+            self._results.put(key, kept, kept.values.nbytes)
         source, movements = self._synthetic.map, self._movements
         if source is not None and movements is not None:
             passed = int(movements.strange(source.values.T, source.axis).sum())
