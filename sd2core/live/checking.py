@@ -35,6 +35,9 @@ _LIKENESS = 0.5
 """Correlation from which two series are alike. Ten seconds of movements slower than 1 Hz are
 twenty independent values, whose correlation exceeds it by chance once in forty."""
 _CLOCK_S = 0.2
+_LEAST_WALK_M = 0.5
+"""Change of distance from which somebody walked. Of one who stands and swings the arms, what moves
+in the picture grows and shrinks for other reasons than its distance."""
 
 
 class Seen(NamedTuple):
@@ -236,15 +239,19 @@ def _agreement(seen: Sequence[Seen], moved: Sequence[Moved]) -> Answer:
     )
     numbers = {"correlation": likeness, "video_late_s": lag_s}
     value = f"correlation {likeness:.2f}".replace("-", "−")
-    if abs(likeness) < _LIKENESS:
+    far_m = np.array([one.distance_m for one in seen])
+    far_m = far_m[np.isfinite(far_m)]
+    walked = not far_m.size or np.ptp(np.quantile(far_m, [0.05, 0.95])) >= _LEAST_WALK_M
+    if abs(likeness) < _LIKENESS or (likeness < 0 and not walked):
+        needed = f"{_LIKENESS:g} is needed" if walked else "nobody comes nearer or goes away"
         words = (
-            f"Radar and video cannot be compared ({value}; {_LIKENESS:g} is needed): walk towards"
-            " both, and away again, a few times."
+            f"Radar and video cannot be compared ({value}; {needed}): walk towards both, and away"
+            " again, a few times."
         )
     elif likeness < 0:
         words = (
             f"The radar's sign is wrong: what it sees come nearer shrinks in the video ({value})."
-            " Set the sign of the radar, or swap I and Q."
+            " If both saw the same walk, set the sign of the radar, or swap I and Q."
         )
     else:
         order = "after" if lag_s > 0 else "before"

@@ -152,6 +152,15 @@ def test_a_swapped_sign(walked: tuple[list[Seen], list[Moved]]) -> None:
     assert said["agreement"].startswith("The radar's sign is wrong")
 
 
+def test_of_who_stands_and_swings_the_arms_no_sign_is_said(
+    walked: tuple[list[Seen], list[Moved]],
+) -> None:
+    stands = [one._replace(distance_m=1.5 + 0.1 * one.velocity_mps) for one in radar_sees(sign=-1)]
+    said = failures(stands, walked[1])
+    assert "cannot be compared" in said["agreement"]
+    assert "nobody comes nearer" in said["agreement"]
+
+
 def test_a_late_video(walked: tuple[list[Seen], list[Moved]]) -> None:
     findings = found(walked[0], camera_sees(late_s=0.36))
     (wrong,) = (one for one in findings.values() if not one.passed)
