@@ -194,7 +194,7 @@ def clips_of_map(
     """
     own_hz = doppler.timebase.frames_per_s
     rate_hz = frame_rate_hz or own_hz
-    if not 1 / matching.MAX_RESAMPLED <= rate_hz / own_hz <= matching.MAX_RESAMPLED:
+    if not matching.can_resample(own_hz, rate_hz):
         raise Sd2Error(
             f"{subject}/{movement}: the {doppler.kind} map has {own_hz:.4g} frames/s",
             f"{rate_hz:.4g} as the other maps, or up to {matching.MAX_RESAMPLED:g} times more or"

@@ -60,6 +60,11 @@ _BREAK_FRAMES = 5.0
 """Number of missing frames after which a new clip begins."""
 
 
+def can_resample(from_hz: float, to_hz: float) -> bool:
+    """True if one frame rate is at most :data:`MAX_RESAMPLED` times the other, but for rounding."""
+    return max(from_hz / to_hz, to_hz / from_hz) <= MAX_RESAMPLED * (1.0 + 1e-6)
+
+
 def check_map(doppler: DopplerMap, card: ModelCard) -> None:
     """Raise Sd2Error for a map that is not synthetic or does not fit the model."""
     model = f"the model {card.title or card.name}"
@@ -113,8 +118,7 @@ def check_bins(doppler: DopplerMap, card: Card) -> None:
             f"Make it with `sd2 synth --null-bins {wanted}`",
         )
     rate_hz = doppler.timebase.frames_per_s
-    factor = rate_hz / card.frame_rate_hz
-    if len(doppler.timebase) > 1 and not 1 / MAX_RESAMPLED <= factor <= MAX_RESAMPLED:
+    if len(doppler.timebase) > 1 and not can_resample(rate_hz, card.frame_rate_hz):
         raise Sd2Error(
             f"The map has {rate_hz:.4g} frames/s",
             f"{card.frame_rate_hz:g} frames/s, for {model}, or up to {MAX_RESAMPLED:g} times"

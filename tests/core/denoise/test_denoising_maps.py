@@ -276,6 +276,11 @@ class TestFrameRates:
         denoised = trained("gru").denoise(synthetic_map(energies(80), timebase=Timebase(times_s)))
         assert any("interpolated" in note for note in denoised.meta["notes"])
 
+    @pytest.mark.parametrize("rate_hz", [120.0, 7.5])
+    def test_four_times_more_or_less_is_not_far(self, rate_hz: float) -> None:
+        timebase = Timebase(np.arange(90) / rate_hz)  # whose rate is rounded to either side
+        assert trained("gru").denoise(synthetic_map(energies(90), timebase=timebase)).values.any()
+
     def test_far_from_it_is_refused(self) -> None:
         with pytest.raises(Sd2Error, match="5 frames/s"):
             trained("gru").denoise(synthetic_map(energies(20), 5.0))
