@@ -9,6 +9,7 @@ import re
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import is_dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -280,3 +281,36 @@ def _is_deep(content: Any) -> bool:
         if not level:
             return False
     return True
+
+
+def first_difference(before: Any, now: Any, name: str = "") -> tuple[str, str, str]:
+    """Name the first part in which two values differ, and say both there in words.
+
+    Parameters
+    ----------
+    before, now : object
+        Mappings, records or lists are gone into; both are of one kind, and differ.
+    name : str
+        Of the whole, before that of the part.
+
+    Examples
+    --------
+    >>> first_difference({"radar": {"chirps": 64}, "seed": 0}, {"radar": {"chirps": 32}, "seed": 0})
+    ('radar chirps', '64', '32')
+    """
+    first, second = (vars(one) if is_dataclass(one) else one for one in (before, now))
+    if isinstance(first, Mapping) and isinstance(second, Mapping):
+        keys = {**first, **second}
+        key = next(key for key in keys if first.get(key) != second.get(key))
+        inside = f"{name} {key}".strip().replace("_", " ")
+        return first_difference(first.get(key), second.get(key), inside)
+    return name, _in_words(before), _in_words(now)
+
+
+def _in_words(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        value = ", ".join(map(str, value))
+    elif isinstance(value, bool):
+        value = "yes" if value else "no"
+    text = "none" if value is None or value == "" else str(value)
+    return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}…"

@@ -14,6 +14,7 @@ from sd2core.files.appended import AppendedFile
 from sd2core.files.atomic import atomic_write_text, full_disk_named
 from sd2core.files.lock import FileLock
 from sd2core.files.recording_json import FILE_NAME
+from sd2core.files.texts import first_difference
 from sd2core.io.radar.growing import (
     ENTRY,
     HEAD_NAME,
@@ -102,10 +103,11 @@ class GrowingRecording:
         for name in ("radar", "word", "full_scale_known", "simulated", "replayed"):
             existing, given = getattr(self._head, name), getattr(head, name)
             if existing != given:
-                message = f"{name} of {self.folder} is {existing}"
+                what, before, now = first_difference(existing, given, name)
+                message = f"{name} of {self.folder} is {before}"
                 if name == "radar":
-                    message = f"{self.folder} is of another radar or configuration: {existing}"
-                raise Sd2Error(message, f"to continue it, {given}", "Give another folder as --out")
+                    message = f"{self.folder} is of another radar or configuration: {what} {before}"
+                raise Sd2Error(message, f"to continue it, {now}", "Give another folder as --out")
 
     def time_of(self, time_s: float, head: GrowingHead) -> float:
         """Time in the recording of a frame of this session, see :meth:`append`.

@@ -26,7 +26,7 @@ from sd2core.files.stores import (
     growing,
     open_group,
 )
-from sd2core.files.texts import append_lines, drop_torn_line
+from sd2core.files.texts import append_lines, drop_torn_line, first_difference
 from sd2core.maps import LimbMaps, joints_of
 from sd2core.pairs.rows import check_array, check_labels, kept_parts, read_rows, row_kinds
 from sd2core.pairs.summary import (
@@ -387,9 +387,10 @@ def _reopened(path: Path, header: dict[str, Any]) -> Any:
     attributes["labels"] = attributes.get("labels", [])[: len(header["labels"])]
     for name, value in header.items():
         if attributes.get(name, []) != value:
+            what, before, now = first_difference(attributes.get(name), value, name)
             raise Sd2Error(
-                f"{path} was begun with {name} {attributes.get(name)}",
-                f"{value}, as it is asked for now",
+                f"{path} was begun with {what} {before}",
+                f"{now}, as it is asked for now",
                 "Go on with the same settings, or choose another folder",
             )
     return group
