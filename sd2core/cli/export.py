@@ -250,11 +250,12 @@ def _content(written: Written, sheet: Path) -> dict[str, Any]:
 def _print(written: Written, sheet: Path) -> None:
     content = _content(written, sheet)
     before = written.sources - written.added
+    was = "was" if before == 1 else "were"
     print_facts(
         str(written.path),
         {
             "segments": f"{written.segments:,} of {counted(written.sources, 'source')}"
-            + (f", of which {before:,} were there already" if before else ""),
+            + (f", of which {before:,} {was} there already" if before else ""),
             "card": content["card"],
             "sheet": content["sheet"],
         },

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,11 @@ from sd2core.datasets.layout import SPLITS, Header
 from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS
 from sd2core.datasets.splitting import RULE, named_splits, reassigned, split_people
+from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_json, atomic_write_text
 from sd2core.files.stores import lost_in_words
 from sd2core.files.tables import counted
+from sd2core.files.texts import read_json
 from sd2core.mesh.vertex_parts import QUANTITIES
 from sd2core.numerics.map_accuracy import MapAccuracy
 
@@ -26,8 +29,19 @@ _MANY = 12
 
 
 def card_paths(path: Path) -> tuple[Path, Path, Path]:
-    """Paths of the Markdown card, the JSON card and the preview sheet beside a data set."""
-    return tuple(path.with_name(f"{path.stem}.{end}") for end in ("card.md", "card.json", "png"))  # type: ignore[return-value]
+    """Paths of the Markdown card, the JSON card and the preview sheet beside a data set.
+
+    They have its name without the ending: ``walk.card.md`` of ``walk.h5``; or with it, where those
+    are of another data set, or there is such a picture that is no sheet.
+    """
+    ends = ("card.md", "card.json", "png")
+    markdown, as_json, sheet = (path.with_name(f"{path.stem}.{end}") for end in ends)
+    of = "" if sheet.exists() else path.name
+    with suppress(OSError, Sd2Error, LookupError, TypeError):
+        of = str(read_json(as_json)["dataset"])
+    if of != path.name:
+        markdown, as_json, sheet = (path.with_name(f"{path.name}.{end}") for end in ends)
+    return markdown, as_json, sheet
 
 
 def write_card(path: Path) -> dict[str, Any]:

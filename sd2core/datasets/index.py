@@ -10,8 +10,9 @@ from sd2core.datasets.cutting import count_spans
 from sd2core.datasets.layout import Header
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import Source
-from sd2core.denoise.resample_to_model import MAX_RESAMPLED
+from sd2core.denoise.resample_to_model import MAX_RESAMPLED, can_resample
 from sd2core.errors import Sd2Error
+from sd2core.files.texts import first_difference
 from sd2core.labels.per_frame import BACKGROUND
 from sd2core.maps import DopplerMap, joints_of
 from sd2core.mesh.vertex_parts import KINEMATICS
@@ -139,8 +140,7 @@ def check_fits(source: Source, header: Header) -> None:
                 "Export with --null-bins that name them, or make the maps again",
             )
     rate_hz = next(iter(source.maps.values())).timebase.frames_per_s
-    factor = rate_hz / header.frame_rate_hz
-    if len(source.times_s) > 1 and not 1 / MAX_RESAMPLED <= factor <= MAX_RESAMPLED:
+    if len(source.times_s) > 1 and not can_resample(rate_hz, header.frame_rate_hz):
         raise Sd2Error(
             f"{title} has {rate_hz:.4g} frames/s",
             f"{header.frame_rate_hz:g} frames/s, or up to {MAX_RESAMPLED:g} times more or less",
@@ -189,8 +189,9 @@ def refuse_other_settings(out: Path, header: Header, options: DatasetOptions) ->
         ("spans as", header.spans or "windows", options.spans or "windows"),
     ):
         if now is not None and before != now:
+            what, begun, asked = first_difference(before, now, what)
             raise Sd2Error(
-                f"{out} was begun with {what} {before}",
-                f"{now}, as it is asked for now",
+                f"{out} was begun with {what} {begun}",
+                f"{asked}, as it is asked for now",
                 "Go on with the same settings, or write another data set",
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable, Sized
+from collections.abc import Iterable, Sequence, Sized
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -131,6 +131,10 @@ class _Writer:
             refuse_other_settings(out, self._store.header, options)
 
     @property
+    def _kept_out(self) -> tuple[Sequence[str] | None, Sequence[str] | None]:
+        return self._options.validation, self._options.test
+
+    @property
     def empty(self) -> bool:
         """True if there is a store without a segment."""
         return self._store is not None and self._store.rows == 0
@@ -151,6 +155,9 @@ class _Writer:
     ) -> tuple[int, list[Failed], Sd2Error | None]:
         """Append all sources: number added, failures, and first error."""
         total = len(sources) if isinstance(sources, Sized) else 0
+        if isinstance(sources, Sequence) and sources:  # a wrong name of a person is known before the work
+            names = [*self._names.subjects, *(one.key.subject for one in sources)]
+            split_people(list(dict.fromkeys(names)), *self._kept_out)
         seen: set[SourceKey] = set()
         failed: list[Failed] = []
         first_error: Sd2Error | None = None
@@ -273,7 +280,7 @@ class _Writer:
 
     def _final(self, header: Header) -> Header:
         names = self._names
-        people = split_people(list(names.subjects), self._options.validation, self._options.test)
+        people = split_people(list(names.subjects), *self._kept_out)
         return replace(
             header,
             kinds=tuple(kind for kind in KINDS if kind in names.kinds),

@@ -18,8 +18,10 @@ import pytest
 from made_sources import AXIS, CLASSES, LABELS, source
 
 from sd2core.datasets import card, formats, store
+from sd2core.datasets.card import card_paths
 from sd2core.datasets.layout import SPLITS, row_shapes
 from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.preview import write_preview
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey
 from sd2core.datasets.writing import write_dataset
@@ -417,6 +419,31 @@ def test_data_sets_from_before_limb_maps_open_and_grow(
     assert "limbs" not in found
     for name, values in contents(whole(ending)).items():
         assert np.array_equal(values, found[name]), name
+
+
+def test_no_card_is_written_over_another_ones(tmp_path: Path) -> None:
+    picture = tmp_path / "walk.png"
+    picture.write_bytes(b"of a walk")
+    for name in ("set.zarr", "set.h5", "walk.npz"):
+        for _ in range(2):
+            write_dataset(tmp_path / name, [source()], OPTIONS)
+            write_preview(tmp_path / name)
+    cards = {
+        one.name: json.loads(one.read_text())["dataset"] for one in tmp_path.glob("*.card.json")
+    }
+    assert cards == {
+        "set.card.json": "set.zarr", "set.h5.card.json": "set.h5", "walk.npz.card.json": "walk.npz",
+    }  # fmt: skip
+    assert picture.read_bytes() == b"of a walk"
+    assert card_paths(tmp_path / "walk.npz")[2].stat().st_size > 1000
+
+
+def test_a_wrong_name_of_a_person_is_refused_before_the_work(tmp_path: Path) -> None:
+    options = replace(OPTIONS, validation=("bob",))
+    for name in ("set.zarr", "set.h5"):
+        with pytest.raises(Sd2Error, match="'bob' is to be a validation subject"):
+            write_dataset(tmp_path / name, several(), options)
+    assert not [*tmp_path.iterdir()]
 
 
 def test_null_bins_are_empty_in_all_kinds(tmp_path: Path) -> None:
