@@ -403,6 +403,11 @@ class DopplerMap:
         return MapAccuracy.of(self.meta)
 
     @property
+    def of_simulated(self) -> bool:
+        """True if its provenance says that no camera saw whom it is of."""
+        return self.meta.get("simulated") is True
+
+    @property
     def times_s(self) -> NDArray[np.float64]:
         """Time of every frame, shape (frames,)."""
         return self.timebase.times_s

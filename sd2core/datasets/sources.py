@@ -154,7 +154,11 @@ def map_source(path: Path, subject: str, label_file: Path | None = None) -> Lazy
             names,
             classes,
             None,
-            {"file": path.name, "labels": None if label_file is None else label_file.name},
+            {
+                "file": path.name,
+                "labels": None if label_file is None else label_file.name,
+                "simulated": doppler.of_simulated,
+            },
             spans=labelled_spans(labels, names),
         )
 
@@ -321,6 +325,7 @@ class _PairStore:
             {
                 "pairs": self.path.name,
                 "take": take.name,
+                "simulated": self.facts.of_simulated,
                 **self._scene(take),
                 **({"damaged_frames": int(lost.sum())} if lost.any() else {}),
             },

@@ -28,6 +28,8 @@ CHUNK = 512
 PIECE = 2048
 """Number that a model that looks both ways over any number of frames is given together."""
 
+_KEPT = ("sensor", "simulated")
+"""What the provenance of a denoised map has from the synthetic one."""
 _ROUND = 64
 _BATCH = 16
 _BLOCK = 16 * CHUNK
@@ -254,8 +256,7 @@ class TrainedDenoiser:
             "data": card.about.get("data"),
         }
         meta: dict[str, Any] = {"denoiser": about, "input": doppler.meta, "version": __version__}
-        if "sensor" in doppler.meta:
-            meta["sensor"] = doppler.meta["sensor"]
+        meta |= {name: doppler.meta[name] for name in _KEPT if name in doppler.meta}
         if notes:
             meta["notes"] = notes
         return meta

@@ -407,6 +407,7 @@ class Synthesizer:
                 "visibility": stretch.quality,
                 "mask_stride": 1 if unshared else options.mask_stride,
                 "source": self.mesh.source,
+                **({"simulated": True} if self.mesh.simulated else {}),
                 "version": __version__,
                 "visible_share": _rounded(stretch.visible_share),
                 "beyond_share": _rounded(stretch.beyond_share),

@@ -21,7 +21,12 @@ from sd2core.scattering.resampling import resample_mesh
 
 
 def load_scene(
-    path: Path | str, *, bodies: Iterable[Body] = (), called: str = "", **reading: Any
+    path: Path | str,
+    *,
+    bodies: Iterable[Body] = (),
+    called: str = "",
+    simulated: bool = False,
+    **reading: Any,
 ) -> MeshSequence:
     """Read a mesh, and the bodies that move beside it.
 
@@ -33,10 +38,13 @@ def load_scene(
         As for :func:`with_bodies`.
     called : str
         Name of the person whom the mesh is of.
+    simulated : bool
+        True if no camera saw it.
     **reading
         Arguments of :func:`sd2core.load_mesh`.
     """
-    return with_bodies(load_mesh(path, **reading), bodies, person=called)
+    mesh = replace(load_mesh(path, **reading), simulated=simulated)
+    return with_bodies(mesh, bodies, person=called)
 
 
 def with_bodies(

@@ -110,7 +110,8 @@ class ReplaySource(Source):
     @property
     def about(self) -> str:
         """Radar and file."""
-        return f"{self._capture.config.name}, replayed from {self._capture.source}"
+        simulated = " (simulated)" if self._capture.simulated else ""
+        return f"{self._capture.config.name}{simulated}, replayed from {self._capture.source}"
 
     def head(self, start_unix_s: float) -> GrowingHead:
         """Description of the frames."""

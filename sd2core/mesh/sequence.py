@@ -68,6 +68,8 @@ class MeshSequence:
         Name of the person in a scene of several.
     placed : Body, optional
         Where one of the others comes from, and how it was put there.
+    simulated : bool
+        True if it is known that no camera saw it.
 
     Examples
     --------
@@ -98,6 +100,7 @@ class MeshSequence:
     others: tuple[MeshSequence, ...] = ()
     person: str = ""
     placed: Body | None = None
+    simulated: bool = False
 
     def __post_init__(self) -> None:
         shape = tuple(self.vertices.shape)

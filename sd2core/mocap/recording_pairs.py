@@ -107,6 +107,7 @@ def make_recording_pairs(
                 labels=labels,
                 provenance={
                     "made_by": f"SD² Studio {__version__}",
+                    "simulated": all(one.simulated for one in opened),
                     "recordings": [one.folder.name for one in opened],
                     **({"radar_channels": channels} if any(channels) else {}),
                     **scenes_of(opened),

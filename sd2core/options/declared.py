@@ -119,6 +119,7 @@ class PairProvenance(_Record):
     """Provenance of pairs, as far as anything is done with it."""
 
     made_by: str = ""
+    simulated: bool = False
     protocol: _Protocol | None = None
     scenes: dict[str, list[str]] = {}
     frames_lost: dict[str, _Rows] = {}

@@ -88,6 +88,12 @@ class PairFacts(BaseModel):
     takes: tuple[TakeEntry, ...] = ()
 
     @property
+    def of_simulated(self) -> bool:
+        """True if no camera saw any of their people."""
+        stores = self.provenance.get("mixed", [self.provenance])
+        return all(one.get("simulated") is True for one in stores)
+
+    @property
     def has_limbs(self) -> bool:
         """True if the input is also split by the parts of the body."""
         return bool(self.parts)

@@ -519,6 +519,8 @@ class Recording:
 
         path = self._present("mesh")
         options = self.mesh_reading.options()
+        if self.simulated:
+            options["simulated"] = True
         if self.faces is not None:
             options["faces"] = self._present("faces")
         if self.things:

@@ -150,6 +150,8 @@ def conclusion(results: Results, findings: Sequence[Finding]) -> str:
             f"{'In' if parts else 'Nothing is certain: in'} {rest} of {len(own)} the difference may"
             " be chance."
         )
+    if results.kind == "simulated":
+        parts.append("The radar is simulated.")
     return " ".join(parts)
 
 
@@ -311,6 +313,7 @@ def draw_curve(results: Results) -> Figure:
     axes.set_xscale("log")
     axes.set_xticks([100.0 * one for one in given], [f"{one:.0%}" for one in given])
     axes.minorticks_off()
+    axes.set_xlim(100.0 * given[0] / 1.5, 100.0 * given[-1] * 1.5)  # wide even for one share
     axes.set(
         xlabel=f"share of the {results.kind} radar's data",
         ylabel="frames found (%), mean over people",

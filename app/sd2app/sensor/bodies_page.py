@@ -57,7 +57,7 @@ class BodiesPage(SceneList):
         if recording is None or recording.mesh is None:
             return
         reading = recording.mesh_options()
-        for name in ("faces", "things", "walls", "bodies", "called"):
+        for name in ("faces", "things", "walls", "bodies", "called", "simulated"):
             reading.pop(name, None)
         path = str(recording.mesh.absolute())
         faces = None if recording.faces is None else str(recording.faces.absolute())

@@ -326,7 +326,8 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         doppler.values, doppler.timebase.times_s, doppler.present, measured=doppler.kind == "real"
     )
     notes = (*doppler.meta.get("notes", ()), *map(str, unlikely))
-    return Description(f"Doppler map {path}", data, facts, notes)
+    simulated = " (of a simulated recording)" if doppler.of_simulated else ""
+    return Description(f"Doppler map {path}{simulated}", data, facts, notes)
 
 
 def _people(bodies: Any) -> str:

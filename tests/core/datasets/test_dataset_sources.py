@@ -232,6 +232,21 @@ def test_a_map_is_labelled_by_a_file(tmp_path: Path) -> None:
     assert not unlabelled.label.any()
 
 
+@pytest.mark.parametrize("simulated", [True, False])
+def test_what_is_made_of_a_simulated_recording_says_so(tmp_path: Path, simulated: bool) -> None:
+    one = recording(tmp_path / "anna.sd2")
+    one.simulated = simulated
+    one.save()
+    counted = Synthesizer(one.load_mesh(), PRESETS["paper"]).map(one.sensor)
+    counted.save(tmp_path / "map.npz")
+    load_model("denoiser").denoise(counted).save(tmp_path / "denoised.npz")
+    make_recording_pairs([one.folder], tmp_path / "pairs.zarr")
+    names = ("anna.sd2", "map.npz", "denoised.npz", "pairs.zarr")
+    sources = [source for name in names for source in made(tmp_path / name)]
+    assert len(sources) >= len(names)
+    assert {source.provenance["simulated"] for source in sources} == {simulated}
+
+
 def test_what_was_counted_is_what_is_written(tmp_path: Path) -> None:
     (tmp_path / "all").mkdir()
     for name in ("anna", "ben"):
