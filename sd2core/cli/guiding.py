@@ -24,7 +24,7 @@ from sd2core.live.prompting import label_take
 from sd2core.live.protocol import Protocol, Take
 from sd2core.live.session import Session
 from sd2core.live.videos import hide_person
-from sd2core.recording.recording import SUFFIX, is_recording, open_recording
+from sd2core.recording.recording import FILE_NAME, SUFFIX, is_recording, open_recording
 from sd2core.runs.control import stop_signals
 
 UNFINISHED = "unfinished"
@@ -55,6 +55,10 @@ def guide(
     """
     if not folder.parent.is_dir():
         raise Sd2Error(f"The folder {folder.parent} does not exist", "an existing folder")
+    if (folder / FILE_NAME).exists():
+        raise Sd2Error(
+            f"{folder} is a recording", "a folder for the takes of a session", "Give another --out"
+        )
     folder.mkdir(exist_ok=True)
     lock = FileLock(folder / _LOCK)
     if not lock.take():  # two would write over each other's takes, and what people agreed to

@@ -277,7 +277,7 @@ def _print_clocks(take: JointRecording, line: ClockLine, *, as_json: bool) -> No
         "clocks",
         {
             "pictures": f"{counted(filmed.recorded, 'frame')}{dropped}",
-            "radar": f"runs {line.drift_ppm:+.1f} millionths slow, arrivals ± "
+            "radar": f"slow by {line.drift_ppm:+.1f} millionths, arrivals ± "
             f"{1e3 * line.jitter_s:.1f} ms",
             "delays": "camera {:g} ms, radar {:.1f} ms".format(
                 *(1e3 * delay_s for delay_s in take.delays_s)

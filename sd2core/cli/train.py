@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.output import picked, print_facts, print_json, tell_lost
+from sd2core.cli.output import counted, picked, print_facts, print_json, tell_lost
 from sd2core.errors import Sd2Error
 from sd2core.options.training import DataConfig, Train, TrainConfig
 
@@ -159,6 +159,11 @@ def _say_ending(options: Train, run: Path, ending: Ending) -> int:
                 )
         if ending.model is not None:
             facts["model"] = str(ending.model)
+        if ending.early_after is not None:
+            facts["ended early"] = (
+                f"none of the last {counted(ending.early_after, 'epoch')} was better"
+                " (--early-stopping 0 trains on)"
+            )
         if ending.outcome == "stopped":
             facts["go on"] = f"sd2 train --resume {run}"
         print_facts(f"{run} has {_WORDS[ending.outcome]}", facts)

@@ -263,7 +263,15 @@ class _Opened:
         if bodies and self._simulates:
             rest = part_of(progress, counted_share, 1.0)
             maps["simulated"] = self._simulated_map(key.placement, rest)
+        there = tuple(maps)
         maps = {kind: one for kind, one in maps.items() if kind in wanted}
+        if there and not maps:
+            raise Sd2Error(
+                f"{self.recording.folder} has no {' or '.join(wanted)} map, but a"
+                f" {' and a '.join(there)} one",
+                "a recording with such a map",
+                f"Choose --kinds {','.join(there)}",
+            )
         maps = self._people.known(person, self._names, maps)
         times_s = next(iter(maps.values())).times_s
         channel = self.recording.channel_in_words

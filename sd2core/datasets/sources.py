@@ -27,6 +27,7 @@ from sd2core.datasets.source import (
 from sd2core.denoise.files import default_name, find_model
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
+from sd2core.files.tables import counted
 from sd2core.io.kinds import kind_of
 from sd2core.io.radar import holds_map, load_recorded_map
 from sd2core.labels.formats import read_label_file
@@ -82,7 +83,8 @@ def gather(
     maps = [path for path in single if not is_recording(path)]
     if label_files and len(label_files) != len(maps):
         raise Sd2Error(
-            f"{len(label_files)} label files are given for {len(maps)} maps", "one for each map"
+            f"{counted(len(label_files), 'label file')} for {counted(len(maps), 'map')}",
+            "one for each map",
         )
     without_body = [*pairs, *maps] if making.imu else []
     if without_body:
@@ -304,11 +306,11 @@ class _PairStore:
 
         maps: dict[MapKind, DopplerMap] = {}
         if {"synthetic", "denoised"} & {*self._kinds}:
-            counted = as_map("synthetic", "synthetic", "share of vertices")
+            whole = as_map("synthetic", "synthetic", "share of vertices")
             split = {name: self._part(name, take) for name in SPLIT if name in self._arrays}
             own = take.model_copy(update={"start": 0, "stop": len(lost)})
             limbs = limbs_of(self.facts, split, own)
-            maps["synthetic"] = replace(counted, limbs=limbs)
+            maps["synthetic"] = replace(whole, limbs=limbs)
         if self._model is not None:
             maps["denoised"] = denoised(maps["synthetic"], self._model, self._texture)
         if self._radar in self._kinds:

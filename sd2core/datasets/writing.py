@@ -155,7 +155,7 @@ class _Writer:
     ) -> tuple[int, list[Failed], Sd2Error | None]:
         """Append all sources: number added, failures, and first error."""
         total = len(sources) if isinstance(sources, Sized) else 0
-        if isinstance(sources, Sequence) and sources:  # a wrong name of a person is known before the work
+        if isinstance(sources, Sequence) and sources:  # a wrong name is known before the work
             names = [*self._names.subjects, *(one.key.subject for one in sources)]
             split_people(list(dict.fromkeys(names)), *self._kept_out)
         seen: set[SourceKey] = set()

@@ -35,6 +35,8 @@ RADAR_MAP_SUFFIXES = frozenset({".h5", ".hdf5"})
 RADAR_SUFFIXES = (
     frozenset({".npy", ".mat", ".bin", ".sigmf-meta", ".sigmf-data"}) | RADAR_MAP_SUFFIXES
 )
+_LOOKED_INTO = (".safetensors", ".npz", ".zarr", *RADAR_MAP_SUFFIXES)
+"""Endings of what is named where a folder itself is nothing that is known."""
 MESH_SUFFIXES = frozenset({".obj", ".ply", ".glb", ".pt", ".pth"}) | PICKLE_SUFFIXES
 
 
@@ -126,18 +128,18 @@ def _kind_of_folder(folder: Path) -> Kind:
     if (folder / "radar.npy").exists() or any(folder.glob("*/radar.npy")):
         return "radar"
     suffixes = {entry.suffix.lower() for entry in folder.iterdir()}
-    if suffixes & MESH_SUFFIXES or files_of_people(folder):
+    if suffixes & MESH_SUFFIXES or any(map(_may_be_of_a_person, files_of_people(folder)[:1])):
         return "mesh"
     if ".bin" in suffixes and suffixes & {".cfg", ".json"}:
         return "radar"
     kind, faults = _kind_by_plug_ins(folder)
     if kind is not None:
         return kind
-    models = sorted(folder.glob("*.safetensors"))
+    known = [one for one in sorted(folder.iterdir()) if one.suffix in _LOOKED_INTO]
     raise Sd2Error(
         f"The folder {folder} holds nothing that is known",
         "recording.json, zarr.json, radar.npy, or .obj/.ply/.glb files",
-        f"Of the model in it: `sd2 info {models[0]}`" if models else faults,
+        f"Of what is in it: `sd2 info {known[0]}`" if known else faults,
     )
 
 
@@ -162,6 +164,10 @@ def _holds_pictures(path: Path) -> bool:
         return False
     with container:
         return container.format.name != _DRAWN_TEXT
+
+
+def _may_be_of_a_person(path: Path) -> bool:
+    return not (is_dataset(path) or _is_doppler_map(path))
 
 
 def _is_doppler_map(path: Path) -> bool:

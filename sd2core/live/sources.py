@@ -123,7 +123,10 @@ class ReplaySource(Source):
             simulated=capture.simulated,
             replayed=True,
             source=capture.source,
-            notes=(*capture.notes, f"Replayed from {capture.source}."),
+            notes=(
+                *(f"Of what was replayed: {note}" for note in capture.notes),
+                f"Replayed from {capture.source}.",
+            ),
             start_unix_s=start_unix_s,
         )
 

@@ -104,7 +104,7 @@ class TrainingConfig(OptionRecord):
     epochs : N
         passes over all segments
     minutes : MIN
-        train for so long instead; the learning rate follows the clock
+        train for so long instead, at most; the learning rate follows the clock
     learning_rate : RATE
         at its highest
     ssm_learning_rate : RATE

@@ -109,7 +109,8 @@ def runs_in(folder: Path) -> list[TrainingFolder]:
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise Sd2Error(f"The folder {folder} does not exist", "a run, or a folder of runs")
+        found = f"{folder} is a file" if folder.exists() else f"The folder {folder} does not exist"
+        raise Sd2Error(found, "a run, or a folder of runs")
     if TrainingFolder(folder).exists:
         return [TrainingFolder(folder)]
     runs = [TrainingFolder(path) for path in sorted(folder.iterdir()) if path.is_dir()]

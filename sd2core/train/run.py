@@ -22,6 +22,7 @@ from sd2core.denoise.registry import build, options
 from sd2core.denoise.scaling import Scaling, whole_map
 from sd2core.denoise.texture import Texture
 from sd2core.errors import Sd2Error
+from sd2core.files.tables import counted
 from sd2core.options.training import TrainConfig
 from sd2core.processes import end_with_parent, lower_priority
 from sd2core.runs.control import Control
@@ -274,8 +275,8 @@ class _Facts:
             whole = whole_map(maps, axis.bins)
             known = known.trusting(answers, whole, radar, held_out.moving, axis)
             answers = known.mixed(answers, whole, axis)
-        counted = [one for one in range(axis.bins) if one not in pairs.null_bins]
-        texture = Texture.fitted(answers[..., counted], radar[..., counted])
+        kept_bins = [one for one in range(axis.bins) if one not in pairs.null_bins]
+        texture = Texture.fitted(answers[..., kept_bins], radar[..., kept_bins])
         if texture is not None:
             floor = max(scaling.floor, texture.mean_that_shows(_SHOWS))
             scaling = replace(scaling, floor=floor)
@@ -318,7 +319,7 @@ class _Facts:
         few = len(split.training) <= _NAMED
         people = f" ({', '.join(split.training)})" if few else ""
         return (
-            f"{names}: {len(split.training)} people{people},"
+            f"{names}: {counted(len(split.training), 'person', 'people')}{people},"
             f" {frames / pairs.frame_rate_hz / 60:.1f} min of {pairs.kind} radar"
             f" at {pairs.frame_rate_hz:g} frames/s"
         )
@@ -326,7 +327,8 @@ class _Facts:
     def _limits(self) -> str:
         stores = self.data.pairs.provenance.get("mixed", [self.data.pairs.provenance])
         sentences = [
-            f"Knows movements like those of {len(self.data.split.training)} people"
+            f"Knows movements like those of"
+            f" {counted(len(self.data.split.training), 'person', 'people')}"
             f"{_named('movements', map(_movements, stores))}"
             f"{_named('before', map(_radar, stores))}."
         ]

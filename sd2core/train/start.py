@@ -43,6 +43,7 @@ class Ending:
     validation_mae_mps: float | None
     model: Path | None  # the best one, where there is one
     interrupted: bool = False  # by Ctrl-C
+    early_after: int | None = None  # epochs without a better one, after which it ended early
 
 
 def begin(
@@ -185,7 +186,8 @@ def _trained(
         lock.release()
         folder.discard()
     assert outcome != "failed"
-    best = position.best or {}
+    best, patience = position.best or {}, config.training.early_stopping_epochs
+    is_early = outcome == "finished" and 0 < patience <= position.epochs_since_best
     return Ending(
         outcome=outcome,
         best_epoch=best.get("epoch"),
@@ -193,6 +195,7 @@ def _trained(
         validation_mae_mps=best.get("validation_mae_mps"),
         model=folder.best if folder.best.exists() else None,
         interrupted=control.interrupted,
+        early_after=patience if is_early else None,
     )
 
 

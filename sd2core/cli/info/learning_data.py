@@ -33,9 +33,9 @@ def describe_dataset_at(path: Path) -> Description:
         "classes": listed(card["segments_of_class"]),
         "splits": listed(card["segments_of_split"]),
         "from": f"{counted(card['recordings'], 'recording')} of"
-        f" {counted(len(card['subjects']), 'subject')}, {duration_text(card)}, up to"
-        f" {counted(card['placements'], 'placement')} each",
-        "range": "" if ranges_m is None else f"{ranges_m[0]:g} to {ranges_m[1]:g} m",
+        f" {counted(len(card['subjects']), 'subject')}, {duration_text(card)}"
+        + (f", up to {card['placements']} placements each" if card["placements"] > 1 else ""),
+        "range": " to ".join(dict.fromkeys(f"{one:.2f} m" for one in ranges_m or ())),
         "velocity": axis_in_words(axis),
         "nulled bins": bins_in_words(axis, null_bins),
     }

@@ -267,14 +267,14 @@ def _check_clock(path: Path, rows: Iterable[Row], clock: LabelClock) -> None:
                 f"{path} gives frames and no seconds",
                 "times in seconds",
                 "Read it together with its recording, which knows the times of frames, or with"
-                " their rate",
+                " their rate (--fps)",
             )
         if row.start_s == row.end_s and clock.mark_s is None:
             raise Sd2Error(
                 f"{path}, {row.place}: {row.label!r} at {row.start_s:g} s has no duration",
                 "spans with a start before the end",
-                "Read the file together with its recording: such a mark becomes one frame; or give"
-                " marks a length",
+                "Read the file together with its recording, or with the rate of its frames (--fps):"
+                " such a mark becomes one frame; or give marks a length (--mark-s)",
             )
 
 

@@ -319,12 +319,16 @@ def test_what_cannot_be_exported_is_named(tmp_path: Path) -> None:
     one = recording(tmp_path / "anna.sd2", radar=False)
     with pytest.raises(Sd2Error, match="2 people are named for 1 recordings"):
         gather([one.folder], Making(), subjects=["a", "b"])
-    with pytest.raises(Sd2Error, match="1 label files are given for 0 maps"):
+    with pytest.raises(Sd2Error, match="1 label file for 0 maps"):
         gather([one.folder], Making(), label_files=[tmp_path / "labels.json"])
     with pytest.raises(Sd2Error, match="is of kind mesh"):
         gather([one.folder / "mesh.npz"], Making())
     (source,) = gather([one.folder], Making(kinds=("real",)))
     with pytest.raises(Sd2Error, match="has no map that is wanted"):
+        source.load(silent)
+    with_radar = recording(tmp_path / "ben.sd2")
+    (source,) = gather([with_radar.folder], Making(kinds=("real",)))
+    with pytest.raises(Sd2Error, match=r"no real map, but a simulated one.*--kinds simulated"):
         source.load(silent)
     assert len(one.load_mesh().timebase) == FRAMES
     assert one.load_mesh().timebase.frames_per_s == pytest.approx(RATE_HZ)

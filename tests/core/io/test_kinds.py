@@ -93,12 +93,15 @@ def test_what_is_nothing_known_is_explained(tmp_path):
     (tmp_path / "nothing.csv").touch()
     (tmp_path / "bad.npz").write_text("no zip")
     (tmp_path / "empty").mkdir()
+    (tmp_path / "maps").mkdir()
+    np.savez(tmp_path / "maps" / "1.npz", velocity_mps=np.zeros(3))
     for name, words in (
         ("notes.txt", "is of no kind that is known"),
         ("nothing.csv", "is empty"),
         ("missing.mp4", "does not exist"),
         ("bad.npz", "is not a readable .npz"),
         ("empty", "holds nothing that is known"),
+        ("maps", f"`sd2 info {tmp_path / 'maps' / '1.npz'}`"),
     ):
         with pytest.raises(Sd2Error) as caught:
             kind_of(tmp_path / name)

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sd2core.cli.guiding import guide
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import GESTURES
 from sd2core.live.consent import FILE_NAME, Consent
@@ -58,6 +59,17 @@ PROTOCOLS = st.builds(
     order=st.sampled_from(["fixed", "random"]),
     seed=st.integers(0, 99),
 )
+
+
+def test_a_recording_is_no_folder_for_takes(tmp_path: Path) -> None:
+    folder = tmp_path / "walk.sd2"
+    folder.mkdir()
+    (folder / "recording.json").touch()
+    with pytest.raises(Sd2Error, match=r"walk\.sd2 is a recording"):
+        guide(PAPER, folder, lambda _: pytest.fail("it is recorded into"), as_json=True)
+    assert [one.name for one in folder.iterdir()] == ["recording.json"]
+
+
 KEYS = ["go on", "again", "skip", "agree", "decline", ""]
 _ENDS = {"ready": "go on", "consent": "agree"}
 

@@ -262,12 +262,13 @@ class TestLearning:
         monkeypatch.setattr("sd2core.train.denoiser_loop.validate", told)
         ending = begin(settings(pairs, early_stopping_epochs=3, epochs=6), tmp_path / "run")
         assert (ending.outcome, ending.best_epoch) == ("finished", 2)
+        assert ending.early_after == 3
         assert [one[3] for one in curve(tmp_path / "run")] == [True, True, False, False, False]
 
     def test_time_limits(self, pairs: Path, tmp_path: Path) -> None:
         ending = begin(settings(pairs, minutes=0.01), tmp_path / "run")
         events = read_events(tmp_path / "run" / "progress.jsonl")
-        assert ending.outcome == "finished"
+        assert (ending.outcome, ending.early_after) == ("finished", None)
         assert (events[0]["epochs"], events[0]["minutes"]) == (None, 0.01)
         kept = json.loads((tmp_path / "run" / "last.json").read_text())
         assert kept["position"]["elapsed_s"] >= 0.6
