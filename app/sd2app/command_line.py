@@ -13,8 +13,8 @@ from sd2app.displays import has_display, silent_displays
 from sd2app.plain_imports import plain_imports
 from sd2app.system_libraries import explain_missing, missing_libraries
 from sd2core.cli import build_parser, run
+from sd2core.cli.command_names import COMMANDS
 from sd2core.cli.command_parser import add_command, in_a_list
-from sd2core.cli.parser import COMMANDS
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:

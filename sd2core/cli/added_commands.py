@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from sd2core.cli.command_names import COMMANDS, WINDOW_COMMANDS
 from sd2core.cli.command_parser import AddedCommand, Subcommands, add_command
-from sd2core.cli.parser import COMMANDS, WINDOW_COMMANDS
 from sd2core.errors import Sd2Error
 from sd2core.options.records import OptionRecord
 from sd2core.plug_ins import Group, PlugIn

@@ -302,8 +302,7 @@ def first_difference(before: Any, now: Any, name: str = "") -> tuple[str, str, s
     if isinstance(first, Mapping) and isinstance(second, Mapping):
         keys = {**first, **second}
         key = next(key for key in keys if first.get(key) != second.get(key))
-        inside = f"{name} {key}".strip().replace("_", " ")
-        return first_difference(first.get(key), second.get(key), inside)
+        return first_difference(first.get(key), second.get(key), f"{name} {key}".strip())
     return name, _in_words(before), _in_words(now)
 
 
