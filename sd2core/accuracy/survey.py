@@ -178,17 +178,21 @@ def survey_scene(
         survey.count_ms[more] = max(survey.count_ms[fewer], survey.count_ms[more])
     step()
     against = at_rate[base]
+    again = trial.columns(base, runs, progress=within)
+    base_ms = min(against.milliseconds, again.milliseconds)
     quick_ms = survey.count_ms[base]
-    survey.mask_ms[base] = max(against.milliseconds - quick_ms, 0.0)
+    survey.mask_ms[base] = max(base_ms - quick_ms, 0.0)
     for plan in single:
         columns = trial.columns(plan, runs, progress=within)
         survey.change[plan] = relative_l1(columns.smooth, against.smooth)
-        survey.mask_ms[plan] = max(columns.milliseconds - quick_ms, 0.0)
-        if plan.vertices_kept < 1:
-            # The first time prepares what only this mesh needs.
+        spent_ms = columns.milliseconds
+        if plan.vertices_kept < 1 or spent_ms > base_ms:
+            # The first time loads and prepares what only this plan needs.
             again = trial.columns(plan, runs, progress=within)
-            spent_ms = min(columns.milliseconds, again.milliseconds)
-            share = spent_ms / against.milliseconds if against.milliseconds > 0 else 1.0
+            spent_ms = min(spent_ms, again.milliseconds)
+        survey.mask_ms[plan] = max(spent_ms - quick_ms, 0.0)
+        if plan.vertices_kept < 1:
+            share = spent_ms / base_ms if base_ms > 0 else 1.0
             survey.cost_share[plan.vertices_kept] = min(max(share, plan.vertices_kept), 1.0)
         step()
     if mesh.others:
