@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,10 +12,10 @@ import trimesh
 from accuracy_scenes import ball, moving, plate, steady, swinging, together
 
 from sd2core.accuracy.choosing import choose
-from sd2core.accuracy.plans import FRAME_RATE_FACTORS
+from sd2core.accuracy.plans import FRAME_RATE_FACTORS, AccuracyPlan
 from sd2core.accuracy.sample import take_sample
 from sd2core.accuracy.survey import Survey, survey_scene
-from sd2core.accuracy.trial import synthesizer_for
+from sd2core.accuracy.trial import Columns, Trial, synthesizer_for
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
@@ -232,3 +233,19 @@ def test_more_moments_never_have_a_lower_forecast(scene: MeshSequence) -> None:
     assert costs == sorted(costs)
     for kept in survey.trial.vertices_kept:
         assert kept <= survey.cost_share[kept] <= 1
+
+
+def test_what_is_loaded_the_first_time_is_not_forecast(
+    scene: MeshSequence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen, columns = set[AccuracyPlan](), Trial.columns
+
+    def slow_at_first(trial: Trial, plan: AccuracyPlan, *runs: Any, **options: Any) -> Columns:
+        made, loading_ms = columns(trial, plan, *runs, **options), 1e4 * (plan not in seen)
+        seen.add(plan)
+        return replace(made, milliseconds=made.milliseconds + loading_ms)
+
+    monkeypatch.setattr(Trial, "columns", slow_at_first)
+    survey = survey_scene(scene, CAMERA, PAPER)
+    assert max(survey.mask_ms.values()) < 1e3
+    assert all(0 < share <= 1 for share in survey.cost_share.values())
