@@ -219,6 +219,7 @@ def _import(options: Import) -> None:
     if options.sensor is not None:
         recording.sensor = VirtualSensor(options.sensor)
     recording.learn_camera()
+    recording.learn_simulated()
     with ExitStack() as made:
         if options.body_model is not None:
             _keep_vertices(recording, _new_folder_for_vertices(options.out, made))

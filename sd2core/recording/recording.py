@@ -11,6 +11,7 @@ import math
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -497,6 +498,13 @@ class Recording:
 
         if self.camera is None and self.mesh is not None and self.mesh_reading.focal_px is None:
             self.camera = fitted_camera(self.mesh)
+
+    def learn_simulated(self) -> None:
+        """Be simulated where video or mesh lies in the folder of a recording that is."""
+        seen = self.video or self.mesh
+        if seen is not None and (seen.parent / FILE_NAME).is_file():
+            with suppress(Sd2Error):
+                self.simulated = self.simulated or open_recording(seen.parent).simulated
 
     def open_video(self, progress: Progress = silent) -> VideoReader:
         """Open the video."""

@@ -137,6 +137,7 @@ def load_content(recording: Recording, progress: Progress) -> Content:
     problems: list[Sd2Error] = []
 
     recording.learn_camera()
+    recording.learn_simulated()
     missing = recording.missing()
     for role, path in missing.items():
         problems.append(

@@ -110,6 +110,16 @@ def test_samples_of_an_inertial_sensor(sd2: Sd2, plate: Path, tmp_path: Path) ->
     assert "no unit" in outcome.err
 
 
+def test_what_lies_in_a_simulated_recording_is_simulated(sd2: Sd2, tmp_path: Path) -> None:
+    sample = tmp_path / "sample.sd2"
+    assert sd2("demo", "--out", sample).code == 0
+    parts = "--video", sample / "video.mp4", "--mesh", sample / "mesh.zarr"
+    for number, arguments in enumerate((parts, parts[2:], ("--radar", sample / "radar"))):
+        out = tmp_path / f"again-{number}.sd2"
+        assert sd2("import", *arguments, "--out", out).code == 0
+        assert open_recording(out).simulated == (number < 2)
+
+
 def test_import_copies_on_request(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
     data = json.loads(
         sd2(
