@@ -33,6 +33,7 @@ _WORDS = {"acc": "accelerations", "gyr": "turn rates", "time": "times"}
 _FACT = re.compile(r"#\s*(\w{1,40})\s*[:=]\s*(.{1,1000})")
 _SLOWEST_HZ, _FASTEST_HZ = 0.5, 50_000.0
 _LONGEST_HEADING = 10_000
+_MOST_FACTS = 200
 
 
 def read_table(
@@ -113,7 +114,7 @@ def _heading(
             if len(line) > _LONGEST_HEADING:
                 break
             return facts, line, (one for one in numbered if not one[1].startswith("#"))
-        if match := _FACT.fullmatch(line):
+        if (match := _FACT.fullmatch(line)) and len(facts) < _MOST_FACTS:
             facts[match[1]] = match[2]
     raise Sd2Error(f"{path} has no heading", EXPECTED, "Name the columns in the first line")
 
