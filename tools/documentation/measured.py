@@ -30,7 +30,6 @@ OLD = {
     "range-synthesis.md": _HOURS,
     "real-pairs.md": "a quarter of an hour; nothing that it measures was meant to change",
     "paper.md": _HOURS,
-    "nulling.md": _SAME,
     "denoiser.md": _SAME,
     "classifier.md": _SAME,
     "studies.md": _SAME,
