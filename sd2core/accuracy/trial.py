@@ -22,7 +22,7 @@ from sd2core.errors import Sd2Error
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.made_vertices import shifted_like, unshifted
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.numerics.compiled import workers
+from sd2core.numerics.parallel import spread
 from sd2core.options.synthesis import ScenePart
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VirtualSensor
@@ -158,7 +158,7 @@ class Trial:
             starts = range(run.start, run.stop, _REFERENCE_FRAMES)
             stops = (min(start + _REFERENCE_FRAMES, run.stop) for start in starts)
             columns = []
-            for number, column in enumerate(workers().map(work, starts, stops)):
+            for number, column in enumerate(spread(work, starts, stops)):
                 columns.append(column)
                 progress(number + 1, len(starts))
             raw = np.concatenate(columns, axis=1)

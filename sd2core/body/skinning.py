@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from sd2core.body.model import Body
 from sd2core.body.rotations import Floats
-from sd2core.numerics.compiled import compiled, kernels_ready, workers
+from sd2core.numerics.compiled import compiled, kernels_ready
+from sd2core.numerics.parallel import spread
 
 _JOB_FRAMES = 8
 
@@ -38,7 +39,7 @@ def pose_vertices(body: Body, transforms: Floats) -> NDArray[np.float32]:
         fill(0)
         return vertices
     # Taken one by one, so that what one of them raises is not lost.
-    for _ in workers().map(fill, range(0, len(transforms), _JOB_FRAMES)):
+    for _ in spread(fill, range(0, len(transforms), _JOB_FRAMES)):
         pass
     return vertices
 

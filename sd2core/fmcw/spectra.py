@@ -15,7 +15,7 @@ from sd2core.fmcw.processing import rebinning
 from sd2core.fmcw.scene import FacetsSeen
 from sd2core.fmcw.wave import BeatSignal, WaveScene
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.numerics.compiled import workers
+from sd2core.numerics.parallel import spread
 from sd2core.radar_config import RadarConfig
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
@@ -70,7 +70,7 @@ def frame_spectra(
         return scene.frame(time_s)
 
     beats: Iterable[BeatSignal]
-    beats = map(signal, times.tolist()) if threads == 1 else workers().map(signal, times.tolist())
+    beats = (map if threads == 1 else spread)(signal, times.tolist())
     return signal_spectra(np.stack(list(beats)), config, axis=axis, processing=processing)
 
 

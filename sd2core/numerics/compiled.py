@@ -48,6 +48,7 @@ KERNEL_MODULES = (
 _PACKAGE = Path(__file__).resolve().parent.parent
 _MARKER = "complete"
 _LOW_PRIORITY = "--low-priority"
+_KERNEL_THREAD = "sd2-kernel"
 _lock = threading.Lock()
 _ready = False
 _background: subprocess.Popen[bytes] | None = None
@@ -232,7 +233,12 @@ def worker_count() -> int:
 @functools.lru_cache(maxsize=1)
 def workers() -> ThreadPoolExecutor:
     """The threads over which kernels are spread; one pool for the whole process."""
-    return ThreadPoolExecutor(worker_count(), thread_name_prefix="sd2-kernel")
+    return ThreadPoolExecutor(worker_count(), thread_name_prefix=_KERNEL_THREAD)
+
+
+def on_worker() -> bool:
+    """True in one of these threads, which must not wait for work of the same pool."""
+    return threading.current_thread().name.startswith(_KERNEL_THREAD)
 
 
 def _main() -> None:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from itertools import islice
+from typing import Any, TypeVar
 
-from sd2core.numerics.compiled import worker_count, workers
+from sd2core.numerics.compiled import on_worker, worker_count, workers
 from sd2core.progress import Cancelled, Progress
 
+Result = TypeVar("Result")
 _POLL_S = 0.03
 _QUEUED = 8
 """Jobs that wait for every thread: those of an hour of frames would be a lot of futures."""
@@ -51,6 +53,15 @@ class Ticket:
     def stop(self) -> None:
         """Make every job stop at its next report."""
         self._stopped.set()
+
+
+def spread(work: Callable[..., Result], *arguments: Iterable[Any]) -> Iterator[Result]:
+    """Results of a function over the kernel threads, in order, as ``map`` gives them.
+
+    On one of these threads they are computed there: were all of them to wait for each other's
+    results, none would come.
+    """
+    return map(work, *arguments) if on_worker() else workers().map(work, *arguments)
 
 
 def run_light_jobs(
@@ -109,10 +120,10 @@ def run_jobs(
         Called in the calling thread, at least every 30 ms.
     threads : int, optional
         Jobs at a time, by default one per core; 1 runs them one after the other in the calling
-        thread, with progress at every report.
+        thread, with progress at every report, as on a kernel thread (:func:`spread`).
     """
     progress(0, total)
-    if threads == 1:
+    if threads == 1 or on_worker():
         # Each report is passed on, and may stop the job by raising.
         own = Ticket(lambda finished: progress(finished, total))
         for job in jobs:
