@@ -28,7 +28,6 @@ OLD = {
     "scale.md": "needs an idle machine; batches changed in what they check",
     "fitting.md": "ten idle minutes; only its commands and how tables are written have changed",
     "range-synthesis.md": _HOURS,
-    "real-pairs.md": "a quarter of an hour; nothing that it measures was meant to change",
     "paper.md": _HOURS,
     "denoiser.md": _SAME,
     "classifier.md": _SAME,
