@@ -23,7 +23,6 @@ from tools.documentation.places import DOCS, REPOSITORY
 _HOURS = "hours of training, due with the next denoisers"
 _SAME = "what it measures gave the same bits before and after its code was rearranged"
 OLD = {
-    "accuracy-and-speed.md": "needs an idle machine; how the plain map is counted was rearranged",
     "performance.md": "needs an idle machine for an hour",
     "scale.md": "needs an idle machine; batches changed in what they check",
     "fitting.md": "ten idle minutes; only its commands and how tables are written have changed",
