@@ -13,16 +13,11 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from sd2core.errors import Sd2Error
+from sd2core.numerics.limits import FARTHEST_M, MAX_BINS
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-FARTHEST_M = 1e9
-"""Largest distance of a sensor from the camera: squares of ranges stay in single precision."""
-
-MAX_BINS = 1 << 16
-"""Most bins of a velocity axis; a radar's chirps per frame are a few hundred."""
 
 Vector = tuple[float, float, float]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
 from contextlib import ExitStack
 from dataclasses import replace
@@ -178,6 +177,8 @@ class Relink(Json):
 
 def copy_sample(out: Path, scene: DemoScene = "one") -> None:
     """Write a copy of the bundled sample recording, with the true body of its person, or two."""
+    import shutil
+
     from sd2core.files.resources import resource_path
     from sd2core.recording.recording import open_recording
 

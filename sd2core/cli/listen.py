@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import shutil
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -216,6 +215,8 @@ class Status:
         if self._as_json:
             print_event("frames", **self._newest(), **self.more())
         elif self._is_line:
+            import shutil
+
             width = shutil.get_terminal_size().columns - 1
             print(f"\r{self._line()[:width]:<{width}}", end="", flush=True)
         else:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from sd2core.sensor import FARTHEST_M, MAX_BINS
+from sd2core.numerics.limits import FARTHEST_M, MAX_BINS
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from sd2core.cli.output import picked, print_facts, print_json, progress_bar
@@ -372,6 +371,8 @@ def bins_in_words(axis: VelocityAxis, bins: tuple[int, ...]) -> str:
 def _synthesis_facts(provenance: dict[str, Any]) -> dict[str, str]:
     if provenance.get("visible_share") is None:
         return {}
+    from statistics import fmean
+
     from sd2core.sensor import VirtualSensor
 
     sensor = provenance.get("sensor")
