@@ -220,25 +220,27 @@ class Synthesizer:
             (one for one in shared if one is not None), None
         ) or PreparedMesh(mesh, options, ByteBudget(share_bytes), block_frames)
         self._frames = FrameCounts(self.prepared)
-        # One for each body of the scene, this one first; each counts its own.
-        self._bodies: tuple[Synthesizer, ...] = (
-            self,
-            *(
-                Synthesizer(
-                    replace(body, surroundings=mesh.surroundings),
-                    options,
-                    memory_budget_bytes=share_bytes,
-                    threads=threads,
-                    block_frames=block_frames,
-                    blocks_of=blocks_of,
-                    left_out=left_out,
-                )
-                for body in mesh.others
-            ),
+        self._others = tuple(
+            Synthesizer(
+                replace(body, surroundings=mesh.surroundings),
+                options,
+                memory_budget_bytes=share_bytes,
+                threads=threads,
+                block_frames=block_frames,
+                blocks_of=blocks_of,
+                left_out=left_out,
+            )
+            for body in mesh.others
         )
         every = [one.prepared for one in self._bodies] if mesh.others else []
         for one in self._bodies if mesh.others else ():
             one._frames.hide_by(tuple(other for other in every if other is not one.prepared))
+
+    @property
+    def _bodies(self) -> tuple[Synthesizer, ...]:
+        """One for each body of the scene, this one first; each counts its own."""
+        # Not kept: who holds itself is not let go with all that it has prepared.
+        return (self, *self._others)
 
     @property
     def unit(self) -> str:

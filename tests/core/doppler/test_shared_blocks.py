@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import replace
 from typing import Any
 
@@ -160,3 +162,19 @@ def test_while_a_body_is_moved_it_hides_from_where_it_is() -> None:
     exact, facing = (there.stretch(sensor, 0, 20, one) for one in ("exact", "facing"))
     off = [np.abs(one.raw - exact.raw).sum() for one in (frozen, facing)]
     assert off[0] < 0.5 * off[1]
+
+
+@pytest.mark.parametrize("others", [0, 1])
+def test_what_was_prepared_is_let_go_with_its_synthesizer(mesh: MeshSequence, others: int) -> None:
+    """At once, not when Python looks for circles: it is hundreds of megabytes."""
+    scene = replace(mesh, others=(replace(mesh, person="ben"),) * others, person="anna")
+    gc.collect()
+    gc.disable()
+    try:
+        made = Synthesizer(scene, BASE, threads=1)
+        made.stretch(VirtualSensor(), *PART)
+        prepared = weakref.ref(made.prepared)
+        del made
+        assert prepared() is None
+    finally:
+        gc.enable()
