@@ -169,10 +169,10 @@ def _print_end(plan: BatchPlan, end: BatchEnd) -> None:
     )
     if not end.failed:
         return
-    import json
+    from sd2core.files.texts import read_json
 
     print(f"  {counted(end.failed, 'task')} cannot be done:")
-    report = json.loads(Path(facts["report"]).read_text(encoding="utf-8"))
+    report = read_json(Path(facts["report"]))
     for failure in report["failures"][:_LISTED_FAILURES]:
         print("  " + _failure_text(failure))
     if end.failed > _LISTED_FAILURES:

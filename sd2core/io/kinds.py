@@ -139,7 +139,7 @@ def _kind_of_folder(folder: Path) -> Kind:
     raise Sd2Error(
         f"The folder {folder} holds nothing that is known",
         "recording.json, zarr.json, radar.npy, or .obj/.ply/.glb files",
-        f"Of what is in it: `sd2 info {known[0]}`" if known else faults,
+        f"{faults} Of what is in it: `sd2 info {known[0]}`".lstrip() if known else faults,
     )
 
 

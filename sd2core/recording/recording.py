@@ -502,9 +502,11 @@ class Recording:
     def learn_simulated(self) -> None:
         """Be simulated where video or mesh lies in the folder of a recording that is."""
         seen = self.video or self.mesh
-        if seen is not None and (seen.parent / FILE_NAME).is_file():
+        if self.simulated or seen is None or seen.parent == self.folder:
+            return
+        if (seen.parent / FILE_NAME).is_file():
             with suppress(Sd2Error):
-                self.simulated = self.simulated or open_recording(seen.parent).simulated
+                self.simulated = open_recording(seen.parent).simulated
 
     def open_video(self, progress: Progress = silent) -> VideoReader:
         """Open the video."""

@@ -51,13 +51,14 @@ def _info(options: Info) -> None:
     sd2 info walk.npz --json
     sd2 info walk.zarr --verify
     """
+    path = _installed(options.path)
     if not options.verify:
-        show(describe(_installed(options.path), options), as_json=options.json)
+        show(describe(path, options), as_json=options.json)
         return
     from sd2core.io.kinds import kind_of
 
-    verified = verify(options.path, kind_of(options.path))
-    description = describe(options.path, options)
+    verified = verify(path, kind_of(path))
+    description = describe(path, options)
     description.data["verified"] = verified
     description.facts["verified"] = in_words(verified)
     show(description, as_json=options.json)
