@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from sd2core.cli.command_parser import add_command
+from sd2core.cli.command_parser import add_command, subcommands_of
 from sd2core.cli.running import run
 from sd2core.options.records import OptionRecord
 
@@ -20,7 +20,7 @@ def tool(name: str, commands: Commands) -> Callable[..., int]:
 
     def main(arguments: Sequence[str] | None = None) -> int:
         parser = argparse.ArgumentParser(prog=f"python -m tools.{name}")
-        places = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+        places = subcommands_of(parser)
         for command, (options, handler) in commands.items():
             add_command(places, command, options=options, handler=handler)
         return run(parser, sys.argv[1:] if arguments is None else arguments)

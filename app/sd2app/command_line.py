@@ -14,7 +14,7 @@ from sd2app.plain_imports import plain_imports
 from sd2app.system_libraries import explain_missing, missing_libraries
 from sd2core.cli import build_parser, run
 from sd2core.cli.command_names import COMMANDS
-from sd2core.cli.command_parser import add_command, in_a_list
+from sd2core.cli.command_parser import Subcommands, add_command, in_a_list
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def full_parser(typed: Sequence[str] = ()) -> argparse.ArgumentParser:
     return parser
 
 
-def _add_window_commands(commands: argparse._SubParsersAction) -> None:
+def _add_window_commands(commands: Subcommands) -> None:
     from sd2app.window_options import Demo, Open
     from sd2core.cli.preparing import JOBS, Doctor
 

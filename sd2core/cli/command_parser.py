@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeVar
 
 from sd2core.errors import Sd2Error
 
@@ -16,8 +16,6 @@ if TYPE_CHECKING:  # records take as long to load as all that `sd2 --help` needs
 
 Record = TypeVar("Record", bound="OptionRecord")
 Handler = TypeVar("Handler", bound=Callable[[Any], int | None])
-Subcommands: TypeAlias = "argparse._SubParsersAction[Any]"
-"""Where commands are added to a parser."""
 
 _DECLARED: dict[str, list[Callable[[Subcommands], object]]] = {}
 """What adds the commands of each module."""
@@ -25,6 +23,19 @@ _DECLARED: dict[str, list[Callable[[Subcommands], object]]] = {}
 
 class UsageError(Sd2Error):
     """A command line that cannot be understood."""
+
+
+class Subcommands(argparse._SubParsersAction):
+    """Where commands are added to a parser.
+
+    Of the commands only the one that is typed here gets its options; where nothing is, all do.
+    """
+
+    typed: Sequence[str] = ()
+
+    def wants(self, name: str) -> bool:
+        """True if a command gets its options."""
+        return not self.typed or self.typed[0] == name
 
 
 class HelpFormatter(argparse.RawDescriptionHelpFormatter):
@@ -69,6 +80,16 @@ class CommandParser(argparse.ArgumentParser):
         near = get_close_matches(typed, names, 1)
         meant = f"Did you mean {wording.format(near[0])}? " if near else ""
         raise UsageError(found, remedy=f"{meant}`{self.prog} --help` lists all")
+
+
+def subcommands_of(parser: argparse.ArgumentParser, typed: Sequence[str] = ()) -> Subcommands:
+    """Make the place for the commands of a parser, of which one may be typed with its words."""
+    commands = parser.add_subparsers(
+        title="commands", metavar="COMMAND", required=True, action=Subcommands
+    )
+    assert isinstance(commands, Subcommands)
+    commands.typed = typed
+    return commands
 
 
 def add_options(parser: argparse._ActionsContainer, kind: type[OptionRecord]) -> None:
@@ -207,7 +228,7 @@ def command_group(name: str) -> Callable[[Handler], Handler]:
     def declare(add_commands: Handler) -> Handler:
         def add(commands: Subcommands) -> None:
             parser = add_command(commands, name, about=add_commands)
-            add_commands(parser.add_subparsers(title="commands", metavar="COMMAND", required=True))
+            add_commands(subcommands_of(parser, commands.typed[1:]))
 
         _DECLARED.setdefault(add_commands.__module__, []).append(add)
         return add_commands
@@ -215,9 +236,20 @@ def command_group(name: str) -> Callable[[Handler], Handler]:
     return declare
 
 
-def add_declared(commands: Subcommands, *modules: str) -> None:
-    """Add the commands that modules of ``sd2core.cli`` declare, in their order."""
-    for module in modules:
+def add_declared(commands: Subcommands, modules: Mapping[str, str]) -> None:
+    """Add commands that modules of ``sd2core.cli`` declare: that which is typed, or else all.
+
+    Parameters
+    ----------
+    commands : Subcommands
+        Where they are added.
+    modules : mapping of str to str
+        Module of each command; they declare them in the order of the help.
+    """
+    name = commands.typed[0] if commands.typed else ""
+    if name in commands.choices:
+        return
+    for module in (modules[name],) if name in modules else dict.fromkeys(modules.values()):
         for add in _DECLARED[import_module(f"sd2core.cli.{module}").__name__]:
             add(commands)
 
@@ -275,7 +307,8 @@ def add_command(
         formatter_class=HelpFormatter,
     )
     if options is not None:
-        add_options(parser, options)
+        if commands.wants(name):
+            add_options(parser, options)
         parser.set_defaults(record=options, writes_map=issubclass(options, ReplacesMaps))
     if handler is not None:
         parser.set_defaults(handler=handler)

@@ -15,7 +15,6 @@ from sd2core.cli.output import counted, print_event, print_facts
 from sd2core.options.kinds import Positive
 from sd2core.options.records import OptionError, Place
 from sd2core.options.shared import Json
-from sd2core.runs.control import stop_signals
 
 if TYPE_CHECKING:
     from sd2core.live.listening import Column, Listening
@@ -142,6 +141,7 @@ def follow(
     That stops it as well: what waits to be stored is stored.
     """
     from sd2core.cli.keys import pressed_keys
+    from sd2core.runs.control import stop_signals
 
     with stop_signals() as stopped, pressed_keys() as key:
         listening.start()

@@ -6,7 +6,13 @@ import argparse
 from collections.abc import Sequence
 
 from sd2core.cli.command_names import COMMANDS, WINDOW_COMMANDS
-from sd2core.cli.command_parser import CommandParser, HelpFormatter, add_declared
+from sd2core.cli.command_parser import (
+    CommandParser,
+    HelpFormatter,
+    Subcommands,
+    add_declared,
+    subcommands_of,
+)
 from sd2core.version import __version__
 
 _DESCRIPTION = """\
@@ -50,7 +56,7 @@ _MODULE_OF = {
 
 def build_parser(
     examples: str = "", typed: Sequence[str] = ()
-) -> tuple[argparse.ArgumentParser, argparse._SubParsersAction]:
+) -> tuple[argparse.ArgumentParser, Subcommands]:
     """Parser of the library's commands, and where others are added, with their examples.
 
     Where the first of the ``typed`` words is a command, the others are left out, and where it asks
@@ -65,7 +71,7 @@ def build_parser(
         formatter_class=HelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"SD² Studio {__version__}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    commands = subcommands_of(parser, typed)
     name = typed[0] if typed else ""
     if name in ("-h", "--help"):
         for command, summary in COMMANDS.items():
@@ -73,13 +79,14 @@ def build_parser(
         return parser, commands
     if name in WINDOW_COMMANDS:
         return parser, commands
+    modules = {command: _module_of(command) for command in COMMANDS}
     if name in COMMANDS:
-        add_declared(commands, _module_of(name))
+        add_declared(commands, modules)
         return parser, commands
     from sd2core.cli.added_commands import add_named, add_usable
 
     if not add_named(commands, name):
-        add_declared(commands, *dict.fromkeys(map(_module_of, COMMANDS)))
+        add_declared(commands, modules)
         if not name.startswith("-"):
             add_usable(commands)
     return parser, commands

@@ -11,12 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.keys import pressed_keys
 from sd2core.cli.output import counted, print_event, print_facts, print_json
 from sd2core.options.kinds import Around, Positive
 from sd2core.options.records import OptionError, Place
 from sd2core.options.shared import Json
-from sd2core.runs.control import stop_signals
 
 if TYPE_CHECKING:
     from sd2core.live.cameras import Camera
@@ -144,10 +142,12 @@ def _record(options: Record) -> int:
 
 def _check(options: Record, choice: CameraChoice) -> int:
     """Say what radar and camera see; 1 if they cannot be recorded with."""
+    from sd2core.cli.keys import pressed_keys
     from sd2core.live.checking import check_place, found_place
     from sd2core.live.filming import preview_of
     from sd2core.live.looking import Looked, look
     from sd2core.live.radars import open_radar
+    from sd2core.runs.control import stop_signals
 
     seconds = options.seconds or _CHECK_S
     with contextlib.ExitStack() as stack, stop_signals() as stop, pressed_keys() as key:

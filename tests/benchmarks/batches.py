@@ -42,10 +42,11 @@ positions_m = [{places}]
 
 
 def save_bodies(folder: Path, count: int, vertices: int, frames: int) -> None:
-    """Meshes of swaying ellipsoids, each of another number of frames: none is like another."""
+    """Meshes of swaying ellipsoids, each of another size: none is like another."""
     folder.mkdir()
     for number in range(count):
-        save_mesh(body(vertices, frames + number), folder / f"{number:05d}.npz")
+        mesh = body(vertices, frames, 1.0 + 1e-5 * number)
+        save_mesh(mesh, folder / f"{number:05d}.npz")
 
 
 def run(

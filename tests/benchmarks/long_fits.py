@@ -173,7 +173,7 @@ def _fill(store: ArrayStore, video: VideoReader, track: LandmarkTrack) -> None:
     rows = there_and_back(len(track), len(video))
     sightings = Sightings(  # of the first frame, where alone somebody was searched for
         np.zeros(1, np.intp),
-        np.zeros((1, 4)),
+        np.array([[0.0, 0.0, 1.0, 0.0]]),
         np.ones(1),
         np.zeros(1, bool),
         np.zeros((1, 4), bool),

@@ -44,11 +44,11 @@ class Swaying:
         return points + np.array([0.0, 0.0, 2.5], np.float32)
 
 
-def body(vertices: int, frames: int) -> MeshSequence:
-    """An ellipsoid of about so many vertices."""
+def body(vertices: int, frames: int, scale: float = 1.0) -> MeshSequence:
+    """An ellipsoid of about so many vertices, as large as a person or so many times."""
     around = max(4, round(np.sqrt(0.5 * vertices)))
     ball = trimesh.creation.uv_sphere(radius=1.0, count=[around, around])
-    rest_m = np.asarray(ball.vertices) * np.array(_SHAPE_M)
+    rest_m = np.asarray(ball.vertices) * (scale * np.array(_SHAPE_M))
     return MeshSequence(
         Swaying(rest_m, frames),
         np.asarray(ball.faces, np.int32),

@@ -15,4 +15,5 @@ def _commands(kinds: Subcommands) -> None:
       sd2 classify train campaign.zarr --out gestures.safetensors
       sd2 classify apply walk.sd2
     """
-    add_declared(kinds, "classify.train", "classify.trained", "classify.comparison")
+    modules = {"train": "train", "eval": "trained", "apply": "trained", "table": "comparison"}
+    add_declared(kinds, {name: f"classify.{module}" for name, module in modules.items()})

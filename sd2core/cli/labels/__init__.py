@@ -65,8 +65,15 @@ def _commands(kinds: Subcommands) -> None:
     add_command(kinds, "show", options=Show, handler=_show)
     add_command(kinds, "convert", options=Convert, handler=_convert)
     add_command(kinds, "statistics", options=Statistics, handler=_statistics)
-    others = ("label_set", "suggest", "recording", "agree", "recover")
-    add_declared(kinds, *(f"labels.{module}" for module in others))
+    modules = {
+        "set": "label_set",
+        "suggest": "suggest",
+        "figure": "recording",
+        "cut": "recording",
+        "agree": "agree",
+        "recover": "recover",
+    }
+    add_declared(kinds, {name: f"labels.{module}" for name, module in modules.items()})
 
 
 def _show(options: Show) -> None:

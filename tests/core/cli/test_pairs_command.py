@@ -39,7 +39,7 @@ def test_a_real_recording_in_part(sd2: Sd2, shared_data: Path, tmp_path: Path) -
 
     again = sd2("pairs", "mars", folder, "--out", out, "--bins", "16", "--v-max", "1.5")
     assert again.code == 0
-    assert "1 takes" in again.out
+    assert "1 take," in again.out
     other = sd2("pairs", "mars", folder, "--out", out, "--target", "intensity")
     assert other.code == 1
     assert "was begun with" in other.err
