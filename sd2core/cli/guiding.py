@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
-from sd2core.cli.keys import pressed_keys
+from sd2core.cli import keys
 from sd2core.cli.output import counted, print_event, print_rows
 from sd2core.errors import Sd2Error
 from sd2core.files.lock import FileLock
@@ -79,7 +79,7 @@ def guide(
             )
         with (
             stop_signals() as stop,
-            pressed_keys() as key,
+            keys.pressed_keys() as key,
             contextlib.closing(_Takes(session, folder, open_take, telling)) as recorder,
         ):
             while session.phase != "over" and not stop.is_set() and _press(session, consent, key()):
@@ -118,6 +118,12 @@ def _press(session: Session, consent: Consent, key: str) -> bool:
             session.skip(time.monotonic())
         case "q":
             return False
+        case keys.NO_MORE if session.phase in ("consent", "ready"):
+            raise Sd2Error(
+                "A session waits for a key, and nobody can press one: the input has ended",
+                "a terminal, or a program that presses keys",
+                "Run it in a terminal, in the foreground",
+            )
     return True
 
 

@@ -6,6 +6,14 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+NO_MORE = "\x04"
+"""The key where nobody will press another: without a terminal, and at the end of a pipe."""
+
+
+def _no_key() -> str:
+    return NO_MORE
+
+
 if sys.platform == "win32":
     import msvcrt
 
@@ -16,7 +24,7 @@ if sys.platform == "win32":
         def key() -> str:
             return msvcrt.getwch() if msvcrt.kbhit() else ""
 
-        yield key if sys.stdin is not None and sys.stdin.isatty() else str
+        yield key if sys.stdin is not None and sys.stdin.isatty() else _no_key
 else:
     import os
     import select
@@ -31,12 +39,12 @@ else:
         """
         terminal = _standard_input()
         if terminal is None or (os.isatty(terminal) and _in_background(terminal)):
-            yield str
+            yield _no_key
             return
 
         def key() -> str:
             ready = select.select([terminal], [], [], 0)[0]
-            return os.read(terminal, 1).decode(errors="replace") if ready else ""
+            return os.read(terminal, 1).decode(errors="replace") or NO_MORE if ready else ""
 
         if not os.isatty(terminal):
             yield key

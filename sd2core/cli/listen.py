@@ -207,7 +207,7 @@ class Status:
                     values=values,
                 )
         if self._listening.silent_s > _SILENT_S and (silence := self._source.silence()):
-            self._warn_once(silence)
+            self.warn_once(silence)
         if time.monotonic() - self._shown_s < (_UPDATE_S if self._is_line else _LINE_S):
             return
         self._shown_s = time.monotonic()
@@ -288,9 +288,9 @@ class Status:
 
     def _warn_of_doubts(self) -> None:
         for doubt in self._listening.doubts(at_end=False):
-            self._warn_once(doubt)
+            self.warn_once(doubt)
 
-    def _warn_once(self, sentence: str) -> None:
+    def warn_once(self, sentence: str) -> None:
         """Print a sentence to standard error, unless it was, with other numbers."""
         words = re.sub(r"[\d.,]+", "", sentence)
         if words not in self._printed:

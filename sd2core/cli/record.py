@@ -17,6 +17,7 @@ from sd2core.options.records import OptionError, Place
 from sd2core.options.shared import Json
 
 if TYPE_CHECKING:
+    from sd2core.cli.listen import Status
     from sd2core.live.cameras import Camera
     from sd2core.live.checking import Answer
     from sd2core.live.clocks import ClockLine
@@ -219,7 +220,7 @@ def _take(options: Record, choice: CameraChoice) -> None:
     with _station(options, choice) as station, station.begin(options.out) as take:
         listening = take.listening
         status = Status(listening, take.source, as_json=options.json, columns=options.previews)
-        status.more, status.each_time = take.progress, partial(_follow, take)
+        status.more, status.each_time = take.progress, partial(_follow, take, status)
         status.nothing = "No frame of the radar came: the recording holds the video alone."
         status.begin(take.folder, False, take.about)
         follow(listening, status, options.seconds, take.stop)
@@ -228,9 +229,11 @@ def _take(options: Record, choice: CameraChoice) -> None:
             _print_clocks(take, line, as_json=options.json)
 
 
-def _follow(take: JointRecording) -> None:
+def _follow(take: JointRecording, status: Status) -> None:
     """Link what is recorded as soon as it can be, and tell the newest picture."""
     take.follow()
+    if take.film.is_over:
+        status.warn_once("The camera has ended: the radar is recorded alone from here on.")
     if (preview := take.film.next_preview()) is not None:
         print_event("preview", picture=preview, **take.progress())
 

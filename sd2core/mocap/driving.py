@@ -204,13 +204,8 @@ def puppet_of(clips: Sequence[SkeletonClip], markers: tuple[Marker, ...]) -> Pup
     space = ShapeSpace()
     points = KeypointSpace(space)
     shape = _shape(space, points, *stills)
-    own = points.of(shape)
-    if len({marker.joint for marker in markers if marker.landmark[:4] == "ear."}) == 1:
-        rest_m = own.rest_m.copy()
-        ears = [LANDMARK["ear.L"], LANDMARK["ear.R"]]
-        rest_m[ears] = rest_m[ears].mean(axis=0)
-        own = replace(own, rest_m=rest_m)
-    return Puppet(shape, _placed(space.skeleton(shape), own, markers, *stills), markers)
+    placed = _placed(space.skeleton(shape), points.of(shape), markers, *stills)
+    return Puppet(shape, placed, markers)
 
 
 def _sample(

@@ -28,7 +28,7 @@ OLD = {
     "fitting.md": "ten idle minutes; only its commands and how tables are written have changed",
     "range-synthesis.md": _HOURS,
     "paper.md": _HOURS,
-    "denoiser.md": _SAME,
+    "denoiser.md": _HOURS,
     "classifier.md": _SAME,
     "studies.md": _SAME,
 }

@@ -154,6 +154,18 @@ def test_on_a_level_surface_x_is_the_nearest_axis_of_the_world() -> None:
     np.testing.assert_allclose(abs(rotation[:, 2]), [0, 1, 0], atol=1e-9)
 
 
+@pytest.mark.parametrize("aside_m", [0.1, 1e-6, 0.0])
+def test_a_surface_of_one_triangle_carries_a_sensor_unless_it_is_a_line(aside_m: float) -> None:
+    points = np.array([[0.0, 0.0, 2.0], [0.1, 0.0, 2.0], [0.05, aside_m, 2.0]])
+    still = np.tile(points, (6, 1, 1))
+    mesh = MeshSequence(still, np.array([[0, 1, 2]]), Timebase.regular(6, 30.0))
+    if aside_m > 0.01:
+        np.testing.assert_allclose(abs(mounted(mesh, 0).rotation[:, 2]), [0, 0, 1], atol=1e-9)
+    else:
+        with pytest.raises(Sd2Error, match="the 3 vertices around number 0 make no surface"):
+            mounted(mesh, 0)
+
+
 def test_a_frame_without_a_body_moves_nothing() -> None:
     mesh = sphere(np.tile([0.0, 0.0, 3.0], (40, 1)))
     points = np.array(mesh.vertices)

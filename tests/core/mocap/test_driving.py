@@ -10,6 +10,7 @@ from sd2core.body.initial import Pose
 from sd2core.body.rig import JOINTS as TURNS
 from sd2core.body.rig import KeypointSpace
 from sd2core.body.rotations import about
+from sd2core.body.track import LANDMARKS
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.mars import JOINTS
 from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, SkeletonClip, puppet_of, resample_pose
@@ -45,6 +46,9 @@ def test_joints_are_met(swiping: tuple[DrivenClip, np.ndarray, np.ndarray]) -> N
     rows = [row for row in range(33) if np.isfinite(driven.residual_m[:, row]).any()]
     assert len(rows) == len(KINECT_MARKERS)
     assert np.nanmean(driven.residual_m) < 0.015
+    # The Kinect has one joint for both ears, in their middle.
+    ears = [LANDMARKS.index("ear.L"), LANDMARKS.index("ear.R")]
+    assert driven.residual_m[:, ears].max() < 0.01
 
 
 def test_arms_move_as_they_did(swiping: tuple[DrivenClip, np.ndarray, np.ndarray]) -> None:

@@ -53,6 +53,15 @@ def test_a_radar_that_saw_something_else_stays_at_the_camera() -> None:
     assert (found.position_m, found.offset_s) == ((0.0, 0.0, 0.0), 0.0)
 
 
+def test_what_was_measured_before_or_after_the_motion_tells_nothing() -> None:
+    one = seen((0.2, 0.4), 0.0)
+    wild_mps = one.velocity_mps.copy()
+    wild_mps[[0, -1]] = -50.0, 50.0  # half of each lies beyond the first or the last frame
+    found = estimate_place([Seen(one.times_s, one.points_m, wild_mps)])
+    np.testing.assert_allclose(found.position_m, [0.2, 0.4, 0.0], atol=0.05)
+    assert found.correlation == pytest.approx(1.0, abs=1e-3)
+
+
 def test_too_little_to_tell() -> None:
     one = seen((0.3, 0.5), 0.1)
     still = Seen(one.times_s, np.repeat(one.points_m[:1], 600, axis=0), one.velocity_mps)

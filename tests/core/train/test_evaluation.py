@@ -92,6 +92,15 @@ def test_an_answer_that_is_off_by_bins(shift: int) -> None:
     assert wiener.values("peak", "mae_mps") == 0.0
 
 
+def test_takes_are_counted_for_every_model_and_filter() -> None:
+    pairs, told = lines(0), []
+    found = evaluate(
+        [model(pairs, 0), model(pairs, 1)], pairs, progress=lambda *one: told.append(one)
+    )
+    total = 3 * sum(len(group.reports) for group in found.groups)
+    assert told == [(done, total) for done in range(total + 1)]
+
+
 def test_noise_is_no_movement() -> None:
     pairs = lines(1, noise=1e-3)
     report = evaluate([model(pairs)], pairs).groups[-1].reports[0]
