@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.model import Body
 from sd2core.body.rotations import Floats
-from sd2core.numerics.compiled import compiled, kernels_ready
+from sd2core.numerics.compiled import compiled
 from sd2core.numerics.parallel import spread
 
 _JOB_FRAMES = 8
@@ -24,8 +24,6 @@ def pose_vertices(body: Body, transforms: Floats) -> NDArray[np.float32]:
     """
     transforms = np.require(transforms, np.float64, ["C", "W"])
     vertices = np.empty((len(transforms), len(body.vertices_m), 3), np.float32)
-    if not kernels_ready():
-        return _pose_plain(body, transforms, vertices)
     # Copies in plain memory: a read-only or strided array is another type to the compiler.
     rest, weights = np.array(body.vertices_m, order="C"), np.array(body.weights, order="C")
     bones = np.array(body.bones, np.int32, order="C")
@@ -55,7 +53,7 @@ def pose_kernel(
     last: int,
     vertices: NDArray[np.float32],
 ) -> None:
-    """Compiled form of :func:`pose_vertices` for frames ``first`` to ``last``.
+    """Pose the vertices of frames ``first`` to ``last``, as :func:`pose_vertices` does.
 
     Parameters
     ----------
@@ -87,21 +85,6 @@ def pose_kernel(
             vertices[t, v, 0] = px
             vertices[t, v, 1] = py
             vertices[t, v, 2] = pz
-
-
-def _pose_plain(
-    body: Body, transforms: Floats, vertices: NDArray[np.float32]
-) -> NDArray[np.float32]:
-    """NumPy form of :func:`pose_kernel`: one matrix product of bones and vertices per frame."""
-    shares = np.zeros((len(body.vertices_m), transforms.shape[1]))
-    rows = np.arange(len(shares))
-    for slot in range(body.weights.shape[1]):
-        shares[rows, body.bones[:, slot]] += body.weights[:, slot]
-    for t, bones in enumerate(transforms):
-        blend = (shares @ bones.reshape(len(bones), 12)).reshape(-1, 3, 4)
-        turned = (blend[:, :, :3] @ body.vertices_m[:, :, None])[:, :, 0]
-        vertices[t] = turned + blend[:, :, 3]
-    return vertices
 
 
 def compile_kernels() -> None:

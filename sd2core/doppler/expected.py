@@ -15,20 +15,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler import histogram
-from sd2core.doppler.histogram import (
-    Counting,
-    Counts,
-    Frames,
-    Scatterers,
-    place_in_bins,
-    places_plain,
-)
+from sd2core.doppler.histogram import Counting, Counts, Frames, Scatterers, place_in_bins
 from sd2core.doppler.kernels import CLIP, WRAP
 from sd2core.doppler.limb_histograms import FineAxis
 from sd2core.doppler.limb_kernels import REACH, fine_kernel
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
-from sd2core.numerics.compiled import kernels_ready
 from sd2core.sensor import VelocityAxis
 
 SIGMA_FACTOR = 0.5
@@ -100,9 +91,6 @@ def count_expected(
     pairs = np.flatnonzero(np.bincount(number))
     group = np.searchsorted(pairs, number)
     limb, part = pairs % sigma_bins.shape[1], pairs // sigma_bins.shape[1]
-    if not kernels_ready():
-        _count_plain(frames, ends, counting, scatterers, sigma_bins[:, vertex_limb], into)
-        return
     place, axis = ends.astype(frames.positions.dtype), counting.arguments()
     sigma = sigma_bins[:, limb]
     room = 0 if counting.beyond == WRAP else math.ceil(REACH * sigma.max()) + 1
@@ -112,33 +100,6 @@ def count_expected(
         np.empty((0, len(pairs), FineAxis(counting, room).parts)), into.histogram, into.visible,
         into.beyond,
     )  # fmt: skip
-
-
-def _count_plain(
-    frames: Frames,
-    ends: NDArray[np.float64],
-    counting: Counting,
-    scatterers: Scatterers,
-    sigma: NDArray[np.float64],
-    into: Counts,
-) -> None:
-    """Count as :func:`count_expected` does, in NumPy, every vertex (n, V) by itself."""
-    histogram.count_plain(frames, ends, counting, scatterers, into)
-    part = scatterers.parts
-    part = np.zeros(sigma.shape[1], np.uint8) if part is None else part
-    for t, knot in enumerate(frames.centre):
-        points = frames.positions[knot]
-        seen = scatterers.seen(t, points, ends)
-        weight = seen * scatterers.weights(t, points, ends, counting)
-        samples = np.flatnonzero(frames.duration_s[t] > 0).tolist()
-        into.histogram[t] = 0
-        for sample in samples:
-            place = places_plain(frames, t, sample, ends, counting)
-            for number in range(into.histogram.shape[1]):
-                own = part == number
-                into.histogram[t, number] += spread_over_bins(
-                    place[own], weight[own] / len(samples), sigma[t, own], counting
-                )
 
 
 def spread_over_bins(

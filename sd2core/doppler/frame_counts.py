@@ -18,7 +18,6 @@ from sd2core.doppler.moving import MovingVertices
 from sd2core.doppler.moving_kernels import marked_counts_kernel
 from sd2core.doppler.prepared import Block, PreparedMesh
 from sd2core.mesh.walls import Wall
-from sd2core.numerics.compiled import kernels_ready
 from sd2core.scattering.amplitude import range_weight
 from sd2core.scattering.echo_paths import EchoPath, echo_paths, mean_distance_m
 from sd2core.sensor import VirtualSensor
@@ -150,11 +149,9 @@ class FrameCounts:
             velocity = self.prepared.velocities_vid2doppler(block, rows, place)
             edges_mps = self.options.axis.edges_mps
             vid2doppler.count(frames, velocity, edges_mps, place, self.counting, scatterers, into)
-        elif kernels_ready():
+        else:
             paths, duration_s = frames.paths(), frames.duration_s
             histogram.count(paths, 0, duration_s, place, self.counting, scatterers, into)
-        else:
-            histogram.count_plain(frames, place, self.counting, scatterers, into)
 
     def prepare(self, index: int, occluded: bool) -> None:
         """Make all that counting a block takes and that no sensor changes."""

@@ -1,8 +1,7 @@
-"""Counting of vertices per velocity bin, frame by frame: compiled, and in NumPy."""
+"""Counting of vertices per velocity bin, frame by frame."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -254,52 +253,6 @@ class Counts:
         return Counts(self.histogram[rows], self.visible[rows], self.beyond[rows])
 
 
-def relative_range(positions: NDArray[Any], sensor: NDArray[np.float64]) -> NDArray[Any]:
-    """Range (V,) of each vertex less the sensor's distance from the clip's origin.
-
-    |p − s| − |s| = p·(p − 2s) / (|p − s| + |s|). The differences between vertices and knots
-    stay at the body's own scale, so the difference of two is the exact change of range of
-    :func:`radial_velocity` however far the sensor is, with one range per vertex and knot.
-    Its rounding error is a few roundings of the largest coordinate
-    (:func:`sd2core.numerics.precision.velocity_error_mps`). Positions (3, V) are relative
-    to the clip's origin; the result has their precision.
-    """
-    x, y, z = positions
-    sx, sy, sz = place = sensor.astype(positions.dtype)
-    two = np.float32(2)
-    distance = np.linalg.norm(place.astype(np.float64)).astype(positions.dtype)
-    away = np.sqrt((x - sx) ** 2 + (y - sy) ** 2 + (z - sz) ** 2)
-    difference = x * (x - two * sx) + y * (y - two * sy) + z * (z - two * sz)
-    return difference / np.maximum(away + distance, np.float32(1e-30))
-
-
-def places_plain(
-    frames: Frames, t: int, sample: int, ends: NDArray[np.float64], counting: Counting
-) -> NDArray[Any]:
-    """Position of every vertex (V,) on the velocity axis, in the precision of the frames.
-
-    Parameters
-    ----------
-    frames : Frames
-        With all vertices.
-    t, sample : int
-        Frame and velocity sample, which has something to measure.
-    ends : float64 ndarray, (1 or 2, 3)
-        Of the path, in the frame of the positions.
-    counting : Counting
-        Its axis runs from 0 to ``bins``.
-    """
-
-    def range_at(knot: int) -> NDArray[Any]:
-        each = [relative_range(frames.positions[knot], end) for end in ends]
-        return each[0] if len(each) == 1 else np.float32(0.5) * (each[0] + each[1])
-
-    closer = range_at(frames.before[t, sample]) - range_at(frames.after[t, sample])
-    precision = frames.positions.dtype
-    per_bin = closer * counting.scale(frames.duration_s[t, sample : sample + 1], precision)
-    return per_bin + np.float32(0.5 * counting.bins)
-
-
 def place_in_bins(
     f: NDArray[Any], counting: Counting
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
@@ -315,46 +268,6 @@ def place_in_bins(
     if counting.beyond == DROP:
         number[beyond] = bins
     return number, beyond
-
-
-def count_plain(
-    frames: Frames,
-    ends: NDArray[np.float64],
-    counting: Counting,
-    scatterers: Scatterers,
-    into: Counts,
-    bins_of: Callable[[int, int], tuple[NDArray[np.intp], NDArray[np.bool_]]] | None = None,
-) -> None:
-    """Count some frames as :func:`count` does, in NumPy.
-
-    Parameters
-    ----------
-    frames : Frames
-        The n frames with all vertices.
-    ends, counting, scatterers, into
-        As for :func:`count`.
-    bins_of : callable, optional
-        ``bins_of(t, sample)`` replaces what :func:`place_in_bins` finds.
-    """
-    _, parts, bins = into.histogram.shape
-    multiplicity = scatterers.multiplicity(frames.positions.shape[2])
-    # Bins of a part, and one for what is dropped.
-    base = 0 if scatterers.parts is None else (bins + 1) * scatterers.parts.astype(np.intp)
-    for t, knot in enumerate(frames.centre):
-        points = frames.positions[knot]
-        seen = scatterers.seen(t, points, ends)
-        weight = scatterers.weights(t, points, ends, counting)
-        into.visible[t] = multiplicity[seen].sum()
-        measured = max(1, int((frames.duration_s[t] > 0).sum()))
-        for sample in np.flatnonzero(frames.duration_s[t] > 0).tolist():
-            if bins_of is None:
-                places = places_plain(frames, t, sample, ends, counting)
-                number, beyond = place_in_bins(places, counting)
-            else:
-                number, beyond = bins_of(t, sample)
-            total = np.bincount((number + base)[seen], weight[seen], parts * (bins + 1))
-            into.histogram[t] += total.reshape(parts, bins + 1)[:, :bins] / measured
-            into.beyond[t] += multiplicity[beyond & seen].sum() / measured
 
 
 def count(
@@ -427,25 +340,4 @@ def mark_needed(
         live,
         needed,
     )
-    return needed
-
-
-def mark_needed_plain(
-    frames: Frames, ends: NDArray[np.float64], counting: Counting, live: NDArray[np.uint8]
-) -> NDArray[np.uint8]:
-    """Mark vertices of all frames as :func:`mark_needed` does, in NumPy.
-
-    Parameters
-    ----------
-    frames : Frames
-        The n frames with all vertices.
-    ends, counting, live
-        As for :func:`mark_needed`.
-    """
-    needed = np.zeros((len(frames.centre), frames.positions.shape[2]), np.uint8)
-    for t in range(len(frames.centre)):
-        for sample in range(frames.before.shape[1]):
-            if frames.duration_s[t, sample] > 0:
-                places = places_plain(frames, t, sample, ends, counting)
-                needed[t] |= live[place_in_bins(places, counting)[0]]
     return needed

@@ -36,7 +36,15 @@ DROP, WRAP, CLIP = 0, 1, 2
 
 @compiled
 def _relative_ranges(x, y, z, sx, sy, sz, distance, ranges):  # type: ignore[no-untyped-def]
-    """Compiled form of :func:`sd2core.doppler.histogram.relative_range` for one knot."""
+    """Ranges (n,) at one knot, less the sensor's ``distance`` from the clip's origin.
+
+    |p − s| − |s| = p·(p − 2s) / (|p − s| + |s|). The differences between vertices and knots
+    stay at the body's own scale, so the difference of two is the exact change of range of
+    :func:`~sd2core.scattering.velocity.radial_velocity` however far the sensor is, with one range
+    per vertex and knot. Its rounding error is a few roundings of the largest coordinate
+    (:func:`sd2core.numerics.precision.velocity_error_mps`). Coordinates (n,) are relative to the
+    clip's origin; the result has their precision.
+    """
     two = np.float32(2)
     for v in range(ranges.shape[0]):
         px, py, pz = x[v], y[v], z[v]

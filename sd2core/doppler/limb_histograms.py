@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler.histogram import Counting, Frames, Scatterers, places_plain
+from sd2core.doppler.histogram import Counting, Frames, Scatterers
 from sd2core.doppler.kernels import CLIP, WRAP
 from sd2core.doppler.limb_kernels import PARTS, fine_kernel
-from sd2core.numerics.compiled import kernels_ready
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,7 @@ def fine_histograms(
     limb, counting = scatterers.parts, axis.counting
     assert limb is not None
     fine = np.zeros((len(frames), limbs, axis.parts))
-    if kernels_ready() and velocity_mps is None:
+    if velocity_mps is None:
         place = ends.astype(frames.positions.dtype)
         fine_kernel(
             tuple(frames.paths()), counting.scale(frames.duration_s, place.dtype),
@@ -107,20 +106,14 @@ def fine_histograms(
             np.empty((0, 1, 0)), np.zeros(len(frames)), np.zeros(len(frames)),
         )  # fmt: skip
         return fine
-    for t, knot in enumerate(frames.centre):
-        points = frames.positions[knot]
+    last = axis.parts - 1
+    for t in np.flatnonzero((frames.duration_s > 0).any(axis=1)).tolist():
+        points = frames.positions[frames.centre[t]]
         seen = scatterers.seen(t, points, ends)
         weight = seen * scatterers.weights(t, points, ends, counting)
-        samples = np.flatnonzero(frames.duration_s[t] > 0).tolist()
-        for sample in samples:
-            if velocity_mps is None:
-                f = places_plain(frames, t, sample, ends, counting)
-            else:
-                f = counting.bins * (0.5 + 0.5 / counting.v_max_mps * velocity_mps[t])
-            number = np.floor((f + axis.room_bins) * PARTS)
-            last = axis.parts - 1
-            number = number % axis.parts if axis.periodic else np.clip(number, 0, last)
-            slot = limb * np.intp(axis.parts) + number.astype(np.intp)
-            counted = np.bincount(slot, weight / len(samples), fine[t].size)
-            fine[t] += counted.reshape(fine[t].shape)
+        place = counting.bins * (0.5 + 0.5 / counting.v_max_mps * velocity_mps[t])
+        number = np.floor((place + axis.room_bins) * PARTS)
+        number = number % axis.parts if axis.periodic else np.clip(number, 0, last)
+        slot = limb * np.intp(axis.parts) + number.astype(np.intp)
+        fine[t] = np.bincount(slot, weight, fine[t].size).reshape(fine[t].shape)
     return fine

@@ -16,12 +16,10 @@ from sd2core.doppler.histogram import Counting, Paths
 from sd2core.doppler.prepared import Block, PreparedMesh
 from sd2core.mesh.things import Surroundings, before_wall
 from sd2core.mesh.walls import Wall
-from sd2core.numerics.compiled import kernels_ready
-from sd2core.scattering import depth_plain, exact_plain
 from sd2core.scattering.behind_things import Hiding, hide_behind
 from sd2core.scattering.depth import depth_visibility_kernel
 from sd2core.scattering.exact import exact_visibility_kernel
-from sd2core.scattering.visibility import facing_kernel, facing_mask
+from sd2core.scattering.visibility import facing_kernel
 
 Visibility = Literal["none", "facing", "depth", "exact", "frozen"]
 """``frozen``: depth or exact visibility of the nearest place that is kept, while dragging."""
@@ -400,8 +398,6 @@ class VisibilityMasks:
             start, duration_s = rows.start, block.frames.duration_s[rows]
         else:
             frames = self._prepared.whole(block).frames.rows(rows)
-            if not kernels_ready():
-                return histogram.mark_needed_plain(frames, ends, self._counting, self._live)
             paths, start, duration_s = frames.paths(), 0, frames.duration_s
         return histogram.mark_needed(paths, start, duration_s, ends, self._counting, self._live)
 
@@ -473,23 +469,14 @@ class VisibilityMasks:
         assert faces is not None  # the Synthesizer refuses to ask it of a point cloud
         points, pixels = view.points, self._prepared.options.depth_resolution
         closed = occlusion == "depth" and self._prepared.closed
-        if kernels_ready():
-            for first, last in view.stretches():
-                place = view.places_m[first]
-                if occlusion == "exact":
-                    exact_visibility_kernel(points, faces, place, needed, first, last, visible)
-                else:
-                    depth_visibility_kernel(
-                        points, faces, closed, place, pixels, needed, first, last, visible
-                    )
-            return
-        for t in np.flatnonzero(needed.any(axis=1)):
-            wanted, place = needed[t] > 0, view.places_m[t]
+        for first, last in view.stretches():
+            place = view.places_m[first]
             if occlusion == "exact":
-                seen = exact_plain.exact_visibility(points[t], faces, place, wanted)
+                exact_visibility_kernel(points, faces, place, needed, first, last, visible)
             else:
-                seen = depth_plain.depth_visibility(points[t], faces, closed, place, pixels, wanted)
-            visible[t][wanted] = seen[wanted]
+                depth_visibility_kernel(
+                    points, faces, closed, place, pixels, needed, first, last, visible
+                )
 
 
 @dataclass(frozen=True, eq=False)
@@ -540,9 +527,6 @@ def position_of(place_m: NDArray[np.float64]) -> Position:
 def _facing(view: _View, normals: NDArray[np.int8]) -> NDArray[np.uint8]:
     visible = np.empty((len(view.points), view.points.shape[2]), np.uint8)
     for t, (points, place) in enumerate(zip(view.points, view.places_m, strict=True)):
-        if kernels_ready():
-            (x, y, z), (nx, ny, nz), (sx, sy, sz) = points, normals[t], place.astype(np.float32)
-            facing_kernel(x, y, z, nx, ny, nz, sx, sy, sz, visible[t])
-        else:
-            visible[t] = facing_mask(points[None], normals[t : t + 1], place)[0]
+        (x, y, z), (nx, ny, nz), (sx, sy, sz) = points, normals[t], place.astype(np.float32)
+        facing_kernel(x, y, z, nx, ny, nz, sx, sy, sz, visible[t])
     return visible

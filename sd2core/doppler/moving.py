@@ -30,7 +30,7 @@ _LARGEST_SHARE = 0.6
 
 _ROUNDINGS = 48.0
 """Bound of the error of the difference of two relative ranges, in roundings of the largest
-distance from the origin: 2 × 10 by the steps of ``relative_range``, doubled and more."""
+distance from the origin: 2 × 10 by the steps of ``_relative_ranges``, doubled and more."""
 
 
 def still_bins(bins: int, null_bins: Collection[int]) -> float:

@@ -22,7 +22,6 @@ from sd2core.mesh.made_vertices import unshifted
 from sd2core.mesh.sequence import MeshSequence, refuse_missing
 from sd2core.mesh.walls import Wall
 from sd2core.numerics.byte_budget import ByteBudget
-from sd2core.numerics.compiled import kernels_ready
 from sd2core.numerics.precision import single_is_enough
 from sd2core.options.bounds import RANGE_EXPONENT
 from sd2core.scattering import amplitude, visibility
@@ -327,7 +326,7 @@ class PreparedMesh:
     def moving(self, block: Block, counting: Counting) -> MovingVertices | None:
         """Vertices of a block that can enter a kept bin; None where counting all is as fast."""
         still = still_bins(counting.bins, self.options.null_bins)
-        if self._compatible or self.spreads or still <= 0 or not kernels_ready():
+        if self._compatible or self.spreads or still <= 0:
             return None
 
         def make() -> tuple[tuple[MovingVertices | None], int]:
@@ -395,8 +394,6 @@ class PreparedMesh:
 
     def _normals(self, block: Block) -> NDArray[np.int8]:
         points, faces = self._at_frames(block), self._faces()
-        if not kernels_ready():
-            return visibility.vertex_normals(points, faces)
         normals = np.empty(points.shape, np.int8)
         visibility.vertex_normals_kernel(points, faces, 0, len(points), normals)
         return normals
@@ -410,8 +407,6 @@ class PreparedMesh:
 
     def _area_vectors(self, block: Block) -> NDArray[np.float32]:
         points, faces = self._at_frames(block), self._faces()
-        if not kernels_ready():
-            return amplitude.vertex_area_vectors(points, faces)
         vectors = np.empty(points.shape, np.float32)
         amplitude.vertex_area_vectors_kernel(points, faces, 0, len(points), vectors)
         return vectors
@@ -434,8 +429,6 @@ class PreparedMesh:
 
     def _areas(self, block: Block) -> NDArray[np.float32]:
         points, faces = self._at_frames(block), self._faces()
-        if not kernels_ready():
-            return amplitude.vertex_areas(points, faces)
         areas = np.empty((len(points), points.shape[2]), np.float32)
         amplitude.vertex_areas_kernel(points, faces, 0, len(points), areas)
         return areas

@@ -18,11 +18,9 @@ from sd2core.doppler.histogram import counting_of
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.things import Surface
-from sd2core.numerics.compiled import kernels_ready
 from sd2core.numerics.precision import keeps_shape
 from sd2core.scattering.echo_paths import EchoPath, echo_paths, mean_distance_m
 from sd2core.scattering.exact import exact_visibility_kernel
-from sd2core.scattering.exact_plain import exact_visibility
 from sd2core.scattering.trajectory import Trajectory
 from sd2core.scattering.velocity import moments, radial_velocity
 from sd2core.sensor import VirtualSensor
@@ -275,8 +273,6 @@ def _visible(
     single = (points - origin[:, None]).astype(np.float32)
     needed = np.zeros((1, points.shape[1]), np.uint8)
     needed[0, :count] = 1
-    if not kernels_ready():
-        return exact_visibility(single, faces, place - origin, needed[0] > 0)[:count] > 0
     visible = np.empty_like(needed)
     exact_visibility_kernel(single[None], faces, place - origin, needed, 0, 1, visible)
     return visible[0, :count] > 0

@@ -25,7 +25,7 @@ from sd2core.mesh.presence import gaps_in_words, runs
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import VertexParts
 from sd2core.numerics.byte_budget import ByteBudget
-from sd2core.numerics.compiled import compile_in_background, kernels_ready, worker_count
+from sd2core.numerics.compiled import await_kernels, worker_count
 from sd2core.numerics.parallel import Ticket, run_jobs, run_light_jobs
 from sd2core.numerics.precision import SHARE_OF_A_BIN, stored_velocity_error_mps
 from sd2core.options.synthesis import ScenePart
@@ -287,6 +287,7 @@ class Synthesizer:
 
             return work
 
+        await_kernels(lambda: progress(0, len(blocks)))
         run_jobs([job(index) for index in sorted(blocks)], len(blocks), progress, self._threads)
 
     def map(
@@ -615,6 +616,7 @@ class Synthesizer:
         if not 0 <= start < stop <= self.mesh.frame_count:
             raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
         chosen, of = self._choose(visibility), len(self._bodies)
+        await_kernels(lambda: progress(0, stop - start))
         known = any(body.uncertainty is not None for body in self.mesh.bodies)
         each = []
         for number, one in enumerate(self._bodies):
@@ -652,16 +654,14 @@ class Synthesizer:
         """Empty counts of what some frames of this body need, and the jobs that fill them."""
         start, stop = frames_within_reach(self.mesh.times_s, *frames, self.options.time_sigma_s)
         sensor = replace(sensor, beam=None) if "beam" in self.left_out else sensor
-        if not kernels_ready():
-            compile_in_background()
         counts = Counts.empty(
             stop - start, self.options.axis.bins, 1 if parts is None else len(parts.names)
         )
         numbers = None if parts is None else parts.numbers
         totals = np.empty(stop - start)
         used: set[Quality] = set()
-        quick = visibility not in ("depth", "exact") and kernels_ready()
-        at_once = max(_EXACT_VERTICES // self.mesh.vertex_count, 1) if kernels_ready() else 1
+        quick = visibility not in ("depth", "exact")
+        at_once = max(_EXACT_VERTICES // self.mesh.vertex_count, 1)
 
         def job(index: int, low: int, high: int) -> Callable[[Ticket], None]:
             def work(ticket: Ticket) -> None:
@@ -704,6 +704,7 @@ class Synthesizer:
         """Count several bodies; returns processor seconds."""
         jobs = [job for one in counted for job in one.jobs]
         of, frames = len(counted), counted[0].stop - counted[0].start
+        await_kernels(lambda: progress(0, frames))
 
         def of_clip(done: int, _: int) -> None:
             progress(done // of, frames)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.doppler.histogram import Counting, Counts, Frames, Scatterers, count_plain
+from sd2core.doppler.histogram import Counting, Counts, Frames, Scatterers
 from sd2core.doppler.kernels import CLIP, DROP, WRAP
 from sd2core.mesh.presence import Presence
 
@@ -130,7 +130,17 @@ def count(
     into : Counts
         Written; zero at first.
     """
-    numbers, beyond = place_in_bins(velocity_mps, edges_mps, counting)
-    count_plain(
-        frames, ends, counting, scatterers, into, lambda row, _: (numbers[row], beyond[row])
-    )
+    _, parts, bins = into.histogram.shape
+    multiplicity = scatterers.multiplicity(frames.positions.shape[2])
+    number, beyond = place_in_bins(velocity_mps, edges_mps, counting)
+    if scatterers.parts is not None:  # bins of a part, and one for what is dropped
+        number = number + (bins + 1) * scatterers.parts.astype(np.intp)
+    for t, knot in enumerate(frames.centre):
+        points = frames.positions[knot]
+        seen = scatterers.seen(t, points, ends)
+        into.visible[t] = multiplicity[seen].sum()
+        if (frames.duration_s[t] > 0).any():
+            weight = scatterers.weights(t, points, ends, counting)
+            total = np.bincount(number[t][seen], weight[seen], parts * (bins + 1))
+            into.histogram[t] += total.reshape(parts, bins + 1)[:, :bins]
+            into.beyond[t] += multiplicity[beyond[t] & seen].sum()

@@ -1,8 +1,9 @@
 """Compilation of numerical kernels, kept on disk and done in the background.
 
 Kernels are serial and release the GIL; callers split their frames over threads
-(see docs/decisions/0002). The machine code is kept on disk. While it is not
-there yet, callers use their plain NumPy form and ask for it in the background.
+(see docs/decisions/0002). The machine code is kept on disk. Where it is not there
+yet, long work waits until another process has made it; a kernel that is called
+meanwhile is compiled at that call.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import functools
 import hashlib
 import importlib
 import importlib.metadata
+import logging
 import os
 import platform
 import shutil
@@ -19,6 +21,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -47,8 +50,8 @@ KERNEL_MODULES = (
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _MARKER = "complete"
-_LOW_PRIORITY = "--low-priority"
 _KERNEL_THREAD = "sd2-kernel"
+_POLL_S = 0.03
 _lock = threading.Lock()
 _ready = False
 _background: subprocess.Popen[bytes] | None = None
@@ -183,12 +186,11 @@ def _source(module: str) -> bytes:
     return _PACKAGE.parent.joinpath(*module.split(".")).with_suffix(".py").read_bytes()
 
 
-def compile_in_background(*, awaited: bool = False) -> subprocess.Popen[bytes] | None:
+def compile_in_background() -> subprocess.Popen[bytes] | None:
     """Start compiling in another process; None if it is done or impossible.
 
     A process, because the compiler holds the GIL: in a thread it would freeze
-    the window. At low priority unless it is ``awaited``: on a busy machine it would never end.
-    After a failure it is not started again.
+    the window. After a failure it is not started again.
     """
     global _background
     with _lock:
@@ -196,7 +198,6 @@ def compile_in_background(*, awaited: bool = False) -> subprocess.Popen[bytes] |
         if kernels_ready() or directory is None:
             return None
         if _background is None:
-            options = [] if awaited else [_LOW_PRIORITY]
             paths = [str(_PACKAGE.parent), os.environ.get("PYTHONPATH", "")]
             environment = {
                 **os.environ,
@@ -205,7 +206,7 @@ def compile_in_background(*, awaited: bool = False) -> subprocess.Popen[bytes] |
             }
             try:
                 _background = subprocess.Popen(
-                    [sys.executable, "-m", "sd2core.numerics.compiled", *options],
+                    [sys.executable, "-m", "sd2core.numerics.compiled"],
                     env=environment,
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
@@ -215,6 +216,26 @@ def compile_in_background(*, awaited: bool = False) -> subprocess.Popen[bytes] |
                 return None
             atexit.register(_stop_background)
         return _background
+
+
+def await_kernels(check: Callable[[], object]) -> None:
+    """Wait until the kernels are on disk, where another process compiles them.
+
+    Where nothing can be written, or that process fails, kernels are compiled where they are called.
+
+    Parameters
+    ----------
+    check : callable
+        Called while it waits; may raise Cancelled.
+    """
+    process = compile_in_background()
+    if process is not None and process.poll() is None:
+        logging.getLogger("sd2core").warning(
+            "Compiling the numerical kernels, once after installing: about half a minute"
+        )
+    while process is not None and process.poll() is None:
+        check()
+        time.sleep(_POLL_S)
 
 
 def _stop_background() -> None:
@@ -241,13 +262,7 @@ def on_worker() -> bool:
     return threading.current_thread().name.startswith(_KERNEL_THREAD)
 
 
-def _main() -> None:
+if __name__ == "__main__":
     from sd2core.numerics import compiled as module
 
-    if _LOW_PRIORITY in sys.argv[1:] and hasattr(os, "nice"):
-        os.nice(10)
     module.warm_up()
-
-
-if __name__ == "__main__":
-    _main()

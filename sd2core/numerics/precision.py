@@ -25,7 +25,7 @@ def velocity_error_mps(extent_m: float, duration_s: float) -> float:
     A range computed from coordinates of up to ``extent_m``, counted from the origin that positions
     are kept around, is wrong by a few roundings of that size, wherever the sensor is: the distance
     to it changes by no more than the coordinates do, and what a far sensor adds is taken off before
-    (:func:`sd2core.doppler.histogram.relative_range`). ``duration_s`` lies between the two ranges.
+    (:mod:`sd2core.doppler.kernels`). ``duration_s`` lies between the two ranges.
     """
     return _STEPS * ROUNDING * extent_m / duration_s
 

@@ -14,29 +14,6 @@ NEAREST_RANGE_M = 0.1
 """Least range of the range law, which is a far-field law; nearer vertices count as here."""
 
 
-def vertex_areas(positions: NDArray[Any], faces: NDArray[np.int32]) -> NDArray[np.float32]:
-    """Area that each vertex stands for: a third of its adjacent triangles.
-
-    Parameters
-    ----------
-    positions : float array, shape (n, 3, V)
-        Metres.
-    faces : int32 array, shape (F, 3)
-
-    Returns
-    -------
-    float32 array, shape (n, V)
-        Square metres; a frame's sum is the area of the surface.
-    """
-    areas = np.empty((positions.shape[0], positions.shape[2]), np.float32)
-    for frame, points in enumerate(positions.astype(np.float64, copy=False)):
-        corner = points[:, faces]  # (3, F, 3)
-        edge1, edge2 = corner[:, :, 1] - corner[:, :, 0], corner[:, :, 2] - corner[:, :, 0]
-        third = np.linalg.norm(np.cross(edge1, edge2, axis=0), axis=0) / 6.0
-        areas[frame] = np.bincount(faces.ravel(), np.repeat(third, 3), points.shape[1])
-    return areas
-
-
 @compiled
 def vertex_areas_kernel(
     positions: NDArray[np.float32],
@@ -45,7 +22,7 @@ def vertex_areas_kernel(
     last: int,
     areas: NDArray[np.float32],
 ) -> None:
-    """Compiled form of :func:`vertex_areas` for frames ``first`` to ``last``.
+    """Find the area that each vertex stands for: a third of its adjacent triangles.
 
     In double precision: the area of a sliver is the small difference of large products.
 
@@ -57,7 +34,7 @@ def vertex_areas_kernel(
     first, last : int
         Half-open range of frames.
     areas : float32 array, shape (n, V)
-        Written.
+        Written; square metres, whose sum over a frame is the area of the surface.
     """
     for t in range(first, last):
         x, y, z = positions[t, 0], positions[t, 1], positions[t, 2]
@@ -75,8 +52,15 @@ def vertex_areas_kernel(
             area[k] += third
 
 
-def vertex_area_vectors(positions: NDArray[Any], faces: NDArray[np.int32]) -> NDArray[np.float32]:
-    """Area vector of each vertex: a third of the sum of its adjacent triangles'.
+@compiled
+def vertex_area_vectors_kernel(
+    positions: NDArray[np.float32],
+    faces: NDArray[np.int32],
+    first: int,
+    last: int,
+    vectors: NDArray[np.float32],
+) -> None:
+    """Find the area vector of each vertex: a third of the sum of its adjacent triangles'.
 
     A triangle's area vector is its area times its outward unit normal. Its part
     along a direction is the area seen from there; a closed surface's sum to zero.
@@ -87,41 +71,10 @@ def vertex_area_vectors(positions: NDArray[Any], faces: NDArray[np.int32]) -> ND
         Metres.
     faces : int32 array, shape (F, 3)
         Counter-clockwise seen from outside.
-
-    Returns
-    -------
-    float32 array, shape (n, 3, V)
-        Square metres.
-    """
-    vectors = np.empty(positions.shape, np.float32)
-    for frame, points in enumerate(positions.astype(np.float64, copy=False)):
-        corner = points[:, faces]  # (3, F, 3)
-        edge1, edge2 = corner[:, :, 1] - corner[:, :, 0], corner[:, :, 2] - corner[:, :, 0]
-        for axis, third in enumerate(np.cross(edge1, edge2, axis=0) / 6.0):
-            vectors[frame, axis] = np.bincount(faces.ravel(), np.repeat(third, 3), points.shape[1])
-    return vectors
-
-
-@compiled
-def vertex_area_vectors_kernel(
-    positions: NDArray[np.float32],
-    faces: NDArray[np.int32],
-    first: int,
-    last: int,
-    vectors: NDArray[np.float32],
-) -> None:
-    """Compiled form of :func:`vertex_area_vectors` for frames ``first`` to ``last``.
-
-    Parameters
-    ----------
-    positions : float array, shape (n, 3, V)
-        Metres.
-    faces : int32 array, shape (F, 3)
-        Counter-clockwise seen from outside.
     first, last : int
         Half-open range of frames.
     vectors : float32 array, shape (n, 3, V)
-        Written.
+        Written; square metres.
     """
     vertices = positions.shape[2]
     total = np.empty((vertices, 3), np.float64)
@@ -142,7 +95,7 @@ def projected_areas(
     points : float array, shape (3, V)
         Metres.
     vectors : float32 array, shape (3, V)
-        Area vectors from :func:`vertex_area_vectors`.
+        Area vectors from :func:`vertex_area_vectors_kernel`.
     sensor : float64 array, shape (3,)
 
     Returns

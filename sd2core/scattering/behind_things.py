@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.numerics.compiled import compiled, kernels_ready
+from sd2core.numerics.compiled import compiled
 from sd2core.scattering.exact import frame_scratch, see_frame
-from sd2core.scattering.exact_plain import exact_visibility
 
 _ROOM = 1e-5
 """Tangent by which pictures are taken to be larger than they are, for roundings."""
@@ -170,44 +169,12 @@ def hide_behind(
     """
     if not len(hiding.faces):
         return
-    if kernels_ready():
-        counts = hiding.counts
-        _hide_behind_kernel(
-            hiding.points, hiding.origins_m, hiding.faces, hiding.boxes_m,
-            np.empty((0, hiding.points.shape[2]), np.uint8) if counts is None else counts,
-            points, origins_m, places_m, needed, visible,
-        )  # fmt: skip
-        return
-    for t in range(len(points)):
-        _hide_plainly(hiding, t, points[t], origins_m[t], places_m[t], needed[t], visible[t])
-
-
-def _hide_plainly(
-    hiding: Hiding,
-    t: int,
-    points: NDArray[np.float32],
-    origin_m: NDArray[np.float64],
-    place_m: NDArray[np.float64],
-    needed: NDArray[np.uint8],
-    visible: NDArray[np.uint8],
-) -> None:
-    """Do :func:`hide_behind` in one frame."""
-    asked = np.flatnonzero(visible & needed)
-    if not len(asked):
-        return
-    its = points[:, asked]
-    box_m = np.stack([its.min(axis=1), its.max(axis=1)]) + origin_m
-    boxes = hiding.boxes_m[min(t, len(hiding.boxes_m) - 1)]
-    overlap = getattr(may_hide, "py_func", may_hide)
-    if not any(overlap(box, box_m, place_m + origin_m) for box in boxes):
-        return
-    at, faces = min(t, len(hiding.points) - 1), hiding.faces
-    surface = hiding.points[at] + (hiding.origins_m[at] - origin_m)[:, None]
-    if hiding.counts is not None:
-        faces = faces[(hiding.counts[t] > 0)[faces].any(axis=1)]
-    both = np.concatenate([surface, its], axis=1, dtype=np.float32, casting="same_kind")
-    marked = np.arange(both.shape[1]) >= surface.shape[1]
-    visible[asked] = exact_visibility(both, faces, place_m, marked)[surface.shape[1] :]
+    counts = hiding.counts
+    _hide_behind_kernel(
+        hiding.points, hiding.origins_m, hiding.faces, hiding.boxes_m,
+        np.empty((0, hiding.points.shape[2]), np.uint8) if counts is None else counts,
+        points, origins_m, places_m, needed, visible,
+    )  # fmt: skip
 
 
 def compile_kernels() -> None:

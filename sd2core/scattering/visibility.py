@@ -19,34 +19,6 @@ NORMAL_SCALE = 127
 """A unit normal's component as a signed byte: directions are right to 0.4 degrees."""
 
 
-def vertex_normals(positions: NDArray[Any], faces: NDArray[np.int32]) -> NDArray[np.int8]:
-    """Area-weighted vertex normals as signed bytes.
-
-    Parameters
-    ----------
-    positions : float array, shape (n, 3, V)
-    faces : int32 array, shape (F, 3)
-        Counter-clockwise seen from outside.
-
-    Returns
-    -------
-    int8 array, shape (n, 3, V)
-        127 times the outward unit normal; zero where there is no surface.
-    """
-    normals = np.empty(positions.shape, np.int8)
-    for frame, points in enumerate(positions):
-        corner = points.astype(np.float64)[:, faces]  # (3, F, 3)
-        edge1, edge2 = corner[:, :, 1] - corner[:, :, 0], corner[:, :, 2] - corner[:, :, 0]
-        cross = np.cross(edge1, edge2, axis=0)
-        total = np.stack(
-            [np.bincount(faces.ravel(), np.repeat(c, 3), points.shape[1]) for c in cross]
-        )
-        length = np.sqrt((total * total).sum(axis=0))
-        factor = np.divide(NORMAL_SCALE, length, out=np.zeros_like(length), where=length > 0)
-        normals[frame] = np.rint(total * factor)
-    return normals
-
-
 def encloses(faces: NDArray[np.int32]) -> bool:
     """True if faces are a closed surface of consistent orientation.
 
@@ -130,7 +102,7 @@ def vertex_normals_kernel(
     last: int,
     normals: NDArray[np.int8],
 ) -> None:
-    """Compiled form of :func:`vertex_normals` for frames ``first`` to ``last``.
+    """Find area-weighted vertex normals as signed bytes.
 
     Parameters
     ----------
@@ -140,7 +112,7 @@ def vertex_normals_kernel(
     first, last : int
         Half-open range of frames.
     normals : int8 array, shape (n, 3, V)
-        Written.
+        Written: :data:`NORMAL_SCALE` times the outward unit normal, zero where there is no surface.
     """
     vertices = positions.shape[2]
     total = np.empty((vertices, 3), np.float64)

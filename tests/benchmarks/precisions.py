@@ -11,9 +11,9 @@ from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
+from oracles.counting import relative_range
 
 from sd2core.doppler import PRESETS, Synthesizer, prepared
-from sd2core.doppler.histogram import relative_range
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.precision import SHARE_OF_A_BIN, velocity_error_mps
 from sd2core.scattering.velocity import radial_velocity

@@ -17,9 +17,10 @@ from extreme_tables import PLACES, Scene, every_scene, exact_velocities
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from oracles.counting import relative_range
+from oracles.plain_maps import plainly
 
-from sd2core.doppler import PRESETS, Synthesizer, masks, prepared, synthesizer
-from sd2core.doppler.histogram import relative_range
+from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import warm_up
 from sd2core.numerics.precision import SHARE_OF_A_BIN, velocity_error_mps
@@ -126,13 +127,6 @@ def assert_counted(
     assert (column <= possible.sum(axis=1)).all()
     if beyond != "drop":
         assert column.sum() == len(place)
-
-
-def plainly(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let NumPy do what the kernels would."""
-    for module in (synthesizer, prepared, masks):
-        monkeypatch.setattr(module, "kernels_ready", lambda: False)
-    monkeypatch.setattr(synthesizer, "compile_in_background", lambda: None)
 
 
 def assert_scene_counted(scene: Scene) -> None:

@@ -12,8 +12,9 @@ from extreme_tables import Scene, every_scene, exact_ranges
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from oracles.plain_maps import plainly
 
-from sd2core.doppler import PRESETS, Synthesizer, masks, prepared, synthesizer
+from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.doppler.reference import reference_stretch
 from sd2core.errors import Sd2Error
 from sd2core.mesh.decimation import decimate
@@ -196,7 +197,7 @@ def heaviest(vertices: NDArray[np.float64], faces: NDArray[np.int32], weight: st
     """The largest share of the whole that one vertex can have."""
     if weight == "count":
         return 1.0 / vertices.shape[1]
-    from sd2core.scattering.amplitude import vertex_areas
+    from oracles.surfaces import vertex_areas
 
     areas = vertex_areas(np.ascontiguousarray(vertices.transpose(0, 2, 1)), faces)
     return float((areas.max(axis=1) / areas.sum(axis=1)).max())
@@ -236,9 +237,7 @@ def test_numpy_makes_the_same_maps(
     chosen = replace(RAW, visibility=visibility, weight=weight, range_exponent=4.0)
     sensor = at(0.6 * away_m, 0.1, 0.8 * away_m - 2.2)
     compiled = Synthesizer(mesh, chosen).map(sensor).values
-    for module in (synthesizer, prepared, masks):
-        monkeypatch.setattr(module, "kernels_ready", lambda: False)
-    monkeypatch.setattr(synthesizer, "compile_in_background", lambda: None)
+    plainly(monkeypatch)
     plain = Synthesizer(mesh, chosen).map(sensor).values
     # One rounding more or less decides a tie for a vertex or two.
     apart = np.abs(plain - compiled)

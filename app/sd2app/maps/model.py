@@ -153,14 +153,14 @@ class SynthesisModel(QObject):
     def frame(self) -> FrameScattering | None:
         """Velocity, range and visibility of every vertex in the frame on screen.
 
-        None while a recording opens, until there is a map: that comes first.
+        None while a recording opens or kernels compile, until there is a map: that comes first.
         """
-        if self._synthesizers is None or self._track.map is None:
+        if self._synthesizers is None or self._track.map is None or self._compiler.busy:
             return None
         full = self._synthesizers.full
         if full.options.visibility == "none":
             return self._reader.scattering(full, "none")
-        if self._compiler.ready and not self.moving:
+        if not self.moving:
             return self._reader.scattering(full, full.options.visibility)
         # The mask of the map, where the map has one and all vertices.
         synthesizer = self._synthesizers.ready(self._plan)

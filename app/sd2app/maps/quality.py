@@ -341,7 +341,7 @@ class CompilerModel(QObject):
 
     def start(self) -> None:
         """Compile what is not compiled: a map waits for it."""
-        self._process = process = compile_in_background(awaited=True)
+        self._process = process = compile_in_background()
         if process is not None and self.busy and self._job is None:
             self._job = self._jobs.start(
                 "Compiling the numerical kernels, once after installing", process.terminate

@@ -20,12 +20,8 @@ def random_transforms(body: Body, frames: int) -> tuple[np.ndarray, np.ndarray]:
     return body.skeleton.transforms(turns, place), posed(body, turns, place)
 
 
-@pytest.mark.parametrize("compiled", [True, False])
 @pytest.mark.parametrize(("resolution", "frames"), [("low", 19), ("high", 3)])
-def test_it_is_the_body_s_own_pose(
-    monkeypatch: pytest.MonkeyPatch, compiled: bool, resolution: str, frames: int
-) -> None:
-    monkeypatch.setattr(skinning, "kernels_ready", lambda: compiled)
+def test_it_is_the_body_s_own_pose(resolution: str, frames: int) -> None:
     body = Body.load(resolution)  # type: ignore[arg-type]
     transforms, expected = random_transforms(body, frames)
     vertices = skinning.pose_vertices(body, transforms)

@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from doppler_scenes import CAMERA, RAW, moving, options, plate, sensor_at, wobbling
+from oracles.counting import relative_range
+from oracles.plain_maps import plainly
+from oracles.surfaces import vertex_area_vectors, vertex_areas
 
 from sd2core.doppler import (
     PRESETS,
     SynthesisOptions,
     Synthesizer,
-    histogram,
-    masks,
-    prepared,
-    synthesizer,
 )
 from sd2core.doppler.masks import VisibilityMasks
 from sd2core.errors import Sd2Error
@@ -24,8 +23,6 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.scattering.amplitude import (
     projected_areas,
     range_weight,
-    vertex_area_vectors,
-    vertex_areas,
 )
 from sd2core.scattering.velocity import radial_velocity
 from sd2core.sensor import VelocityAxis, VirtualSensor
@@ -117,12 +114,8 @@ def test_plain_form_gives_the_same(
     mesh = wobbling(10)
     chosen = options(visibility=visibility, **changes)
     compiled = Synthesizer(mesh, chosen).stretch(SENSOR, 0, 10)
-    for module in (synthesizer, prepared, masks):
-        monkeypatch.setattr(module, "kernels_ready", lambda: False)
-    asked: list[bool] = []
-    monkeypatch.setattr(synthesizer, "compile_in_background", lambda: asked.append(True))
+    plainly(monkeypatch)
     plain = Synthesizer(mesh, chosen).stretch(SENSOR, 0, 10)
-    assert asked
     np.testing.assert_allclose(plain.visible_share, compiled.visible_share, atol=1e-6)
     # Fused multiplication rounds once instead of twice: an edge case in the literal
     # sense. At the axis's end it may move one vertex at one of a frame's moments.
@@ -256,9 +249,9 @@ def test_the_change_of_range_keeps_its_digits(distance_m: float) -> None:
     sensor = np.float32(distance_m) * np.array([0.48, 0.6, -0.64])
     sensor = sensor.astype(np.float32).astype(np.float64)
     truth = radial_velocity(before.astype(float), after.astype(float), sensor, 1 / 15)
-    closer = histogram.relative_range(before, sensor) - histogram.relative_range(after, sensor)
+    closer = relative_range(before, sensor) - relative_range(after, sensor)
     assert closer.dtype == np.float32
     error = np.abs(closer * 15 - truth)
     assert error.max() <= 1e-5
-    still = histogram.relative_range(before, sensor) - histogram.relative_range(before, sensor)
+    still = relative_range(before, sensor) - relative_range(before, sensor)
     assert not still.any()

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 import zarr
 from doppler_scenes import CAMERA, moving, options, plate, sensor_at, wobbling
+from oracles.plain_maps import plainly
 
-from sd2core.doppler import PRESETS, Synthesizer, masks, prepared, synthesizer
+from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.sequence import MeshSequence
 
@@ -79,9 +80,7 @@ def test_plain_form_gives_the_same(
     assert mesh.vertex_counts is not None
     chosen = options(visibility=visibility, axis=replace(options().axis, v_max_mps=0.9), **changes)
     compiled = Synthesizer(mesh, chosen).stretch(SENSOR, 0, 10)
-    for module in (synthesizer, prepared, masks):
-        monkeypatch.setattr(module, "kernels_ready", lambda: False)
-    monkeypatch.setattr(synthesizer, "compile_in_background", lambda: None)
+    plainly(monkeypatch)
     plain = Synthesizer(mesh, chosen).stretch(SENSOR, 0, 10)
     assert compiled.beyond_share.any()
     np.testing.assert_allclose(plain.visible_share, compiled.visible_share, atol=1e-6)

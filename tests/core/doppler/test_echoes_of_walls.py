@@ -12,15 +12,12 @@ from doppler_scenes import CAMERA, RAW, moving, options, sensor_at, wobbling
 from hypothesis import assume, given, settings
 from hypothesis import strategies as some
 from mirrored_echoes import echoes_by_way_of
+from oracles.plain_maps import plainly
 
 from sd2core.body.parts import body_parts
 from sd2core.doppler import (
     PRESETS,
     Synthesizer,
-    expected,
-    frame_counts,
-    limb_histograms,
-    masks,
 )
 from sd2core.doppler.reference import reference_stretch
 from sd2core.io.things import with_things, with_walls
@@ -29,17 +26,11 @@ from sd2core.mesh.things import Thing
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.mesh.walls import Wall
 from sd2core.recording.recording import open_sample
-from sd2core.scattering import behind_things
 from sd2core.sensor import Beam
 
 TIMES_S = np.arange(6) / 30
 SENSOR = sensor_at(0.3, -0.2, -0.5)
 RIGHT, FLOOR = Wall.named("right", 1.6, 3.0), Wall.named("floor", 1.2, 6.0)
-
-
-def plain(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (masks, behind_things, frame_counts):
-        monkeypatch.setattr(module, "kernels_ready", lambda: False)
 
 
 def dot(velocity_mps: tuple[float, float, float], at_m: tuple[float, float, float]) -> MeshSequence:
@@ -54,7 +45,7 @@ def test_each_vertex_comes_as_its_segments_say(
     compiled: bool, beam: Beam | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not compiled:
-        plain(monkeypatch)
+        plainly(monkeypatch)
     mesh = wobbling(5, divisions=1)
     table = Thing("screen", (0.75, 0.9, 1.2), 20.0, (0.5, 1.0, 0.05))
     scene = with_walls(with_things(mesh, [table]), [RIGHT, FLOOR])
@@ -176,7 +167,7 @@ def test_compiled_and_plain_agree(
     sensor = replace(SENSOR, beam=Beam(60.0, 40.0))
     made = Synthesizer(mesh, chosen).stretch(sensor, 0, 5, visibility).raw
     with pytest.MonkeyPatch.context() as monkeypatch:
-        plain(monkeypatch)
+        plainly(monkeypatch)
         slow = Synthesizer(mesh, chosen).stretch(sensor, 0, 5, visibility).raw
     # Beams are looked up in tables, and a vertex may lie between two bins.
     np.testing.assert_allclose(made.sum(axis=0), slow.sum(axis=0), rtol=2e-3, atol=1e-9)
@@ -217,9 +208,7 @@ def test_expected_maps_and_uncertain_cells_have_them(
     compiled: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not compiled:
-        plain(monkeypatch)
-        for module in (expected, limb_histograms):
-            monkeypatch.setattr(module, "kernels_ready", lambda: False)
+        plainly(monkeypatch)
     mesh = wobbling(5, divisions=1)
     alike = np.full((5, 1), 0.2, np.float32)
     known = VelocityUncertainty(("body",), np.zeros(mesh.vertex_count, np.uint8), alike, alike)

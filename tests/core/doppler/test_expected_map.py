@@ -11,6 +11,7 @@ from doppler_scenes import CAMERA, RAW, sensor_at, wobbling
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from oracles.plain_maps import plainly
 from scipy.special import ndtr
 
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer, expected
@@ -107,7 +108,8 @@ def test_it_is_what_spreading_each_vertex_gives(sigma_bins: float, beyond: Any) 
 def test_options_of_the_plain_map(
     monkeypatch: pytest.MonkeyPatch, changes: dict[str, Any], compiled: bool
 ) -> None:
-    monkeypatch.setattr(expected, "kernels_ready", lambda: compiled)
+    if not compiled:
+        plainly(monkeypatch)
     mesh, options = scene(np.linspace(0.0, 0.4, FRAMES)[:, None], 0.05), replace(PAPER, **changes)
     assert off(raw_of(mesh, options), reference_stretch(mesh, ASIDE, options, 0, FRAMES)) < 2e-3
 

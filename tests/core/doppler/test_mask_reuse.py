@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from doppler_scenes import RAW, cached_mask, options, sensor_at, wobbling
+from oracles.plain_maps import plainly
 
-from sd2core.doppler import PRESETS, Synthesizer, masks
+from sd2core.doppler import PRESETS, Synthesizer
 
 NEAR = sensor_at(0.3, -0.2, 0.1)
 NEXT = sensor_at(0.32, -0.2, 0.1)
@@ -119,12 +120,12 @@ def test_depth_of_a_ball_before_another_errs_at_its_outline_only(resolution: Any
 
 @OCCLUSION
 @pytest.mark.parametrize("preset", list(PRESETS))
-def test_the_same_while_kernels_are_not_ready(
+def test_numpy_finds_the_same(
     monkeypatch: pytest.MonkeyPatch, visibility: Any, preset: str
 ) -> None:
     chosen = replace(PRESETS[preset], mask_stride=3)
     mesh = wobbling(9, divisions=2)
     compiled = Synthesizer(mesh, chosen).map(NEAR, visibility=visibility)
-    monkeypatch.setattr(masks, "kernels_ready", lambda: False)
+    plainly(monkeypatch)
     plain = Synthesizer(mesh, chosen).map(NEAR, visibility=visibility)
     np.testing.assert_allclose(plain.values, compiled.values, atol=1e-6)

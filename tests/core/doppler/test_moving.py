@@ -10,9 +10,10 @@ import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
+from oracles.counting import places
 
 from sd2core.doppler import PRESETS, Synthesizer
-from sd2core.doppler.histogram import Counting, Frames, place_in_bins, places_plain
+from sd2core.doppler.histogram import Counting, Frames, place_in_bins
 from sd2core.doppler.kernels import DROP
 from sd2core.doppler.moving import find_moving, still_bins
 from sd2core.doppler.moving_kernels import GROUP
@@ -172,7 +173,7 @@ def test_what_is_left_out_is_in_an_emptied_bin_from_any_place(data: Any, precisi
     moving = find_moving(frames, reach_m, counting, still_bins(32, null_bins))
     if moving is None:
         return
-    number, _ = place_in_bins(places_plain(frames, 0, 0, sensor[None], counting), counting)
+    number, _ = place_in_bins(places(frames, 0, 0, sensor[None], counting), counting)
     left_out = np.setdiff1d(np.arange(400), moving.vertex)
     assert set(number[left_out]) <= set(null_bins)
 

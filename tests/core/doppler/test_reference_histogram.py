@@ -19,13 +19,14 @@ from doppler_scenes import (
     wobbling,
 )
 from numpy.typing import NDArray
+from oracles.surfaces import vertex_areas
 
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.doppler.reference import reference_stretch
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.scattering.amplitude import NEAREST_RANGE_M, vertex_areas
+from sd2core.scattering.amplitude import NEAREST_RANGE_M
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 

@@ -72,7 +72,12 @@ def test_a_recording_is_no_folder_for_takes(tmp_path: Path) -> None:
 
 def test_where_nobody_can_press_a_key_none_is_waited_for(tmp_path: Path) -> None:
     with pytest.raises(Sd2Error, match="nobody can press one"):
-        guide(read_protocol(PAPER), tmp_path / "s", lambda _: pytest.fail("it is recorded"), as_json=True)
+        guide(
+            read_protocol(PAPER),
+            tmp_path / "s",
+            lambda _: pytest.fail("it is recorded"),
+            as_json=True,
+        )
 
 
 KEYS = ["go on", "again", "skip", "agree", "decline", ""]

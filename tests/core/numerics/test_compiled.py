@@ -13,6 +13,7 @@ import pytest
 
 import sd2core
 from sd2core.numerics import compiled
+from sd2core.progress import Cancelled
 
 PACKAGE = Path(sd2core.__file__).parent
 
@@ -183,9 +184,8 @@ print(sum(count for _, count in misses))
     assert run(code, PACKAGE.parent) == ["0"]
 
 
-@pytest.mark.parametrize(("awaited", "options"), [(True, []), (False, ["--low-priority"])])
 def test_compiling_in_the_background_runs_once(
-    awaited: bool, options: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     started: list[list[str]] = []
 
@@ -198,14 +198,47 @@ def test_compiling_in_the_background_runs_once(
     monkeypatch.setattr(compiled, "cache_directory", lambda: tmp_path)
     monkeypatch.setattr(compiled.subprocess, "Popen", Process)
     monkeypatch.setattr(compiled.atexit, "register", lambda *_: None)
-    first = compiled.compile_in_background(awaited=awaited)
+    first = compiled.compile_in_background()
     assert first is not None
     assert compiled.compile_in_background() is first
-    assert started == [[sys.executable, "-m", "sd2core.numerics.compiled", *options]]
+    assert started == [[sys.executable, "-m", "sd2core.numerics.compiled"]]
     # Once the marker is there, everyone knows.
     (tmp_path / "complete").touch()
     assert compiled.kernels_ready()
     assert compiled.compile_in_background() is None
+
+
+class Compiler:
+    """A process that ends when it was looked at so many times."""
+
+    def __init__(self, looks: int, exit_code: int = 0) -> None:
+        self.looks, self._exit_code = looks, exit_code
+
+    def poll(self) -> int | None:
+        self.looks -= 1
+        return None if self.looks >= 0 else self._exit_code
+
+
+@pytest.mark.parametrize("exit_code", [0, 1])
+def test_long_work_waits_for_the_compiler_and_says_so_once(
+    exit_code: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    compiler, checks = Compiler(4, exit_code), []
+    monkeypatch.setattr(compiled, "compile_in_background", lambda: compiler)
+    compiled.await_kernels(lambda: checks.append(compiler.looks))
+    assert checks == [2, 1, 0]
+    assert [record.name for record in caplog.records] == ["sd2core"]
+    compiled.await_kernels(lambda: pytest.fail("the compiler has ended"))
+    assert len(caplog.records) == 1
+
+
+def test_waiting_for_the_compiler_can_be_cancelled(monkeypatch: pytest.MonkeyPatch) -> None:
+    def cancel() -> None:
+        raise Cancelled
+
+    monkeypatch.setattr(compiled, "compile_in_background", lambda: Compiler(10**9))
+    with pytest.raises(Cancelled):
+        compiled.await_kernels(cancel)
 
 
 def test_numba_users_beside_us_keep_their_folder() -> None:

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from oracles.depth_visibility import depth_visibility
 from scattering_scenes import Mesh, columns, plate, sphere, together
 
-from sd2core.scattering import depth_plain
 from sd2core.scattering.depth import depth_visibility_kernel
 from sd2core.scattering.exact import exact_visibility_kernel
 from sd2core.scattering.visibility import encloses
@@ -50,7 +50,7 @@ def look_plainly(
 ) -> NDArray[np.bool_]:
     points = columns(vertices)[0]
     needed = np.ones(points.shape[1], bool)
-    return depth_plain.depth_visibility(
+    return depth_visibility(
         points, faces, encloses(faces), np.array(sensor, float), resolution, needed
     )
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from oracles.exact_visibility import exact_visibility as exact_plainly
 from scattering_scenes import (
     Mesh,
     certain,
@@ -21,7 +22,6 @@ from scattering_scenes import (
 )
 
 from sd2core.files.resources import resource_path
-from sd2core.scattering import exact_plain
 from sd2core.scattering.exact import exact_visibility_kernel
 
 
@@ -41,7 +41,7 @@ def look_plainly(
 ) -> NDArray[np.bool_]:
     points = columns(vertices)[0]
     needed = np.ones(points.shape[1], bool)
-    return exact_plain.exact_visibility(points, faces, np.array(sensor, float), needed)
+    return exact_plainly(points, faces, np.array(sensor, float), needed)
 
 
 BALL = sphere(1.0, 3, 0.4)
@@ -147,7 +147,7 @@ def test_plain_form_gives_the_same(
     vertices, faces = walker[0][0], walker[1]
     asked = np.arange(len(vertices)) % 9 == 0  # a vertex takes the plain form long
     points = columns(vertices)[0]
-    plain = exact_plain.exact_visibility(points, faces, np.array(sensor, float), asked)
+    plain = exact_plainly(points, faces, np.array(sensor, float), asked)
     differing = np.flatnonzero(asked & (look(vertices, faces, sensor) != plain))
     # Both are double precision; only a ray through an edge to the last digit may differ.
     hidden, visible = certain(

@@ -13,23 +13,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from oracles.depth_visibility import depth_visibility
+from oracles.exact_visibility import exact_visibility
+from oracles.surfaces import vertex_areas, vertex_normals
 from scattering_scenes import Mesh, certain, columns, plate, sphere, together
 
 from sd2core.scattering.amplitude import (
     NEAREST_RANGE_M,
     range_weight,
-    vertex_areas,
     vertex_areas_kernel,
 )
 from sd2core.scattering.depth import depth_visibility_kernel
-from sd2core.scattering.depth_plain import depth_visibility
 from sd2core.scattering.exact import CONTACT, exact_visibility_kernel
-from sd2core.scattering.exact_plain import exact_visibility
 from sd2core.scattering.visibility import (
     encloses,
     facing_kernel,
     facing_mask,
-    vertex_normals,
     vertex_normals_kernel,
 )
 

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
+from oracles.surfaces import vertex_area_vectors, vertex_areas, vertex_normals
 from scattering_scenes import columns, plate, sphere, together
 
 from sd2core.scattering.amplitude import (
     NEAREST_RANGE_M,
     projected_areas,
     range_weight,
-    vertex_area_vectors,
     vertex_area_vectors_kernel,
-    vertex_areas,
     vertex_areas_kernel,
 )
 from sd2core.scattering.visibility import (
     encloses,
     facing_mask,
-    vertex_normals,
     vertex_normals_kernel,
 )
 

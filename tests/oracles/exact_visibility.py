@@ -1,4 +1,4 @@
-"""Exact visibility in NumPy: serves while the kernels are being compiled.
+"""Exact visibility in NumPy.
 
 The same rule as :mod:`sd2core.scattering.exact`, reached by another way: double
 precision throughout, and always the six faces of a cube around the sensor unless

@@ -1,4 +1,4 @@
-"""The depth buffer in NumPy: serves while the kernels are being compiled.
+"""The depth buffer in NumPy.
 
 The same arithmetic as :mod:`sd2core.scattering.depth`; only a pixel centre on an
 edge, or a depth on the limit, to the last digit can come out differently.
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from oracles.exact_visibility import exact_visibility
 from sd2core.scattering.depth import (
     ALMOST_ONE,
     BEHIND_PIXELS,
@@ -20,7 +21,6 @@ from sd2core.scattering.depth import (
     THINNEST,
 )
 from sd2core.scattering.exact import EDGE, WIDEST, axes_along
-from sd2core.scattering.exact_plain import exact_visibility
 
 _PAIRS_AT_ONCE = 1 << 20
 
@@ -57,8 +57,7 @@ def depth_visibility(
         return exact_visibility(points, faces, sensor, needed)
     axes = np.empty((3, 3))
     fx, fy, fz = (towards / distance).tolist()
-    # Not its compiled form: this serves while that is not there.
-    getattr(axes_along, "py_func", axes_along)(fx, fy, fz, axes)
+    axes_along(fx, fy, fz, axes)
     right, up, behind = axes @ (place - centre[:, None])
     ahead = distance + behind
     if (ahead <= 0).any() or (np.abs(right) + np.abs(up) > WIDEST * ahead).any():

@@ -1,0 +1,1 @@
+"""What kernels compute, plainly in NumPy: slower, and easier to believe."""
