@@ -186,6 +186,7 @@ class SynthesisModel(QObject):
             options = replace(options, visibility="none")
         self._accuracy.attach(mesh, options)
         if mesh is None:
+            self._track.set_awaited(False)
             self._announce()
             return
         try:
@@ -196,6 +197,7 @@ class SynthesisModel(QObject):
             return
         self._partial.begin(empty_map(options, mesh))
         self._compiler.start()
+        self._track.set_awaited(self._compiler.busy)
         self._announce()
         self._follow()
 

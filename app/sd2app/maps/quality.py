@@ -343,9 +343,7 @@ class CompilerModel(QObject):
         """Compile what is not compiled: a map waits for it."""
         self._process = process = compile_in_background()
         if process is not None and self.busy and self._job is None:
-            self._job = self._jobs.start(
-                "Compiling the numerical kernels, once after installing", process.terminate
-            )
+            self._job = self._jobs.start("Compiling, once after installing", process.terminate)
             self._poll.start()
 
     def stop(self) -> None:

@@ -118,7 +118,7 @@ class MapStack(QScrollArea):
         document, maps = self._session.document, self._session.maps
         has_any = maps.synthetic.map is not None or maps.real.map is not None
         with_content = {
-            "synthetic": maps.synthetic.map is not None or not has_any,
+            "synthetic": maps.synthetic.map is not None or maps.synthetic.awaited or not has_any,
             "denoised": maps.denoised.map is not None or maps.denoised.awaited,
             "before": maps.before.map is not None,
             "real": maps.real.map is not None,
