@@ -64,7 +64,8 @@ PAGES = {
     ),
     "range-synthesis.md": Measured("make range-synthesis", (*_LEARNING, *_CAMPAIGN)),
     "real-pairs.md": Measured(
-        "python -m tools.documentation.real_pairs", ("sd2core/pairs", *_LEARNING)
+        "python -m tools.documentation.real_pairs",
+        ("sd2core/pairs", "sd2core/mocap", *_LEARNING),
     ),
     "studies.md": Measured(
         "python -m tools.documentation.studies",
