@@ -12,18 +12,12 @@ from oracles.counting import relative_range
 from oracles.plain_maps import plainly
 from oracles.surfaces import vertex_area_vectors, vertex_areas
 
-from sd2core.doppler import (
-    PRESETS,
-    SynthesisOptions,
-    Synthesizer,
-)
+from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer, synthesizer
 from sd2core.doppler.masks import VisibilityMasks
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.scattering.amplitude import (
-    projected_areas,
-    range_weight,
-)
+from sd2core.progress import Cancelled
+from sd2core.scattering.amplitude import projected_areas, range_weight
 from sd2core.scattering.velocity import radial_velocity
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
@@ -92,6 +86,24 @@ def test_against_numpy(changes: dict[str, Any]) -> None:
     one_vertex = expected.sum(axis=0).max() / mesh.vertex_count * 8
     assert difference.max() <= one_vertex
     assert (difference > 1e-5 * expected.max()).mean() < 0.01
+
+
+def test_maps_wait_for_the_kernels_and_can_be_cancelled_meanwhile(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def compiling(check: Any) -> None:
+        check()
+        pytest.fail("it goes on")
+
+    def cancel(done: int, total: int) -> None:
+        assert done == 0 < total
+        raise Cancelled
+
+    maker = Synthesizer(wobbling(10), options())
+    monkeypatch.setattr(synthesizer, "await_kernels", compiling)
+    for work in (maker.map, maker.prepare):
+        with pytest.raises(Cancelled):
+            work(progress=cancel)
 
 
 @pytest.mark.one_in(5)
