@@ -27,7 +27,8 @@ from sd2core.sensor import VirtualSensor
 from tools.documentation.pages import filled, table, write_filled
 from tools.documentation.places import BENCHMARKS, IMAGES, SHARED
 
-sys.path[:0] = [str(BENCHMARKS), str(BENCHMARKS.parent)]
+sys.path.insert(0, str(BENCHMARKS.parent))
+sys.path.insert(0, str(BENCHMARKS))
 from precisions import costs, errors, in_both_precisions
 from scaling import BUDGET_BYTES, Scaling, scalings
 
