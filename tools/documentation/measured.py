@@ -24,7 +24,6 @@ _HOURS = "hours of training, due with the next denoisers"
 _SAME = "what it measures gave the same bits before and after its code was rearranged"
 OLD = {
     "performance.md": "needs an idle machine for an hour",
-    "scale.md": "needs an idle machine; batches changed in what they check",
     "fitting.md": "ten idle minutes; only its commands and how tables are written have changed",
     "range-synthesis.md": _HOURS,
     "paper.md": _HOURS,
