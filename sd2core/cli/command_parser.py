@@ -17,6 +17,8 @@ if TYPE_CHECKING:  # records take as long to load as all that `sd2 --help` needs
 Record = TypeVar("Record", bound="OptionRecord")
 Handler = TypeVar("Handler", bound=Callable[[Any], int | None])
 
+HELP = ("-h", "--help")
+
 _DECLARED: dict[str, list[Callable[[Subcommands], object]]] = {}
 """What adds the commands of each module."""
 
@@ -84,11 +86,13 @@ class CommandParser(argparse.ArgumentParser):
 
 def subcommands_of(parser: argparse.ArgumentParser, typed: Sequence[str] = ()) -> Subcommands:
     """Make the place for the commands of a parser, of which one may be typed with its words."""
+    first = typed[0] if typed else ""
     commands = parser.add_subparsers(
         title="commands", metavar="COMMAND", required=True, action=Subcommands
     )
     assert isinstance(commands, Subcommands)
-    commands.typed = typed
+    # An option before the command: which that is, argparse finds.
+    commands.typed = () if first.startswith("-") and first not in HELP else typed
     return commands
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from sd2core.cli.command_names import COMMANDS, WINDOW_COMMANDS
 from sd2core.cli.command_parser import (
+    HELP,
     CommandParser,
     HelpFormatter,
     Subcommands,
@@ -73,7 +74,7 @@ def build_parser(
     parser.add_argument("--version", action="version", version=f"SD² Studio {__version__}")
     commands = subcommands_of(parser, typed)
     name = typed[0] if typed else ""
-    if name in ("-h", "--help"):
+    if name in HELP:
         for command, summary in COMMANDS.items():
             commands.add_parser(command, help=summary, add_help=False)
         return parser, commands

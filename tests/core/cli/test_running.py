@@ -78,6 +78,11 @@ def test_wrong_usage_is_2(sd2: Sd2, arguments: list[str]) -> None:
         ("opne a.sd2", "Did you mean `sd2 open`?"),
         ("zzz", "There is no command 'zzz'. `sd2 --help` lists all."),
         ("synth a.npz b.npz --out c.npz", "'b.npz' is one argument too many. `sd2 synth --help`"),
+        (
+            "--verbose synth a.npz --out c.npz",
+            "There is no option --verbose. Did you mean --version? `sd2 --help`",
+        ),
+        ("labels --track A show a.eaf", "There is no option --track. `sd2 labels --help`"),
     ],
 )
 def test_what_was_meant_is_said(sd2: Sd2, typed: str, says: str) -> None:
