@@ -82,7 +82,7 @@ def test_wrong_usage_is_2(sd2: Sd2, arguments: list[str]) -> None:
             "--verbose synth a.npz --out c.npz",
             "There is no option --verbose. Did you mean --version? `sd2 --help`",
         ),
-        ("labels --track A show a.eaf", "There is no option --track. `sd2 labels --help`"),
+        ("labels --json show a.eaf", "There is no option --json. `sd2 labels --help`"),
     ],
 )
 def test_what_was_meant_is_said(sd2: Sd2, typed: str, says: str) -> None:
