@@ -486,8 +486,10 @@ class DopplerMap:
 
         Also ``present`` if there are columns without a person, ``expected`` and ``sd`` if
         the uncertainty of the values is known, and ``parts``, ``limbs`` and ``kinematics`` if
-        the map is split.
+        the map is split. Raises Sd2Error if a value is not finite.
         """
+        if not np.isfinite(self.values).all():
+            raise Sd2Error(f"Values of the map for {path} are NaN or infinite", "finite numbers")
         meta = {
             "format": "sd2-doppler-map",
             "version": FORMAT_VERSION,

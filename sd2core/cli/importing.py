@@ -260,7 +260,7 @@ def _keep_vertices(recording: Recording, folder: Path) -> None:
         print(f"note: {note}", file=sys.stderr)
     vertices = free_path(folder, _VERTICES, "posed", reserved="")
     with progress_bar("Writing the mesh", unit="frame") as progress:
-        save_mesh(mesh, vertices, progress)
+        save_mesh(replace(mesh, others=()), vertices, progress)
     recording.mesh, recording.faces = vertices, None
     focal_px = recording.mesh_reading.focal_px
     recording.mesh_reading = type(recording.mesh_reading)(focal_px=focal_px)

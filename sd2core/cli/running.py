@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import re
 import sys
@@ -22,6 +23,7 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
     handler's code; 1 for an error; 2 where the words are no command; 130 when interrupted.
     """
     flags = {"--json", "--progress-json"}.intersection(arguments)
+    _take_any_output()
     try:
         options = parser.parse_args(attach_negative_values(arguments))
         with output_folders(options):
@@ -103,6 +105,14 @@ def attach_negative_values(arguments: Sequence[str]) -> list[str]:
         else:
             attached.append(argument)
     return attached
+
+
+def _take_any_output() -> None:
+    """Let no letter that an encoding lacks end a command, and no standard error that is closed."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (for all that follows)
 
 
 def _flush_output() -> None:

@@ -2,10 +2,10 @@
 
 A mesh that was fitted to a video states how badly the velocity of each limb is known
 (:class:`~sd2core.mesh.velocity_uncertainty.VelocityUncertainty`). Of the vertices of a limb, each
-is spread over the bins as N(v, σ²) around its own velocity (docs/decisions/0071). They are counted
-on a finer axis first, and each of its parts is spread from the mean velocity of what lies in it, by
-their deviation, too; where σ is very small, each vertex is spread by itself. Of a raw map that is
-right to 1e-3.
+is spread over the bins as N(v, (σ/2)²) around its own velocity (docs/decisions/0071). They are
+counted on a finer axis first, and each of its parts is spread from the mean velocity of what lies
+in it, by their deviation, too; where σ is very small, each vertex is spread by itself. Of a raw map
+that is right to 1e-3.
 """
 
 from __future__ import annotations

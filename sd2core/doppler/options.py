@@ -46,9 +46,10 @@ class SynthesisOptions(OptionRecord):
         constant-gamma law of rough surfaces. It relies on faces that are
         oriented outwards, as the facing test does.
     count : {"expected", "plain"}
-        A vertex is spread over the bins as badly as the mesh says its velocity to be known, as a
-        normal distribution, or counts in the bin of that velocity; of a mesh that says nothing
-        both are the same map. Vid2Doppler's velocities always count plainly.
+        A vertex is spread over the bins as badly as its velocity is known, as a normal
+        distribution of half the deviation that the mesh states, or counts in the bin of that
+        velocity; of a mesh that says nothing both are the same map. Vid2Doppler's velocities
+        always count plainly.
     axis : VelocityAxis
         Up to 254 bins.
     null_bins : tuple of int

@@ -317,11 +317,12 @@ class Synthesizer:
             version, how vertices were counted (``count``), the quality of the
             visibility, how many frames share a mask,
             per frame ``visible_share`` and ``beyond_share``, both of the direct
-            echoes, in ``things`` and ``walls`` what stood around, and in ``bodies`` who
-            was in a scene of several, if anything or anybody was, and in ``notes`` where
-            single precision limits what the map says and how much of it is empty.
-            ``present`` is False in frames without a person, and in one that stands alone:
-            what moves how fast is not known there.
+            echoes and of velocities as they are before any is spread, in ``things`` and
+            ``walls`` what stood around, and in ``bodies`` who was in a scene of several, if
+            anything or anybody was, and in ``notes`` where single precision limits what the
+            map says and how much of it is empty.
+            ``present`` is False in frames without a person, and in one that stands alone
+            between such: what moves how fast is not known there.
         """
         return self._map(sensor or VirtualSensor(), None, visibility, frames, progress)
 

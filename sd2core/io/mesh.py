@@ -160,10 +160,12 @@ def load_mesh(
 def save_mesh(mesh: MeshSequence, path: Path | str, progress: Progress = silent) -> None:
     """Write a mesh as ``.npz``, ``.zarr`` or ``.zarr.zip``, block by block and in one step.
 
+    Things and walls around it, and that it is simulated, are a recording's and are not written.
+
     Raises
     ------
     Sd2Error
-        When the name ends in none of these, or a vertex is not finite.
+        When the name ends in none of these, a vertex is not finite, or others are in the scene.
 
     Examples
     --------
@@ -183,6 +185,12 @@ def save_mesh(mesh: MeshSequence, path: Path | str, progress: Progress = silent)
     if not path.absolute().parent.is_dir():
         raise Sd2Error(
             f"The folder {path.absolute().parent} does not exist", "an existing folder for the mesh"
+        )
+    if mesh.others:
+        raise Sd2Error(
+            f"The mesh is a scene of {len(mesh.bodies)} bodies, and {path.name} holds one",
+            "a single body",
+            "Save each of mesh.bodies",
         )
     if path.suffix.lower() == ".npz":
         write_npz(mesh, path, progress)

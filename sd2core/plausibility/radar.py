@@ -39,9 +39,11 @@ def judge_map(
             Finding(
                 "The map holds nothing but zeros",
                 "something that moves",
-                "Nobody moves, or faster than the velocity axis reaches"
-                if not measured
-                else "The recording holds no signal, or its processing went wrong",
+                "The recording holds no signal, or its processing went wrong"
+                if measured
+                else "Nobody moves, or faster than the velocity axis reaches"
+                if count > 1
+                else "One frame alone has no velocity",
             )
         )
     elif measured and count > _LOST_SHARE * values.shape[1]:

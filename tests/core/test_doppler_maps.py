@@ -122,6 +122,9 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
     before = path.read_bytes()
     with pytest.raises(TypeError):
         map_of(np.ones((4, 3)), meta={"sensor": object()}).save(path)
+    for value in (np.nan, np.inf):
+        with pytest.raises(Sd2Error, match="NaN or infinite"):
+            map_of(np.full((4, 3), value)).save(path)
     assert path.read_bytes() == before
     assert [entry.name for entry in tmp_path.iterdir()] == ["map.npz"]
 

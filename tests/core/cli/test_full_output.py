@@ -34,9 +34,24 @@ def test_a_full_disk_is_said_once(plate: Path, buffered: bool) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="closes the output as a POSIX shell does")
-def test_a_closed_output_is_no_error(plate: Path) -> None:
-    command = f'"{sys.executable}" -m sd2app.command_line info "{plate}" >&-'
+@pytest.mark.parametrize("closed", [">&-", "2>&-"])
+def test_a_closed_output_is_no_error(plate: Path, closed: str) -> None:
+    command = f'"{sys.executable}" -m sd2app.command_line info "{plate}" {closed}'
     done = subprocess.run(
-        ["sh", "-c", command], stderr=subprocess.PIPE, text=True, check=False, cwd=REPOSITORY
+        ["sh", "-c", command], capture_output=True, text=True, check=False, cwd=REPOSITORY
     )
     assert (done.returncode, done.stderr) == (0, "")
+    assert bool(done.stdout) == (closed == "2>&-")
+
+
+def test_letters_that_the_outputs_encoding_lacks_end_no_command() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "sd2app.command_line", "--help"],
+        env=os.environ | {"PYTHONIOENCODING": "ascii"},
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=REPOSITORY,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert r"SD\xb2 Studio" in done.stdout

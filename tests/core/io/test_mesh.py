@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import re
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +63,14 @@ def test_frames_without_a_person_come_back(tmp_path: Path, suffix: str) -> None:
     # As any other mesh where there is somebody in every frame.
     save_mesh(MeshSequence(vertices, faces, Timebase(times(6))), tmp_path / f"whole{suffix}")
     assert load_mesh(tmp_path / f"whole{suffix}").present is None
+
+
+def test_a_scene_of_two_is_no_mesh_to_write(tmp_path: Path) -> None:
+    vertices, faces = body()
+    one = MeshSequence(vertices, faces, Timebase(times(6)))
+    with pytest.raises(Sd2Error, match=r"scene of 2 bodies, and m\.zarr holds one"):
+        save_mesh(replace(one, others=(one,)), tmp_path / "m.zarr")
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_compact_form_keeps_everything(tmp_path: Path) -> None:

@@ -26,7 +26,11 @@ def test_empty_frames_are_lost_in_a_radar_and_rest_in_a_computed_map():
     assert "10 of 100 frames (10%)" in finding.found
     assert judge_map(values, TIMES_S, measured=False) == []
     assert judge_map(values, TIMES_S, ~np.isin(np.arange(100), range(20, 30))) == []
-    assert "nothing but zeros" in judge_map(0 * values, TIMES_S, measured=False)[0].found
+    (finding,) = judge_map(0 * values, TIMES_S, measured=False)
+    assert "nothing but zeros" in finding.found
+    assert "Nobody moves" in finding.remedy
+    (finding,) = judge_map(np.zeros((32, 1)), TIMES_S[:1], measured=False)
+    assert "One frame alone" in finding.remedy
 
 
 @pytest.mark.parametrize(
