@@ -41,7 +41,7 @@ def judge_map(
                 "something that moves",
                 "The recording holds no signal, or its processing went wrong"
                 if measured
-                else "Nobody moves, or faster than the velocity axis reaches"
+                else "Nobody moves, or too far away or too fast to be seen"
                 if count > 1
                 else "One frame alone has no velocity",
             )

@@ -238,6 +238,16 @@ def test_a_long_break_in_time_begins_a_new_clip() -> None:
     assert "notes" not in denoised.meta
 
 
+@pytest.mark.parametrize(("peak", "said"), [(0.0, False), (5e-4, True), (2e-3, False)])
+def test_what_is_far_fainter_than_what_was_learnt_is_said(peak: float, said: bool) -> None:
+    values = energies(60)
+    values *= np.float32(peak / values.max())
+    denoised = trained("gru").denoise(synthetic_map(values))
+    notes = denoised.meta.get("notes", [])
+    assert len(notes) == said
+    assert all("0.05 times the mean energy" in note for note in notes)
+
+
 class TestFrameRates:
     @pytest.mark.parametrize("rate_hz", [29.5, 30.5])
     def test_small_differences_are_none(self, rate_hz: float) -> None:
