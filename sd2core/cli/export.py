@@ -199,21 +199,23 @@ def _dry_run(
     forecast = counting.forecast(wanted, making.synthesis.axis.bins)
     each_s = known_pace_s(making.pace_kind)
     seconds = None if each_s is None else each_s * forecast.segments
-    if options.json:
-        print_json(
-            {
-                "dataset": str(options.out),
-                **picked(forecast, "sources", "segments"),
-                "segments_of_subject": forecast.of_subject,
-                "segments_of_label": forecast.of_label,
-                "segments_of_kind": forecast.of_kind,
-                "segments_of_split": forecast.of_split(),
-                **picked(forecast, "frame_rate_hz", "total_bytes"),
-                "seconds": seconds,
-                "frames_damaged": forecast.frames_damaged,
-                "failed": list(forecast.failed),
-            }
-        )
+    if options.json or options.progress_json:
+        content = {
+            "dataset": str(options.out),
+            **picked(forecast, "sources", "segments"),
+            "segments_of_subject": forecast.of_subject,
+            "segments_of_label": forecast.of_label,
+            "segments_of_kind": forecast.of_kind,
+            "segments_of_split": forecast.of_split(),
+            **picked(forecast, "frame_rate_hz", "total_bytes"),
+            "seconds": seconds,
+            "frames_damaged": forecast.frames_damaged,
+            "failed": list(forecast.failed),
+        }
+        if options.json:
+            print_json(content)
+        else:
+            print_event("forecast", **content)
     else:
         facts = {
             "segments": f"{forecast.segments:,} of {counted(forecast.sources, 'source')}",

@@ -27,6 +27,7 @@ from sd2core.datasets.source import (
 from sd2core.denoise.files import default_name, find_model
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
+from sd2core.files.paths import check_distinct
 from sd2core.files.tables import counted
 from sd2core.io.kinds import kind_of
 from sd2core.io.radar import holds_map, load_recorded_map
@@ -72,6 +73,7 @@ def gather(
         When a path is something else, or their numbers do not fit.
     """
     files = [one for path in paths for one in _expanded(Path(path))]
+    check_distinct(files)
     pairs = [path for path in files if not is_recording(path) and kind_of(path) == "pairs"]
     single = [path for path in files if path not in pairs]
     names = [_person(path) for path in single] if subjects is None else list(subjects)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 import os
+from collections.abc import Iterable
 from itertools import chain, count, takewhile
 from pathlib import Path, PurePath, PurePosixPath, PureWindowsPath
 
@@ -39,6 +40,15 @@ def plain_path(path: Path) -> Path:
     """Absolute, with links in the folders (not the name itself) resolved, so that .. is true."""
     path = Path(os.path.abspath(path))
     return path.parent.resolve() / path.name
+
+
+def check_distinct(paths: Iterable[Path]) -> None:
+    """Refuse two names of one file or folder: what is learnt from it would judge it as well."""
+    known: dict[str, Path] = {}
+    for path in paths:
+        other = known.setdefault(os.path.realpath(path), path)
+        if plain_path(other) != plain_path(path):
+            raise Sd2Error(f"{path} is a link to {other}, or both to another", "each once")
 
 
 def stored_path(path: Path, folder: Path) -> str:

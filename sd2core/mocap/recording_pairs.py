@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from sd2core.body.parts import synthetic_map
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
+from sd2core.files.paths import check_distinct
 from sd2core.fmcw.processing import doppler_map
 from sd2core.io.stored_vertices import damaged_frames
 from sd2core.labels.per_frame import BACKGROUND, label_per_frame, plain_name
@@ -135,8 +136,9 @@ def named_recordings(
 ) -> list[tuple[Recording, str]]:
     """Open recordings, each with its person: by default another in each, named like it.
 
-    Raises Sd2Error if two are called alike, or there is not one person for each.
+    Raises Sd2Error if two are called alike or are one, or there is not one person for each.
     """
+    check_distinct(recordings)
     opened = [open_recording(path) for path in recordings]
     folders = [recording.folder.stem for recording in opened]
     for name in folders:

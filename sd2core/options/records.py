@@ -215,11 +215,16 @@ class Option:
         if (value is True and self.kind is bool) or value == self.place.bare:
             return [self.flags[0]]
         texts = [self.typed.write(one) if self.typed else str(one) for one in self.values(value)]
-        if self.place.argument:
-            return texts
-        if self.place.many == "again":
-            return [word for text in texts for word in (self.flags[0], text)]
-        return [self.flags[0], *texts]
+        if self.place.argument:  # a file that begins as an option does
+            return [f"./{text}" if text.startswith("-") else text for text in texts]
+        if self.place.many == "together":
+            return [self.flags[0], *texts]
+        return [word for text in texts for word in _with_value(self.flags[0], text)]
+
+
+def _with_value(name: str, text: str) -> tuple[str, ...]:
+    """Words of an option; a text that begins as one does is not mistaken for it."""
+    return (f"{name}={text}",) if re.match(r"-(?!\.?\d)", text) else (name, text)
 
 
 def typed_options(kind: type[OptionRecord]) -> tuple[Option, ...]:

@@ -29,6 +29,14 @@ def people(tmp_path: Path) -> Path:
     return tmp_path / "people"
 
 
+def test_a_link_is_no_other_recording(sd2: Sd2, people: Path, tmp_path: Path) -> None:
+    (people / "dora.sd2").symlink_to(people / "anna.sd2")
+    for command in (("export", people), ("pairs", "recordings", *sorted(people.iterdir()))):
+        told = sd2(*command, "--out", tmp_path / "set.zarr")
+        assert told.code == 1
+        assert "dora.sd2 is a link to" in told.err
+
+
 @pytest.mark.slow
 def test_a_folder_of_recordings_becomes_a_data_set_with_card_and_sheet(
     sd2: Sd2, people: Path, tmp_path: Path
@@ -115,6 +123,8 @@ def test_a_dry_run_says_what_would_be_written_and_writes_nothing(
     assert said["segments"] == 15
     assert said["segments_of_split"] == {"train": 5, "validation": 5, "test": 5}
     assert "would hold" in sd2("export", people, "--out", out, *SMALL, "--dry-run").out
+    line = sd2("export", people, "--out", out, *SMALL, "--dry-run", "--progress-json").out
+    assert json.loads(line) == {"event": "forecast"} | said
     assert sd2("export", people, "--out", out, *SMALL).code == 0
     again = sd2("export", people, "--out", out, *SMALL)
     assert "of which 3 were there already" in again.out

@@ -37,6 +37,11 @@ from sd2core.options.toml_files import parsed
 
 NAMES = st.text("abcdefg", min_size=1, max_size=4).filter(lambda text: text != "none")
 PATHS = NAMES.map(lambda name: Path(f"{name}.npz"))
+DASHED: dict[Any, st.SearchStrategy[Any]] = {
+    str: NAMES.map(lambda name: f"-{name}"),
+    Path: PATHS.map(lambda path: Path(f"-{path}")),
+}
+"""What begins as an option does."""
 PLAIN: dict[Any, st.SearchStrategy[Any]] = {str: NAMES, Path: PATHS, bool: st.booleans()}
 TYPED: dict[str, st.SearchStrategy[Any]] = {
     "share": st.floats(0.001, 1.0),
@@ -74,6 +79,8 @@ def values_of(option: Option) -> st.SearchStrategy[Any] | None:
             one = st.floats(low, high, exclude_min=bounds.above)
     else:
         one = PLAIN[option.kind]
+        if option.kind is Path if option.place.argument else option.place.many != "together":
+            one |= DASHED.get(option.kind, st.nothing())
     if option.section and option.kind is bool:
         return st.just(True)  # a switch cannot be typed to be off
     least = 0 if option.default == () else 1  # where none is another thing, it is not typed
