@@ -41,7 +41,7 @@ def judge_map(
                 "something that moves",
                 "The recording holds no signal, or its processing went wrong"
                 if measured
-                else "Nobody moves, or too far away or too fast to be seen"
+                else "Nobody moves, or all is too far away, too fast or in emptied bins"
                 if count > 1
                 else "One frame alone has no velocity",
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
@@ -169,7 +170,7 @@ class CommandForms(Runs[AnyCommandRun]):
         self._chosen = next(named)
         self.select(None)
         self._texts[self._chosen] = {
-            option.dest: words[-1]
+            option.dest: words[-1].removeprefix(f"{option.flags[0]}=")
             for option in self.options
             if (words := option.written(option.of(record)))
         }
@@ -222,9 +223,11 @@ def _refusal(attempt: Callable[[], object]) -> str:
 
 
 def _read(option: Option, text: str) -> Any:
-    """Value of what was typed; several are separated by spaces."""
+    """Value of what was typed; several are separated by spaces, and ``~`` is one's own folder."""
     if option.kind is bool:
         return True
+    if option.kind is Path and text.startswith("~"):
+        text = os.path.expanduser(text)
     try:
         texts = shlex.split(text) if option.place.many else [text]
         values = tuple((option.read or str)(one) for one in texts)

@@ -14,7 +14,7 @@ from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.manual.help import with_help
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import Dialog, ExportButtons, accepted, ask_new
+from sd2app.widgets.dialogs import Dialog, ExportButtons, accepted, ask_new, with_suffix
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, form_of
 from sd2app.widgets.panel import copy_button, rule, say, sentence
@@ -101,7 +101,8 @@ class LabelExportDialog(Dialog):
     def export(self, path: Path) -> None:
         """Write the file, with the usual suffix where the name has none."""
         labels, base, chosen, media = self._labels, self._timebase, self.format, self._media
-        target = path if path.suffix else path.with_suffix(chosen.suffixes[0])
+        known = [suffix for one in all_formats() for suffix in one.suffixes]
+        target = with_suffix(path, chosen.suffixes[0], known)
         if target != path and target.exists():
             # The user was not asked about that one.
             remedy = "Type the ending as well to replace it"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QPoint, QSize, Qt
@@ -152,8 +152,7 @@ def ask_figure(parent: QWidget, title: str, name: str) -> Path | None:
     chosen, kind = QFileDialog.getSaveFileName(parent, title, f"{name}.png", FIGURES)
     if not chosen:
         return None
-    path = Path(chosen)
-    return path if path.suffix else path.with_suffix(f".{kind[:3].lower()}")
+    return with_suffix(Path(chosen), f".{kind[:3].lower()}", SUFFIXES)
 
 
 def ask_file(parent: QWidget, title: str, kinds: str, start: str = "") -> Path | None:
@@ -176,6 +175,7 @@ def ask_new(
     return with_suffix(Path(chosen), suffix) if chosen else None
 
 
-def with_suffix(path: Path, suffix: str) -> Path:
-    """Path with a suffix after its name, unless it has it."""
-    return path if path.suffix.lower() == suffix else path.with_name(path.name + suffix)
+def with_suffix(path: Path, suffix: str, others: Collection[str] = ()) -> Path:
+    """Path with a suffix after its name, unless it has it, or one of the others."""
+    has = path.suffix.lower() in (suffix, *others)
+    return path if has else path.with_name(path.name + suffix)

@@ -44,6 +44,17 @@ def test_what_is_typed_is_the_command_that_is_copied(forms: CommandForms) -> Non
     assert (parsed.mesh, parsed.bins, parsed.limbs) == (Path("a walk.npz"), 64, True)
 
 
+def test_what_begins_as_an_option_does_is_none_and_a_tilde_is_a_folder(forms: CommandForms) -> None:
+    forms.choose("set")
+    typed(forms, recording="~/a.sd2", title="-hello")
+    record = forms.record
+    line = shlex.split(forms.line)
+    assert record_of(build_parser()[0].parse_args(line[1:])) == record
+    assert (record.recording, record.title) == (Path.home() / "a.sd2", "-hello")
+    forms.fill(record)
+    assert forms.record == record
+
+
 def test_sections_of_settings_are_given_only_where_something_is_typed(forms: CommandForms) -> None:
     forms.choose("train")
     typed(

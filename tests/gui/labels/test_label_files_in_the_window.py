@@ -120,8 +120,9 @@ def test_export_to_every_format_and_back(window, qtbot, monkeypatch, tmp_path) -
     c = models_of(window)
     spans = [(span.start_s, span.end_s, span.label) for span in c.labels.labels.spans]
     for one in FORMATS:
-        path = tmp_path / f"mine{one.suffixes[0]}"
-        choose(monkeypatch, "getSaveFileName", path)
+        # A name with a point in it has no ending yet.
+        path = tmp_path / f"take 2.5 m{one.suffixes[0]}"
+        choose(monkeypatch, "getSaveFileName", path.with_suffix(""))
 
         def work(dialog: LabelExportDialog, title: str = one.title) -> None:
             named(dialog, "The program that is to read", Choice).setCurrentText(title)
