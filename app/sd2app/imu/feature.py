@@ -15,7 +15,7 @@ from sd2app.imu.track import InertialTrack
 from sd2app.manual.help import show_help
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import Overlay
-from sd2app.widgets.dialogs import ask_new, with_suffix
+from sd2app.widgets.dialogs import ask_new
 from sd2core.imu.files import SUFFIXES
 
 _FILES = "Table (*.csv);;OpenSim (*.sto);;NumPy (*.npz)"
@@ -50,9 +50,8 @@ class ImuFeature(Feature):
 
     def _save(self) -> None:
         window, name = self._shell.dialog_parent, self.model.file_name
-        path = ask_new(window, "Save inertial signals", name, _FILES)
-        if path is not None:
-            self.model.save(with_suffix(path, ".csv", SUFFIXES))
+        if path := ask_new(window, "Save inertial signals", name, _FILES, ".csv", SUFFIXES):
+            self.model.save(path)
 
     def track(self, overlays: Sequence[Overlay]) -> InertialTrack:
         """The track below the maps, with what other features draw over it."""

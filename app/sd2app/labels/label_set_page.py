@@ -88,7 +88,7 @@ class LabelSetPage(QWidget):
     def _export(self) -> None:
         shown = self._model.label_set
         start = f"{shown.name or 'labels'}.json".replace("/", "-")
-        if path := ask_new(self, "Export label set", start, _FILES):
+        if path := ask_new(self, "Export label set", start, _FILES, ".json"):
             self._shell.attempt(lambda: write_label_set(path, shown))
 
     def _added(self) -> None:

@@ -200,7 +200,7 @@ class RecoverLabelsDialog(Dialog):
         offer = self.offer
         assert offer is not None
         start = f"{offer.recording.stem}-labels.json"
-        if path := ask_new(self, "Write labels", start, "Labels (*.json)"):
+        if path := ask_new(self, "Write labels", start, "Labels (*.json)", ".json"):
             try:
                 write_labels(path, offer.labels, recording=offer.recording)
             except (OSError, Sd2Error) as error:

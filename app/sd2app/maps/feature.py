@@ -68,7 +68,7 @@ class MapExportDialog(Dialog):
         self.setMinimumWidth(440)
 
     def _ask(self) -> None:
-        if path := ask_new(self, self.windowTitle(), self._name, "Doppler map (*.npz)"):
+        if path := ask_new(self, self.windowTitle(), self._name, "Doppler map (*.npz)", ".npz"):
             self.path = path
             self.accept()
 

@@ -366,12 +366,13 @@ class MainWindow(QMainWindow):
 
     def attempt(self, work: Callable[[], T]) -> T | None:
         """Result of ``work``; an error is told to the user, and None returned."""
+        from sd2core.cli.running import explanation
         from sd2core.errors import Sd2Error
 
         try:
             return work()
         except (Sd2Error, OSError) as error:
-            self.warn(str(error))
+            self.warn(str(explanation(error)))
             return None
 
     def bring_up(self, panel: str, page: str = "") -> None:

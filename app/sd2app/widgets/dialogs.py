@@ -150,9 +150,7 @@ class ExportButtons(QDialogButtonBox):
 def ask_figure(parent: QWidget, title: str, name: str) -> Path | None:
     """Let the user choose; a name without an ending gets that of the kind."""
     chosen, kind = QFileDialog.getSaveFileName(parent, title, f"{name}.png", FIGURES)
-    if not chosen:
-        return None
-    return with_suffix(Path(chosen), f".{kind[:3].lower()}", SUFFIXES)
+    return _completed(parent, title, chosen, f".{kind[:3].lower()}", SUFFIXES)
 
 
 def ask_file(parent: QWidget, title: str, kinds: str, start: str = "") -> Path | None:
@@ -168,11 +166,32 @@ def ask_folder(parent: QWidget, title: str) -> Path | None:
 
 
 def ask_new(
-    parent: QWidget, title: str, start: str, kinds: str = "", suffix: str = ""
+    parent: QWidget,
+    title: str,
+    start: str,
+    kinds: str = "",
+    suffix: str = "",
+    others: Collection[str] = (),
 ) -> Path | None:
-    """Let the user name a file or folder to write; ``suffix`` is added where it is missing."""
+    """Let the user name a file or folder to write.
+
+    ``suffix`` is added to a name with neither it nor one of the ``others``.
+    """
     chosen, _ = QFileDialog.getSaveFileName(parent, title, start, kinds)
-    return with_suffix(Path(chosen), suffix) if chosen else None
+    return _completed(parent, title, chosen, suffix, others)
+
+
+def _completed(
+    parent: QWidget, title: str, chosen: str, suffix: str, others: Collection[str]
+) -> Path | None:
+    """A chosen path with its suffix; the dialog has not asked about a file of that name."""
+    if not chosen:
+        return None
+    path = with_suffix(Path(chosen), suffix, others)
+    if path == Path(chosen) or not path.exists():
+        return path
+    words = f"{path.name} exists. Replace it?"
+    return path if confirmed(parent, title, words, Answer.Yes, Answer.Cancel) else None
 
 
 def with_suffix(path: Path, suffix: str, others: Collection[str] = ()) -> Path:

@@ -94,7 +94,7 @@ def write_picture(widget: QWidget, path: Path) -> None:
 
 def save_picture(widget: QWidget, name: str) -> None:
     """Ask where a picture of a widget is to be written, and write it."""
-    path = ask_new(widget.window(), "Save picture", name, _KINDS)
+    path = ask_new(widget.window(), "Save picture", name, _KINDS, ".png", (".svg",))
     if path is None:
         return
     try:

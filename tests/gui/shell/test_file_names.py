@@ -8,12 +8,13 @@ import pytest
 from answering import menu_at, once_asked, pick
 from copied import copied_record
 from finding import button_of
-from PySide6.QtWidgets import QDialog, QFileDialog, QPushButton
+from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QPushButton
 from window_models import models_of
 
 from sd2app.maps.feature import MapExportDialog
 from sd2app.sensor.placements_page import PlacementsPage
 from sd2core.cli.synth import Synth
+from sd2core.maps import DopplerMap
 from sd2core.placements.placements import PlacementGrid
 
 
@@ -74,3 +75,46 @@ def test_a_title_is_no_path(labelled):
     document = models_of(labelled).document
     document.recording.title = "walk/run: 1"
     assert document.file_name(".sd2") == "walk-run- 1.sd2"
+
+
+@pytest.fixture
+def asked(monkeypatch) -> list[str]:
+    """Questions that are answered with Cancel."""
+    words: list[str] = []
+    cancel = QMessageBox.StandardButton.Cancel
+    monkeypatch.setattr(
+        QMessageBox, "question", lambda *given, **_: (words.append(given[2]), cancel)[1]
+    )
+    return words
+
+
+def export_map(window, monkeypatch, path: Path) -> None:
+    """Name a file for the synthetic map; a dialog that gets none is given up."""
+
+    def export(dialog: MapExportDialog) -> None:
+        button_of(dialog, "Export…").click()
+        if dialog.path is None:
+            dialog.reject()
+
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, **__: (str(path), ""))
+    once_asked(MapExportDialog, export)
+    window.action("export_map").trigger()
+
+
+def test_a_file_that_the_ending_leads_to_is_not_replaced_unasked(
+    window, tmp_path, monkeypatch, asked
+):
+    old = tmp_path / "walk 2.5 m.npz"
+    old.write_bytes(b"kept")
+    export_map(window, monkeypatch, tmp_path / old.stem)
+    assert asked == ["walk 2.5 m.npz exists. Replace it?"]
+    assert old.read_bytes() == b"kept"
+    export_map(window, monkeypatch, tmp_path / "other")
+    assert DopplerMap.load(tmp_path / "other.npz").kind == "synthetic"
+    assert len(asked) == 1
+
+
+def test_a_folder_that_cannot_be_written_is_said_in_words(window, tmp_path, monkeypatch):
+    path = tmp_path / "none" / "map.npz"
+    export_map(window, monkeypatch, path)
+    assert f"{path}: No such file or directory" in window.messages.text
