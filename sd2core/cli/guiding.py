@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from sd2core.cli import keys
-from sd2core.cli.output import counted, print_event, print_rows
+from sd2core.cli.output import counted, print_event, print_rows, tell
 from sd2core.errors import Sd2Error
 from sd2core.files.lock import FileLock
 from sd2core.files.paths import remove
@@ -246,7 +246,7 @@ class _Telling:
             )
             return
         print(f"{protocol.title}: {missing:,} of {counted(len(session.takes), 'take')} to record")
-        print(f"  into {folder}. Space or Enter: go on, a: again, s: skip, q: stop.", flush=True)
+        tell(f"  into {folder}. Space or Enter: go on, a: again, s: skip, q: stop.")
 
     def hidden(self, how: Literal["blur", "drop"], names: list[str]) -> None:
         """Say in whose videos the head was covered, or whose were deleted."""
@@ -254,7 +254,7 @@ class _Telling:
             print_event("dropped" if how == "drop" else "blurred", takes=names)
         elif names:
             done = "The video was deleted" if how == "drop" else "The head was covered in the video"
-            print(f"{done}, since there is a body: {', '.join(names)}", flush=True)
+            tell(f"{done}, since there is a body: {', '.join(names)}")
 
     def step(self) -> None:
         """Say what is to be done, where that has changed or another second has passed."""
@@ -278,9 +278,9 @@ class _Telling:
             )
         elif is_new:
             for line in self._lines(take):
-                print(line, flush=True)
+                tell(line)
         elif session.phase == "countdown":
-            print(f"  {left}", flush=True)
+            tell(f"  {left}")
 
     def _lines(self, take: Take | None) -> list[str]:
         """What a new phase is told by."""
@@ -319,7 +319,7 @@ class _Telling:
             )
             return
         motion = span.note or "motion"
-        print(f"  {take.name}: {motion} from {span.start_s:.2f} to {span.end_s:.2f} s", flush=True)
+        tell(f"  {take.name}: {motion} from {span.start_s:.2f} to {span.end_s:.2f} s")
         for loss in losses:
             print(f"sd2: {take.name}: {loss}", file=sys.stderr, flush=True)
 

@@ -221,6 +221,8 @@ def _import(options: Import) -> None:
         recording.sensor = VirtualSensor(options.sensor)
     recording.learn_camera()
     recording.learn_simulated()
+    if options.radar_offset_s is None:
+        recording.learn_offset()
     with ExitStack() as made:
         if options.body_model is not None:
             _keep_vertices(recording, _new_folder_for_vertices(options.out, made))
@@ -333,6 +335,8 @@ def _set(options: Set) -> None:
     if options.video is not None or options.mesh is not None:
         recording.camera = None
         recording.learn_camera()
+    if options.radar is not None and options.radar_offset_s is None:
+        recording.learn_offset()
     if options.body_model is not None:
         _keep_vertices(recording, recording.folder)
     recording.sensor = _placed(recording, options)

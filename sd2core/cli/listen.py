@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import command
-from sd2core.cli.output import counted, print_event, print_facts
+from sd2core.cli.output import counted, print_event, print_facts, tell
 from sd2core.options.kinds import Positive
 from sd2core.options.records import OptionError, Place
 from sd2core.options.shared import Json
@@ -188,7 +188,7 @@ class Status:
         else:
             words = " (continued)" if continued else ""
             stop = "Ctrl-C or q stops." if self._is_line else "Ctrl-C stops."
-            print(f"{about}\n  into {folder}{words}. {stop}", flush=True)
+            tell(f"{about}\n  into {folder}{words}. {stop}")
         self._warn_of_doubts()
 
     def show(self, column: Column | None) -> None:
@@ -218,9 +218,9 @@ class Status:
             import shutil
 
             width = shutil.get_terminal_size().columns - 1
-            print(f"\r{self._line()[:width]:<{width}}", end="", flush=True)
+            tell(f"\r{self._line()[:width]:<{width}}", end="")
         else:
-            print(self._line(), flush=True)
+            tell(self._line())
 
     def end(self, folder: Path) -> None:
         """Say what there is."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -42,7 +43,20 @@ def print_event(event: str, **content: Any) -> None:
     import json
 
     line = finite({"event": event, **content})
-    print(json.dumps(line, ensure_ascii=False), flush=True)
+    tell(json.dumps(line, ensure_ascii=False))
+
+
+def tell(text: str, end: str = "\n") -> None:
+    """Print at once; whoever closes the output has read enough, and the work goes on."""
+    try:
+        print(text, end=end, flush=True)
+    except BrokenPipeError:
+        discard_output()
+
+
+def discard_output() -> None:
+    """Keep Python from trying, and complaining, once more when it flushes at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def progress_events(every_s: float, *, time_left: bool = False, **content: Any) -> Progress:

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Sequence
 
 from sd2core.cli.command_parser import UsageError, record_of
+from sd2core.cli.output import discard_output
 from sd2core.cli.output_folders import output_folders
 from sd2core.errors import Sd2Error
 
@@ -37,13 +38,13 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
         return INTERRUPTED
     except BrokenPipeError:
         # Whoever read the output (`| head`) has seen enough.
-        _discard_output()
+        discard_output()
         return 0
     except Exception as error:
         if os.environ.get("SD2_TRACEBACK") == "1" and not isinstance(error, Sd2Error):
             raise
         if isinstance(error, OSError) and not error.filename and error.errno and _output_fails():
-            _discard_output()
+            discard_output()
             error, flags = Sd2Error(f"The output cannot be written ({error.strerror})"), set()
         explained = explanation(error)
         print(f"sd2: {explained}", file=sys.stderr)
@@ -83,7 +84,7 @@ def _tell_programs(error: Sd2Error, *, as_line: bool) -> None:
             print_json({"error": picked(error, "found", "expected", "remedy")})
         _flush_output()
     except OSError:
-        _discard_output()
+        discard_output()
 
 
 def attach_negative_values(arguments: Sequence[str]) -> list[str]:
@@ -127,8 +128,3 @@ def _output_fails() -> bool:
     except OSError:
         return True
     return False
-
-
-def _discard_output() -> None:
-    """Keep Python from trying, and complaining, once more when it flushes at exit."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -19,6 +19,7 @@ from sd2core.fmcw.wave import BeatSignal, WaveScene
 from sd2core.io.radar.capture import RadarCapture, Signal
 from sd2core.mesh.presence import runs
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.numerics.compiled import await_kernels
 from sd2core.numerics.parallel import Ticket, run_jobs
 from sd2core.progress import Progress, silent
 from sd2core.radar_config import RadarConfig
@@ -135,5 +136,6 @@ def _fill(
         signal[frame] = beat
         ticket.advance(1)
 
+    await_kernels(lambda: progress(0, frames))
     run_jobs([partial(fill, frame) for frame in range(frames)], frames, progress)
     return power, float(peak.max())

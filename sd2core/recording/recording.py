@@ -508,6 +508,15 @@ class Recording:
             with suppress(Sd2Error):
                 self.simulated = open_recording(seen.parent).simulated
 
+    def learn_offset(self) -> None:
+        """Put a simulated capture where its first frame stood on the clock of its mesh."""
+        if self.radar is None or self.holds_radar_map:
+            return
+        simulation = self.load_every_channel().meta.get("simulation")
+        first_s = simulation.get("first_frame_s") if isinstance(simulation, dict) else None
+        if isinstance(first_s, float) and math.isfinite(first_s):
+            self.radar_offset_s = first_s
+
     def open_video(self, progress: Progress = silent) -> VideoReader:
         """Open the video."""
         from sd2core.io.video import open_video

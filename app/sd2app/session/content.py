@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -122,8 +123,10 @@ def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Record
     recording = base or Recording(UNTITLED, title=Path(paths[0]).stem)
     for kind, path in kinds.items():
         setattr(recording, kind, path)
-    if base is not None and "radar" in kinds:  # which may have other channels
+    if "radar" in kinds:  # which may have other channels
         recording.radar_receiver = recording.radar_transmitter = None
+        with suppress(Sd2Error):  # what cannot be read is said where it is opened
+            recording.learn_offset()
     return recording
 
 

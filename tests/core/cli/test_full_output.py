@@ -55,3 +55,27 @@ def test_letters_that_the_outputs_encoding_lacks_end_no_command() -> None:
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert r"SD\xb2 Studio" in done.stdout
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="closes the output as a POSIX shell does")
+def test_work_goes_on_when_nobody_reads_its_progress_any_more(tmp_path: Path) -> None:
+    code = (
+        "import pathlib, time\n"
+        "from sd2core.cli.output import print_event\n"
+        "for done in range(3):\n"
+        "    print_event('progress', done=done)\n"
+        "    time.sleep(0.2)\n"
+        "print('the end')\n"
+        "pathlib.Path('made').touch()\n"
+    )
+    command = f'"{sys.executable}" -c "{code}" | head -1'
+    done = subprocess.run(
+        ["sh", "-c", command],
+        env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+    )
+    assert (done.stdout, done.stderr) == ('{"event": "progress", "done": 0}\n', "")
+    assert (tmp_path / "made").exists()

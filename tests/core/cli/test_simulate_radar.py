@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.io.radar import load_capture
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.recording.recording import open_recording
 from sd2core.timebase import Timebase
 
 
@@ -25,6 +27,23 @@ def test_the_samples_are_read_like_a_capture(sd2: Sd2, plate: Path, tmp_path: Pa
     assert columns.kind == "simulated"
     assert np.abs(columns.peak_velocity_mps() - 1.3).max() <= columns.axis.bin_width_mps
     assert load_capture(folder).meta["simulation"]["source"] == "plate.npz"
+
+
+def test_a_simulated_radar_stands_where_its_mesh_stood_in_time(
+    sd2: Sd2, plate: Path, tmp_path: Path
+) -> None:
+    mesh = load_mesh(plate)
+    late, folder, out = tmp_path / "late.npz", tmp_path / "radar", tmp_path / "late.sd2"
+    save_mesh(replace(mesh, timebase=mesh.timebase.shifted(2.0)), late)
+    assert sd2("simulate", "radar", late, "--out", folder).code == 0
+    parts = ("--mesh", late, "--radar", folder)
+    assert sd2("import", *parts, "--out", out).code == 0
+    assert open_recording(out).radar_offset_s == pytest.approx(2.0, abs=1e-6)
+    assert sd2("set", out, "--radar-offset-s", 0.5).code == 0
+    assert sd2("set", out, "--title", "still").code == 0
+    assert open_recording(out).radar_offset_s == 0.5
+    assert sd2("set", out, "--radar", folder).code == 0
+    assert open_recording(out).radar_offset_s == pytest.approx(2.0, abs=1e-6)
 
 
 def test_every_option_arrives(sd2: Sd2, plate: Path, tmp_path: Path) -> None:
