@@ -190,7 +190,7 @@ def save_mesh(mesh: MeshSequence, path: Path | str, progress: Progress = silent)
         raise Sd2Error(
             f"The mesh is a scene of {len(mesh.bodies)} bodies, and {path.name} holds one",
             "a single body",
-            "Save each of mesh.bodies",
+            "Save mesh.body(person) of each of mesh.persons",
         )
     if path.suffix.lower() == ".npz":
         write_npz(mesh, path, progress)

@@ -89,6 +89,7 @@ class TrainingHistory(StepHistory):
         self.minutes = 0.0
         self.steps_per_epoch = 0
         self.segments = 0
+        self.simulated = False  # the radar that is learnt from
         self.step_points: list[StepPoint] = []
         self.epoch_points: list[EpochPoint] = []
         self.epoch = 0  # under way, from 1; zero before the first
@@ -115,6 +116,7 @@ class TrainingHistory(StepHistory):
         self.epochs, self.steps_per_epoch = epochs, steps_per_epoch
         self.total, self.minutes = epochs * steps_per_epoch, minutes if minutes > 0 else 0.0
         self.parameters, self.segments = parameters, segments
+        self.simulated = event.get("kind") == "simulated"
         # What was done after the checkpoint is done again.
         self.steps_done = done if event.get("resumed") else 0
         at = self.steps_done / self.steps_per_epoch if self.steps_per_epoch else 0.0

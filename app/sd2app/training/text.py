@@ -121,7 +121,8 @@ def about_text(run: TrainingMonitor) -> str:
         parts.append(", ".join(path.name for path in config.data.pairs))
         parts.append(f"batch {config.training.batch_size}, seed {config.training.seed}")
     if history.segments:
-        parts.append(f"{history.segments:,} segments")
+        of = " of a simulated radar" if history.simulated else ""
+        parts.append(f"{history.segments:,} segments{of}")
     if history.device:
         parts.append("GPU" if history.device.startswith("cuda") else history.device.upper())
     return " · ".join(parts)

@@ -41,6 +41,7 @@ def test_what_is_told_stands_in_it() -> None:
     assert history.best.epoch == 1
     assert [point.at for point in history.step_points] == [0.2, 1.0, 1.2]
     assert metric_rows(history)[0] == ("Best epoch", "1")
+    assert (history.simulated, told(START | {"kind": "simulated"}).simulated) == (False, True)
 
 
 def test_a_run_limited_by_time_knows_its_share_by_the_clock() -> None:
