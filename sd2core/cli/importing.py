@@ -48,7 +48,8 @@ class Content(MeshReading, Channel):
     radar : CAPTURE
         radar capture of the same scene
     radar_offset_s : S
-        time in the video, in seconds, of the first radar frame (default: 0)
+        time in the video, in seconds, of the first radar frame (default: 0, or where the mesh of a
+        simulated capture stood in time)
     imu : FILE
         samples of an inertial sensor (.csv, .sto, .npz)
     imu_offset_s : S
