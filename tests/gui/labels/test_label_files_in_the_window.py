@@ -119,9 +119,9 @@ def test_without_a_recording_it_says_what_to_do(empty_window, tmp_path) -> None:
 def test_export_to_every_format_and_back(window, qtbot, monkeypatch, tmp_path) -> None:
     c = models_of(window)
     spans = [(span.start_s, span.end_s, span.label) for span in c.labels.labels.spans]
-    for one in FORMATS:
+    for number, one in enumerate(FORMATS):
         # A name with a point in it has no ending yet.
-        path = tmp_path / f"take 2.5 m{one.suffixes[0]}"
+        path = tmp_path / f"take {number}.5 m{one.suffixes[0]}"
         choose(monkeypatch, "getSaveFileName", path.with_suffix(""))
 
         def work(dialog: LabelExportDialog, title: str = one.title) -> None:
