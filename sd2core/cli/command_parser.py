@@ -35,9 +35,10 @@ class Subcommands(argparse._SubParsersAction):
 
     typed: Sequence[str] = ()
 
-    def wants(self, name: str) -> bool:
-        """True if a command gets its options."""
-        return not self.typed or self.typed[0] == name
+    @property
+    def first(self) -> str:
+        """The command that is typed here; empty where nothing is."""
+        return self.typed[0] if self.typed else ""
 
 
 class HelpFormatter(argparse.RawDescriptionHelpFormatter):
@@ -86,13 +87,13 @@ class CommandParser(argparse.ArgumentParser):
 
 def subcommands_of(parser: argparse.ArgumentParser, typed: Sequence[str] = ()) -> Subcommands:
     """Make the place for the commands of a parser, of which one may be typed with its words."""
-    first = typed[0] if typed else ""
     commands = parser.add_subparsers(
         title="commands", metavar="COMMAND", required=True, action=Subcommands
     )
     assert isinstance(commands, Subcommands)
-    # An option before the command: which that is, argparse finds.
-    commands.typed = () if first.startswith("-") and first not in HELP else typed
+    commands.typed = typed
+    if commands.first.startswith("-") and commands.first not in HELP:
+        commands.typed = ()  # an option before the command: which that is, argparse finds
     return commands
 
 
@@ -250,7 +251,7 @@ def add_declared(commands: Subcommands, modules: Mapping[str, str]) -> None:
     modules : mapping of str to str
         Module of each command; they declare them in the order of the help.
     """
-    name = commands.typed[0] if commands.typed else ""
+    name = commands.first
     if name in commands.choices:
         return
     for module in (modules[name],) if name in modules else dict.fromkeys(modules.values()):
@@ -311,7 +312,7 @@ def add_command(
         formatter_class=HelpFormatter,
     )
     if options is not None:
-        if commands.wants(name):
+        if commands.first in ("", name):
             add_options(parser, options)
         parser.set_defaults(record=options, writes_map=issubclass(options, ReplacesMaps))
     if handler is not None:

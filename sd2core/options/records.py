@@ -223,7 +223,10 @@ class Option:
 
 
 def _with_value(name: str, text: str) -> tuple[str, ...]:
-    """Words of an option; a text that begins as one does is not mistaken for it."""
+    """Words of an option; a text that begins as one does is not mistaken for it.
+
+    Of negative numbers the command line sees to that, so that they stand as they are read best.
+    """
     return (f"{name}={text}",) if re.match(r"-(?!\.?\d)", text) else (name, text)
 
 

@@ -180,13 +180,13 @@ class SynthesisModel(QObject):
         self._forget()
         self._set_moving(False)
         self._track.set_map(None)
+        self._track.set_awaited(False)
         mesh = self._session.document.mesh
         options = replace(PRESETS["paper"], count=self._session.document.count)
         if mesh is not None and mesh.faces is None:
             options = replace(options, visibility="none")
         self._accuracy.attach(mesh, options)
         if mesh is None:
-            self._track.set_awaited(False)
             self._announce()
             return
         try:

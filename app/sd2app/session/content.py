@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -125,8 +124,6 @@ def recording_of(paths: Sequence[Path], base: Recording | None = None) -> Record
         setattr(recording, kind, path)
     if "radar" in kinds:  # which may have other channels
         recording.radar_receiver = recording.radar_transmitter = None
-        with suppress(Sd2Error):  # what cannot be read is said where it is opened
-            recording.learn_offset()
     return recording
 
 

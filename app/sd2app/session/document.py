@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,6 +30,7 @@ from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
 from sd2core.errors import Cure, Sd2Error
 from sd2core.io.bodies import at_hand, with_bodies
+from sd2core.io.kinds import kind_of
 from sd2core.io.things import with_things, with_walls
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
@@ -291,6 +293,9 @@ class DocumentModel(QObject):
             recording = recording_of(paths, base) if paths or base is None else base
             for field, value in (mesh or {}).items():
                 setattr(recording, field, value)
+            if "radar" in map(kind_of, paths):
+                with suppress(Sd2Error):  # what cannot be read is said where it is loaded
+                    recording.learn_offset()
             if cure is not None:
                 recording.mesh_reading = recording.mesh_reading.cured(cure)
             return load_content(recording, lambda done, total: emit((done, total)))
@@ -476,6 +481,6 @@ def _keep_edits(before: Recording, after: Recording) -> None:
     if after.imu not in (None, before.imu):  # one of the files that were read
         kept -= {"imu", "imu_offset_s"}
     if after.radar != before.radar:
-        kept -= {"radar_receiver", "radar_transmitter"}
+        kept -= {"radar_offset_s", "radar_receiver", "radar_transmitter"}
     for name in kept:
         setattr(after, name, getattr(before, name))

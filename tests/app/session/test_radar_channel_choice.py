@@ -1,4 +1,4 @@
-"""A receiver or transmitter chosen in the window: its map, one step in the history, stored."""
+"""A radar in the window: a receiver or transmitter that is chosen, and where it stands in time."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from swinging_recordings import recording
 from sd2app.session.session import build_session
 from sd2app.settings import Settings
 from sd2core.fmcw import doppler_map
+from sd2core.io.radar.infineon import write_capture
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VelocityAxis
 
@@ -87,3 +88,22 @@ def test_a_number_that_is_not_there_is_told_and_can_be_replaced(session, qtbot):
     assert "1 to 2" in told.args[0]
     session.edits.choose_channel("receiver", 2)
     wait_for(session, np.zeros_like(document.radar_map.values), qtbot)
+
+
+def test_a_simulated_radar_that_is_added_stands_where_its_mesh_stood(session, qtbot, tmp_path):
+    document = session.document
+    folder, late = document.recording.folder, tmp_path / "late"
+    capture = document.capture
+    about = capture.meta.get("simulation", {}) | {"first_frame_s": 1.5}
+    write_capture(
+        late,
+        capture.samples[:],
+        capture.config,
+        capture.timebase.times_s,
+        simulated=True,
+        meta={"simulation": about},
+    )
+    for paths, offset_s in (([late], 1.5), ([folder], 0.0)):
+        with qtbot.waitSignal(document.opened, timeout=10_000):
+            document.add(paths) if paths == [late] else document.open(paths)
+        assert document.recording.radar_offset_s == offset_s
