@@ -84,8 +84,6 @@ class MeshDialog(Dialog):
         self._lay_out()
         preview.changed.connect(self._refresh)
         self._refresh()
-        # Not on Cancel, which alone can be pressed while the mesh is read: Return is to take it.
-        self._slider.slider.setFocus()
         self.resize(980, 600)
 
     # --- building -------------------------------------------------------------------------

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QPoint, QSize, Qt
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QGuiApplication, QShowEvent
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
@@ -80,6 +80,12 @@ class Dialog(QDialog):
     def __init__(self, title: str, parent: QWidget | None) -> None:
         super().__init__(parent)
         self.setWindowTitle(title)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Begin with the first control: Qt takes Cancel while it is the only button to press."""
+        super().showEvent(event)
+        if self.focusWidget() is None:
+            tab_to([self], None, forward=True)
 
     def focusNextPrevChild(self, forward: bool) -> bool:
         """Go to the next control, or to the one before."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -131,6 +132,27 @@ def test_people_are_listed_and_chosen_and_frames_stepped_through(qtbot, dialog) 
     # Where the user looks it stays.
     choose(qtbot, dialog, "How the mesh is turned", 1)
     assert preview.frame == SHORT
+
+
+def test_return_takes_the_mesh_and_cancels_nothing_while_it_is_read(
+    qtbot, qapp, files, monkeypatch
+) -> None:
+    read, may_read = Recording.load_mesh, threading.Event()
+    monkeypatch.setattr(Recording, "load_mesh", lambda *given: may_read.wait() and read(*given))
+    video, mesh = files
+    parent = QWidget()
+    qtbot.addWidget(parent)
+    preview = MeshPreview(Recording(Path(), video=video, mesh=mesh), parent)
+    dialog = MeshDialog(preview, palette_for(dark=False), parent)
+    dialog.open()
+    qtbot.waitUntil(dialog.isActiveWindow)
+    QTest.keyClick(dialog.focusWidget(), Qt.Key.Key_Return)
+    assert dialog.isVisible()
+    may_read.set()
+    settle(qtbot, preview)
+    QTest.keyClick(dialog.focusWidget(), Qt.Key.Key_Return)
+    assert dialog.result() == MeshDialog.DialogCode.Accepted
+    preview.close()
 
 
 def test_what_a_button_puts_right_is_told_once_and_by_no_option(qtbot, dialog) -> None:
