@@ -17,12 +17,10 @@ from sd2core.recording.divergence import WORDS
 from sd2core.recording.recording import Recording, settings_of
 
 _ALWAYS = ("sensor", "placements", "radar_offset_s")
-_INERTIAL = ("imu", "imu_offset_s", "imu_places")
-_CHANNEL = ("radar_receiver", "radar_transmitter")
 MESH = ("mesh", "faces", "mesh_reading", "camera")
 """Names of the fields on which the mesh depends."""
-EDITED = (*_ALWAYS, *_INERTIAL, *_CHANNEL, *MESH, "things", "bodies", "walls")
-"""Names of the fields. Journals of earlier versions lack some of the later ones."""
+EDITED = tuple(WORDS)
+"""Names of the fields. Journals of earlier versions lack some of them."""
 
 
 def edited_fields(recording: Recording) -> dict[str, Any]:

@@ -436,6 +436,11 @@ class Recording:
                 settings[role] = located_path(stored, self.folder)
         return State(settings, self.labelled)
 
+    @property
+    def edited(self) -> bool:
+        """True unless it is as it was last read or written."""
+        return self._base is None or self.state() != self._base
+
     def accept(self, theirs: Recording) -> None:
         """Take what is on disk as known, so that :meth:`save` writes over it."""
         self._read, self._base, self._digests = theirs._read, theirs._base, theirs._digests

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +38,7 @@ from sd2core.mesh.bodies import Body
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.options.synthesis import HowCounted
 from sd2core.radar_config import CLUTTER, Clutter
-from sd2core.recording.edited import EDITED, MESH
+from sd2core.recording.edited import EDITED
 from sd2core.recording.recording import Recording
 from sd2core.recording.relinking import Relinked
 from sd2core.sensor import VelocityAxis
@@ -46,6 +46,19 @@ from sd2core.sensor import VelocityAxis
 if TYPE_CHECKING:
     from sd2core.io.radar import RadarCapture
     from sd2core.io.video import VideoReader
+
+
+_COUNT: HowCounted = "expected"
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """Files to read, alone or beside those of a recording, and what is done with its new fields."""
+
+    paths: tuple[Path, ...]
+    mesh: Mapping[str, Any]  # fields that say how their mesh is read
+    base: Recording | None = None
+    then: Callable[[dict[str, Any]], object] = lambda fields: None
 
 
 class DocumentModel(QObject):
@@ -65,14 +78,14 @@ class DocumentModel(QObject):
         self.undo_stack = QUndoStack(self)
         self.content: Content | None = None  # all parts; None while nothing is open
         self.clutter: Clutter = CLUTTER  # method that removes static echoes from the capture
-        self.count: HowCounted = "expected"  # of vertices whose mesh states its uncertainty
+        self.count: HowCounted = _COUNT  # of vertices whose mesh states its uncertainty
         self.same_recording = False  # as was open before, with other files
         self.growing = False  # a radar is listened to, and adds frames
         self.offers: tuple[OfferedCure, ...] = ()  # of reading the mesh another way
-        self._base: Recording | None = None
-        self._asked: list[Path] = []  # files that were opened last
-        self._cured = False
-        self._runner = ListedRunner("open", jobs, self, self._receive)
+        self._asked: _Asked | None = None  # last
+        self._take: Callable[[Content], object] = self._open  # what is done with what is read
+        self._ready: Content | None = None  # read already, before its fields are assigned
+        self._runner = ListedRunner("open", jobs, self, lambda content: self._take(content))
         self._runner.failed.connect(self._offer_instead)
         self._maps = ListedRunner("radar", jobs, self, self._receive_map)
         for runner in (self._runner, self._maps):
@@ -152,8 +165,9 @@ class DocumentModel(QObject):
 
     @property
     def modified(self) -> bool:
-        """True if there are unsaved edits."""
-        return self.content is not None and not self.undo_stack.isClean()
+        """True if there are unsaved edits; how maps are shown is saved nowhere."""
+        content = self.content
+        return content is not None and not self.undo_stack.isClean() and content.recording.edited
 
     # --- opening --------------------------------------------------------------------------
 
@@ -180,12 +194,20 @@ class DocumentModel(QObject):
 
         ``mesh`` holds fields of the recording that say how its mesh is read, where it does not.
         """
-        self._start(None, list(paths), mesh)
+        self._start(_Asked(tuple(paths), mesh or {}))
 
-    def add(self, paths: Sequence[Path], mesh: Mapping[str, Any] | None = None) -> None:
-        """Add files to the recording that is open, or open them; ``mesh`` as for :meth:`open`."""
-        recording = self.recording
-        self._start(replace(recording) if recording is not None else None, list(paths), mesh)
+    def read_added(
+        self,
+        paths: Sequence[Path],
+        mesh: Mapping[str, Any] | None,
+        then: Callable[[dict[str, Any]], object],
+    ) -> None:
+        """Read files beside those of the recording that is open, in the background.
+
+        ``mesh`` is as for :meth:`open`; ``then`` is called with the fields to assign.
+        """
+        assert self.recording is not None
+        self._start(_Asked(tuple(paths), mesh or {}, replace(self.recording), then))
 
     @property
     def offers_of_open(self) -> bool:
@@ -194,7 +216,8 @@ class DocumentModel(QObject):
 
     def open_mesh_so(self, cure: Cure) -> None:
         """Open what was refused, its mesh read with a setting that puts it right."""
-        self._start(self._base, self._asked, cure=cure)
+        assert self._asked is not None
+        self._start(self._asked, cure)
 
     def keep_mesh(self, read: ReadMesh) -> None:
         """Have a mesh ready that was read elsewhere, for its fields to be assigned."""
@@ -278,41 +301,42 @@ class DocumentModel(QObject):
             self.content.close()
             self.content = None
 
-    def _start(
-        self,
-        base: Recording | None,
-        paths: list[Path],
-        mesh: Mapping[str, Any] | None = None,
-        cure: Cure | None = None,
-    ) -> None:
-        self._asked, self._cured = paths, cure is not None
-        name = paths[0].name if paths else (base.title if base else "")
-        self._base = base
+    def _start(self, asked: _Asked, cure: Cure | None = None) -> None:
+        self._asked, base = asked, asked.base
 
         def read(emit: Emit) -> Content:
-            recording = recording_of(paths, base) if paths or base is None else base
-            for field, value in (mesh or {}).items():
+            recording = recording_of(asked.paths, None if base is None else replace(base))
+            for field, value in asked.mesh.items():
                 setattr(recording, field, value)
-            if "radar" in map(kind_of, paths):
+            if "radar" in map(kind_of, asked.paths):
                 with suppress(Sd2Error):  # what cannot be read is said where it is loaded
                     recording.learn_offset()
             if cure is not None:
                 recording.mesh_reading = recording.mesh_reading.cured(cure)
             return load_content(recording, lambda done, total: emit((done, total)))
 
-        self._runner.submit(read, f"Opening {name}")
+        def take(content: Content) -> None:
+            if base is None:
+                self._open(content, unsaved=cure is not None and content.saved)
+                return
+            self._ready = content
+            read = {name: getattr(content.recording, name) for name in EDITED}
+            asked.then({one: read[one] for one in EDITED if read[one] != getattr(base, one)})
+            if self._ready is not None:  # the same files, which may hold something else by now
+                self._show_parts()
 
-    def _receive(self, content: Content) -> None:
+        self._take = take
+        self._runner.submit(read, f"Opening {asked.paths[0].name}")
+
+    def _open(self, content: Content, *, unsaved: bool = False) -> None:
         before, self.content = self.content, content
-        if before is not None and before.video is not content.video:
+        if before is not None:
             before.close()
-        self.same_recording = before is not None and content.recording is self._base
-        unsaved = (self.same_recording and self.modified) or (self._cured and content.saved)
-        if before is not None and self.same_recording:
-            _keep_edits(before.recording, content.recording)
-            self._surround()
-        self.growing = False
-        self._tell_opened(unsaved)
+        self.same_recording = self.growing = False
+        self._tell_opened(unsaved=unsaved)
+        self._tell_read(content)
+
+    def _tell_read(self, content: Content) -> None:
         for problem in content.problems:
             self.failed.emit(problem)
         if content.notes:
@@ -322,13 +346,50 @@ class DocumentModel(QObject):
 
     def _tell_opened(self, unsaved: bool) -> None:
         assert self.content is not None
+        self.clutter, self.count = CLUTTER, _COUNT  # chosen for the one before
         fields = mesh_fields(self.content.recording)
         self._meshes.reset(ReadMesh(fields, self.content.mesh, self.content.offers))
+        self._forget_steps(unsaved=unsaved)
+        self.opened.emit()
+        self.changed.emit()
+
+    def _forget_steps(self, *, unsaved: bool) -> None:
         self.undo_stack.clear()
         if unsaved:
             self.undo_stack.resetClean()
+
+    def _read_parts(self) -> None:
+        """Read all files of the recording that is open, and show them in it."""
+        assert self.recording is not None
+        asked = replace(self.recording)
+
+        def take(content: Content) -> None:
+            self._ready = content
+            self._show_parts()
+
+        self._take = take
+        self._runner.submit(
+            lambda emit: load_content(asked, lambda done, total: emit((done, total))),
+            f"Reading {asked.title}",
+        )
+
+    def _show_parts(self) -> None:
+        """Show what was read in what is open; the recording, its history and edits stay."""
+        before, content, self._ready = self.content, self._ready, None
+        assert before is not None
+        assert content is not None
+        recording, read_by = before.recording, mesh_fields(content.recording)
+        self.content = replace(content, recording=recording)
+        self._meshes.keep(ReadMesh(read_by, content.mesh, content.offers))
+        if read_by != mesh_fields(recording):  # edited meanwhile
+            self._meshes.follow(recording)
+        self._surround()
+        self.same_recording, self.growing = True, False
         self.opened.emit()
         self.changed.emit()
+        if before.video is not content.video:
+            before.close()
+        self._tell_read(content)
 
     # --- changing -------------------------------------------------------------------------
 
@@ -338,9 +399,14 @@ class DocumentModel(QObject):
         if recording is None or all(getattr(recording, name) == fields[name] for name in fields):
             return
         channel, mesh = _channel(recording), mesh_fields(recording)
+        files = recording.video, recording.radar
         for name, value in fields.items():
             setattr(recording, name, value)
-        if mesh_fields(recording) != mesh:
+        if self._ready is not None:
+            self._show_parts()
+        elif (recording.video, recording.radar) != files:
+            self._read_parts()
+        elif mesh_fields(recording) != mesh:
             self._meshes.follow(recording)
         self._surround()
         self.changed.emit()
@@ -456,7 +522,8 @@ class DocumentModel(QObject):
         if relinked.paths:
             if self.content is not None and self.content.saved:
                 self.tell_saved()
-            self._start(self.recording, [])
+            self._forget_steps(unsaved=self.modified)  # which speak of where files were
+            self._read_parts()
         return relinked
 
     def read_labels_again(self) -> None:
@@ -473,14 +540,3 @@ class DocumentModel(QObject):
 
 def _channel(recording: Recording) -> tuple[int | None, int | None]:
     return recording.radar_receiver, recording.radar_transmitter
-
-
-def _keep_edits(before: Recording, after: Recording) -> None:
-    """Apply edits made while files were read to what was read."""
-    kept = {"labels", "denoiser", "bundled_denoiser", *EDITED} - {*MESH}
-    if after.imu not in (None, before.imu):  # one of the files that were read
-        kept -= {"imu", "imu_offset_s"}
-    if after.radar != before.radar:
-        kept -= {"radar_offset_s", "radar_receiver", "radar_transmitter"}
-    for name in kept:
-        setattr(after, name, getattr(before, name))

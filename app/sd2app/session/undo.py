@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -22,6 +22,7 @@ from sd2core.mesh.walls import Wall
 from sd2core.options.synthesis import HowCounted
 from sd2core.placements.placements import Placements
 from sd2core.radar_config import Clutter
+from sd2core.recording.divergence import WORDS
 from sd2core.recording.recording import Recording
 from sd2core.sensor import Vector, VirtualSensor, aimed_at
 
@@ -62,6 +63,7 @@ class Edits:
     def __init__(self, document: DocumentModel, sensor: SensorModel) -> None:
         self._document = document
         self._sensor = sensor
+        self.dragging = False  # something is held, and is no step yet
         self._before: Any = None
         self._dragged: Thing | Body | None = None
         self._planned_before: tuple[Recording, Placements | None] | None = None
@@ -83,7 +85,7 @@ class Edits:
 
     def begin_sensor_drag(self) -> None:
         """Begin a drag of the sensor."""
-        self._before = self._sensor.sensor
+        self._before, self.dragging = self._sensor.sensor, True
         self._sensor.set_dragging(True)
 
     def drag_sensor(self, position_m: Vector) -> None:
@@ -92,6 +94,7 @@ class Edits:
 
     def end_sensor_drag(self) -> None:
         """End the drag; it becomes one step in the history."""
+        self.dragging = False
         self._sensor.set_dragging(False)
         self._push("Move sensor", self._assign_sensor, self._before, self._sensor.sensor)
 
@@ -171,6 +174,7 @@ class Edits:
         movable = [*things, *(other.placed for other in mesh.others)]
         self._dragged = movable[number]
         self._before = self._fields(["things" if number < len(things) else "bodies"])
+        self.dragging = True
         self._sensor.set_dragging(True)
 
     def drag_in_scene(self, by_m: Vector) -> None:
@@ -180,6 +184,7 @@ class Edits:
 
     def end_scene_drag(self, by_m: Vector) -> None:
         """End the drag of a thing or body; it becomes one step in the history."""
+        self.dragging = False
         self._sensor.set_dragging(False)
         self.drag_in_scene(by_m)
         if self._dragged is not None:
@@ -239,6 +244,22 @@ class Edits:
         recording = self._document.recording
         return () if recording is None else recording.imu_places
 
+    # --- files ----------------------------------------------------------------------------
+
+    def add(self, paths: Sequence[Path], mesh: Mapping[str, Any] | None = None) -> None:
+        """Add files, a step once they were read; they are opened where nothing is open.
+
+        ``mesh`` holds fields of the recording that say how a mesh among them is read.
+        """
+        if self._document.recording is None:
+            self._document.open(paths, mesh)
+        else:
+            self._document.read_added(paths, mesh, self._take_added)
+
+    def _take_added(self, fields: Mapping[str, Any]) -> None:
+        added = [WORDS[name] for name in ("video", "mesh", "radar", "imu") if fields.get(name)]
+        self._change(f"Add {' and '.join(added)}", fields)
+
     # --- the mesh -------------------------------------------------------------------------
 
     def read_mesh(self, text: str, fields: Mapping[str, Any]) -> None:
@@ -265,7 +286,7 @@ class Edits:
     def begin_offset_drag(self, name: Offset = "radar_offset_s") -> None:
         """Begin to drag what was measured in time."""
         if self._document.recording is not None:
-            self._before = self._fields([name])
+            self._before, self.dragging = self._fields([name]), True
 
     def drag_offset(self, seconds: float) -> None:
         """Shift it by ``seconds`` since the drag began."""
@@ -274,6 +295,7 @@ class Edits:
 
     def end_offset_drag(self) -> None:
         """End the drag; it becomes one step in the history."""
+        self.dragging = False
         self._push_change(_ALIGNED[next(iter(self._before))], self._before)
 
     # --- synthesis ------------------------------------------------------------------------

@@ -187,12 +187,12 @@ class FilesFeature(Feature):
         if _is_inertial(paths):
             self._add_inertial(paths[0])
         elif mesh is None:
-            self._document.add(paths)
+            self._session.edits.add(paths)
         elif seen := self._see_mesh(mesh):
             if len(paths) == 1 and self._document.recording is not None:
                 self._session.edits.take_mesh("Take mesh", seen)
             else:
-                self._document.add(paths, seen.fields)
+                self._session.edits.add(paths, seen.fields)
 
     def _foreign(self, paths: Sequence[Path], base: Recording | None) -> Recording | None:
         """The recording that these files would make, where they bring a foreign mesh to a video."""

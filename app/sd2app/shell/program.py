@@ -67,7 +67,7 @@ _PANES = {
 
 
 class ProgramFeature(Feature):
-    """Actions of the program; the history waits while labels are dragged."""
+    """Actions of the program; the history waits while anything is dragged."""
 
     def __init__(
         self, session: Session, shell: Shell, labels: LabelsFeature, manual: ManualOpener
@@ -80,6 +80,10 @@ class ProgramFeature(Feature):
         layouts = session.layouts.changed, session.layouts.panes_changed
         self.changing = *history, *layouts, session.display.theme_changed
 
+    def _at_rest(self, step: Callable[[], None]) -> None:
+        if not self._session.edits.dragging:
+            step()
+
     def actions(self) -> Sequence[Action]:
         """Undo, theme, messages, side panel, manual, keys, about, quit."""
         stack, display = self._session.document.undo_stack, self._session.display
@@ -91,11 +95,13 @@ class ProgramFeature(Feature):
             ),
             Action(
                 "undo", "Edit", "Undo", ("Ctrl+Z",), "Take back the last edit of this recording",
-                stack.undo, lambda: stack.canUndo() and not dragging.dragging,
+                lambda: self._at_rest(stack.undo),
+                lambda: stack.canUndo() and not dragging.dragging,
             ),
             Action(
                 "redo", "Edit", "Redo", ("Ctrl+Shift+Z",), "Do again what was taken back",
-                stack.redo, lambda: stack.canRedo() and not dragging.dragging,
+                lambda: self._at_rest(stack.redo),
+                lambda: stack.canRedo() and not dragging.dragging,
             ),
             Action(
                 "preferences", "Edit", "Preferences…", ("Ctrl+,",),

@@ -279,14 +279,14 @@ def test_files_that_are_added_leave_the_sensors_alone(
     desk.add(written(tmp_path / "wrist.csv", 0.25))
     save_mesh(turning_body(FRAMES + 10), tmp_path / "longer.npz")
     with desk.qtbot.waitSignal(desk.session.document.opened, timeout=20_000):
-        desk.session.document.add([tmp_path / "longer.npz"])
+        desk.session.edits.add([tmp_path / "longer.npz"])
     desk.settle()
     assert (desk.recording.imu, desk.recording.imu_offset_s) == (tmp_path / "wrist.csv", 0.25)
     assert desk.recording.imu_places == ("head",)
     assert model.signals is not None
     assert model.signals.times_s[-1] == pytest.approx((FRAMES + 9) / 30)
     with desk.qtbot.waitSignal(desk.session.document.opened, timeout=20_000):
-        desk.session.document.add([written(tmp_path / "other.csv", 0.5), tmp_path / "longer.npz"])
+        desk.session.edits.add([written(tmp_path / "other.csv", 0.5), tmp_path / "longer.npz"])
     assert (desk.recording.imu, desk.recording.imu_offset_s) == (tmp_path / "other.csv", 0.25)
 
 

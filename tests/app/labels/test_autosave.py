@@ -29,7 +29,7 @@ from sd2core.errors import Cure
 from sd2core.labels import edits as core_edits
 from sd2core.labels.files import read_labels, write_labels
 from sd2core.labels.recovery import Recoverable, Recoveries, offers_in
-from sd2core.recording.recording import Recording
+from sd2core.recording.recording import Recording, open_recording
 
 
 class Desk:
@@ -41,6 +41,8 @@ class Desk:
         self.labels, self.playback = LabelsModel(), PlaybackModel()
         self.session = LabelAutosave(self.document, self.labels, root, self.document)
         self.edits = LabelEdits(self.document, self.labels, self.playback, self.session)
+        self.all_edits = Edits(self.document, SensorModel())
+        self.edits.restoring.connect(self.all_edits.restore)
         self.marking = LabelMarking(self.edits, Settings.forgetful())
         self.hand = LabelDragging(self.edits)
         self.said: list[str] = []
@@ -246,24 +248,53 @@ class TestOpeningAndClosing:
         again.edits.restore()
         assert again.spans == [("left-to-right", 10, 20)]
 
-    def test_files_that_are_added_change_nothing(self, qtbot, desk, root, mesh, tmp_path) -> None:
+    def test_files_that_are_added_change_no_labels(self, qtbot, desk, root, mesh, tmp_path) -> None:
         at = desk().open(mesh)
         at.mark(10, 20)
         write_capture_of_nothing(tmp_path / "radar")
         with qtbot.waitSignal(at.document.opened, timeout=10_000):
-            at.document.add([tmp_path / "radar"])
+            at.all_edits.add([tmp_path / "radar"])
             at.mark(30, 40)  # while it is read
         assert at.spans == [("left-to-right", 10, 20), ("left-to-right", 30, 40)]
         assert at.document.modified
         at.mark(50, 60)
         (offer,) = left(root)
-        assert (offer.edits, offer.recording) == (3, mesh)
+        assert (offer.edits, offer.recording) == (4, mesh)
+
+    def test_files_that_are_added_are_an_edit_as_any_other(
+        self, qtbot, desk, root, recording, tmp_path
+    ) -> None:
+        at = desk().open(recording)
+        at.mark(10, 20)
+        write_capture_of_nothing(tmp_path / "radar")
+        document, stack = at.document, at.document.undo_stack
+        with qtbot.waitSignal(document.opened, timeout=10_000):
+            at.all_edits.add([tmp_path / "radar"])
+        assert (stack.undoText(), document.modified) == ("Add radar file", True)
+        for step, radar in ((stack.undo, None), (stack.redo, tmp_path / "radar")):
+            with qtbot.waitSignal(document.opened, timeout=10_000):
+                step()
+            assert (document.recording.radar, document.capture is None) == (radar, radar is None)
+        for step in (stack.undo, stack.undo):
+            step()
+        assert (at.spans, document.modified) == ([], False)
+        for step in (stack.redo, stack.redo):
+            step()
+        at.crash()
+        again = desk().open(recording)
+        assert again.document.capture is None
+        with qtbot.waitSignal(again.document.opened, timeout=10_000):
+            again.edits.restore()
+        assert again.document.capture is not None
+        assert again.spans == [("left-to-right", 10, 20)]
+        again.document.save()
+        assert open_recording(recording).radar == tmp_path / "radar"
 
     def test_a_recording_is_not_added_to_another(self, qtbot, desk, mesh, recording) -> None:
         at = desk().open(mesh)
         at.mark(10, 20)
         with qtbot.waitSignal(at.document.failed, timeout=10_000) as caught:
-            at.document.add([recording])
+            at.all_edits.add([recording])
         assert "cannot be added to another" in caught.args[0]
         assert at.spans == [("left-to-right", 10, 20)]
 
@@ -476,7 +507,7 @@ class TestTwoWindows:
         first, second = desk().open(recording), desk().open(recording)
         write_capture_of_nothing(tmp_path / "radar")
         with qtbot.waitSignal(second.document.opened, timeout=10_000):
-            second.document.add([tmp_path / "radar"])
+            second.all_edits.add([tmp_path / "radar"])
         assert not second.hand.begin_drag()
         first.mark(10, 20)
         first.document.save()

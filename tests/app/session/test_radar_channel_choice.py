@@ -75,7 +75,7 @@ def test_another_radar_file_has_no_choice_yet(session, qtbot, tmp_path):
     session.edits.choose_channel("receiver", 2)
     other = recording(tmp_path / "ben.sd2", silent_receivers=2)
     with qtbot.waitSignal(document.opened, timeout=10_000):
-        document.add([other.radar])
+        session.edits.add([other.radar])
     assert document.recording.radar == other.radar
     assert document.recording.radar_receiver is None
 
@@ -105,5 +105,5 @@ def test_a_simulated_radar_that_is_added_stands_where_its_mesh_stood(session, qt
     )
     for paths, offset_s in (([late], 1.5), ([folder], 0.0)):
         with qtbot.waitSignal(document.opened, timeout=10_000):
-            document.add(paths) if paths == [late] else document.open(paths)
+            session.edits.add(paths) if paths == [late] else document.open(paths)
         assert document.recording.radar_offset_s == offset_s

@@ -347,7 +347,7 @@ class TestLabelsOfARadarFile:
             file["LABEL"] = np.isin(np.arange(10), (2, 3)).astype(np.uint16)[:, None]
         window = on(small_recording / "video.mp4")
         with qtbot.waitSignal(models_of(window).document.opened, timeout=20_000):
-            models_of(window).document.add([tmp_path / "swing.h5"])
+            models_of(window).edits.add([tmp_path / "swing.h5"])
         labels, edits = models_of(window).labels, models_of(window).edits
         (before,) = labels.labels.spans
         edits.set_radar_offset(0.5)

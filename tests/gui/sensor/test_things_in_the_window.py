@@ -121,6 +121,8 @@ def test_it_is_dragged_on_its_level_and_with_shift_upwards(window, qtbot):
         QTest.mouseMove(widget, start + moved * part)
     assert scene.pose == pose
     (after,) = things(window)  # while it is held
+    qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert things(window) == (after,)  # the history waits
     assert stack.count() == count
     shown = scene.things.surfaces
     QTest.mouseRelease(widget, LEFT, Qt.KeyboardModifier.NoModifier, start + moved)
