@@ -316,7 +316,8 @@ class LabelsFeature(Feature):
 
     def _use_label(self, label: str) -> None:
         chosen = self.model.selected
-        if not chosen or self._session.playback.playing or self.model.marks:
+        marks = self._session.playback.playing or self.model.marks or self.marking.left_behind
+        if not chosen or marks:
             self.marking.mark(label)
         elif any(span.origin == "suggestion" for span in chosen):
             self._accept(label)

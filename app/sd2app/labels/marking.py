@@ -29,6 +29,16 @@ class LabelMarking:
     def __init__(self, edits: LabelEdits, settings: Settings) -> None:
         self._labels, self._playback, self._edits = edits.labels, edits.playback, edits
         self._settings = settings
+        self._made: frozenset[int] = frozenset()  # the span that ended last, selected since then
+
+    @property
+    def left_behind(self) -> bool:
+        """True while the span that ended last is selected, but is not on screen."""
+        chosen, playback = self._labels.selected, self._playback
+        if self._labels.selected_ids != self._made or len(chosen) != 1:
+            return False
+        first, stop = playback.timebase.frames_between(chosen[0].start_s, chosen[0].end_s)
+        return not first <= playback.frame <= stop
 
     def mark(self, label: str) -> None:
         """Begin a span with this label, or end the one that has begun.
@@ -78,3 +88,4 @@ class LabelMarking:
         self._edits.apply(
             lambda labels, base: make(labels, base, mark.track, mark.start_s, end_s, mark.label)
         )
+        self._made = self._labels.selected_ids

@@ -67,6 +67,16 @@ def test_a_key_marks_from_the_frame_on_screen_to_the_frame_on_screen(labelled, q
     assert not models_of(labelled).document.modified
 
 
+def test_what_was_marked_keeps_its_label_once_it_is_left_behind(labelled, qtbot) -> None:
+    playback = models_of(labelled).playback
+    models_of(labelled).labels.select_all()
+    key(labelled, qtbot, "Backspace")
+    for frame, name in ((5, "1"), (10, "1"), (20, "2"), (30, "2"), (30, "3")):
+        playback.seek_frame(frame)
+        key(labelled, qtbot, name)
+    assert spans(labelled) == [("left-to-right", 5, 10), ("up-to-down", 20, 30)]
+
+
 def test_keys_while_it_plays(labelled, qtbot) -> None:
     c = models_of(labelled)
     c.label_edits.step(1)
