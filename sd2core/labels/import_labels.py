@@ -49,6 +49,12 @@ class Incoming:
                 outside.append(span)
         return cls(replace(labels, spans=tuple(kept)), tuple(cut), tuple(outside))
 
+    def refusal(self, way: Way) -> str:
+        """Why nothing can be taken in; empty where something can, or all labels are to go."""
+        if self.labels.spans or (way == "replace" and not self.outside):
+            return ""
+        return f"no spans{' within the recording' if self.outside else ''}"
+
     def unknown(self, label_set: LabelSet) -> dict[str, int]:
         """Count the spans of each label that a set does not have."""
         counts = Counter(span.label for span in self.labels.spans)
@@ -74,11 +80,11 @@ def take_in(labels: Labels, incoming: Incoming, way: Way, source: str) -> Edit:
     Raises
     ------
     Sd2Error
-        When a file without spans is to be added.
+        When the file has no spans in the recording; one without any may replace all labels.
     """
     brought = incoming.labels
-    if not brought.spans and not incoming.outside and way == "add":
-        raise Sd2Error(f"{source} holds no spans", "at least one, to add them")
+    if refusal := incoming.refusal(way):
+        raise Sd2Error(f"{source} holds {refusal}", "at least one, to take it in")
     name = f"Import {len(brought.spans)} span{'s' * (len(brought.spans) != 1)}"
     label_set = set_after(labels.label_set, incoming, way)
     if way == "replace":

@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.background.latest import Emit, LatestRunner, ReportingModel
 from sd2app.background.quoting import quoted
 from sd2app.labels.model import LabelsModel
+from sd2app.session.content import folder_for_command
 from sd2app.session.session import Session
 from sd2core.cli.labels.agree import Agree
 from sd2core.labels.agreement import Agreement, Disagreement, agreement, disagreements
@@ -60,7 +61,9 @@ class AgreementModel(ReportingModel):
         content, other = self._document.content, self.path
         assert content is not None
         assert other is not None
-        return quoted(words_of("labels agree", Agree(a=content.recording.folder, b=other)))
+        return quoted(
+            words_of("labels agree", Agree(a=folder_for_command(content.recording), b=other))
+        )
 
     @property
     def current(self) -> int | None:

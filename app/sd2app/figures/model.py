@@ -14,7 +14,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.background.latest import Emit, LatestRunner, ProblemModel
 from sd2app.background.quoting import quoted
 from sd2app.maps.difference import DifferenceModel
-from sd2app.session.content import UNTITLED, Content
+from sd2app.session.content import UNTITLED, Content, folder_for_command
 from sd2app.session.session import Session
 from sd2core.cli.labels.recording import DrawnLabels
 from sd2core.cli.strip import Strip
@@ -149,7 +149,7 @@ class MapFigure(DrawnFigure):
         super().__init__("figure", MapChoice(), parent)
         s, levels, clock = session, session.display.levels, session.playback.timebase
         notes = {s.maps.denoised: denoiser, s.maps.before: s.maps.before.status}
-        self._folder = Path() if (it := s.document.recording) is None else it.folder
+        self._recording = s.document.recording
         self._named = {one.title: one.name for one in s.maps.all if one.name}
         # By titles; those without a map are left out.
         self._rows = {
@@ -189,10 +189,11 @@ class MapFigure(DrawnFigure):
     @property
     def line(self) -> str:
         """Command for a terminal that draws these maps of the saved recording."""
+        assert self._recording is not None
         shown = [title for title in self._rows if title not in self.choice.left_out]
         from_s, to_s = (None, None) if self.choice.whole else self._view_s
         drawn = DrawnLabels(
-            recording=self._folder,
+            recording=folder_for_command(self._recording),
             out=Path("maps.png"),
             maps=",".join(self._named[title] for title in shown if title in self._named) or None,
             from_s=from_s,
@@ -252,7 +253,7 @@ class StripModel(DrawnFigure):
         super().__init__("strip", StripChoice(options=StripOptions(rows=rows)), parent)
         named = recording.title if recording.folder == UNTITLED else str(recording.folder)
         self.source = StripSource.of(recording, content.video, content.mesh, named)
-        self._folder = recording.folder
+        self._recording = recording
         self._cursor = self.source.clock.frame_at(cursor_s)
         self._draw()
 
@@ -262,7 +263,7 @@ class StripModel(DrawnFigure):
         choice, options = self.choice, self.options
         spread = choice.way == "spread"
         strip = Strip(
-            paths=(self._folder,),
+            paths=(folder_for_command(self._recording),),
             out=Path("strip.png"),
             frames=None if spread else ",".join(map(str, self.frames())),
             count=choice.count if spread else None,

@@ -14,6 +14,7 @@ from sd2app.background.quoting import quoted
 from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.manual.help import with_help
+from sd2app.session.content import folder_for_command
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
 from sd2app.widgets.dialogs import Dialog, accepted, accepting, ask_folder
@@ -93,9 +94,8 @@ class CutOutModel(ReportingModel):
         assert recording is not None
         assert source is not None
         maps, out = ",".join(source.maps) or None, Path("cuts")
-        cut = CutCommand(
-            recording=recording.folder, out=out, label=labels, parts=",".join(parts), maps=maps
-        )
+        folder, shown = folder_for_command(recording), ",".join(parts)
+        cut = CutCommand(recording=folder, out=out, label=labels, parts=shown, maps=maps)
         return quoted(words_of("labels cut", cut))
 
     def start(self, spans: Sequence[Span], parts: Iterable[Part], folder: Path) -> None:

@@ -13,6 +13,7 @@ from sd2app.background.quoting import quoted
 from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.manual.help import with_help
+from sd2app.session.content import folder_for_command
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import Dialog, ExportButtons, accepted, ask_new, with_suffix
 from sd2app.widgets.inputs import Choice
@@ -95,7 +96,7 @@ class LabelExportDialog(Dialog):
     def line(self) -> str:
         """Command for a terminal that writes the labels of the saved recording."""
         out = Path(f"{self._name}{self.format.suffixes[0]}")
-        file = self._recording.folder
+        file = folder_for_command(self._recording)
         return quoted(words_of("labels convert", Convert(file=file, out=out, to=self.format.name)))
 
     def export(self, path: Path) -> None:

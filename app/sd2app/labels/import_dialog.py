@@ -266,4 +266,5 @@ class LabelImportDialog(Dialog):
         observed = self.observations.index(self._observed) if self._observed else -1
         self._observation.offer(self.observations, observed)
         self._consequence.setText(self.consequence())
-        self._import.setEnabled(self.incoming is not None)
+        incoming = self.incoming
+        self._import.setEnabled(incoming is not None and not incoming.refusal(self.way))

@@ -9,6 +9,7 @@ from PySide6.QtCore import QObject
 from sd2app.background.latest import LatestRunner, ProblemModel
 from sd2app.background.quoting import quoted
 from sd2app.maps.model import SynthesisModel
+from sd2app.session.content import folder_for_command
 from sd2app.session.session import Session
 from sd2core.cli.align import Align
 from sd2core.doppler.alignment import WITHIN_S, Alignment, align
@@ -37,7 +38,7 @@ class AlignmentModel(ProblemModel):
     def line(self) -> str:
         """Command for a terminal that looks for the offset in the saved recording, and keeps it."""
         recording = self._session.document.recording
-        folders = () if recording is None else (recording.folder,)
+        folders = () if recording is None else (folder_for_command(recording),)
         return quoted(words_of("align", Align(recordings=folders, within=self.within_s, save=True)))
 
     @property

@@ -33,6 +33,16 @@ PARTS = ("video", "mesh", "radar")
 UNTITLED = Path()
 """Folder of a recording that was not saved yet."""
 
+
+def folder_for_command(recording: Recording) -> Path:
+    """Folder by which a command finds a recording. Raises Sd2Error where it was never saved."""
+    if recording.folder == UNTITLED:
+        raise Sd2Error(
+            f"{recording.title} was never saved", "a recording, which the command reads", "Save it"
+        )
+    return recording.folder
+
+
 _TOLD: dict[str, tuple[str, str]] = {
     "map": ("is a Doppler map", "Look at it with `sd2 info`"),
     "pairs": ("holds pairs to learn from", "Train with them in the Train panel"),

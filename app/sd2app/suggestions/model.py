@@ -9,6 +9,7 @@ from PySide6.QtCore import QObject
 from sd2app.background.latest import LatestRunner, ProblemModel
 from sd2app.background.quoting import quoted
 from sd2app.labels.edits import LabelEdits
+from sd2app.session.content import folder_for_command
 from sd2app.session.maps import MapModel
 from sd2app.suggestions.finders import SearchResult, SpanFinder
 from sd2app.widgets.text import counted
@@ -91,7 +92,7 @@ class SuggestionsModel(ProblemModel):
         """Command for a terminal that searches the saved recording likewise."""
         recording = self._edits.recording
         assert recording is not None
-        return quoted(self.finder.words(recording.folder, self.threshold))
+        return quoted(self.finder.words(folder_for_command(recording), self.threshold))
 
     # --- asking ---------------------------------------------------------------------------
 

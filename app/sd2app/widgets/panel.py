@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QLayout,
     QMenu,
+    QMessageBox,
     QProgressBar,
     QSizePolicy,
     QSplitter,
@@ -24,6 +25,7 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.widgets.layouts import STRETCH, Part, column_of, grid_of, row_of
+from sd2core.errors import Sd2Error
 
 
 def title(text: str, name: str = "") -> QLabel:
@@ -39,7 +41,7 @@ def copy_button(
     line: Callable[[], str],
     parent: QWidget,
     tip: str = "The same as a command for a terminal",
-    attempt: Callable[[Callable[[], object]], object] = lambda work: work(),
+    attempt: Callable[[Callable[[], object]], object] | None = None,
 ) -> QToolButton:
     """A button *Copy command*, which puts a command line on the clipboard.
 
@@ -50,18 +52,25 @@ def copy_button(
     parent : QWidget
     tip : str
     attempt : callable
-        Calls what may fail, and says why it did.
+        Calls what may fail, and says why it did; by default in a box of its own.
     """
+
+    def in_a_box(work: Callable[[], object]) -> None:
+        try:
+            work()
+        except Sd2Error as error:
+            QMessageBox.warning(parent, "Copy command", str(error))
 
     def copy() -> None:
         QApplication.clipboard().setText(line())
 
-    return outlined("Copy command", tip, lambda: attempt(copy), parent)
+    return outlined("Copy command", tip, lambda: (attempt or in_a_box)(copy), parent)
 
 
 def sentence(text: str, role: str = "muted") -> QLabel:
     """Words that wrap and can be selected."""
     label = QLabel(text)
+    label.setTextFormat(Qt.TextFormat.PlainText)
     label.setObjectName(role)
     label.setWordWrap(True)
     label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -185,6 +194,7 @@ class FactRows(QWidget):
         self._cells: list[tuple[QLabel, QLabel]] = []
         for _ in range(most):
             name, value = sentence(""), QLabel(self)
+            value.setTextFormat(Qt.TextFormat.PlainText)
             name.setWordWrap(at_the_edge)
             if at_the_edge:
                 value.setAlignment(Qt.AlignmentFlag.AlignRight)
