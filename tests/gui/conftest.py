@@ -12,6 +12,8 @@ from fake_classifiers import FakeClassifiers
 from fake_denoisers import FakeDenoisers
 from grey_video import FRAMES, RATE, write_video
 from kept_window import KeptWindow, close_window, new_window
+from PySide6.QtCore import QPoint
+from PySide6.QtGui import QCursor
 
 from sd2core.io.mesh import save_mesh
 from sd2core.io.radar.infineon import write_capture
@@ -80,6 +82,12 @@ def kept():
 def first_of_file(request, kept) -> None:
     """Another file begins."""
     kept.begin_file()
+
+
+@pytest.fixture(autouse=True)
+def pointer_elsewhere(qapp) -> None:
+    """The pointer is where no test left it: what goes where it is already is no move."""
+    QCursor.setPos(QPoint(5_000, 5_000))
 
 
 def shares(request) -> bool:
