@@ -344,7 +344,14 @@ class Recording:
         return tuple(one for one in self.things if not one.is_file or Path(one.shape).exists())
 
     def relink(self, folder: Path, progress: Progress = silent) -> Relinked:
-        """Find all missing files by name under one folder, and save where it was saved before.
+        """Find all missing files by name under one folder, and save where it was saved before."""
+        relinked = self.find_missing(folder, progress)
+        if relinked.paths and (self.folder / FILE_NAME).exists():
+            self.save()
+        return relinked
+
+    def find_missing(self, folder: Path, progress: Progress = silent) -> Relinked:
+        """Find all missing files by name under one folder; nothing is saved.
 
         See :func:`~sd2core.recording.relinking.find_again`.
         """
@@ -355,8 +362,6 @@ class Recording:
             setattr(self, role, relinked.paths[role])
         self.bodies = _with_paths(self.bodies, relinked.paths.get)
         self.things = _with_files(self.things, lambda path: moved.get(path, path))
-        if relinked.paths and (self.folder / FILE_NAME).exists():
-            self.save()
         return relinked
 
     def save(self, timebase: Timebase | None = None) -> None:

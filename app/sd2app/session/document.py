@@ -40,7 +40,6 @@ from sd2core.options.synthesis import HowCounted
 from sd2core.radar_config import CLUTTER, Clutter
 from sd2core.recording.edited import EDITED
 from sd2core.recording.recording import Recording
-from sd2core.recording.relinking import Relinked
 from sd2core.sensor import VelocityAxis
 
 if TYPE_CHECKING:
@@ -349,14 +348,11 @@ class DocumentModel(QObject):
         self.clutter, self.count = CLUTTER, _COUNT  # chosen for the one before
         fields = mesh_fields(self.content.recording)
         self._meshes.reset(ReadMesh(fields, self.content.mesh, self.content.offers))
-        self._forget_steps(unsaved=unsaved)
-        self.opened.emit()
-        self.changed.emit()
-
-    def _forget_steps(self, *, unsaved: bool) -> None:
         self.undo_stack.clear()
         if unsaved:
             self.undo_stack.resetClean()
+        self.opened.emit()
+        self.changed.emit()
 
     def _read_parts(self) -> None:
         """Read all files of the recording that is open, and show them in it."""
@@ -513,18 +509,6 @@ class DocumentModel(QObject):
         )
         self.content = replace(self.content, recording=made)
         self.tell_saved()
-
-    def relink(self, folder: Path) -> Relinked | None:
-        """Look for missing files under one folder, and read again what was found."""
-        if self.recording is None:
-            return None
-        relinked = self.recording.relink(folder)
-        if relinked.paths:
-            if self.content is not None and self.content.saved:
-                self.tell_saved()
-            self._forget_steps(unsaved=self.modified)  # which speak of where files were
-            self._read_parts()
-        return relinked
 
     def read_labels_again(self) -> None:
         """Take over labels that another program has written; Sd2Error if the file is damaged."""

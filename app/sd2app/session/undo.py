@@ -24,6 +24,7 @@ from sd2core.placements.placements import Placements
 from sd2core.radar_config import Clutter
 from sd2core.recording.divergence import WORDS
 from sd2core.recording.recording import Recording
+from sd2core.recording.relinking import ROLES, Relinked
 from sd2core.sensor import Vector, VirtualSensor, aimed_at
 
 Offset = Literal["radar_offset_s", "imu_offset_s"]
@@ -259,6 +260,17 @@ class Edits:
     def _take_added(self, fields: Mapping[str, Any]) -> None:
         added = [WORDS[name] for name in ("video", "mesh", "radar", "imu") if fields.get(name)]
         self._change(f"Add {' and '.join(added)}", fields)
+
+    def relink(self, folder: Path) -> Relinked | None:
+        """Look for missing files below a folder; what was found is read again."""
+        recording = self._document.recording
+        if recording is None:
+            return None
+        found = replace(recording)
+        relinked = found.find_missing(folder)
+        names = (*ROLES, "bodies", "things")
+        self._change("Find missing files", {name: getattr(found, name) for name in names})
+        return relinked
 
     # --- the mesh -------------------------------------------------------------------------
 

@@ -239,7 +239,7 @@ class FilesFeature(Feature):
         folder = ask_folder(self._shell.dialog_parent, "Find missing files below")
         if folder is None:
             return
-        relinked = self._shell.attempt(lambda: self._document.relink(folder))
+        relinked = self._shell.attempt(lambda: self._session.edits.relink(folder))
         if relinked is None:
             return
         for role in relinked.missing:

@@ -308,7 +308,8 @@ class TestTheFolderIsGone:
         assert on_disk(moved) == [THERE, BACK]
         assert not recording_copy.exists()
         assert "video and mesh and radar went with the folder" in window.messages.text
-        models_of(window).document.relink(moved)
+        models_of(window).edits.relink(moved)
+        save(window, qtbot)
         assert open_recording(tmp_path / "again.sd2").missing() == {}
 
     def test_cancelled_the_edits_are_kept_for_recovery(self, on, qtbot, recording_copy) -> None:

@@ -498,8 +498,11 @@ def test_a_recording_with_a_missing_file_shows_the_rest_and_finds_it_again(
     assert document.mesh is None
     assert "mesh.npz" in empty_window.messages.text
     with qtbot.waitSignal(document.opened, timeout=10_000):
-        document.relink(tmp_path / "elsewhere")
+        models_of(empty_window).edits.relink(tmp_path / "elsewhere")
     assert document.mesh is not None
+    assert (document.modified, document.undo_stack.undoText()) == (True, "Find missing files")
+    document.save()
+    assert not open_recording(recording_copy).missing()
 
 
 def test_a_thing_whose_file_is_gone_is_named_left_out_and_found_again(
@@ -528,8 +531,7 @@ def test_a_thing_whose_file_is_gone_is_named_left_out_and_found_again(
     edits.drag_in_scene((0.25, 0.0, 0.0))
     edits.end_scene_drag((0.5, 0.0, 0.0))
     assert document.recording.things[1].position_m == (1.5, 0.3, 1.0)
-    with qtbot.waitSignal(document.opened, timeout=10_000):
-        document.relink(tmp_path / "store")
+    edits.relink(tmp_path / "store")
     assert [one.name for one in document.mesh.surroundings.things] == ["chair.obj", "box"]
     assert not document.recording.missing()
 
