@@ -46,7 +46,6 @@ class BatchEnd:
 
     outcome: Outcome
     failed: int  # tasks that cannot be done
-    interrupted: bool  # by Ctrl-C
     facts: dict[str, Any]  # content of the line "end"
 
 
@@ -152,7 +151,7 @@ class _Run:
             )
             raise
         facts = self._end(outcome, None)
-        return BatchEnd(outcome, facts["failed"], self._control.interrupted, facts)
+        return BatchEnd(outcome, facts["failed"], facts)
 
     def _drive(self, driver: Driver) -> Outcome:
         try:

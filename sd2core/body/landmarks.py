@@ -106,7 +106,7 @@ def find_landmarks(
         raise Sd2Error(
             f"No person could be followed through {video.path}",
             "a person who is seen in some frames in succession",
-            "Say where the person is: --person-box X,Y,WIDTH,HEIGHT --person-frame FRAME",
+            "Mark the person in one frame (--person-box X,Y,WIDTH,HEIGHT --person-frame FRAME)",
         )
     unclear = sightings.unclear_frames(len(video))
     others = who_else(sightings, video.timebase.times_s)

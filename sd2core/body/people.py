@@ -117,7 +117,8 @@ def find_people(
         raise Sd2Error(
             f"Nobody was found in {video.path}",
             "a video of people, each of them seen for a second or more",
-            "Where there is somebody, say where: --person-box X,Y,WIDTH,HEIGHT --person-frame N",
+            "Where there is somebody, mark them in one frame"
+            " (--person-box X,Y,WIDTH,HEIGHT --person-frame FRAME)",
         )
     return _people(kept, video.timebase.times_s)
 

@@ -88,7 +88,8 @@ def find_prominent_person(
         f"No person was found in {video.path} (in the best of {len(looked)} frames the model is"
         f" {100 * best_score:.0f} % sure)",
         "a video of a person, seen at 50 % or more",
-        "Where there is one, say where: --person-box X,Y,WIDTH,HEIGHT --person-frame FRAME",
+        "Where there is one, mark the person in one frame"
+        " (--person-box X,Y,WIDTH,HEIGHT --person-frame FRAME)",
     )
 
 

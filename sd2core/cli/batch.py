@@ -117,7 +117,7 @@ def _run(plan: BatchPlan, options: Batch) -> int:
         print_json({"out": plan.out, **end.facts})
     elif not options.progress_json:
         _print_end(plan, end)
-    if end.interrupted:
+    if end.outcome == "stopped":
         from sd2core.processes import INTERRUPTED
 
         return INTERRUPTED

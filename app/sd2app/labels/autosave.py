@@ -303,4 +303,7 @@ def _held_words(place: RecoveryPlace, title: str) -> str:
     holder = place.holder()
     who = str(holder) if holder and holder.host else "another user"
     since = f" since {clock_text(holder.since_unix_s)}" if holder and holder.since_unix_s else ""
-    return f"The labels of {title} are edited by {who}{since}; here they can only be looked at"
+    return (
+        f"The labels of {title} are edited by {who}{since}; here they can only be looked at, and"
+        " what else is edited is kept once it is saved"
+    )

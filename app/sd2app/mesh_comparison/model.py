@@ -15,6 +15,8 @@ from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
 from sd2core.cli.compare_meshes import CompareMeshes
+from sd2core.errors import Sd2Error
+from sd2core.files.paths import is_there
 from sd2core.files.tables import capitalised
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.options.records import words_of
@@ -188,5 +190,7 @@ def load_other(path: Path, recording: Recording, focal_px: float) -> MeshSequenc
     """
     if is_recording(path):
         return open_recording(path).load_mesh()
+    if not is_there(path):
+        raise Sd2Error(f"There is no file {path}", "another mesh of this recording")
     reading = MeshReading(focal_px=recording.mesh_reading.focal_px or focal_px)
     return Recording(UNTITLED, video=recording.video, mesh=path, mesh_reading=reading).load_mesh()
