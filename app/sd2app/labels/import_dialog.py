@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QLabel, QWidget
 
 from sd2app.background.latest import Emit, LatestRunner
@@ -266,5 +267,7 @@ class LabelImportDialog(Dialog):
         observed = self.observations.index(self._observed) if self._observed else -1
         self._observation.offer(self.observations, observed)
         self._consequence.setText(self.consequence())
-        incoming = self.incoming
+        incoming, layout = self.incoming, self.layout()
+        if layout is not None and layout.hasHeightForWidth():  # facts wrap
+            self.resize(self.size().expandedTo(QSize(0, layout.totalHeightForWidth(self.width()))))
         self._import.setEnabled(incoming is not None and not incoming.refusal(self.way))

@@ -194,11 +194,11 @@ def _paint_names(
             painter.fillRect(bar, QColor(palette.accent))
         room = QRectF(5, row.top_px, room_px, row.height_px)
         whole = metrics.horizontalAdvance(name) <= room_px
-        words = max(map(metrics.horizontalAdvance, name.split()), default=0)
-        if not whole and words <= room_px and row.height_px > 2 * metrics.height():
+        wrapped = metrics.boundingRect(room.toRect(), Qt.TextFlag.TextWordWrap, name)
+        if not whole and room.height() >= wrapped.height() and room_px >= wrapped.width():
             painter.drawText(room, AT_RIGHT | Qt.TextFlag.TextWordWrap, name)
-        else:
-            shown = metrics.elidedText(name, Qt.TextElideMode.ElideRight, room_px)
+        else:  # names of tracks differ at either end
+            shown = metrics.elidedText(name, Qt.TextElideMode.ElideMiddle, room_px)
             painter.drawText(room, AT_RIGHT, shown)
     painter.restore()
 

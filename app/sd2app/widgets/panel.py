@@ -196,8 +196,11 @@ class FactRows(QWidget):
             name, value = sentence(""), QLabel(self)
             value.setTextFormat(Qt.TextFormat.PlainText)
             name.setWordWrap(at_the_edge)
+            value.setWordWrap(not at_the_edge)
             if at_the_edge:
                 value.setAlignment(Qt.AlignmentFlag.AlignRight)
+            else:
+                name.setAlignment(Qt.AlignmentFlag.AlignTop)
             self._cells.append((name, value))
         wide = 0 if at_the_edge else 1
         self.setLayout(grid_of(*self._cells, gaps_px=(12, 2), wide=(wide,)))
