@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from sd2core.batch.exporting import is_exported
 from sd2core.batch.fitting import fitted
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import (
@@ -109,8 +110,11 @@ def estimate(plan: BatchPlan, workers: int, progress: Progress = silent) -> Batc
     steps["inspect"].to_do = steps["inspect"].work = len(new)
     made.looked_at = steps["inspect"].there + len(glanced) + len(made.unusable)
     if plan.export is not None:
-        maps = steps["synthesise"]
-        steps["export"].to_do, steps["export"].work = 1, maps.there + maps.to_do
+        maps, export = steps["synthesise"], steps["export"]
+        if any(one.to_do for one in steps.values()) or not is_exported(folder, plan.export):
+            export.to_do, export.work = 1, maps.there + maps.to_do
+        else:
+            export.there = 1
     for step in graph.steps:
         _add_costs(plan, step, steps)
     return made

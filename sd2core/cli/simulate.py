@@ -257,6 +257,7 @@ def _radar(options: SimulateRadar) -> None:
     from sd2core.cli.reading import mesh_and_sensor
     from sd2core.fmcw import LinkBudget, Mirror, SignalOptions, WaveOptions
     from sd2core.io.radar import check_replaceable, named_radar, write_capture, write_described
+    from sd2core.placements.body_extent import notes_on
 
     check_replaceable(options.out)
     config = named_radar(options.radar)
@@ -299,7 +300,7 @@ def _radar(options: SimulateRadar) -> None:
         meta=capture.meta,
     )
     description = describe_capture(folder, capture)
-    description.notes = mesh.notes + description.notes
+    description.notes = mesh.notes + notes_on(mesh, sensor, config) + description.notes
     description.data["notes"] = list(description.notes)
     show(description, as_json=options.json)
 

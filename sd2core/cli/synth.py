@@ -80,7 +80,9 @@ def _synth(options: Synth) -> None:
     from sd2core.cli.reading import mesh_and_sensor
     from sd2core.doppler import Synthesizer
     from sd2core.doppler.options import chosen_options
+    from sd2core.io.radar import named_radar
     from sd2core.mesh.decimation import decimate
+    from sd2core.placements.body_extent import notes_on
 
     request = options.tolerance is not None or options.budget_ms is not None
     synthesis = chosen_options(options)
@@ -102,7 +104,8 @@ def _synth(options: Synth) -> None:
         doppler = _counted(options, maker, sensor)
     doppler.save(options.out)
     description = describe_map(options.out, doppler)
-    description.notes = mesh.notes + description.notes
+    radar = named_radar(options.radar) if options.method == "fmcw" else None
+    description.notes = mesh.notes + notes_on(mesh, sensor, radar) + description.notes
     description.data["notes"] = list(description.notes)
     show(description, as_json=options.json)
 

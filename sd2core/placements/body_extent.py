@@ -106,3 +106,27 @@ class BodyExtent:
             fastest_mps[number] = np.partition(radial_mps, rank, axis=1)[:, rank].max()
         progress(len(sensors), len(sensors))
         return SensorCoverage(inside, farthest_m, fastest_mps)
+
+
+def notes_on(
+    mesh: MeshSequence, sensor: VirtualSensor, radar: RadarConfig | None = None
+) -> tuple[str, ...]:
+    """Sentences on a sensor in the body, or one that is a radar which the body is too much for."""
+    if not mesh.presence.present.any():
+        return ()
+    seen = BodyExtent.of(mesh).coverage((sensor,))
+    notes = []
+    if seen.inside[0]:
+        notes.append("The sensor stands in the body: what is nearest to it outweighs all else.")
+    if radar is not None and seen.farthest_m[0] > radar.range_max_m:
+        turned = ", and velocities have the wrong sign" if radar.sampling == "real" else ""
+        notes.append(
+            f"The body is up to {seen.farthest_m[0]:.1f} m away: beyond {radar.range_max_m:.1f} m"
+            f" this radar's beat frequencies fold, so that it seems to be nearer{turned}."
+        )
+    if radar is not None and seen.fastest_mps[0] > radar.v_max_mps:
+        notes.append(
+            f"The body is as fast as {seen.fastest_mps[0]:.1f} m/s: beyond"
+            f" {radar.v_max_mps:.1f} m/s this radar's velocities fold."
+        )
+    return tuple(notes)

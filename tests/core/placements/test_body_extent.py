@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.placements.body_extent import BodyExtent
+from sd2core.placements.body_extent import BodyExtent, notes_on
 from sd2core.placements.placements import PlacementGrid
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.sensor import VirtualSensor
@@ -75,3 +75,21 @@ def test_what_folds_in_range_or_velocity_is_beyond_a_radar():
 def test_a_clip_without_anybody_is_refused():
     with pytest.raises(Sd2Error, match="cube has a person in no frame"):
         BodyExtent.of(cube_walking_right(present=np.zeros(10, bool)))
+
+
+@pytest.mark.parametrize(
+    ("position_m", "interval_s", "radar", "words"),
+    [
+        ((4.5, 0.0, 0.0), 10.0, PAPER_RADAR, ()),
+        ((4.2, 0.0, 3.0), 10.0, None, ("stands in the body",)),
+        ((0.0, 0.0, -3.0), 10.0, None, ()),  # nothing folds in a histogram
+        ((0.0, 0.0, -3.0), 10.0, PAPER_RADAR, ("11.5 m away: beyond 9.6 m", "the wrong sign")),
+        ((4.5, 0.0, 0.0), 0.1, PAPER_RADAR, ("beyond 3.2 m/s",)),
+    ],
+)
+def test_what_is_wrong_with_a_sensor_is_said(position_m, interval_s, radar, words):
+    mesh, sensor = cube_walking_right(interval_s=interval_s), VirtualSensor(position_m)
+    notes = " ".join(notes_on(mesh, sensor, radar))
+    assert all(word in notes for word in words)
+    assert bool(notes) == bool(words)
+    assert notes_on(cube_walking_right(present=np.zeros(10, bool)), sensor, radar) == ()
