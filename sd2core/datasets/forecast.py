@@ -10,7 +10,7 @@ from sd2core.datasets.cutting import count_segments
 from sd2core.datasets.index import empty_header
 from sd2core.datasets.layout import bytes_per_segment
 from sd2core.datasets.options import DatasetOptions
-from sd2core.datasets.source import KINDS, LazySource, Outline, Source, SourceKey
+from sd2core.datasets.source import KINDS, LazySource, Outline, Source, SourceKey, each_once
 from sd2core.datasets.splitting import named_splits, split_people
 from sd2core.errors import Sd2Error
 from sd2core.maps import MapKind
@@ -55,7 +55,7 @@ class Counting:
     def of(cls, sources: Iterable[Source | LazySource], progress: Progress = silent) -> Counting:
         """Read the outlines of sources; those without one are refused."""
         counting = cls()
-        sources = list(sources)
+        sources = list(each_once(sources))
         for number, one in enumerate(sources):
             progress(number, len(sources))
             try:

@@ -11,7 +11,7 @@ import numpy as np
 
 from sd2core.classify.data import ClipSet, clips_of_map
 from sd2core.datasets.labelled_source import LabelledSource
-from sd2core.datasets.people import subject_of
+from sd2core.datasets.people import people_shown, subject_of
 from sd2core.datasets.reading import open_dataset
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import RADAR_MAP_SUFFIXES, kind_of
@@ -56,14 +56,16 @@ class LabelledFacts:
 
 
 def unfolded(sources: Sequence[LabelledSource]) -> list[LabelledSource]:
-    """Replace folders by the recordings and radar files in them."""
+    """Replace folders by the recordings and radar files in them, and name whom recordings show."""
     result: list[LabelledSource] = []
     for one in sources:
         if not one.path.exists():
             raise Sd2Error(f"{one.path} does not exist", "labelled data", "Check the path")
         inside = inside_of(one.path)
         result += [LabelledSource(path, one.subject) for path in inside] if inside else [one]
-    return result
+    unnamed = [one.path for one in result if not one.subject and is_recording(one.path)]
+    names = dict(zip(unnamed, people_shown(unnamed), strict=True))
+    return [LabelledSource(one.path, one.subject or names.get(one.path, "")) for one in result]
 
 
 def inside_of(folder: Path) -> list[Path]:
@@ -171,7 +173,8 @@ def labels_given(labels: Labels, path: Path) -> tuple[Span, ...]:
 
 def _of_recording(source: LabelledSource) -> LabelledFacts:
     recording = open_recording(source.path)
-    labels, first = recording.effective_labels(), source.subject or recording.person
+    labels = recording.effective_labels()
+    first = source.subject or people_shown([source.path])[0]
     spans = labels_given(labels, source.path)
     maps: list[str] = []
     if recording.mesh is not None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +18,28 @@ from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.recording.recording import Recording
+from sd2core.recording.recording import Recording, is_recording, open_recording
+
+
+def people_shown(paths: Sequence[Path]) -> list[str]:
+    """Whom each recording or map shows, see :func:`told_apart`."""
+    return told_apart(
+        [open_recording(path).subject if is_recording(path) else "" for path in paths], paths
+    )
+
+
+def told_apart(said: Sequence[str], paths: Sequence[Path]) -> list[str]:
+    """Names that files give people; without one each shows another, called as file or folder is."""
+    names = [name or path.stem for name, path in zip(said, paths, strict=True)]
+    folders = [path.absolute().parent.name for path in paths]
+    stems = [f"{folder} {path.stem}" for folder, path in zip(folders, paths, strict=True)]
+    for others in (folders, stems, [str(path) for path in paths]):
+        count = Counter(name for known, name in zip(said, names, strict=True) if not known)
+        names = [
+            known or (name if count[name] == 1 else other)
+            for known, name, other in zip(said, names, others, strict=True)
+        ]
+    return names
 
 
 def subject_of(recording: Recording, person: str, first: str) -> str:

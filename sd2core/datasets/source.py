@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -277,3 +277,17 @@ def _short(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return None if len(value) > _LONGEST_LIST else [_short(inner) for inner in value]
     return value
+
+
+def each_once(sources: Iterable[Source | LazySource]) -> Iterator[Source | LazySource]:
+    """Yield sources; Sd2Error for two of one key, which nothing would tell apart."""
+    seen: set[SourceKey] = set()
+    for one in sources:
+        if one.key in seen:
+            raise Sd2Error(
+                f"Two sources are {one.key.title}",
+                "subject, recording and placement once",
+                "Say whom each of them shows, as by --subjects anna,ben",
+            )
+        seen.add(one.key)
+        yield one

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.datasets.kept_maps import denoised
+from sd2core.datasets.people import people_shown
 from sd2core.datasets.recording_sources import Making, labels_and_classes, recording_sources
 from sd2core.datasets.source import (
     LazySource,
@@ -40,7 +41,7 @@ from sd2core.pairs.rows import UNKNOWN, check_labels, lost_frames, read_around
 from sd2core.pairs.store import SPLIT, limbs_of, open_takes
 from sd2core.pairs.summary import REMAKE, TakeEntry
 from sd2core.progress import Progress, silent
-from sd2core.recording.recording import SUFFIX, is_recording, open_recording
+from sd2core.recording.recording import SUFFIX, is_recording
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
@@ -62,8 +63,8 @@ def gather(
         Recordings, folders of recordings, pairs, Doppler maps.
     subjects : sequence of str, optional
         Subject of each recording and each map, in their order; by default the one that a
-        recording names, or else each shows another person, named like the file. Pairs name their
-        subjects themselves.
+        recording names, or else each shows another person, named like the file or its folder.
+        Pairs name their subjects themselves.
     label_files : sequence of Path
         One for each map (``.npz``), or none.
 
@@ -76,7 +77,7 @@ def gather(
     check_distinct(files)
     pairs = [path for path in files if not is_recording(path) and kind_of(path) == "pairs"]
     single = [path for path in files if path not in pairs]
-    names = [_person(path) for path in single] if subjects is None else list(subjects)
+    names = people_shown(single) if subjects is None else list(subjects)
     if len(names) != len(single):
         raise Sd2Error(
             f"{len(names)} people are named for {len(single)} recordings and maps",
@@ -103,11 +104,6 @@ def gather(
         if path in maps:
             sources.append(map_source(path, name, labelled.get(path)))
     return sources
-
-
-def _person(path: Path) -> str:
-    """Who a recording says is in it, or else the name of the file."""
-    return (open_recording(path).subject if is_recording(path) else "") or path.stem
 
 
 def recordings_in(folder: Path) -> list[Path]:

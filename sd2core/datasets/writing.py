@@ -17,7 +17,7 @@ from sd2core.datasets.index import Names, check_fits, entry_of, header_of, refus
 from sd2core.datasets.layout import SPLITS, FileFormat, Header, format_of
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import Dataset, open_dataset
-from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey
+from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey, each_once
 from sd2core.datasets.splitting import named_splits, split_people
 from sd2core.datasets.store import LOCK_NAME, SOURCES_NAME, SegmentStore, is_begun, open_arrays
 from sd2core.errors import Sd2Error
@@ -110,6 +110,7 @@ class _Writer:
         self._out, self._work, self._form, self._options = out, work, form, options
         self._names = Names()
         self._fingerprints: dict[SourceKey, str] = {}
+        self._before: dict[str, SourceKey] = {}  # what each of those is of that were there
         self._store: SegmentStore | None = None
         begun = SegmentStore(work) if is_dataset(work) else None
         if begun is not None and begun.complete and not begun.sources:
@@ -129,6 +130,7 @@ class _Writer:
                 refuse_other_settings(out, dataset.header, options)
         if self._store is not None:
             refuse_other_settings(out, self._store.header, options)
+        self._before = {made_of: key for key, made_of in self._fingerprints.items() if made_of}
 
     @property
     def _kept_out(self) -> tuple[Sequence[str] | None, Sequence[str] | None]:
@@ -158,16 +160,11 @@ class _Writer:
         if isinstance(sources, Sequence) and sources:  # a wrong name is known before the work
             names = [*self._names.subjects, *(one.key.subject for one in sources)]
             split_people(list(dict.fromkeys(names)), *self._kept_out)
-        seen: set[SourceKey] = set()
+            list(each_once(sources))
         failed: list[Failed] = []
         first_error: Sd2Error | None = None
         added = 0
-        for number, one in enumerate(sources):
-            if one.key in seen:
-                raise Sd2Error(
-                    f"Two sources are {one.key.title}", "subject, recording and placement once"
-                )
-            seen.add(one.key)
+        for number, one in enumerate(each_once(sources)):
             report = part_of(progress, number, number + 1, total)
             report(0, 1)
             if self._is_there(one):
@@ -186,10 +183,17 @@ class _Writer:
         return added, failed, first_error
 
     def _is_there(self, one: Source | LazySource) -> bool:
-        known = self._fingerprints.get(one.key)
-        if known is None:
+        if one.key not in self._fingerprints and not self._before:
             return False
-        now = one.fingerprint()
+        known, now = self._fingerprints.get(one.key), one.fingerprint()
+        if known is None:
+            if now in self._before:
+                raise Sd2Error(
+                    f"{one.key.title} is in {self._out} already, as {self._before[now].title}",
+                    "the same names as before",
+                    "Name it so, or write a new data set",
+                )
+            return False
         if known and now and known != now:
             raise Sd2Error(
                 f"{self._out} holds {one.key.title} already, made of something else",

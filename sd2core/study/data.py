@@ -156,7 +156,7 @@ def _sources(plan: StudyPlan) -> tuple[list[Path], list[ClipSet], list[Take | No
         elif kind == "recording":
             recording = open_recording(one.path)
             if recording.mesh is not None and not recording.holds_radar_map:
-                with_mesh.append((one.path, one.subject or recording.person))
+                with_mesh.append((one.path, one.subject))
             else:
                 sets.append(_of_recording(recording, one.subject, rate_hz))
         else:

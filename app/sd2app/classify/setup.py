@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -216,7 +216,7 @@ def division_of(data: Sequence[DataSource]) -> Split | None:
     from sd2core.datasets.labelled import people_of
     from sd2core.train.data import split_subjects
 
-    facts = [one for source in data for one in source.facts]
+    facts = _told_apart([one for source in data for one in source.facts])
     people = people_of(facts)
     if not people:
         return None
@@ -227,6 +227,17 @@ def division_of(data: Sequence[DataSource]) -> Split | None:
             validation += one.splits.get("validation", ())
             test += one.splits.get("test", ())
     return split_subjects(people, validation or None, test or None)
+
+
+def _told_apart(facts: Sequence[LabelledFacts]) -> list[LabelledFacts]:
+    """Facts of recordings that name nobody, each of another person, as the command takes them."""
+    from sd2core.datasets.people import told_apart
+
+    single = [one for one in facts if one.kind == "recording" and len(one.subjects) == 1]
+    said = ["" if one.subjects == (one.path.stem,) else one.subjects[0] for one in single]
+    paths = [one.path for one in single]
+    names = {path: (name,) for path, name in zip(paths, told_apart(said, paths), strict=True)}
+    return [replace(one, subjects=names.get(one.path, one.subjects)) for one in facts]
 
 
 def why_not_together(data: Sequence[DataSource], maps: Sequence[str] = ()) -> str:

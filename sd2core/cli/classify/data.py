@@ -171,9 +171,8 @@ def _single(
     else:
         # Beside maps of a mesh the radar's is on their axis, so that they can be mixed.
         axis = None if recording.mesh is None else PRESETS["paper"].axis
-        subject = one.subject or recording.person
         made = maps_of(recording, names, axis=axis)
-        maps_and_labels = [(subject, doppler, labels) for doppler in made.values()]
+        maps_and_labels = [(one.subject, doppler, labels) for doppler in made.values()]
     clip_sets: list[ClipSet] = []
     for subject, doppler, own in maps_and_labels:
         rate_hz = clip_sets[0].frame_rate_hz if clip_sets else frame_rate_hz
@@ -196,7 +195,7 @@ def _of_persons(
         kind for kind in KINDS if kind in wanted or (kind in _RADARS and "radar" in wanted)
     )
     labels, making = recording.effective_labels(), Making(kinds)
-    sources = recording_sources([one.path], [one.subject or recording.person], making)
+    sources = recording_sources([one.path], [one.subject], making)
     for person, lazy in zip(labels.persons, sources, strict=True):
         with progress_bar("Synthesising", unit="") as progress:
             source = lazy.load(progress)

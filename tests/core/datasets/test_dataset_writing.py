@@ -19,6 +19,7 @@ from made_sources import AXIS, CLASSES, LABELS, source
 
 from sd2core.datasets import card, formats, store
 from sd2core.datasets.card import card_paths
+from sd2core.datasets.forecast import Counting
 from sd2core.datasets.layout import SPLITS, row_shapes
 from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.preview import write_preview
@@ -476,6 +477,12 @@ def test_what_cannot_be_is_refused_in_words(
         write_dataset(out, [changed], OPTIONS)
     with pytest.raises(Sd2Error, match=r"Two sources are r1 of anna\. "):
         write_dataset(tmp_path / "twice.zarr", [source(), source()], OPTIONS)
+    assert not (tmp_path / "twice.zarr").exists()
+    with pytest.raises(Sd2Error, match=r"Two sources are r1 of anna\. .*--subjects"):
+        Counting.of([source(), source()])
+    renamed = replace(several()[0], subject="anne")
+    with pytest.raises(Sd2Error, match=r"r1 of anne is in .*set.zarr already, as r1 of anna"):
+        write_dataset(out, [renamed], OPTIONS)
     with pytest.raises(Sd2Error, match="no sources"):
         write_dataset(tmp_path / "empty.zarr", [], OPTIONS)
     with pytest.raises(Sd2Error, match="No source has 24 frames"):

@@ -67,7 +67,7 @@ def test_people_are_called_as_a_training_calls_them(tmp_path: Path) -> None:
 
 def test_a_recording_is_of_who_is_named(tmp_path: Path) -> None:
     for given, name in (
-        (LabelledSource(SAMPLE), open_recording(SAMPLE).title),
+        (LabelledSource(SAMPLE), "swipes"),
         (LabelledSource(SAMPLE, "ben"), "ben"),
     ):
         facts = labelled_facts(given)

@@ -14,6 +14,7 @@ from sd2core.datasets.card import describe_dataset, limits
 from sd2core.datasets.labelled import labelled_facts
 from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.people import told_apart
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.source import Source
@@ -137,6 +138,21 @@ def test_who_has_no_name_is_somebody_else_in_each_recording(tmp_path: Path) -> N
         one.save()
     found = [lazy.key.subject for lazy in gather([one.folder for one in pair], Making())]
     assert found == ["anna", "a person 2", "anna", "b person 2"]
+
+
+@pytest.mark.parametrize(
+    ("said", "files", "names"),
+    [
+        (("", ""), ("anna.sd2", "ben.sd2"), ["anna", "ben"]),
+        (("", ""), ("anna/walk.sd2", "ben/walk.sd2"), ["anna", "ben"]),
+        (("", "", ""), ("anna/walk.sd2", "ben/walk.sd2", "x/run.sd2"), ["anna", "ben", "run"]),
+        (("walk", ""), ("ben/run.sd2", "ben/walk.sd2"), ["walk", "walk"]),
+        (("eva", "eva"), ("a/walk.sd2", "b/walk.sd2"), ["eva", "eva"]),
+        (("", "", ""), ("a/x/w.sd2", "b/x/w.sd2", "w.sd2"), ["/r/a/x/w.sd2", "/r/b/x/w.sd2", "r"]),
+    ],
+)
+def test_who_is_not_named_is_another_person_in_each_file(said, files, names) -> None:
+    assert told_apart(said, [Path("/r") / file for file in files]) == names
 
 
 def test_another_scene_is_no_continuation(tmp_path: Path) -> None:
