@@ -29,6 +29,8 @@ _MOMENT_S = 2.0 * math.sqrt(math.pi) * _SMOOTH_S
 _ONE_SIDED = 0.01
 """Share of the energy on one side of 0 m/s below which a map does not tell the sign."""
 _MIN_OVERLAP_S = 3.0
+_RIVAL_OVERLAP_S = 1.5
+"""So much at an offset is too little to choose it, and enough to doubt another."""
 _MIN_HALF_WIDTH_S = 0.2
 _ALIKE = 0.99
 """Correlation of a mesh and a radar at best; nearer to 1, differences would mean too much."""
@@ -46,7 +48,8 @@ class Alignment:
     offsets_s: Floats  # (N,) tried
     correlation: Floats  # (N,) of the two maps, 0 to 1; time without an overlap counts as 0
     other_s: float | None  # next best, beyond the peak; None if there is nothing else
-    at_the_end: bool  # the best is where the search ends: it may be beyond
+    at_the_end: bool  # the best is where the search, or an overlap of 3 s, ends: it may be beyond
+    searched: bool  # at_the_end: nothing is left to search
 
     @property
     def peak(self) -> float:
@@ -59,10 +62,10 @@ class Alignment:
         if self.peak <= 0:
             return "The mesh and the radar have nothing in common at any offset."
         if self.at_the_end:
-            return (
-                f"The mesh and the radar fit best at {self.offset_s:+.2f} s, where the search ends."
-                " Search farther."
-            )
+            where = f"The mesh and the radar fit best at {self.offset_s:+.2f} s, where"
+            if self.searched:
+                return f"{where} they overlap by {_MIN_OVERLAP_S:g} s. Take longer recordings."
+            return f"{where} the search ends. Search farther."
         if self.confidence >= MIN_CONFIDENCE:
             return ""
         return (
@@ -88,8 +91,9 @@ def align(
     a map with echoes on one side of 0 m/s only has motion alone. Where n independent moments
     overlap and the series correlate with r₁ and r₂ (0 if negative), that both show one motion is
     likelier than that they do not by −n/2 · log((1 − r₁²)(1 − r₂²)). The offset is where this
-    is greatest. Offsets beyond that peak have less by d: in all, or per moment times the moments
-    of the shorter overlap, whichever is less. The least 1 / (1 + exp(−d)) is the confidence.
+    is greatest, of those with an overlap of 3 s. Offsets beyond that peak, with an overlap of
+    1.5 s, have less by d: in all, or per moment times the moments of the shorter overlap,
+    whichever is less. The least 1 / (1 + exp(−d)) is the confidence.
 
     Parameters
     ----------
@@ -129,27 +133,38 @@ def align(
     # A shift of so many steps is an offset of 0.
     unmoved = (their_start_s - start_s) / _STEP_S
     low, high = (unmoved + (around_s + end_s) / _STEP_S for end_s in (-within_s, within_s))
-    least = math.ceil(_MIN_OVERLAP_S / _STEP_S)
+    least, rival = (math.ceil(one / _STEP_S) for one in (_MIN_OVERLAP_S, _RIVAL_OVERLAP_S))
     shifts = np.arange(
-        max(math.ceil(low), least - theirs.shape[1]),
-        min(math.floor(high), ours.shape[1] - least) + 1,
+        max(math.ceil(low), rival - theirs.shape[1]),
+        min(math.floor(high), ours.shape[1] - rival) + 1,
     )
     longest = min(ours.shape[1], theirs.shape[1])
-    if len(shifts) < 3 or longest < least:
+    steps = np.minimum(ours.shape[1], theirs.shape[1] + shifts) - np.maximum(0, shifts)
+    may_be = np.flatnonzero(steps >= least)
+    if len(may_be) < 3:
         raise Sd2Error(
             f"The mesh and the radar do not overlap by {_MIN_OVERLAP_S:g} s at offsets up to"
             f" {within_s:g} s from {around_s:g} s",
             "two recordings of the same time",
-            "Search farther",
+            "Take longer recordings" if longest < least else "Search farther",
         )
     evidence = np.array([_evidence(ours, theirs, int(shift)) for shift in shifts])
-    moments = _moments(np.minimum(ours.shape[1], theirs.shape[1] + shifts) - np.maximum(0, shifts))
-    return _best_of((shifts - unmoved) * _STEP_S, evidence, moments, _moments(longest))
+    offsets_s = (shifts - unmoved) * _STEP_S
+    return _best_of(offsets_s, evidence, _moments(steps), _moments(longest), may_be)
 
 
-def _best_of(offsets_s: Floats, evidence: Floats, moments: Floats, longest: float) -> Alignment:
-    """Alignment from evidence and overlap at each offset; ``longest`` is the longest overlap."""
-    best = int(evidence.argmax())
+def _best_of(
+    offsets_s: Floats,
+    evidence: Floats,
+    moments: Floats,
+    longest: float,
+    may_be: NDArray[np.int64],
+) -> Alignment:
+    """Alignment from evidence and overlap at each offset; ``longest`` is the longest overlap.
+
+    ``may_be`` are those of the offsets that can be chosen.
+    """
+    best = int(may_be[evidence[may_be].argmax()])
     # In all, and over the time that both have: of a motion that repeats itself the longest overlap
     # explains most, and tells nothing.
     rates = evidence / moments
@@ -157,19 +172,20 @@ def _best_of(offsets_s: Floats, evidence: Floats, moments: Floats, longest: floa
     margins = np.minimum(evidence[best] - evidence, shared)
     margins[slice(*_own_width(evidence, best))] = np.inf
     other = int(margins.argmin())
-    at_the_end = best in (0, len(evidence) - 1)
+    at_the_end = best in (may_be[0], may_be[-1])
     offset_s = float(offsets_s[best])
     if not at_the_end:
         before, here, after = evidence[best - 1 : best + 2]
         bend = before - 2.0 * here + after
         offset_s += _STEP_S * 0.5 * (before - after) / bend if bend < 0 else 0.0
     return Alignment(
-        offset_s=round(float(offset_s), 3),
+        offset_s=round(float(offset_s), 3) + 0.0,
         confidence=float(1.0 / (1.0 + np.exp(-margins[other]))),
         offsets_s=offsets_s,
         correlation=np.sqrt(1.0 - np.exp(-2.0 * evidence / longest)),
         other_s=round(float(offsets_s[other]), 3) if np.isfinite(margins[other]) else None,
         at_the_end=at_the_end,
+        searched=best not in (0, len(evidence) - 1),
     )
 
 

@@ -124,6 +124,25 @@ def test_motion_that_repeats_itself_is_refused():
         found.checked()
 
 
+def test_short_maps_are_compared_at_offsets_that_are_too_far_to_be_chosen():
+    times_s = np.arange(0.0, 4.0, 0.05)
+
+    def swing(times_s: np.ndarray) -> np.ndarray:
+        return np.sin(np.pi * times_s)
+
+    # The true offset leaves an overlap of 1.9 s, and one of a period less looks as good.
+    found = align(seen(swing, times_s), seen(swing, times_s + 2.1))
+    assert "fit nearly alike" in found.problem
+    right, taken = [], []
+    for seed in range(20):
+        ours = seen(motion(seed), times_s)
+        own = align(ours, seen(motion(seed), times_s + 0.5, 0.1, seed))
+        right.append(not own.problem and abs(own.offset_s - 0.5) < 0.1)
+        taken.append(not align(ours, seen(motion(seed + 100), times_s)).problem)
+    assert np.mean(right) >= 0.7
+    assert np.mean(taken) <= 0.1
+
+
 def test_maps_of_other_motions_are_mostly_refused():
     times_s = np.arange(0.0, 15.0, 0.05)
     refused = [
@@ -149,7 +168,7 @@ def test_what_cannot_be_compared_is_explained():
     for radar, words in (
         (still, "Nothing moves in the radar's map"),
         (good.shifted(60.0), "do not overlap by 3 s"),
-        (good.between(0, 30), "do not overlap by 3 s"),
+        (good.between(0, 30), r"do not overlap by 3 s.* Take longer recordings"),
         (good.between(0, 1), "Nothing moves in the radar's map"),
     ):
         with pytest.raises(Sd2Error, match=words):
