@@ -121,8 +121,8 @@ def _placed(body: Body, first: MeshSequence) -> MeshSequence:
         raise Sd2Error(
             f"The mesh {path} of a body is not there",
             "the file where the recording or the command says",
-            "Move it back, find it with `sd2 relink RECORDING FOLDER`, or say anew who is there:"
-            " `sd2 set RECORDING --body`",
+            "Move it back, find it again (File → Find missing files…, or `sd2 relink`), or say anew"
+            " who is there: `sd2 set RECORDING --body`",
         ) from error
     if own.faces is None:
         raise _no_surface(str(path), "`sd2 set RECORDING --body FILE,FACES`")

@@ -73,8 +73,8 @@ def _read(path: Path) -> Surface:
         raise Sd2Error(
             f"The mesh {path} of a thing is not there",
             "the file where the recording or the command says",
-            "Move it back, find it again with `sd2 relink RECORDING FOLDER`, or say anew what"
-            " stands there with `sd2 set RECORDING --thing`",
+            "Move it back, find it again (File → Find missing files…, or `sd2 relink`), or say anew"
+            " what stands there with `sd2 set RECORDING --thing`",
         )
     return _read_once(path, path.stat().st_mtime_ns)
 

@@ -618,7 +618,7 @@ class Recording:
             raise Sd2Error(
                 f"The {role} of {self.folder} is not at {path}",
                 "the file where the recording says",
-                "Move it back, or find it again with `sd2 relink RECORDING FOLDER`",
+                "Move it back, or find it again (File → Find missing files…, or `sd2 relink`)",
             )
         return path
 

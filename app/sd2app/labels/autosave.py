@@ -83,6 +83,11 @@ class LabelAutosave(QObject):
             self.waiting = Recoveries()
             self._others = edited_fields(recording)
             self._begin(reread=True)
+        elif recording is not None and self._is_elsewhere:  # files were added to others
+            self.close()
+            self._begin(reread=False)
+            self._others, labels = edited_fields(recording), self._document.labels
+            self.keep("Add files", Labels(), labels, self._others)
         self._recording = recording
         self._labels.open(self._document.labels)
 
@@ -108,6 +113,10 @@ class LabelAutosave(QObject):
     def _labelled_path(self) -> Path:
         """Path that names a recording's recoveries: its folder, or the file it was made from."""
         return next(iter(self._document.paths), UNTITLED)
+
+    @property
+    def _is_elsewhere(self) -> bool:
+        return self._place is None or self._place.recording != self._labelled_path.resolve()
 
     def _begin(self, *, reread: bool) -> None:
         content, path = self._document.content, self._labelled_path
@@ -141,7 +150,7 @@ class LabelAutosave(QObject):
         if recording is None:
             return
         self._recording, self._others = recording, edited_fields(recording)
-        if self._place is None or self._place.recording != self._labelled_path.resolve():
+        if self._is_elsewhere:
             self.close()
             self._begin(reread=False)
         elif self._journal is not None:

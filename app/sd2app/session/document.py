@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoStack
 
-from sd2app.background.latest import Emit
+from sd2app.background.latest import Emit, LatestRunner
 from sd2app.session.content import (
     PARTS,
     UNTITLED,
@@ -83,11 +83,13 @@ class DocumentModel(QObject):
         self.offers: tuple[OfferedCure, ...] = ()  # of reading the mesh another way
         self._asked: _Asked | None = None  # last
         self._take: Callable[[Content], object] = self._open  # what is done with what is read
-        self._ready: Content | None = None  # read already, before its fields are assigned
+        self._added: Content | None = None  # read already, before its fields are assigned
         self._runner = ListedRunner("open", jobs, self, lambda content: self._take(content))
         self._runner.failed.connect(self._offer_instead)
+        # Not listed: cancelled, it would leave on screen what is no longer in the recording.
+        self._reader = LatestRunner("files", self, self._show_parts)
         self._maps = ListedRunner("radar", jobs, self, self._receive_map)
-        for runner in (self._runner, self._maps):
+        for runner in (self._runner, self._reader, self._maps):
             runner.failed.connect(lambda error: self.failed.emit(words_of(error)))
         self._meshes = MeshReader(jobs, self)
         self._meshes.ready.connect(self._exchange_mesh)
@@ -206,6 +208,9 @@ class DocumentModel(QObject):
         ``mesh`` is as for :meth:`open`; ``then`` is called with the fields to assign.
         """
         assert self.recording is not None
+        pending = self._asked
+        if pending is not None and pending.base is not None and self._runner.busy:  # with these
+            paths, mesh = (*pending.paths, *paths), {**pending.mesh, **(mesh or {})}
         self._start(_Asked(tuple(paths), mesh or {}, replace(self.recording), then))
 
     @property
@@ -253,8 +258,8 @@ class DocumentModel(QObject):
 
         Where it is the one that is open, its edits and their history stay.
         """
-        self._runner.cancel()
-        self._maps.cancel()
+        for runner in (self._runner, self._reader, self._maps):
+            runner.cancel()
         before, self.content = self.content, content
         self.growing = True
         if before is not None and before.recording.folder == content.recording.folder:
@@ -293,9 +298,8 @@ class DocumentModel(QObject):
 
     def close(self) -> None:
         """Stop all work and let go of the files."""
-        self._runner.close()
-        self._maps.close()
-        self._meshes.close()
+        for runner in (self._runner, self._reader, self._maps, self._meshes):
+            runner.close()
         if self.content is not None:
             self.content.close()
             self.content = None
@@ -318,17 +322,18 @@ class DocumentModel(QObject):
             if base is None:
                 self._open(content, unsaved=cure is not None and content.saved)
                 return
-            self._ready = content
+            self._added = content
             read = {name: getattr(content.recording, name) for name in EDITED}
             asked.then({one: read[one] for one in EDITED if read[one] != getattr(base, one)})
-            if self._ready is not None:  # the same files, which may hold something else by now
-                self._show_parts()
+            if self._added is not None:  # the same files, which may hold something else by now
+                self._show_parts(content)
 
         self._take = take
         self._runner.submit(read, f"Opening {asked.paths[0].name}")
 
     def _open(self, content: Content, *, unsaved: bool = False) -> None:
         before, self.content = self.content, content
+        self._reader.cancel()
         if before is not None:
             before.close()
         self.same_recording = self.growing = False
@@ -358,23 +363,17 @@ class DocumentModel(QObject):
         """Read all files of the recording that is open, and show them in it."""
         assert self.recording is not None
         asked = replace(self.recording)
+        self._reader.submit(lambda emit: load_content(asked, lambda *_: emit(None)))
 
-        def take(content: Content) -> None:
-            self._ready = content
-            self._show_parts()
-
-        self._take = take
-        self._runner.submit(
-            lambda emit: load_content(asked, lambda done, total: emit((done, total))),
-            f"Reading {asked.title}",
-        )
-
-    def _show_parts(self) -> None:
+    def _show_parts(self, content: Content) -> None:
         """Show what was read in what is open; the recording, its history and edits stay."""
-        before, content, self._ready = self.content, self._ready, None
+        before, self._added = self.content, None
         assert before is not None
-        assert content is not None
         recording, read_by = before.recording, mesh_fields(content.recording)
+        if _files(recording) != _files(content.recording):  # undone meanwhile
+            content.close()
+            self._read_parts()
+            return
         self.content = replace(content, recording=recording)
         self._meshes.keep(ReadMesh(read_by, content.mesh, content.offers))
         if read_by != mesh_fields(recording):  # edited meanwhile
@@ -394,13 +393,12 @@ class DocumentModel(QObject):
         recording = self.recording
         if recording is None or all(getattr(recording, name) == fields[name] for name in fields):
             return
-        channel, mesh = _channel(recording), mesh_fields(recording)
-        files = recording.video, recording.radar
+        channel, mesh, files = _channel(recording), mesh_fields(recording), _files(recording)
         for name, value in fields.items():
             setattr(recording, name, value)
-        if self._ready is not None:
-            self._show_parts()
-        elif (recording.video, recording.radar) != files:
+        if self._added is not None:
+            self._show_parts(self._added)
+        elif _files(recording) != files:
             self._read_parts()
         elif mesh_fields(recording) != mesh:
             self._meshes.follow(recording)
@@ -520,6 +518,10 @@ class DocumentModel(QObject):
         self.undo_stack.setClean()
         self.saved.emit()
         self.changed.emit()
+
+
+def _files(recording: Recording) -> tuple[Path | None, Path | None]:
+    return recording.video, recording.radar
 
 
 def _channel(recording: Recording) -> tuple[int | None, int | None]:

@@ -254,12 +254,14 @@ class Edits:
         """
         if self._document.recording is None:
             self._document.open(paths, mesh)
+        elif self._document.growing:
+            self._document.failed.emit("A radar is listened to. Stop it, then add files.")
         else:
             self._document.read_added(paths, mesh, self._take_added)
 
     def _take_added(self, fields: Mapping[str, Any]) -> None:
         added = [WORDS[name] for name in ("video", "mesh", "radar", "imu") if fields.get(name)]
-        self._change(f"Add {' and '.join(added)}", fields)
+        self._change(f"Add {' and '.join(added)}" if added else "Read files again", fields)
 
     def relink(self, folder: Path) -> Relinked | None:
         """Look for missing files below a folder; what was found is read again."""

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from labelled import even, imported, random_edit
 from left_behind import end_process
+from numbered_videos import write_video
 from PySide6.QtCore import QTimer
 
 from sd2app.labels.autosave import LabelAutosave
@@ -278,8 +279,9 @@ class TestOpeningAndClosing:
         for step in (stack.undo, stack.undo):
             step()
         assert (at.spans, document.modified) == ([], False)
-        for step in (stack.redo, stack.redo):
-            step()
+        with qtbot.waitSignal(document.opened, timeout=10_000):
+            for step in (stack.redo, stack.redo):
+                step()
         at.crash()
         again = desk().open(recording)
         assert again.document.capture is None
@@ -289,6 +291,40 @@ class TestOpeningAndClosing:
         assert again.spans == [("left-to-right", 10, 20)]
         again.document.save()
         assert open_recording(recording).radar == tmp_path / "radar"
+
+    def test_what_was_never_saved_is_offered_with_the_files_that_were_added(
+        self, qtbot, desk, root, mesh, tmp_path
+    ) -> None:
+        video = write_video(tmp_path / "walk.mp4", 90)
+        at = desk().open(mesh)
+        at.mark(10, 20)
+        with qtbot.waitSignal(at.document.opened, timeout=10_000):
+            at.all_edits.add([video])
+        at.crash()
+        again = desk()
+        with qtbot.waitSignal(again.document.opened, timeout=10_000):
+            again.document.open([video, mesh])
+        again.edits.restore()
+        assert again.spans == [("left-to-right", 10, 20)]
+
+    def test_files_that_are_added_while_others_are_read_come_with_them(
+        self, qtbot, desk, root, mesh, tmp_path
+    ) -> None:
+        write_capture_of_nothing(tmp_path / "radar")
+        shutil.copy(mesh, tmp_path / "other.npz")
+        at = desk().open(mesh)
+        at.all_edits.add([tmp_path / "radar"])
+        with qtbot.waitSignal(at.document.opened, timeout=10_000):
+            at.all_edits.add([tmp_path / "other.npz"])
+        recording = at.document.recording
+        assert (recording.radar, recording.mesh) == (tmp_path / "radar", tmp_path / "other.npz")
+        assert at.document.undo_stack.undoText() == "Add mesh and radar file"
+        # A file that is read again while a step is undone is not left out.
+        at.all_edits.add([mesh])
+        at.document.undo_stack.undo()
+        qtbot.waitUntil(lambda: at.document.recording.mesh == mesh and not at.document.reading)
+        assert at.document.recording.radar is None
+        qtbot.waitUntil(lambda: at.document.capture is None, timeout=10_000)
 
     def test_a_recording_is_not_added_to_another(self, qtbot, desk, mesh, recording) -> None:
         at = desk().open(mesh)
