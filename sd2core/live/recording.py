@@ -207,9 +207,9 @@ class GrowingRecording:
         elif not self.radar.exists() or is_growing(self.radar):
             return
         raise Sd2Error(
-            f"{self.folder} exists, and was not written by `sd2 listen`",
-            "a new folder, or a recording of `sd2 listen` to continue",
-            "Give another folder as --out",
+            f"{self.folder} exists, and no radar was recorded into it that could be continued",
+            "a new folder, or a recording of a radar by this program",
+            "Choose another folder (--out)",
         )
 
     def _continue(self) -> None:

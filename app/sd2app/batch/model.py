@@ -113,6 +113,19 @@ class BatchModel(Runs[BatchMonitor]):
         BatchFolder(path).about()
         self.select(path)
 
+    @property
+    def replaces(self) -> bool:
+        """True if the folder of the results holds those of other recordings, which would go."""
+        from sd2core.batch.plan_file import read_plan
+
+        plan = self.setup.plan()
+        folder = BatchFolder(Path(plan.out))
+        try:
+            before = read_plan(folder.plan).recordings.files if folder.exists else ()
+        except (Sd2Error, OSError):
+            return False
+        return not {*before} <= {*plan.recordings.files}
+
     def start(self) -> None:
         """Begin as set up; Sd2Error if it cannot start, OSError if its plan cannot be written."""
         from sd2core.batch.plan_file import write_plan

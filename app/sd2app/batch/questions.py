@@ -19,7 +19,7 @@ from sd2app.feature import Shell
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.saving import saved_first
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import ask_file, ask_folder, ask_new
+from sd2app.widgets.dialogs import Answer, ask_file, ask_folder, ask_new, confirmed
 from sd2app.widgets.text import counted
 from sd2core.denoise.card import ModelCard
 from sd2core.errors import Sd2Error
@@ -187,7 +187,14 @@ class BatchQuestions(QObject):
             and not saved_first(document, self.shell, "A batch works on what is saved.")
         ):
             return
-        self._attempt(self._batch.start)
+        words = (
+            f"{self._batch.setup.out} holds a batch of other recordings. Its data set and its list"
+            " of results are replaced."
+        )
+        if not self._attempt(lambda: self._batch.replaces) or confirmed(
+            self._over, "Replace a batch?", words, Answer.Yes, Answer.Cancel
+        ):
+            self._attempt(self._batch.start)
 
     # --- a batch that is there ------------------------------------------------------------
 

@@ -112,7 +112,7 @@ class CommandForms(Runs[AnyCommandRun]):
     def missing(self) -> Option | None:
         """The first option that has to be typed and is not yet."""
         needed = (one for one in self.options if one.default is MISSING and not one.section)
-        return next((one for one in needed if not self.text(one)), None)
+        return next((one for one in needed if not self.text(one).strip()), None)
 
     @property
     def wrong(self) -> str:

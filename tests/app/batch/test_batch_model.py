@@ -283,6 +283,11 @@ def test_a_batch_runs_to_its_end_and_its_results_are_listed(qtbot, made, meshes)
     ]  # fmt: skip
     assert len(said) == 1
     assert "1 task could not be done" in said[0]
+    # The same, or more, in the same folder replaces nothing; another recording alone does.
+    model.setup.set_out(run.folder.path)
+    assert not model.replaces
+    model.setup.remove(meshes[0])
+    assert model.replaces
 
 
 @pytest.mark.slow

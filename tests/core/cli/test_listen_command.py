@@ -138,7 +138,7 @@ def test_what_does_not_go_together_is_refused(sd2: Sd2, tmp_path: Path) -> None:
         (("--dca1000", "127.0.0.1:x", "--setup", setup, *out), "The port is 'x'"),
         (("--dca1000", "--setup", tmp_path / "none.cfg", *out), "does not exist"),
         (("--replay", tmp_path / "none", *out), "does not exist"),
-        (("--replay", SWIPES, "--out", SWIPES.parent), "was not written by `sd2 listen`"),
+        (("--replay", SWIPES, "--out", SWIPES.parent), "no radar was recorded into it"),
     ):
         outcome = sd2("listen", *arguments)
         assert outcome.code == 1

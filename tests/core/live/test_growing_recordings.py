@@ -188,10 +188,10 @@ def test_what_does_not_belong_is_refused(tmp_path: Path) -> None:
     recording.close()
     GrowingRecording(folder).close()
     Recording.create(tmp_path / "own.sd2", radar=folder / "radar")
-    with pytest.raises(Sd2Error, match="was not written by `sd2 listen`"):
+    with pytest.raises(Sd2Error, match="no radar was recorded into it"):
         GrowingRecording(tmp_path / "own.sd2")
     (tmp_path / "some.sd2" / "radar").mkdir(parents=True)
-    with pytest.raises(Sd2Error, match="was not written by `sd2 listen`"):
+    with pytest.raises(Sd2Error, match="no radar was recorded into it"):
         GrowingRecording(tmp_path / "some.sd2")
     with pytest.raises(Sd2Error, match="does not exist"):
         GrowingRecording(tmp_path / "none" / "walk.sd2")

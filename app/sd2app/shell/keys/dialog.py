@@ -202,7 +202,7 @@ class KeyCapture(QLineEdit):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Take it."""
         key = Qt.Key(event.key())
-        if key in _MODIFIERS or key == Qt.Key.Key_unknown:
+        if key in _MODIFIERS or key == Qt.Key.Key_unknown or key.name.startswith("Key_Dead_"):
             return
         if key == Qt.Key.Key_Escape and not event.modifiers():
             self.given_up.emit()
