@@ -82,3 +82,10 @@ def wanted(value: object, kind: type[Value], example: str) -> Value:
     shown = " ".join(repr(value).split())
     shown = shown if len(shown) <= _LONGEST else f"{shown[:_LONGEST]}…"
     raise Sd2Error(f"{shown} is given, a {type(value).__name__}", f"a {kind.__name__}", example)
+
+
+def of_the_system(error: OSError) -> Sd2Error:
+    """The same error in words, with its file."""
+    if not error.strerror:
+        return Sd2Error(str(error))
+    return Sd2Error(f"{error.filename}: {error.strerror}" if error.filename else error.strerror)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from sd2core.cli.command_parser import UsageError, record_of
 from sd2core.cli.output import discard_output
 from sd2core.cli.output_folders import output_folders
-from sd2core.errors import Sd2Error
+from sd2core.errors import Sd2Error, of_the_system
 
 _STARTS_WITH_NEGATIVE_NUMBER = re.compile(r"-\.?\d")
 
@@ -58,7 +58,7 @@ def explanation(error: Exception) -> Sd2Error:
     if isinstance(error, Sd2Error):
         return error
     if isinstance(error, OSError) and error.strerror:
-        return Sd2Error(f"{error.filename}: {error.strerror}" if error.filename else error.strerror)
+        return of_the_system(error)
     if isinstance(error, MemoryError):
         return Sd2Error(f"There is not enough memory for this ({error})")
     if isinstance(error, ModuleNotFoundError) and error.name == "torch":

@@ -9,6 +9,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
+from sd2core.errors import of_the_system
 from sd2core.progress import Cancelled
 
 Emit = Callable[[Any], None]
@@ -106,6 +107,8 @@ class LatestRunner(QObject):
                 self._post(revision, "finished", task(partial(self._emit, revision)))
             except Cancelled:
                 continue
+            except OSError as error:
+                self._post(revision, "failed", of_the_system(error))
             except Exception as error:
                 self._post(revision, "failed", error)
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPainter
-from PySide6.QtWidgets import QLabel, QLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import QLabel, QLayout, QLineEdit, QMessageBox, QWidget
 
 from sd2app.figures.model import DrawnFigure
 from sd2app.manual.help import with_help
@@ -66,6 +66,7 @@ class FigureDialog(Dialog):
         self.setLayout(column_of(*parts, spacing_px=16, margins_px=16))
         model.changed.connect(self._refresh)
         model.written.connect(lambda _: self.accept())
+        model.failed.connect(lambda text: QMessageBox.warning(self, self.TITLE, text))
         self._refresh()
         take_room(self, *self.USUAL_PX)
 

@@ -50,6 +50,7 @@ class DrawnFigure(ProblemModel):
 
     drawn = Signal()  # another preview
     written = Signal(object)  # Path
+    failed = Signal(str)  # to write it; the picture stays
 
     def __init__(self, name: str, choice: Any, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -72,7 +73,7 @@ class DrawnFigure(ProblemModel):
             check_figure(path)
             plot, save = self._recipe()
         except Sd2Error as error:
-            self._refuse(error)
+            self.failed.emit(str(error))
             return
 
         def write(emit: Emit) -> Path:
@@ -118,8 +119,12 @@ class DrawnFigure(ProblemModel):
 
     def _refuse(self, error: Exception) -> None:
         self._runner.cancel()
-        self.exporting = False
-        super()._refuse(error)
+        if self.exporting:
+            self.exporting = False
+            self.changed.emit()
+            self.failed.emit(str(error))
+        else:
+            super()._refuse(error)
 
 
 @dataclass(frozen=True)

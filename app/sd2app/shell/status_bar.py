@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtWidgets import QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QToolButton, QWidget
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.background.latest import delayed
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.session import Session
 from sd2app.widgets.layouts import STRETCH, row_of
-from sd2app.widgets.panel import ProgressBar, outlined
+from sd2app.widgets.panel import ElidedLabel, ProgressBar, outlined
 
 _QUIET_MS = 300
 
@@ -31,8 +31,7 @@ class StatusLine(QWidget):
         self._jobs = session.jobs
         self._accuracy, self._synthesis = accuracy, synthesis
         self._plan = outlined("", "", show_accuracy, self, look="")
-        self._title = QLabel(self)
-        self._title.setObjectName("muted")
+        self._title = ElidedLabel(self, "muted")
         self._bar = ProgressBar("", width_px=140)
         self._cancel = QToolButton(self)
         self._cancel.setText("Cancel")
