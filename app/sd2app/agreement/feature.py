@@ -74,5 +74,8 @@ class AgreementFeature(Feature):
         }
 
     def attach(self) -> None:
-        """Forget the comparison of the recording before."""
-        self.model.clear()
+        """Compare anew, or forget the comparison of the recording before."""
+        if self._session.document.same_recording and self.model.path is not None:
+            self.model.open(self.model.path)
+        else:
+            self.model.clear()

@@ -137,7 +137,8 @@ class Session:
             real.title = ", ".join(filter(None, (real.title, recording.channel_in_words)))
         # A map of another channel, or with its clutter removed in another manner, is compared at
         # the same 0 dB.
-        if radar_map is not None and (new or real.map is None):
+        chosen = self.document.same_recording and real.by_hand
+        if radar_map is not None and (new or real.map is None) and not chosen:
             real.set_reference(reference_of(radar_map.values, radar_map.null_bins))
         real.set_map(radar_map)
 

@@ -130,7 +130,8 @@ class SuggestionsFeature(Feature):
         others: Sequence[SpanFinder],
         parent: QObject,
     ) -> None:
-        self._shell, self._edits, maps = shell, edits, session.maps
+        self._shell, self._edits, self._document = shell, edits, session.document
+        maps = session.maps
         searched = maps.synthetic, maps.denoised, maps.real
         finders = (MotionFinder(searched), *others)
         self.model = SuggestionsModel(edits, finders, parent)
@@ -191,4 +192,4 @@ class SuggestionsFeature(Feature):
 
     def attach(self) -> None:
         """Begin without suggestions."""
-        self.model.open()
+        self.model.open(same=self._document.same_recording)

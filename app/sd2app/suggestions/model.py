@@ -128,9 +128,10 @@ class SuggestionsModel(ProblemModel):
             self.finder.set_source(source)
             self._look()
 
-    def open(self) -> None:
-        """Forget everything about the recording before."""
-        self._declined, self._made, self._if_none, self.problem = (), None, "", ""
+    def open(self, *, same: bool = False) -> None:
+        """Forget everything about the recording before, or about the same one's other files."""
+        self._declined = self._declined if same else ()
+        self._made, self._if_none, self.problem = None, "", ""
         for finder in self.finders:
             finder.set_source(None)
         self._runner.cancel()

@@ -269,8 +269,10 @@ class TestOpeningAndClosing:
         at.mark(10, 20)
         write_capture_of_nothing(tmp_path / "radar")
         document, stack = at.document, at.document.undo_stack
+        at.labels.select_all()
         with qtbot.waitSignal(document.opened, timeout=10_000):
             at.all_edits.add([tmp_path / "radar"])
+        assert len(at.labels.selected) == 1
         assert (stack.undoText(), document.modified) == ("Add radar file", True)
         for step, radar in ((stack.undo, None), (stack.redo, tmp_path / "radar")):
             with qtbot.waitSignal(document.opened, timeout=10_000):

@@ -141,6 +141,9 @@ def test_what_was_rejected_does_not_come_again(set_up) -> None:
     assert starts(model.pending) == [10, 15]
     set_up.look(7.0)
     assert starts(model.pending) == [10, 15]
+    model.open(same=True)  # with other files
+    set_up.look()
+    assert starts(model.pending) == [10, 15]
     model.open()
     set_up.look()
     assert starts(model.pending) == [5, 10, 15]
