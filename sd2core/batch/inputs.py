@@ -56,6 +56,7 @@ class MeshInput:
     faces: str | None = None
     reading: Mapping[str, Any] | None = None  # arguments for load_mesh
     others_m: tuple[Vector, ...] = ()  # as target_m, of the other bodies of a scene
+    damaged: int = 0  # frames that are lost
 
 
 @dataclass(frozen=True)
@@ -319,6 +320,7 @@ def mesh_input_of(
     reading : mapping, optional
         Further arguments for :func:`~sd2core.io.mesh.load_mesh`.
     """
+    from sd2core.io.stored_vertices import damaged_frames
     from sd2core.placements.body_extent import BodyExtent
 
     mesh = open_mesh(path, faces, reading or {})
@@ -327,8 +329,8 @@ def mesh_input_of(
     bodies = (body if body.presence.present.any() else mesh for body in mesh.others)
     others_m = tuple(BodyExtent.of(body).target_m for body in bodies)
     rate = mesh.timebase.frames_per_s
-    shape = mesh.frame_count, mesh.vertex_count
-    return MeshInput(str(path), identity, *shape, rate, (x, y, z), faces, reading, others_m)
+    shape, lost = (mesh.frame_count, mesh.vertex_count), damaged_frames(mesh.vertices)
+    return MeshInput(str(path), identity, *shape, rate, (x, y, z), faces, reading, others_m, lost)
 
 
 def _record_path(folder: BatchFolder, origin: Origin) -> Path:

@@ -25,6 +25,7 @@ from sd2core.batch.tasks import BEGUN
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write, atomic_write_text
 from sd2core.files.paths import remove
+from sd2core.files.tables import counted
 from sd2core.runs.control import Control, signals_kept, write_control
 from sd2core.runs.pace import keep_pace
 from sd2core.runs.progress import Event, ProgressWriter
@@ -235,11 +236,12 @@ class _Run:
 
     def _write_results(self) -> None:
         """Write a line for every map, by recording, in the order of the plan."""
-        root = self._folder.path
+        root, damaged = self._folder.path, dict[str, int]()
         with atomic_write(self._folder.results) as stream:
             for number, (origin, about, mesh, planned) in enumerate(self._graph.all_maps()):
                 if number % 256 == 0:
                     self._tick()
+                damaged[origin.name] = mesh.damaged
                 for share, index in product(planned.shares, range(len(planned.stretches))):
                     who, (start, stop) = share.who, planned.stretches[index]
                     of_all = planned.synthesis[index].out
@@ -264,6 +266,9 @@ class _Run:
                     }
                     if Path(of_all).exists():
                         stream.write((json.dumps(row, ensure_ascii=False) + "\n").encode())
+        for name, frames in damaged.items():
+            if frames:
+                self._note(f"{name}: {counted(frames, 'frame')} of its mesh are lost: damaged")
 
     def _end(self, outcome: str, error: Sd2Error | None) -> dict[str, Any]:
         if error is not None:

@@ -51,7 +51,8 @@ class SynthesisOptions(OptionRecord):
         velocity; of a mesh that says nothing both are the same map. Vid2Doppler's velocities
         always count plainly.
     axis : VelocityAxis
-        Up to 254 bins.
+        Up to 254 bins. On another than the preset's ``null_bins`` are other velocities: see
+        :func:`same_velocities`, which :func:`chosen_options` calls.
     null_bins : tuple of int
         Bins set to zero: the static surroundings that a radar's clutter removal
         takes away.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from contextlib import nullcontext
 from itertools import pairwise
@@ -267,6 +268,20 @@ def test_maps_of_one_recording_are_made_by_few_processes(run: Runs) -> None:
         names = [task.origin.name for task in tasks if task.step == "synthesise"]
         changes += sum(a != b for a, b in pairwise(names))
     assert changes <= 12
+
+
+def test_frames_of_a_damaged_mesh_are_said_to_be_lost(run: Runs) -> None:
+    (run.folder / "meshes").mkdir()
+    mesh = run.folder / "meshes" / "long.zarr"
+    save_mesh(swinging_sphere(4_000, 0.4), mesh)
+    chunks = sorted(one for one in (mesh / "vertices" / "c").rglob("*") if one.is_file())
+    assert len(chunks) > 1
+    chunks[0].unlink()
+    events: list[dict[str, Any]] = []
+    end = run(MAPS.replace(".npz", ".zarr"), watch=events.append)
+    assert end.outcome == "finished"
+    (note,) = (one["text"] for one in events if one["event"] == "note")
+    assert re.fullmatch(r"long\.zarr: [\d,]+ frames of its mesh are lost: damaged", note)
 
 
 def test_stopped_it_goes_on(run: Runs) -> None:
