@@ -16,7 +16,7 @@ from sd2core.timebase import Timebase
 def label_edits(timebase: Timebase) -> LabelEdits:
     """Edits on a model and a clock of their own, which nobody refuses and nothing keeps."""
     document: Any = SimpleNamespace(
-        recording=SimpleNamespace(labels=None),
+        recording=SimpleNamespace(labels=None, unlabel=lambda: None),
         mesh=None,
         undo_stack=QUndoStack(),
         renamed=SimpleNamespace(connect=lambda _: None),

@@ -322,6 +322,11 @@ class Recording:
         """True if it was not labelled here; a radar file's own labels may then stand for it."""
         return self.labels is None and not self.spans
 
+    def unlabel(self) -> None:
+        """Take it back that it was labelled here, unless that was saved."""
+        if LABELS_NAME not in self._digests:
+            self.labels = None
+
     def effective_labels(self) -> Labels:
         """The labels; if it was not labelled here, those of its radar's file."""
         if self.unlabelled and self.holds_radar_map:

@@ -247,21 +247,25 @@ class LabelEdits(QObject):
     def make(self, done: Edit, before: Labels) -> None:
         """Apply a computed edit as one step in the history."""
         if done.labels is not before:
-            forward = done.name, before, done.labels
-            back = f"Undo {done.name.lower()}", done.labels, before
+            recording = self._document.recording
+            first = recording is not None and recording.labels is None
+            forward = done.name, before, done.labels, False
+            back = f"Undo {done.name.lower()}", done.labels, before, first
             step = Assign(done.name, lambda change: self._become(*change), back, forward)
             step.redo()
             self.undo_stack.push(step)
         if done.ids:
             self.labels.select(done.ids)
 
-    def _become(self, name: str, before: Labels, after: Labels) -> None:
+    def _become(self, name: str, before: Labels, after: Labels, unlabel: bool) -> None:
         """Change the labels: the only place that does, on disk first, then on screen."""
         recording = self._document.recording
         if recording is None or recording.labels is after:
             return
         self._session.keep(name, before, after)
         recording.labels = after
+        if unlabel:
+            recording.unlabel()
         self.labels.set_labels(after)
         if (stretch := changed_stretch(before, after)) is not None:
             self.done_at.emit(*stretch)

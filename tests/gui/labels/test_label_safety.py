@@ -358,6 +358,13 @@ class TestLabelsOfARadarFile:
         models_of(window).label_edits.step(1)
         qtbot.keyClick(window, Qt.Key.Key_Backspace)
         assert labels.labels.spans == ()
+        # Taken back, they are the file's again, and go with it.
+        stack = models_of(window).document.undo_stack
+        stack.undo()
+        assert labels.labels.spans == (before,)
+        stack.undo()
+        assert stack.redoText() == "Add radar file"
+        qtbot.waitUntil(lambda: labels.labels.spans == (), timeout=10_000)
         edits.set_radar_offset(0.5)
         assert labels.labels.spans == ()
 
