@@ -26,6 +26,7 @@ from sd2core.labels.label_set import LabelSet
 _PLOT_PX = 30
 _BAR_PX = (28, 8)
 _GAP_PX = 10
+_LEAST_PX = 60
 _FAINT = 90
 """Opacity of probabilities that are not of the current map."""
 
@@ -126,8 +127,8 @@ class ClassReadout(Canvas):
         return QSize(self._bars_px + self._words_px, self.fontMetrics().height() + 4)
 
     def minimumSizeHint(self) -> QSize:
-        """Size with room for the text."""
-        return QSize(self._words_px, self.fontMetrics().height() + 4)
+        """Size with room for the beginning of the text."""
+        return QSize(min(self._words_px, _LEAST_PX), self.fontMetrics().height() + 4)
 
     def _follow(self) -> None:
         self._shown = self._classify.reading
@@ -145,7 +146,9 @@ class ClassReadout(Canvas):
         font.setBold(reading.current)
         painter.setFont(font)
         painter.setPen(QColor(palette.text if reading.current else palette.muted))
-        painter.drawText(self.rect(), AT_RIGHT, reading_text(reading) if reading.current else "…")
+        text = reading_text(reading) if reading.current else "…"
+        shown = painter.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, self.width())
+        painter.drawText(self.rect(), AT_RIGHT, shown)
 
     def _paint_bars(self, painter: QPainter, reading: ClassReading) -> None:
         palette, offered = self._display.palette, self._labels.labels.label_set

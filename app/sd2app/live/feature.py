@@ -17,7 +17,7 @@ from sd2app.live.setup import ListenRequest, ListenSetup
 from sd2app.live.text import frames_text, latency_text, level_text, title_text
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import Answer, accepted, confirmed
-from sd2app.widgets.panel import ElidedLabel, StateBar, say
+from sd2app.widgets.panel import ElidedLabel, StateBar, say, sentence
 
 
 class LiveBar(StateBar):
@@ -29,7 +29,7 @@ class LiveBar(StateBar):
         super().__init__("Radar that is listened to")
         self._live = live
         self._title = ElidedLabel(self, "title")
-        self._frames = QLabel(self)
+        self._frames, self._reason = QLabel(self), sentence("", "warning")
         self._numbers = ElidedLabel(self, "muted")
         gap = "Listen again, into the same recording: the pause is a gap"
         buttons = {
@@ -38,7 +38,8 @@ class LiveBar(StateBar):
             "go_on": ("Continue", gap, go_on),
             "close": ("✕", "Close this message", live.dismiss),
         }
-        self.lay_out((self._title, self._frames, (self._numbers, 1)), buttons, spacing_px=12)
+        parts = (self._title, (self._reason, 1), self._frames, (self._numbers, 1))
+        self.lay_out(parts, buttons, spacing_px=12)
         live.changed.connect(self._refresh)
         self._refresh()
 
@@ -48,12 +49,14 @@ class LiveBar(StateBar):
         if live.state == "idle":
             return
         self._title.setText(title_text(live))
-        if live.state == "failed":
-            say(self._frames, live.text, "warning")
-        else:
-            whole = live.counts.whole and not live.pictures_dropped
-            text = frames_text(live.counts, live.pictures, live.pictures_dropped)
-            say(self._frames, text, "" if whole else "warning")
+        failed = live.state == "failed"
+        self._reason.setText(live.text if failed else "")
+        self._reason.setVisible(failed)
+        for label in (self._frames, self._numbers):
+            label.setVisible(not failed)
+        whole = live.counts.whole and not live.pictures_dropped
+        text = frames_text(live.counts, live.pictures, live.pictures_dropped)
+        say(self._frames, text, "" if whole else "warning")
         parts = (level_text(live.level_db), latency_text(live.latency_s))
         listening = live.state == "listening"
         self._numbers.setText(" · ".join(filter(None, parts)) if listening else "")

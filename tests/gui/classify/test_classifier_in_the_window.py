@@ -21,6 +21,7 @@ from window_models import models_of
 from sd2app.classify.panel import ClassPanel
 from sd2app.classify.strip import ClassPlot, ClassReadout, ClassStrip, stacked_image
 from sd2app.labels.timeline import LabelTimeline
+from sd2app.shell.side_panel import RailButton
 from sd2app.suggestions.feature import SuggestionBar
 from sd2app.widgets.chart import ChartView
 from sd2app.widgets.inputs import Choice, NumberBox, TypedLine
@@ -134,6 +135,17 @@ def test_what_belongs_to_another_sensor_is_not_shown_as_current(classified, fake
     )
     shares = truth(classified)[c.playback.frame]
     assert readout.text == f"{CLASSES[int(shares.argmax())]} {100 * shares.max():.0f} %"
+
+
+def test_the_strip_takes_no_room_from_the_panels(classified, qtbot):
+    before = classified.size()
+    classified.resize(960, 640)
+    qtbot.waitUntil(lambda: classified.width() == 960)
+    rail = classified.findChild(RailButton)
+    right = lambda: rail.mapTo(classified, rail.rect().bottomRight()).x()  # noqa: E731
+    qtbot.waitUntil(lambda: right() < 960, timeout=5_000)
+    assert classified.minimumSizeHint().width() + rail.width() < 960
+    classified.resize(before)
 
 
 def test_another_map_is_looked_at(classified, qtbot):
