@@ -322,6 +322,11 @@ class DocumentModel(QObject):
             if base is None:
                 self._open(content, unsaved=cure is not None and content.saved)
                 return
+            if unread := _unread(content, base):
+                content.close()
+                self.failed.emit(unread)
+                self._offer(content.offers)
+                return
             self._added = content
             read = {name: getattr(content.recording, name) for name in EDITED}
             asked.then({one: read[one] for one in EDITED if read[one] != getattr(base, one)})
@@ -518,6 +523,14 @@ class DocumentModel(QObject):
         self.undo_stack.setClean()
         self.saved.emit()
         self.changed.emit()
+
+
+def _unread(content: Content, base: Recording) -> str:
+    """Why files that were to be added are of no use; empty where all were read."""
+    radar = content.capture or content.radar_map
+    parts = {"video": content.video, "mesh": content.mesh, "radar": radar}
+    added = (name for name in parts if getattr(content.recording, name) != getattr(base, name))
+    return " ".join(content.problems) if any(parts[name] is None for name in added) else ""
 
 
 def _files(recording: Recording) -> tuple[Path | None, Path | None]:

@@ -294,6 +294,15 @@ class TestOpeningAndClosing:
         again.document.save()
         assert open_recording(recording).radar == tmp_path / "radar"
 
+    def test_what_cannot_be_read_is_not_added(self, qtbot, desk, root, mesh, tmp_path) -> None:
+        at = desk().open(mesh)
+        lost = write_video(tmp_path / "walk.mp4", 90)
+        lost.write_bytes(lost.read_bytes()[:2_000])
+        with qtbot.waitSignal(at.document.failed, timeout=10_000) as caught:
+            at.all_edits.add([lost])
+        assert "walk.mp4" in caught.args[0]
+        assert (at.document.recording.video, at.document.undo_stack.count()) == (None, 0)
+
     def test_what_was_never_saved_is_offered_with_the_files_that_were_added(
         self, qtbot, desk, root, mesh, tmp_path
     ) -> None:
