@@ -89,9 +89,8 @@ class LabelAutosave(QObject):
             self._others, labels = edited_fields(recording), self._document.labels
             self.keep("Add files", Labels(), labels, self._others)
         self._recording = recording
-        labels = self._labels
-        show = labels.set_labels if self._document.same_recording else labels.open
-        show(self._document.labels)
+        same, model = self._document.same_recording, self._labels
+        (model.set_labels if same else model.open)(self._document.labels)
 
     def try_again(self) -> None:
         """Read the labels again and edit them, if the other window has released them."""
