@@ -14,7 +14,7 @@ and 5.725 to 5.875 GHz for industry, science and medicine); IEEE 802.11 (channel
 from __future__ import annotations
 
 from sd2core.plug_ins import Group
-from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS, RadarConfig, Sampling
+from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS, RadarConfig
 from sd2core.sensor import Beam
 
 PAPER = "paper"
@@ -23,35 +23,55 @@ PAPER = "paper"
 _UNVERIFIED = "unverified against hardware"
 
 
+_SWEEPS = {
+    # name, first and last Hz, samples, chirps, v_max in m/s, frames/s, samples/s
+    "bgt60": ("Infineon BGT60, 61 GHz", 60.5e9, 61.5e9, 64, 64, 3.1, 30.0, 2e6),
+    "iwr6843": ("TI IWR6843, 60 to 64 GHz", 60.25e9, 63.25e9, 128, 64, 3.5, 20.0, 4e6),
+    "iwr1443": ("TI IWR1443 or AWR1843, 77 to 81 GHz", 77.25e9, 80.25e9, 128, 64, 3.5, 20.0, 4e6),
+    # Range is formed by a sweep as wide as a pulse of profile 3 (0.14 m); its shape is not that of
+    # the pulse.
+    "a121": ("Acconeer A121, 60.5 GHz, as a sweep", 59.965e9, 61.035e9, 32, 32, 3.0, 25.0, 2e6),
+    "k-band": ("24 GHz, K band", 24.0e9, 24.25e9, 64, 64, 3.1, 15.0, 1e6),
+}
+_CARRIERS = {
+    # name, Hz, samples, frames/s
+    "cw-5.8ghz": ("5.8 GHz", 5.8e9, 32, 10.0),
+    "wifi-5ghz": ("Wi-Fi carrier at 5.25 GHz", 5.25e9, 32, 10.0),
+    "wifi-2.4ghz": ("Wi-Fi carrier at 2.44 GHz", 2.44e9, 32, 5.0),
+}
+_READ = {"bgt60"}
+"""Whose recordings this program reads."""
+
+
 def _sweep(
     name: str,
-    band_hz: tuple[float, float],
-    *,
+    first_hz: float,
+    last_hz: float,
     samples: int,
     chirps: int,
     v_max_mps: float,
     frames_per_s: float,
     sample_rate_hz: float,
-    sampling: Sampling = "complex",
-    bits: int = 16,
+    *,
+    read: bool,
 ) -> RadarConfig:
     """FMCW radar whose chirps follow one another as v_max asks, λ / (4 v_max)."""
-    wavelength_m = 2.0 * SPEED_OF_LIGHT_MPS / sum(band_hz)
+    wavelength_m = 2.0 * SPEED_OF_LIGHT_MPS / (first_hz + last_hz)
     return RadarConfig(
-        start_frequency_hz=band_hz[0],
-        end_frequency_hz=band_hz[1],
+        start_frequency_hz=first_hz,
+        end_frequency_hz=last_hz,
         samples_per_chirp=samples,
         chirps_per_frame=chirps,
         chirp_repetition_s=wavelength_m / (4.0 * v_max_mps),
         frame_repetition_s=1.0 / frames_per_s,
         sample_rate_hz=sample_rate_hz,
-        adc_bits=bits,
-        name=name,
-        sampling=sampling,
+        adc_bits=12 if read else 16,
+        name=name if read else f"{name} ({_UNVERIFIED})",
+        sampling="real" if read else "complex",
     )
 
 
-def _carrier(name: str, carrier_hz: float, *, samples: int, frames_per_s: float) -> RadarConfig:
+def _carrier(name: str, carrier_hz: float, samples: int, frames_per_s: float) -> RadarConfig:
     """Doppler of a carrier: complex samples of a continuous wave, without gaps."""
     sample_s = 1.0 / (samples * frames_per_s)
     return RadarConfig(
@@ -70,58 +90,8 @@ def _carrier(name: str, carrier_hz: float, *, samples: int, frames_per_s: float)
 
 RADARS: dict[str, RadarConfig] = {
     PAPER: PAPER_RADAR,
-    "bgt60": _sweep(
-        "Infineon BGT60, 61 GHz",
-        (60.5e9, 61.5e9),
-        samples=64,
-        chirps=64,
-        v_max_mps=3.1,
-        frames_per_s=30.0,
-        sample_rate_hz=2e6,
-        sampling="real",
-        bits=12,
-    ),
-    "iwr6843": _sweep(
-        f"TI IWR6843, 60 to 64 GHz ({_UNVERIFIED})",
-        (60.25e9, 63.25e9),
-        samples=128,
-        chirps=64,
-        v_max_mps=3.5,
-        frames_per_s=20.0,
-        sample_rate_hz=4e6,
-    ),
-    "iwr1443": _sweep(
-        f"TI IWR1443 or AWR1843, 77 to 81 GHz ({_UNVERIFIED})",
-        (77.25e9, 80.25e9),
-        samples=128,
-        chirps=64,
-        v_max_mps=3.5,
-        frames_per_s=20.0,
-        sample_rate_hz=4e6,
-    ),
-    # Range is formed by a sweep as wide as a pulse of profile 3 (0.14 m); its shape is not that of
-    # the pulse.
-    "a121": _sweep(
-        f"Acconeer A121, 60.5 GHz, as a sweep ({_UNVERIFIED})",
-        (59.965e9, 61.035e9),
-        samples=32,
-        chirps=32,
-        v_max_mps=3.0,
-        frames_per_s=25.0,
-        sample_rate_hz=2e6,
-    ),
-    "k-band": _sweep(
-        f"24 GHz, K band ({_UNVERIFIED})",
-        (24.0e9, 24.25e9),
-        samples=64,
-        chirps=64,
-        v_max_mps=3.1,
-        frames_per_s=15.0,
-        sample_rate_hz=1e6,
-    ),
-    "cw-5.8ghz": _carrier("5.8 GHz", 5.8e9, samples=32, frames_per_s=10.0),
-    "wifi-5ghz": _carrier("Wi-Fi carrier at 5.25 GHz", 5.25e9, samples=32, frames_per_s=10.0),
-    "wifi-2.4ghz": _carrier("Wi-Fi carrier at 2.44 GHz", 2.44e9, samples=32, frames_per_s=5.0),
+    **{name: _sweep(*row, read=name in _READ) for name, row in _SWEEPS.items()},
+    **{name: _carrier(*row) for name, row in _CARRIERS.items()},
 }
 """Radars by name.
 
