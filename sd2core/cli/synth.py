@@ -105,7 +105,8 @@ def _synth(options: Synth) -> None:
     doppler.save(options.out)
     description = describe_map(options.out, doppler)
     radar = named_radar(options.radar) if options.method == "fmcw" else None
-    description.notes = mesh.notes + notes_on(mesh, sensor, radar) + description.notes
+    notes = (*mesh.notes, *notes_on(mesh, sensor, radar), *description.notes)
+    description.notes = tuple(dict.fromkeys(notes))
     description.data["notes"] = list(description.notes)
     show(description, as_json=options.json)
 

@@ -25,13 +25,18 @@ class Presence:
     last: NDArray[np.int64]  # (T,) last frame of that stretch
 
     @classmethod
-    def of(cls, present: ArrayLike | None, frames: int) -> Presence:
-        """Presence by a mask (frames,); None means everywhere."""
+    def of(
+        cls, present: ArrayLike | None, frames: int, breaks: NDArray[np.bool_] | None = None
+    ) -> Presence:
+        """Presence by a mask (frames,); None means everywhere.
+
+        ``breaks`` (frames - 1,) marks what lies between frames that do not follow each other.
+        """
         mask = np.ones(frames, bool) if present is None else checked(present, frames)
         numbers = np.arange(frames)
         # A stretch begins at every frame that does not go on from the one before.
         begins = np.ones(frames, bool)
-        begins[1:] = ~(mask[1:] & mask[:-1])
+        begins[1:] = ~(mask[1:] & mask[:-1]) | (False if breaks is None else breaks)
         ends = np.ones(frames, bool)
         ends[:-1] = begins[1:]
         first = np.maximum.accumulate(np.where(begins, numbers, 0))
@@ -43,8 +48,8 @@ class Presence:
 
     @cached_property
     def whole(self) -> bool:
-        """True if the person is there in every frame."""
-        return bool(self.present.all())
+        """True if the person is there in every frame, and all of them are one stretch."""
+        return bool(self.present.all()) and not self.first.any()
 
     @cached_property
     def measured(self) -> NDArray[np.bool_]:
@@ -56,7 +61,8 @@ class Presence:
 
     def between(self, start: int, stop: int) -> Presence:
         """Frames ``start`` to ``stop`` as a clip of their own."""
-        return Presence.of(self.present[start:stop], stop - start)
+        breaks = self.first[start + 1 : stop] == np.arange(start + 1, stop)
+        return Presence.of(self.present[start:stop], stop - start, breaks)
 
 
 def runs(mask: NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:

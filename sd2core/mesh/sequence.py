@@ -14,6 +14,7 @@ from sd2core.mesh.bodies import Body, persons_of
 from sd2core.mesh.presence import Presence, checked
 from sd2core.mesh.things import Surroundings
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
+from sd2core.plausibility.clock import gaps_between
 from sd2core.plausibility.findings import Finding
 from sd2core.timebase import Timebase
 
@@ -195,8 +196,8 @@ class MeshSequence:
 
     @cached_property
     def presence(self) -> Presence:
-        """Frames with a person."""
-        return Presence.of(self.present, self.frame_count)
+        """Frames with a person, in stretches that no frames are lost from."""
+        return Presence.of(self.present, self.frame_count, gaps_between(self.times_s))
 
     @property
     def bodies(self) -> tuple[MeshSequence, ...]:

@@ -80,6 +80,13 @@ def judge_rate(step_s: float, *, of_a_mesh: bool = False) -> list[Finding]:
                     cure)]  # fmt: skip
 
 
+def gaps_between(times_s: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """True, (T - 1,), where so much time lies between two frames that others were lost."""
+    steps_s = np.diff(times_s)
+    usual_s = float(np.median(steps_s)) if len(steps_s) else 0.0
+    return np.asarray(steps_s > max(_GAP_STEPS * usual_s, _GAP_S))
+
+
 def judge_clock(
     times_s: NDArray[np.float64],
     present: NDArray[np.bool_] | None = None,
@@ -102,7 +109,7 @@ def judge_clock(
         return []
     usual_s = float(np.median(steps_s))
     findings = judge_rate(usual_s, of_a_mesh=of_a_mesh)
-    gaps = steps_s > max(_GAP_STEPS * usual_s, _GAP_S)
+    gaps = gaps_between(times_s)
     if present is not None:
         gaps &= present[1:] & present[:-1]
     count = int(gaps.sum())

@@ -69,6 +69,25 @@ def test_every_stretch_is_a_clip_of_its_own(whole: MeshSequence, way: str) -> No
 
 
 @pytest.mark.parametrize("way", WAYS)
+def test_frames_between_which_others_were_lost_begin_a_clip_of_their_own(
+    whole: MeshSequence, way: str
+) -> None:
+    joined, options = cut(whole, 0, 32), WAYS[way]
+    later_s = joined.times_s + 3.0 * (np.arange(32) >= 16)
+    vertices = np.array(joined.vertices)
+    vertices[16:, :, 2] += 0.4  # somewhere else meanwhile
+    found = Synthesizer(
+        replace(joined, vertices=vertices, timebase=Timebase(later_s)), options
+    ).map(CAMERA)
+    assert found.present is None  # somebody is there in every frame
+    takes = (cut(whole, 0, 16), replace(cut(whole, 16, 32), vertices=vertices[16:]))
+    for start, take in zip((0, 16), takes, strict=True):
+        alone = Synthesizer(take, options).map(CAMERA).values
+        difference = np.abs(found.values[:, start : start + 16] - alone).sum()
+        assert difference < 0.02 * alone.sum()
+
+
+@pytest.mark.parametrize("way", WAYS)
 def test_away_from_the_hole_nothing_changes(whole: MeshSequence, way: str) -> None:
     options = WAYS[way]
     found = Synthesizer(holed(whole), options).map(CAMERA)
