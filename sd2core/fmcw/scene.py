@@ -83,9 +83,12 @@ class MeshScene:
         return radar_times_s(self.mesh.timebase, self.config)
 
     def is_present(self, time_s: float) -> bool:
-        """True if there is a person in the mesh frames on both sides of an instant."""
+        """True if there is a person in the mesh frames around an instant, and no gap between."""
         presence = self.mesh.presence
-        return presence.whole or bool(presence.measured[list(self._around(time_s))].all())
+        if presence.whole:
+            return True
+        around = list(self._around(time_s))
+        return bool(presence.measured[around].all()) and len({*presence.first[around]}) == 1
 
     def moving(self, time_s: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Vertices at an instant and their velocity, (V, 3) each; from any thread."""

@@ -24,6 +24,7 @@ from sd2core.io.radar import load_capture, write_capture
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.sensor import VirtualSensor
+from sd2core.timebase import Timebase
 
 FRAMES = 15
 THERE = np.ones(FRAMES, bool)
@@ -62,6 +63,15 @@ def test_nobody_sends_nothing_back_and_the_others_what_they_did(
         rtol=1e-4,
         atol=1e-9,
     )
+
+
+def test_in_a_gap_of_the_times_there_is_nobody(whole: MeshSequence) -> None:
+    later_s = whole.times_s + 1.0 * (np.arange(FRAMES) >= 8)
+    scene = MeshScene(replace(whole, timebase=Timebase(later_s)), CONFIG, VirtualSensor())
+    assert all(scene.is_present(time_s) for time_s in later_s.tolist())
+    between_s = 0.5 * (later_s[7] + later_s[8])
+    assert not scene.is_present(between_s)
+    assert not frame_spectra(scene.mesh, CONFIG, np.array([between_s])).any()
 
 
 @pytest.mark.parametrize("motion", ["constant", "interpolated"])
