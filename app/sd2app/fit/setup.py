@@ -64,6 +64,11 @@ class FitSetupModel(VideoFrames):
         self.choices = replace(self.choices, folder=folder, person=None, people=())
         self.open_video(path)
 
+    def _take_video(self, reader: Any) -> None:
+        if len(reader) < 2:
+            self.problem = f"{reader.path.name} has one frame: a body is fitted to a video."
+        super()._take_video(reader)
+
     # --- everybody ------------------------------------------------------------------------
 
     def find_people(self) -> None:

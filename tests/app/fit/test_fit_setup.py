@@ -8,6 +8,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
+from PySide6.QtGui import QImage
 
 from sd2app.fit.request import FitRequest, Person
 from sd2app.fit.setup import FitSetupModel, folder_for
@@ -69,6 +70,14 @@ def test_the_video_is_shown_from_its_middle(setup, video, qtbot) -> None:
     assert setup.picture.mean() == pytest.approx(100, abs=4)
     setup.show_frame(2)
     qtbot.waitUntil(lambda: abs(float(setup.picture.mean()) - 40) < 4)
+
+
+def test_a_picture_is_no_video_to_fit_to(setup, tmp_path, qtbot) -> None:
+    QImage(160, 120, QImage.Format.Format_RGB888).save(str(tmp_path / "still.png"))
+    setup.choose_video(tmp_path / "still.png")
+    qtbot.waitUntil(lambda: bool(setup.problem), timeout=10_000)
+    assert setup.problem == "still.png has one frame: a body is fitted to a video."
+    assert not setup.ready
 
 
 def test_nothing_said_leaves_all_to_the_fit(setup, video) -> None:
