@@ -25,6 +25,7 @@ from sd2core.files.tables import counted
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.plausibility.clock import gaps_between
 from sd2core.progress import Progress, silent
 from sd2core.scattering.resampling import resample_mesh
 from sd2core.sensor import VirtualSensor
@@ -153,10 +154,12 @@ def compare_meshes(
         one.positions(np.asarray(mesh.vertices)) for one, mesh in zip(patches, placed, strict=True)
     )
     presence = Presence.of(
-        np.logical_and.reduce([mesh.presence.present for mesh in placed]), len(times_s)
+        np.logical_and.reduce([mesh.presence.present for mesh in placed]),
+        len(times_s),
+        gaps_between(times_s),
     )
     measured = presence.measured
-    if not presence.whole:
+    if not measured.all():
         placed = [replace(mesh, present=presence.present) for mesh in placed]
         notes.append(
             f"{int((~measured).sum())} of {len(times_s)} frames are left out: not every mesh has a"

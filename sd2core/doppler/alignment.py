@@ -48,13 +48,9 @@ class Alignment:
     offsets_s: Floats  # (N,) tried
     correlation: Floats  # (N,) of the two maps, 0 to 1; time without an overlap counts as 0
     other_s: float | None  # next best, beyond the peak; None if there is nothing else
+    peak: float  # correlation at the best
     at_the_end: bool  # the best is where the search, or an overlap of 3 s, ends: it may be beyond
     searched: bool  # at_the_end: nothing is left to search
-
-    @property
-    def peak(self) -> float:
-        """Highest correlation."""
-        return float(self.correlation.max())
 
     @property
     def problem(self) -> str:
@@ -178,11 +174,13 @@ def _best_of(
         before, here, after = evidence[best - 1 : best + 2]
         bend = before - 2.0 * here + after
         offset_s += _STEP_S * 0.5 * (before - after) / bend if bend < 0 else 0.0
+    correlation = np.sqrt(1.0 - np.exp(-2.0 * evidence / longest))
     return Alignment(
         offset_s=round(float(offset_s), 3) + 0.0,
         confidence=float(1.0 / (1.0 + np.exp(-margins[other]))),
         offsets_s=offsets_s,
-        correlation=np.sqrt(1.0 - np.exp(-2.0 * evidence / longest)),
+        correlation=correlation,
+        peak=float(correlation[best]),
         other_s=round(float(offsets_s[other]), 3) if np.isfinite(margins[other]) else None,
         at_the_end=at_the_end,
         searched=best not in (0, len(evidence) - 1),

@@ -54,7 +54,7 @@ _COUNT: HowCounted = "expected"
 class _Asked:
     """Files to read, alone or beside those of a recording, and what is done with its new fields."""
 
-    paths: tuple[Path, ...]
+    paths: tuple[tuple[Path, ...], ...]  # each beside, or in place of, what is before it
     mesh: Mapping[str, Any]  # fields that say how their mesh is read
     base: Recording | None = None
     then: Callable[[dict[str, Any]], object] = lambda fields: None
@@ -83,6 +83,7 @@ class DocumentModel(QObject):
         self.offers: tuple[OfferedCure, ...] = ()  # of reading the mesh another way
         self._asked: _Asked | None = None  # last
         self._take: Callable[[Content], object] = self._open  # what is done with what is read
+        self._behind = False  # files were undone or done again while a radar was listened to
         self._added: Content | None = None  # read already, before its fields are assigned
         self._runner = ListedRunner("open", jobs, self, lambda content: self._take(content))
         self._runner.failed.connect(self._offer_instead)
@@ -195,7 +196,7 @@ class DocumentModel(QObject):
 
         ``mesh`` holds fields of the recording that say how its mesh is read, where it does not.
         """
-        self._start(_Asked(tuple(paths), mesh or {}))
+        self._start(_Asked((tuple(paths),), mesh or {}))
 
     def read_added(
         self,
@@ -208,10 +209,11 @@ class DocumentModel(QObject):
         ``mesh`` is as for :meth:`open`; ``then`` is called with the fields to assign.
         """
         assert self.recording is not None
-        pending = self._asked
-        if pending is not None and pending.base is not None and self._runner.busy:  # with these
-            paths, mesh = (*pending.paths, *paths), {**pending.mesh, **(mesh or {})}
-        self._start(_Asked(tuple(paths), mesh or {}, replace(self.recording), then))
+        pending, fields = self._asked, mesh or {}
+        asked: tuple[tuple[Path, ...], ...] = (tuple(paths),)
+        if pending is not None and pending.base is not None and self._runner.busy:
+            asked, fields = (*pending.paths, *asked), {**pending.mesh, **fields}
+        self._start(_Asked(asked, fields, replace(self.recording), then))
 
     @property
     def offers_of_open(self) -> bool:
@@ -282,6 +284,9 @@ class DocumentModel(QObject):
         if self.content is None or not self.growing:
             return
         self.growing = False
+        if self._behind:
+            self._read_parts()
+            return
         capture = self.content.recording.load_every_channel()
         self._take_growth(capture, capture=capture)
         self.changed.emit()
@@ -308,10 +313,13 @@ class DocumentModel(QObject):
         self._asked, base = asked, asked.base
 
         def read(emit: Emit) -> Content:
-            recording = recording_of(asked.paths, None if base is None else replace(base))
+            recording = None if base is None else replace(base)
+            for paths in asked.paths:
+                recording = recording_of(paths, recording)
+            assert recording is not None
             for field, value in asked.mesh.items():
                 setattr(recording, field, value)
-            if "radar" in map(kind_of, asked.paths):
+            if any(kind_of(path) == "radar" for paths in asked.paths for path in paths):
                 with suppress(Sd2Error):  # what cannot be read is said where it is loaded
                     recording.learn_offset()
             if cure is not None:
@@ -334,7 +342,7 @@ class DocumentModel(QObject):
                 self._show_parts(content)
 
         self._take = take
-        self._runner.submit(read, f"Opening {asked.paths[0].name}")
+        self._runner.submit(read, f"Opening {asked.paths[-1][0].name}")
 
     def _open(self, content: Content, *, unsaved: bool = False) -> None:
         before, self.content = self.content, content
@@ -367,6 +375,9 @@ class DocumentModel(QObject):
     def _read_parts(self) -> None:
         """Read all files of the recording that is open, and show them in it."""
         assert self.recording is not None
+        self._behind = self.growing  # then it is read at the end
+        if self._behind:
+            return
         asked = replace(self.recording)
         self._reader.submit(lambda emit: load_content(asked, lambda *_: emit(None)))
 
@@ -375,6 +386,9 @@ class DocumentModel(QObject):
         before, self._added = self.content, None
         assert before is not None
         recording, read_by = before.recording, mesh_fields(content.recording)
+        if recording.camera is None:
+            recording.camera = content.recording.camera  # which the mesh brings
+        recording.simulated |= content.recording.simulated
         if _files(recording) != _files(content.recording):  # undone meanwhile
             content.close()
             self._read_parts()

@@ -140,7 +140,6 @@ def test_whatever_is_opened_or_saved_is_recent(empty_window, qtbot, recording_co
     # What was opened together is opened together again.
     entry = recent_menu(empty_window).actions()[1]
     assert entry.text().replace("&", "") == f"{video} + mesh.npz"
-    press_when_ready(MeshDialog, "Take")
     with qtbot.waitSignal(c.document.opened, timeout=20_000):
         entry.trigger()
     assert c.document.paths == (video, mesh)
