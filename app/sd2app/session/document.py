@@ -386,19 +386,19 @@ class DocumentModel(QObject):
         before, self._added = self.content, None
         assert before is not None
         recording, read_by = before.recording, mesh_fields(content.recording)
-        if recording.camera is None:
-            recording.camera = content.recording.camera  # which the mesh brings
-        recording.simulated |= content.recording.simulated
         if _files(recording) != _files(content.recording):  # undone meanwhile
             content.close()
             self._read_parts()
             return
+        if recording.camera is None:
+            recording.camera = content.recording.camera  # which the mesh brings
+        recording.simulated |= content.recording.simulated
         self.content = replace(content, recording=recording)
         self._meshes.keep(ReadMesh(read_by, content.mesh, content.offers))
         if read_by != mesh_fields(recording):  # edited meanwhile
             self._meshes.follow(recording)
         self._surround()
-        self.same_recording, self.growing = True, False
+        self.same_recording = True
         self.opened.emit()
         self.changed.emit()
         if before.video is not content.video:
