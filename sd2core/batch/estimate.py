@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from sd2core.batch.exporting import is_exported
+from sd2core.batch.exporting import is_exported, rows_of
 from sd2core.batch.fitting import fitted
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import (
@@ -111,7 +111,12 @@ def estimate(plan: BatchPlan, workers: int, progress: Progress = silent) -> Batc
     made.looked_at = steps["inspect"].there + len(glanced) + len(made.unusable)
     if plan.export is not None:
         maps, export = steps["synthesise"], steps["export"]
-        if any(one.to_do for one in steps.values()) or not is_exported(folder, plan.export):
+        here = {origin.path for origin in origins}
+        if (
+            any(one.to_do for one in steps.values())
+            or not is_exported(folder, plan.export)
+            or any(rows[0]["source"] not in here for rows in rows_of(folder))
+        ):
             export.to_do, export.work = 1, maps.there + maps.to_do
         else:
             export.there = 1

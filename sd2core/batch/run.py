@@ -268,7 +268,7 @@ class _Run:
                         stream.write((json.dumps(row, ensure_ascii=False) + "\n").encode())
         for name, frames in damaged.items():
             if frames:
-                self._note(f"{name}: {counted(frames, 'frame')} of its mesh are lost: damaged")
+                self._note(f"{name}: lost {counted(frames, 'frame')} of its mesh, which is damaged")
 
     def _end(self, outcome: str, error: Sd2Error | None) -> dict[str, Any]:
         if error is not None:

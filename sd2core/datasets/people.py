@@ -49,7 +49,10 @@ def subject_of(recording: Recording, person: str, first: str) -> str:
         return first
     own = dict(zip(persons[1:], (one.person for one in recording.bodies), strict=True))
     # Who has no name is somebody else in each recording.
-    return person if own.get(person, person) else f"{recording.folder.stem} {person}"
+    folder = recording.folder
+    told_apart = first not in (folder.stem, recording.subject)
+    called = f"{folder.parent.name} {folder.stem}" if told_apart else folder.stem
+    return person if own.get(person, person) else f"{called} {person}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -287,7 +287,7 @@ def each_once(sources: Iterable[Source | LazySource]) -> Iterator[Source | LazyS
             raise Sd2Error(
                 f"Two sources are {one.key.title}",
                 "subject, recording and placement once",
-                "Say whom each of them shows, as by --subjects anna,ben",
+                "Say whom each shows, as by --subjects anna,ben, or rename one of the files",
             )
         seen.add(one.key)
         yield one

@@ -68,7 +68,7 @@ class Divergence:
     @property
     def changes(self) -> list[str]:
         """What was saved elsewhere and is not the same here, in words; empty without any."""
-        settings = [f"another {words}" for words in _named(self._changed())]
+        settings = [f"another {words}" for words in named(self._changed())]
         if self.theirs.labels == self.mine.labels:
             return settings
         labels = str(compare(self.base.labels, self.theirs.labels))
@@ -89,7 +89,7 @@ class Divergence:
         if labels.aside:
             aside = counted(labels.aside, "span")
             notes.append(f"On tracks “(both)” lie {aside} that had no room.")
-        if clash := _named(name for name in self._changed() if mine[name] != base[name]):
+        if clash := named(name for name in self._changed() if mine[name] != base[name]):
             notes.append(f"Both had changed the {' and the '.join(clash)}: yours is kept.")
         return Merge(State(settings, labels.labels), tuple(notes))
 
@@ -111,5 +111,6 @@ def digests_of(paths: Iterable[Path]) -> dict[str, str]:
     }
 
 
-def _named(names: Iterable[str]) -> list[str]:
+def named(names: Iterable[str]) -> list[str]:
+    """Settings in words, each once."""
     return list(dict.fromkeys(WORDS[name] for name in names))

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
 from sd2core.files.recording_json import Document
-from sd2core.recording.divergence import WORDS
+from sd2core.recording.divergence import WORDS, named
 from sd2core.recording.recording import Recording, settings_of
 
 _ALWAYS = ("sensor", "placements", "radar_offset_s")
@@ -57,4 +57,4 @@ def decoded_fields(entry: Mapping[str, Any]) -> dict[str, Any]:
 def differing(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
     """Name the fields in which two entries differ, in words."""
     both = [name for name in EDITED if name in _ALWAYS or (name in one and name in other)]
-    return [WORDS[name] for name in both if one.get(name) != other.get(name)]
+    return named(name for name in both if one.get(name) != other.get(name))

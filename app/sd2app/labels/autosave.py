@@ -83,11 +83,8 @@ class LabelAutosave(QObject):
             self.waiting = Recoveries()
             self._others = edited_fields(recording)
             self._begin(reread=True)
-        elif recording is not None and self._is_elsewhere:  # files were added to others
-            self.close()
-            self._begin(reread=False)
-            self._others, labels = edited_fields(recording), self._document.labels
-            self.keep("Add files", Labels(), labels, self._others)
+        elif recording is not None and self._is_elsewhere:
+            self._move(recording)
         self._recording = recording
         same, model = self._document.same_recording, self._labels
         (model.set_labels if same else model.open)(self._document.labels)
@@ -118,6 +115,24 @@ class LabelAutosave(QObject):
     @property
     def _is_elsewhere(self) -> bool:
         return self._place is None or self._place.recording != self._labelled_path.resolve()
+
+    def _move(self, recording: Recording) -> None:
+        """Keep edits of what was never saved under the name of its files, which are others now."""
+        place = RecoveryPlace(self._root, self._labelled_path)
+        try:
+            taken = place.take()
+        except (OSError, Sd2Error):
+            taken = False
+        if not taken:
+            return  # another window has that name: the one before goes on
+        journal, before = self._journal, self._place
+        self._journal, self._place, self._others = None, place, edited_fields(recording)
+        self.keep("Files", Labels(), self._document.labels, self._others)
+        if journal is not None:
+            with suppress(OSError):
+                journal.close()
+        if before is not None:
+            before.release()
 
     def _begin(self, *, reread: bool) -> None:
         content, path = self._document.content, self._labelled_path

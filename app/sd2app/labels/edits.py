@@ -163,11 +163,11 @@ class LabelEdits(QObject):
             except Sd2Error as error:
                 self.failed.emit(str(error))
         self.applying.emit()
-        before = self.labels.labels
+        before, first = self.labels.labels, recording.labels is None
         recording.labels = self._session.take_offer()  # on disk already, as a session of its own
         self.labels.set_labels(recording.labels)
         name = "Restore edits" if others else "Restore labels"
-        self._make_with(name, before, recording.labels, others)
+        self._make_with(name, before, recording.labels, others, first)
 
     def take_state(self, name: str, state: State) -> None:
         """Take over labels and settings that were saved elsewhere, as one step."""
@@ -181,10 +181,18 @@ class LabelEdits(QObject):
         if others or after is not before:
             self._make_with(name, before, after, others)
 
-    def _make_with(self, name: str, before: Labels, after: Labels, others: dict[str, Any]) -> None:
+    def _make_with(
+        self,
+        name: str,
+        before: Labels,
+        after: Labels,
+        others: dict[str, Any],
+        *,
+        first: bool = False,
+    ) -> None:
         """Make one step of an edit of labels and of other fields."""
         self.undo_stack.beginMacro(name)
-        self.make(Edit(name, after), before)
+        self.make(Edit(name, after), before, first=first)
         if others:
             self.restoring.emit(others)
         self.undo_stack.endMacro()
@@ -244,11 +252,14 @@ class LabelEdits(QObject):
             self.failed.emit(self.refusal)
         return bool(self.refusal)
 
-    def make(self, done: Edit, before: Labels) -> None:
-        """Apply a computed edit as one step in the history."""
+    def make(self, done: Edit, before: Labels, *, first: bool = False) -> None:
+        """Apply a computed edit as one step in the history.
+
+        ``first`` of a recording that was not labelled before, and is not once it is undone.
+        """
         if done.labels is not before:
             recording = self._document.recording
-            first = recording is not None and recording.labels is None
+            first = first or (recording is not None and recording.labels is None)
             forward = done.name, before, done.labels, False
             back = f"Undo {done.name.lower()}", done.labels, before, first
             step = Assign(done.name, lambda change: self._become(*change), back, forward)

@@ -30,12 +30,13 @@ class LabelMarking:
         self._labels, self._playback, self._edits = edits.labels, edits.playback, edits
         self._settings = settings
         self._made: frozenset[int] = frozenset()  # the span that ended last, selected since then
+        self._labels.selection_changed.connect(self._forget)
 
     @property
     def left_behind(self) -> bool:
         """True while the span that ended last is selected, but is not on screen."""
         chosen, playback = self._labels.selected, self._playback
-        if self._labels.selected_ids != self._made or len(chosen) != 1:
+        if not self._made or len(chosen) != 1:
             return False
         first, stop = playback.timebase.frames_between(chosen[0].start_s, chosen[0].end_s)
         return not first <= playback.frame <= stop
@@ -85,7 +86,10 @@ class LabelMarking:
         # A reaction does not end what had not begun; going back and ending it there does.
         went_back = self._playback.time_s < mark.start_s
         end_s = seen_s if went_back else max(mark.start_s, seen_s)
-        self._edits.apply(
+        made = self._edits.apply(
             lambda labels, base: make(labels, base, mark.track, mark.start_s, end_s, mark.label)
         )
-        self._made = self._labels.selected_ids
+        self._made = self._labels.selected_ids if made else frozenset()
+
+    def _forget(self) -> None:
+        self._made = frozenset()

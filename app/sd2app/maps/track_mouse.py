@@ -155,7 +155,9 @@ class TrackMouse(ZoomedPlot):
         raise NotImplementedError
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Start to drag the cursor, the time axis or the alignment."""
+        """Start to drag the cursor, the time axis or the alignment, with one button."""
+        if self._grab is not None:
+            return
         place = event.position()
         if event.button() == Qt.MouseButton.MiddleButton:
             self._grab = ("pan", place.x())

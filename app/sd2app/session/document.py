@@ -52,12 +52,16 @@ _COUNT: HowCounted = "expected"
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """Files to read, alone or beside those of a recording, and what is done with its new fields."""
+    """Files to read, alone or beside those of a recording, and what is done with its new fields.
 
-    paths: tuple[tuple[Path, ...], ...]  # each beside, or in place of, what is before it
-    mesh: Mapping[str, Any]  # fields that say how their mesh is read
+    Each of the ``groups`` goes beside, or in place of, what is before it; with it go fields of the
+    recording that say how its mesh is read.
+    """
+
+    groups: tuple[tuple[Sequence[Path], Mapping[str, Any]], ...]
     base: Recording | None = None
     then: Callable[[dict[str, Any]], object] = lambda fields: None
+    cure: Cure | None = None
 
 
 class DocumentModel(QObject):
@@ -82,10 +86,9 @@ class DocumentModel(QObject):
         self.growing = False  # a radar is listened to, and adds frames
         self.offers: tuple[OfferedCure, ...] = ()  # of reading the mesh another way
         self._asked: _Asked | None = None  # last
-        self._take: Callable[[Content], object] = self._open  # what is done with what is read
-        self._behind = False  # files were undone or done again while a radar was listened to
+        self._shown: tuple[Path | None, Path | None] = None, None  # video and radar on screen
         self._added: Content | None = None  # read already, before its fields are assigned
-        self._runner = ListedRunner("open", jobs, self, lambda content: self._take(content))
+        self._runner = ListedRunner("open", jobs, self, self._receive)
         self._runner.failed.connect(self._offer_instead)
         # Not listed: cancelled, it would leave on screen what is no longer in the recording.
         self._reader = LatestRunner("files", self, self._show_parts)
@@ -196,7 +199,7 @@ class DocumentModel(QObject):
 
         ``mesh`` holds fields of the recording that say how its mesh is read, where it does not.
         """
-        self._start(_Asked((tuple(paths),), mesh or {}))
+        self._start(_Asked(((paths, mesh or {}),)))
 
     def read_added(
         self,
@@ -209,11 +212,11 @@ class DocumentModel(QObject):
         ``mesh`` is as for :meth:`open`; ``then`` is called with the fields to assign.
         """
         assert self.recording is not None
-        pending, fields = self._asked, mesh or {}
-        asked: tuple[tuple[Path, ...], ...] = (tuple(paths),)
+        asked, pending = _Asked(((paths, mesh or {}),), replace(self.recording), then), self._asked
         if pending is not None and pending.base is not None and self._runner.busy:
-            asked, fields = (*pending.paths, *asked), {**pending.mesh, **fields}
-        self._start(_Asked(asked, fields, replace(self.recording), then))
+            groups = (*pending.groups, *asked.groups)
+            asked = replace(asked, groups=groups, cure=pending.cure)
+        self._start(asked)
 
     @property
     def offers_of_open(self) -> bool:
@@ -223,7 +226,7 @@ class DocumentModel(QObject):
     def open_mesh_so(self, cure: Cure) -> None:
         """Open what was refused, its mesh read with a setting that puts it right."""
         assert self._asked is not None
-        self._start(self._asked, cure)
+        self._start(replace(self._asked, cure=cure))
 
     def keep_mesh(self, read: ReadMesh) -> None:
         """Have a mesh ready that was read elsewhere, for its fields to be assigned."""
@@ -271,7 +274,7 @@ class DocumentModel(QObject):
             return
         if before is not None:
             before.close()
-        self.same_recording = False
+        self.same_recording, self._shown = False, _files(content.recording)
         self._offer(content.offers)
         self._tell_opened(unsaved=False)
 
@@ -280,11 +283,14 @@ class DocumentModel(QObject):
         self._take_growth(radar_map, radar_map=radar_map)
 
     def end_growth(self) -> None:
-        """Take over the whole capture; Sd2Error if it cannot be read."""
+        """Take over the whole capture; Sd2Error if it cannot be read.
+
+        Where its files were undone, or done again, meanwhile, they are read in the background.
+        """
         if self.content is None or not self.growing:
             return
         self.growing = False
-        if self._behind:
+        if _files(self.content.recording) != self._shown:
             self._read_parts()
             return
         capture = self.content.recording.load_every_channel()
@@ -309,43 +315,47 @@ class DocumentModel(QObject):
             self.content.close()
             self.content = None
 
-    def _start(self, asked: _Asked, cure: Cure | None = None) -> None:
-        self._asked, base = asked, asked.base
+    def _start(self, asked: _Asked) -> None:
+        self._asked = asked
 
         def read(emit: Emit) -> Content:
-            recording = None if base is None else replace(base)
-            for paths in asked.paths:
+            recording = None if asked.base is None else replace(asked.base)
+            for paths, fields in asked.groups:
                 recording = recording_of(paths, recording)
+                for field, value in fields.items():
+                    setattr(recording, field, value)
             assert recording is not None
-            for field, value in asked.mesh.items():
-                setattr(recording, field, value)
-            if any(kind_of(path) == "radar" for paths in asked.paths for path in paths):
+            if any(kind_of(path) == "radar" for paths, _ in asked.groups for path in paths):
                 with suppress(Sd2Error):  # what cannot be read is said where it is loaded
                     recording.learn_offset()
-            if cure is not None:
-                recording.mesh_reading = recording.mesh_reading.cured(cure)
+            if asked.cure is not None:
+                recording.mesh_reading = recording.mesh_reading.cured(asked.cure)
             return load_content(recording, lambda done, total: emit((done, total)))
 
-        def take(content: Content) -> None:
-            if base is None:
-                self._open(content, unsaved=cure is not None and content.saved)
-                return
-            if unread := _unread(content, base):
-                content.close()
-                self.failed.emit(unread)
-                self._offer(content.offers)
-                return
+        self._runner.submit(read, f"Opening {asked.groups[-1][0][0].name}")
+
+    def _receive(self, content: Content) -> None:
+        asked = self._asked
+        assert asked is not None
+        if asked.base is None:
+            self._open(content, unsaved=asked.cure is not None and content.saved)
+        elif unread := _unread(content, asked.base):
+            content.close()
+            self.failed.emit(unread)
+            self._offer(content.offers)
+        else:
             self._added = content
-            read = {name: getattr(content.recording, name) for name in EDITED}
-            asked.then({one: read[one] for one in EDITED if read[one] != getattr(base, one)})
+            before, read = (
+                {name: getattr(one, name) for name in EDITED}
+                for one in (asked.base, content.recording)
+            )
+            asked.then({name: read[name] for name in EDITED if read[name] != before[name]})
             if self._added is not None:  # the same files, which may hold something else by now
                 self._show_parts(content)
 
-        self._take = take
-        self._runner.submit(read, f"Opening {asked.paths[-1][0].name}")
-
-    def _open(self, content: Content, *, unsaved: bool = False) -> None:
+    def _open(self, content: Content, *, unsaved: bool) -> None:
         before, self.content = self.content, content
+        self._shown = _files(content.recording)
         self._reader.cancel()
         if before is not None:
             before.close()
@@ -375,9 +385,8 @@ class DocumentModel(QObject):
     def _read_parts(self) -> None:
         """Read all files of the recording that is open, and show them in it."""
         assert self.recording is not None
-        self._behind = self.growing  # then it is read at the end
-        if self._behind:
-            return
+        if self.growing:
+            return  # at the end
         asked = replace(self.recording)
         self._reader.submit(lambda emit: load_content(asked, lambda *_: emit(None)))
 
@@ -393,7 +402,7 @@ class DocumentModel(QObject):
         if recording.camera is None:
             recording.camera = content.recording.camera  # which the mesh brings
         recording.simulated |= content.recording.simulated
-        self.content = replace(content, recording=recording)
+        self.content, self._shown = replace(content, recording=recording), _files(recording)
         self._meshes.keep(ReadMesh(read_by, content.mesh, content.offers))
         if read_by != mesh_fields(recording):  # edited meanwhile
             self._meshes.follow(recording)
@@ -401,8 +410,7 @@ class DocumentModel(QObject):
         self.same_recording = True
         self.opened.emit()
         self.changed.emit()
-        if before.video is not content.video:
-            before.close()
+        before.close()
         self._tell_read(content)
 
     # --- changing -------------------------------------------------------------------------
@@ -417,7 +425,8 @@ class DocumentModel(QObject):
             setattr(recording, name, value)
         if self._added is not None:
             self._show_parts(self._added)
-        elif _files(recording) != files:
+            return
+        if _files(recording) != files:
             self._read_parts()
         elif mesh_fields(recording) != mesh:
             self._meshes.follow(recording)
@@ -433,6 +442,8 @@ class DocumentModel(QObject):
         radar = content.capture or content.radar_map
         if content.video is None and radar is None and read.mesh is None:
             return  # there would be nothing to show
+        if content.recording.camera is None:
+            content.recording.camera = read.fields["camera"]  # which the mesh brings
         timebase = clock_of(content.recording, content.video, read.mesh, radar)
         self.content = replace(content, mesh=read.mesh, timebase=timebase, offers=read.offers)
         self._surround()

@@ -254,8 +254,6 @@ class Edits:
         """
         if self._document.recording is None:
             self._document.open(paths, mesh)
-        elif self._document.growing:
-            self._document.failed.emit("A radar is listened to. Stop it, then add files.")
         else:
             self._document.read_added(paths, mesh, self._take_added)
 

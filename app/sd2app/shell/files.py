@@ -183,6 +183,8 @@ class FilesFeature(Feature):
             self._add(paths)
 
     def _add(self, paths: Sequence[Path]) -> None:
+        if self._is_growing():
+            return
         mesh = self._foreign(paths, self._document.recording)
         if _is_inertial(paths):
             self._add_inertial(paths[0])
@@ -193,6 +195,12 @@ class FilesFeature(Feature):
                 self._session.edits.take_mesh("Take mesh", seen)
             else:
                 self._session.edits.add(paths, seen.fields)
+
+    def _is_growing(self) -> bool:
+        growing = self._document.growing
+        if growing:
+            self._shell.warn("A radar is listened to. Stop it first: other files are read anew.")
+        return growing
 
     def _foreign(self, paths: Sequence[Path], base: Recording | None) -> Recording | None:
         """The recording that these files would make, where they bring a foreign mesh to a video."""
@@ -236,6 +244,8 @@ class FilesFeature(Feature):
 
     def _relink(self) -> None:
         """Choose the one folder below which missing files are."""
+        if self._is_growing():
+            return
         folder = ask_folder(self._shell.dialog_parent, "Find missing files below")
         if folder is None:
             return

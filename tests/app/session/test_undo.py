@@ -75,7 +75,7 @@ def test_undo_restores_every_former_state(moves, qapp, tmp_path_factory):
     sensor = SensorModel()
     edits = Edits(document, sensor)
     path = write_points(tmp_path_factory.mktemp("points") / "points.npz")
-    document._open(load_content(recording_of([path]), lambda *_: None))
+    document._open(load_content(recording_of([path]), lambda *_: None), unsaved=False)
 
     def state():
         return (sensor.sensor, document.recording.radar_offset_s)

@@ -281,7 +281,7 @@ def test_frames_of_a_damaged_mesh_are_said_to_be_lost(run: Runs) -> None:
     end = run(MAPS.replace(".npz", ".zarr"), watch=events.append)
     assert end.outcome == "finished"
     (note,) = (one["text"] for one in events if one["event"] == "note")
-    assert re.fullmatch(r"long\.zarr: [\d,]+ frames of its mesh are lost: damaged", note)
+    assert re.fullmatch(r"long\.zarr: lost [\d,]+ frames of its mesh, which is damaged", note)
 
 
 def test_stopped_it_goes_on(run: Runs) -> None:

@@ -333,7 +333,7 @@ def test_a_person_is_typed_and_who_does_what_is_said(trainable, tmp_path, qtbot)
     def said() -> str:
         return " ".join(one.text() for one in panel.findChildren(QLabel) if one.isVisible())
 
-    qtbot.waitUntil(lambda: "All of it is of one person" in said(), timeout=60_000)
+    qtbot.waitUntil(lambda: "Learns from 1 person" in said(), timeout=60_000)
     # Rows that were replaced are hidden until they are deleted.
     (line,) = [
         one
