@@ -106,7 +106,7 @@ def _synth(options: Synth) -> None:
     description = describe_map(options.out, doppler)
     radar = named_radar(options.radar) if options.method == "fmcw" else None
     notes = (*mesh.notes, *notes_on(mesh, sensor, radar), *description.notes)
-    description.notes = tuple(dict.fromkeys(notes))
+    description.notes = tuple(dict.fromkeys(notes))  # a gap is found in the mesh and in the map
     description.data["notes"] = list(description.notes)
     show(description, as_json=options.json)
 

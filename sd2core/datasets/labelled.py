@@ -174,7 +174,7 @@ def labels_given(labels: Labels, path: Path) -> tuple[Span, ...]:
 def _of_recording(source: LabelledSource) -> LabelledFacts:
     recording = open_recording(source.path)
     labels = recording.effective_labels()
-    first = source.subject or people_shown([source.path])[0]
+    first = source.subject or recording.subject or source.path.stem
     spans = labels_given(labels, source.path)
     maps: list[str] = []
     if recording.mesh is not None:

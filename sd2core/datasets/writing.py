@@ -110,7 +110,7 @@ class _Writer:
         self._out, self._work, self._form, self._options = out, work, form, options
         self._names = Names()
         self._fingerprints: dict[SourceKey, str] = {}
-        self._before: dict[str, SourceKey] = {}  # what each of those is of that were there
+        self._before: dict[str, SourceKey] = {}  # what was there, by its fingerprint
         self._store: SegmentStore | None = None
         begun = SegmentStore(work) if is_dataset(work) else None
         if begun is not None and begun.complete and not begun.sources:
@@ -183,9 +183,10 @@ class _Writer:
         return added, failed, first_error
 
     def _is_there(self, one: Source | LazySource) -> bool:
-        if one.key not in self._fingerprints and not self._before:
+        known = self._fingerprints.get(one.key)
+        if known is None and not self._before:
             return False
-        known, now = self._fingerprints.get(one.key), one.fingerprint()
+        now = one.fingerprint()
         if known is None:
             if now in self._before:
                 raise Sd2Error(

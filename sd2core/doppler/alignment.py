@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,19 +49,19 @@ class Alignment:
     correlation: Floats  # (N,) of the two maps, 0 to 1; time without an overlap counts as 0
     other_s: float | None  # next best, beyond the peak; None if there is nothing else
     peak: float  # correlation at the best
-    at_the_end: bool  # the best is where the search, or an overlap of 3 s, ends: it may be beyond
-    searched: bool  # at_the_end: nothing is left to search
+    end: Literal["", "search", "overlap"]
+    """What ends at the best, which may lie beyond: the search, or an overlap of 3 s."""
 
     @property
     def problem(self) -> str:
         """Reason not to trust the offset; empty if it is clear."""
         if self.peak <= 0:
             return "The mesh and the radar have nothing in common at any offset."
-        if self.at_the_end:
+        if self.end:
             where = f"The mesh and the radar fit best at {self.offset_s:+.2f} s, where"
-            if self.searched:
-                return f"{where} they overlap by {_MIN_OVERLAP_S:g} s. Take longer recordings."
-            return f"{where} the search ends. Search farther."
+            if self.end == "search":
+                return f"{where} the search ends. Search farther."
+            return f"{where} they overlap by {_MIN_OVERLAP_S:g} s. Take longer recordings."
         if self.confidence >= MIN_CONFIDENCE:
             return ""
         return (
@@ -168,22 +168,23 @@ def _best_of(
     margins = np.minimum(evidence[best] - evidence, shared)
     margins[slice(*_own_width(evidence, best))] = np.inf
     other = int(margins.argmin())
-    at_the_end = best in (may_be[0], may_be[-1])
+    end: Literal["", "search", "overlap"] = ""
+    if best in (may_be[0], may_be[-1]):
+        end = "search" if best in (0, len(evidence) - 1) else "overlap"
     offset_s = float(offsets_s[best])
-    if not at_the_end:
+    if not end:
         before, here, after = evidence[best - 1 : best + 2]
         bend = before - 2.0 * here + after
         offset_s += _STEP_S * 0.5 * (before - after) / bend if bend < 0 else 0.0
     correlation = np.sqrt(1.0 - np.exp(-2.0 * evidence / longest))
     return Alignment(
-        offset_s=round(float(offset_s), 3) + 0.0,
+        offset_s=round(float(offset_s), 3) + 0.0,  # not -0.0
         confidence=float(1.0 / (1.0 + np.exp(-margins[other]))),
         offsets_s=offsets_s,
         correlation=correlation,
         peak=float(correlation[best]),
         other_s=round(float(offsets_s[other]), 3) if np.isfinite(margins[other]) else None,
-        at_the_end=at_the_end,
-        searched=best not in (0, len(evidence) - 1),
+        end=end,
     )
 
 

@@ -111,13 +111,15 @@ class BodyExtent:
 def notes_on(
     mesh: MeshSequence, sensor: VirtualSensor, radar: RadarConfig | None = None
 ) -> tuple[str, ...]:
-    """Sentences on a sensor in the body, or one that is a radar which the body is too much for."""
+    """Sentences on a sensor in the box around the body, and on what of it folds for a radar."""
     if not mesh.presence.present.any():
         return ()
     seen = BodyExtent.of(mesh).coverage((sensor,))
     notes = []
     if seen.inside[0]:
-        notes.append("The sensor stands in the body: what is nearest to it outweighs all else.")
+        notes.append(
+            "The sensor stands in the box around the body: what is nearest outweighs all else."
+        )
     if radar is not None and seen.farthest_m[0] > radar.range_max_m:
         turned = ", and velocities have the wrong sign" if radar.sampling == "real" else ""
         notes.append(

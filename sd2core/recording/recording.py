@@ -308,11 +308,6 @@ class Recording:
         return labels_of(self.spans) if self.labels is None else self.labels
 
     @property
-    def person(self) -> str:
-        """Who is in it: the subject, or where that is not known somebody called as the title."""
-        return self.subject or self.title
-
-    @property
     def persons(self) -> tuple[str, ...]:
         """Name of each of the bodies of its scene, its own mesh first; each once."""
         return persons_of([self.subject, *(one.person for one in self.bodies)])

@@ -177,7 +177,7 @@ def _of_recording(recording: Recording, subject: str, rate_hz: float | None) -> 
     labels = recording.effective_labels()
     labels_given(labels, recording.folder)
     return clips_of_map(
-        radar_map(recording, None), labels, subject=subject or recording.title,
+        radar_map(recording, None), labels, subject=subject,
         movement=recording.folder.stem, frame_rate_hz=rate_hz,
     )  # fmt: skip
 

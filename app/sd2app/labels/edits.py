@@ -182,13 +182,7 @@ class LabelEdits(QObject):
             self._make_with(name, before, after, others)
 
     def _make_with(
-        self,
-        name: str,
-        before: Labels,
-        after: Labels,
-        others: dict[str, Any],
-        *,
-        first: bool = False,
+        self, name: str, before: Labels, after: Labels, others: dict[str, Any], first: bool = False
     ) -> None:
         """Make one step of an edit of labels and of other fields."""
         self.undo_stack.beginMacro(name)

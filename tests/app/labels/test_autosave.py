@@ -318,6 +318,24 @@ class TestOpeningAndClosing:
         again.edits.restore()
         assert again.spans == [("left-to-right", 10, 20)]
 
+    def test_edits_stay_where_they_are_kept_while_another_window_has_the_added_file(
+        self, qtbot, desk, root, mesh, tmp_path
+    ) -> None:
+        video = write_video(tmp_path / "walk.mp4", 90)
+        other = desk().open(video)
+        at = desk().open(mesh)
+        at.mark(10, 20)
+        with qtbot.waitSignal(at.document.opened, timeout=10_000):
+            at.all_edits.add([video])
+        assert not at.session.read_only
+        at.mark(30, 40)
+        assert at.spans == [("left-to-right", 10, 20), ("left-to-right", 30, 40)]
+        other.session.close()
+        at.crash()
+        again = desk().open(mesh)
+        again.edits.restore()
+        assert again.spans == at.spans
+
     def test_files_that_are_added_while_others_are_read_come_with_them(
         self, qtbot, desk, root, mesh, tmp_path
     ) -> None:

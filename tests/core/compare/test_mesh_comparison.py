@@ -131,6 +131,16 @@ def test_frames_without_a_person_do_not_count(mesh: MeshSequence) -> None:
     assert moved.presence.present.tolist() == [True, False, False, False, True]
 
 
+def test_no_velocity_is_measured_across_a_gap_in_the_times(mesh: MeshSequence) -> None:
+    later = Timebase(TIMES + 2.0 * (np.arange(24) >= 12))
+    vertices = np.array(mesh.vertices)
+    apart = vertices + np.array([0.0, 0.0, 1.0]) * (np.arange(24) >= 12)[:, None, None]
+    here, there = (replace(mesh, vertices=one, timebase=later) for one in (vertices, apart))
+    found = compare_meshes([here, there], ["a", "b"])
+    assert found.differences[1].velocity_rms_mps.max() < 0.05  # 0.5 m/s across the gap
+    assert found.notes == ()
+
+
 def test_frames_at_the_same_times_are_not_touched(mesh: MeshSequence) -> None:
     again, interpolated = resample_mesh(mesh, TIMES[3:9] + 2e-5)
     assert not interpolated

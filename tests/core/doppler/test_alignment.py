@@ -156,7 +156,7 @@ def test_an_offset_beyond_the_search_is_not_taken_for_one_within():
     velocity, times_s = motion(3), np.arange(0.0, 15.0, 0.05)
     # The peak is half a tenth of a second beyond what is searched.
     found = align(seen(velocity, times_s), seen(velocity, times_s + 2.05), within_s=2.0)
-    assert found.at_the_end
+    assert found.end == "search"
     with pytest.raises(Sd2Error, match="Search farther"):
         found.checked()
 

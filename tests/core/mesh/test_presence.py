@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from sd2core.errors import Sd2Error
 from sd2core.mesh.presence import Presence, gaps_in_words, runs
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.plausibility.clock import gaps_between
 from sd2core.timebase import Timebase
 
 
@@ -37,6 +38,20 @@ def test_a_frame_alone_has_no_motion_but_a_clip_of_one_frame_is_no_gap() -> None
     assert Presence.of(None, 1).measured.tolist() == [True]
     assert Presence.of(None, 3).whole
     assert presence.between(1, 4).measured.tolist() == [False, True, True]
+
+
+def test_where_frames_were_lost_another_stretch_begins() -> None:
+    times_s = np.array([0.0, 0.1, 0.2, 0.7, 0.8, 5.0, 5.1])  # 0.5 s is more than four steps
+    assert gaps_between(times_s).tolist() == [False, False, True, False, True, False]
+    assert not gaps_between(times_s[:1]).any()
+    assert not gaps_between(np.array([0.0, 0.01, 0.2])).any()  # less than 0.25 s
+    presence = Presence.of(None, 7, gaps_between(times_s))
+    assert presence.first.tolist() == [0, 0, 0, 3, 3, 5, 5]
+    assert presence.last.tolist() == [2, 2, 2, 4, 4, 6, 6]
+    assert (presence.whole, presence.measured.all()) == (False, True)
+    part = presence.between(2, 6)
+    assert part.first.tolist() == [0, 1, 1, 3]
+    assert part.measured.tolist() == [False, True, True, False]
 
 
 def test_what_is_missing_is_counted_in_frames_and_on_real_times() -> None:

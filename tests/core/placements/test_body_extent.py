@@ -81,7 +81,7 @@ def test_a_clip_without_anybody_is_refused():
     ("position_m", "interval_s", "radar", "words"),
     [
         ((4.5, 0.0, 0.0), 10.0, PAPER_RADAR, ()),
-        ((4.2, 0.0, 3.0), 10.0, None, ("stands in the body",)),
+        ((4.2, 0.0, 3.0), 10.0, None, ("stands in the box around the body",)),
         ((0.0, 0.0, -3.0), 10.0, None, ()),  # nothing folds in a histogram
         ((0.0, 0.0, -3.0), 10.0, PAPER_RADAR, ("11.5 m away: beyond 9.6 m", "the wrong sign")),
         ((4.5, 0.0, 0.0), 0.1, PAPER_RADAR, ("beyond 3.2 m/s",)),

@@ -75,6 +75,13 @@ def test_what_was_marked_keeps_its_label_once_it_is_left_behind(labelled, qtbot)
         playback.seek_frame(frame)
         key(labelled, qtbot, name)
     assert spans(labelled) == [("left-to-right", 5, 10), ("up-to-down", 20, 30)]
+    # Chosen again by hand, it is what the key is for.
+    playback.seek_frame(50)
+    chosen = models_of(labelled).labels.selected_ids
+    for ids in ((), chosen):
+        models_of(labelled).labels.select(ids)
+    key(labelled, qtbot, "4")
+    assert spans(labelled)[1] == ("down-to-up", 20, 30)
 
 
 def test_keys_while_it_plays(labelled, qtbot) -> None:

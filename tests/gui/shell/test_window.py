@@ -197,6 +197,7 @@ def test_a_grip_aligns_the_radar_in_one_step_while_that_is_asked_for(window, qtb
 
     def drag(start: QPoint, shift_px: int) -> None:
         qtbot.mousePress(real, Qt.MouseButton.LeftButton, pos=start)
+        qtbot.mousePress(real, Qt.MouseButton.MiddleButton, pos=start)  # takes nothing away
         for step in (0.3, 0.7, 1.0):
             qtbot.mouseMove(real, start + QPoint(round(step * shift_px), 0))
         qtbot.mouseRelease(real, Qt.MouseButton.LeftButton, pos=start + QPoint(shift_px, 0))
