@@ -50,8 +50,8 @@ def subject_of(recording: Recording, person: str, first: str) -> str:
     own = dict(zip(persons[1:], (one.person for one in recording.bodies), strict=True))
     # Who has no name is somebody else in each recording.
     folder = recording.folder
-    told_apart = first not in (folder.stem, recording.subject)
-    called = f"{folder.parent.name} {folder.stem}" if told_apart else folder.stem
+    usual = first in (folder.stem, recording.subject)
+    called = folder.stem if usual else f"{folder.parent.name} {folder.stem}"
     return person if own.get(person, person) else f"{called} {person}"
 
 

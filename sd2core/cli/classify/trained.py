@@ -17,7 +17,7 @@ from sd2core.cli.labels.suggest import (
     write_spans,
 )
 from sd2core.cli.output import counted, print_json, print_rows, progress_bar
-from sd2core.cli.recording_maps import parsed_maps
+from sd2core.cli.recording_maps import MapName, parsed_maps
 from sd2core.errors import Sd2Error
 from sd2core.options.kinds import NotNegative, Share
 from sd2core.options.records import OptionRecord, Place
@@ -66,6 +66,8 @@ class Apply(SearchedMap, TrainedModel, Json):
 
     Parameters
     ----------
+    of
+        which map of a recording (default: of a kind that was learnt from; synthetic, or radar)
     probabilities : FILE.npz
         write `probabilities` (frames, classes), `times_s` and `classes`
     min_duration_s : S
@@ -76,6 +78,7 @@ class Apply(SearchedMap, TrainedModel, Json):
         spans whose class is less probable on average are left out, as 50% or 0.5 (default: none)
     """
 
+    of: MapName | None = None
     probabilities: Annotated[Path | None, Place(endings=(".npz",))] = None
     min_duration_s: NotNegative = 0.2
     merge_gap_s: NotNegative = 0.1
@@ -190,7 +193,7 @@ def _apply(options: Apply) -> None:
         check_label_output(options.out)
     chosen = SpanOptions(options.min_duration_s, options.merge_gap_s, options.min_confidence or 0.0)
     card = describe_classifier(options.classifier)
-    doppler, clock = map_and_clock(options, card.axis)
+    doppler, clock = map_and_clock(options, card.axis, card.trained_on)
     # Before torch is loaded, which takes seconds.
     with errors_in(options.map):
         check_bins(doppler, card)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -124,11 +125,12 @@ def span_cells(span: Span) -> tuple[str, str, str]:
 
 
 def map_and_clock(
-    options: SearchedMap, axis: VelocityAxis | None = None
+    options: SearchedMap, axis: VelocityAxis | None = None, learnt: Sequence[str] = ()
 ) -> tuple[DopplerMap, Timebase]:
     """Read the map of ``options.map`` and ``options.of``, and the frame times of its labels.
 
-    A recording's capture becomes a map on the velocity axis given, or on its own.
+    A recording's capture becomes a map on the velocity axis given, or on its own. Where nothing is
+    chosen, it is a map of a kind that was ``learnt`` from.
     """
     from sd2core.io.kinds import kind_of
     from sd2core.io.radar import holds_map, load_recorded_map
@@ -139,7 +141,9 @@ def map_and_clock(
     kind = kind_of(path)
     if kind == "recording":
         recording = open_recording(path)
-        name = options.of or ("radar" if recording.mesh is None else "synthetic")
+        by_radar = bool({"simulated", "real"} & {*learnt}) and "synthetic" not in learnt
+        by_radar = recording.mesh is None or (by_radar and recording.radar is not None)
+        name = options.of or ("radar" if by_radar else "synthetic")
         return maps_of(recording, (name,), axis=axis)[name], recording_clock(recording)
     if options.of is not None:
         raise Sd2Error(f"--of is given, and {path} is no recording", "--of for a recording only")

@@ -181,8 +181,11 @@ def test_a_classifier_is_judged_on_a_labelled_recording(sd2: Sd2, model: Path) -
     assert np.sum(found["gestures"]) == 8
 
 
-def test_a_capture_of_a_recording_is_seen_as_the_classifier_learnt(sd2: Sd2, model: Path) -> None:
-    found = sd2("classify", "apply", SAMPLE, "--of", "radar", "--model", model, "--json")
+@pytest.mark.parametrize("chosen", [("--of", "radar"), ()])
+def test_a_capture_of_a_recording_is_seen_as_the_classifier_learnt(
+    sd2: Sd2, model: Path, chosen: tuple[str, ...]
+) -> None:
+    found = sd2("classify", "apply", SAMPLE, *chosen, "--model", model, "--json")
     assert found.code == 0, found.err
     assert json.loads(found.out)["map_kind"] == "simulated"
 
