@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -30,10 +31,11 @@ def people_shown(paths: Sequence[Path]) -> list[str]:
 
 def told_apart(said: Sequence[str], paths: Sequence[Path]) -> list[str]:
     """Names that files give people; without one each shows another, called as file or folder is."""
+    places = [Path(os.path.abspath(path)) for path in paths]  # however they were typed
     names = [name or path.stem for name, path in zip(said, paths, strict=True)]
-    folders = [path.absolute().parent.name for path in paths]
-    stems = [f"{folder} {path.stem}" for folder, path in zip(folders, paths, strict=True)]
-    for others in (folders, stems, [str(path) for path in paths]):
+    folders = [path.parent.name or path.stem for path in places]
+    stems = [f"{path.parent.name} {path.stem}" for path in places]
+    for others in (folders, stems, [str(path) for path in places]):
         count = Counter(name for known, name in zip(said, names, strict=True) if not known)
         names = [
             known or (name if count[name] == 1 else other)

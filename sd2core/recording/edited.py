@@ -19,7 +19,7 @@ from sd2core.recording.recording import Recording, settings_of
 _ALWAYS = ("sensor", "placements", "radar_offset_s")
 MESH = ("mesh", "faces", "mesh_reading", "camera")
 """Names of the fields on which the mesh depends."""
-EDITED = tuple(WORDS)
+EDITED = tuple(name for name in WORDS if name != "title")  # which saving elsewhere gives
 """Names of the fields. Journals of earlier versions lack some of them."""
 
 

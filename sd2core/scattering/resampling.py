@@ -32,8 +32,9 @@ def resample_mesh(mesh: MeshSequence, times_s: NDArray[np.float64]) -> tuple[Mes
     interpolated = bool((np.abs(own[nearest] - times_s)[within] > SAME_S).any())
     frames = np.searchsorted(own, times_s, side="right").clip(1, max(len(own) - 1, 1)) - 1
     following = (frames + 1).clip(max=len(own) - 1)
-    # Between two frames there is a person where both of them have one.
-    present = presence.present[frames] & presence.present[following] & within
+    # Between two frames there is a person where both have one, and none were lost between them.
+    together = presence.first[frames] == presence.first[following]
+    present = presence.present[frames] & presence.present[following] & together & within
 
     def made(rows: NDArray[np.intp]) -> NDArray[Any]:
         ends = frames[rows]

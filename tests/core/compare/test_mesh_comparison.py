@@ -141,6 +141,15 @@ def test_no_velocity_is_measured_across_a_gap_in_the_times(mesh: MeshSequence) -
     assert found.notes == ()
 
 
+def test_nobody_is_there_in_a_gap_of_the_times(mesh: MeshSequence) -> None:
+    later = replace(mesh, timebase=Timebase(TIMES + 1.0 * (np.arange(24) >= 12)))
+    times_s = np.arange(0.0, 1.7, 0.05)
+    moved, interpolated = resample_mesh(later, times_s)
+    assert interpolated
+    beyond = (times_s > later.times_s[11] - 1e-6) & (times_s < later.times_s[12])
+    np.testing.assert_array_equal(moved.presence.present, ~beyond)
+
+
 def test_frames_at_the_same_times_are_not_touched(mesh: MeshSequence) -> None:
     again, interpolated = resample_mesh(mesh, TIMES[3:9] + 2e-5)
     assert not interpolated

@@ -147,6 +147,7 @@ def test_who_has_no_name_is_somebody_else_in_each_recording(tmp_path: Path) -> N
         (("", ""), ("anna/walk.sd2", "ben/walk.sd2"), ["anna", "ben"]),
         (("", "", ""), ("anna/walk.sd2", "ben/walk.sd2", "x/run.sd2"), ["anna", "ben", "run"]),
         (("walk", ""), ("ben/run.sd2", "ben/walk.sd2"), ["walk", "walk"]),
+        (("", ""), ("anna/../ben/walk.sd2", "../r/anna/walk.sd2"), ["ben", "anna"]),
         (("eva", "eva"), ("a/walk.sd2", "b/walk.sd2"), ["eva", "eva"]),
         (("", "", ""), ("a/x/w.sd2", "b/x/w.sd2", "w.sd2"), ["/r/a/x/w.sd2", "/r/b/x/w.sd2", "r"]),
     ],
