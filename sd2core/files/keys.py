@@ -19,6 +19,7 @@ _CODE: dict[str, tuple[str, ...]] = {
         "io",
         "recording",
         "mesh",
+        "plausibility/clock.py",
     ),
     "fit": ("batch/fitting.py", "body", "io", "mesh", "timebase.py"),
     "synthesise": (
@@ -30,6 +31,7 @@ _CODE: dict[str, tuple[str, ...]] = {
         "accuracy",
         "mesh",
         "numerics",
+        "plausibility/clock.py",
         "scattering",
         "sensor.py",
         "maps.py",
@@ -49,6 +51,7 @@ _CODE: dict[str, tuple[str, ...]] = {
         "io",
         "mesh",
         "mocap/recording_pairs.py",
+        "plausibility/clock.py",
         "scattering",
         "sensor.py",
         "maps.py",

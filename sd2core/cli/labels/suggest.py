@@ -141,9 +141,11 @@ def map_and_clock(
     kind = kind_of(path)
     if kind == "recording":
         recording = open_recording(path)
-        by_radar = bool({"simulated", "real"} & {*learnt}) and "synthetic" not in learnt
-        by_radar = recording.mesh is None or (by_radar and recording.radar is not None)
-        name = options.of or ("radar" if by_radar else "synthetic")
+        known = {"radar" if kind in ("simulated", "real") else kind for kind in learnt}
+        there: list[MapName] = [] if recording.mesh is None else ["synthetic", "denoised"]
+        if recording.radar is not None or not there:
+            there.append("radar")
+        name: MapName = options.of or next((one for one in there if one in known), there[0])
         return maps_of(recording, (name,), axis=axis)[name], recording_clock(recording)
     if options.of is not None:
         raise Sd2Error(f"--of is given, and {path} is no recording", "--of for a recording only")
