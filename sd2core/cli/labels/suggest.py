@@ -145,7 +145,8 @@ def map_and_clock(
         there: list[MapName] = [] if recording.mesh is None else ["synthetic", "denoised"]
         if recording.radar is not None or not there:
             there.append("radar")
-        name: MapName = options.of or next((one for one in there if one in known), there[0])
+        usual = next((one for one in there if one in known), there[0])
+        name = options.of or usual
         return maps_of(recording, (name,), axis=axis)[name], recording_clock(recording)
     if options.of is not None:
         raise Sd2Error(f"--of is given, and {path} is no recording", "--of for a recording only")
