@@ -115,18 +115,19 @@ def notes_on(
     if not mesh.presence.present.any():
         return ()
     seen = BodyExtent.of(mesh).coverage((sensor,))
-    notes = []
-    if seen.inside[0]:
+    problems = {"inside": seen.inside} if radar is None else seen.problems(radar)
+    met, notes = {name for name, mask in problems.items() if mask[0]}, []
+    if "inside" in met:
         notes.append(
             "The sensor stands in the box around the body: what is nearest outweighs all else."
         )
-    if radar is not None and seen.farthest_m[0] > radar.range_max_m:
+    if radar is not None and "out_of_range" in met:
         turned = ", and velocities have the wrong sign" if radar.sampling == "real" else ""
         notes.append(
             f"The body is up to {seen.farthest_m[0]:.1f} m away: beyond {radar.range_max_m:.1f} m"
             f" this radar's beat frequencies fold, so that it seems to be nearer{turned}."
         )
-    if radar is not None and seen.fastest_mps[0] > radar.v_max_mps:
+    if radar is not None and "aliasing" in met:
         notes.append(
             f"The body is as fast as {seen.fastest_mps[0]:.1f} m/s: beyond"
             f" {radar.v_max_mps:.1f} m/s this radar's velocities fold."

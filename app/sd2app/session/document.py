@@ -28,6 +28,7 @@ from sd2app.session.content import (
 from sd2app.session.mesh_reading import MeshReader, ReadMesh, mesh_fields
 from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
+from sd2core.doppler.options import PRESETS
 from sd2core.errors import Cure, Sd2Error
 from sd2core.io.bodies import at_hand, with_bodies
 from sd2core.io.kinds import kind_of
@@ -45,9 +46,6 @@ from sd2core.sensor import VelocityAxis
 if TYPE_CHECKING:
     from sd2core.io.radar import RadarCapture
     from sd2core.io.video import VideoReader
-
-
-_COUNT: HowCounted = "expected"
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +79,7 @@ class DocumentModel(QObject):
         self.undo_stack = QUndoStack(self)
         self.content: Content | None = None  # all parts; None while nothing is open
         self.clutter: Clutter = CLUTTER  # method that removes static echoes from the capture
-        self.count: HowCounted = _COUNT  # of vertices whose mesh states its uncertainty
+        self.count = PRESETS["paper"].count  # of vertices whose mesh states its uncertainty
         self.same_recording = False  # as was open before, with other files
         self.growing = False  # a radar is listened to, and adds frames
         self.offers: tuple[OfferedCure, ...] = ()  # of reading the mesh another way
@@ -373,7 +371,8 @@ class DocumentModel(QObject):
 
     def _tell_opened(self, unsaved: bool) -> None:
         assert self.content is not None
-        self.clutter, self.count = CLUTTER, _COUNT  # chosen for the one before
+        # Chosen for the one before.
+        self.clutter, self.count = CLUTTER, PRESETS["paper"].count
         fields = mesh_fields(self.content.recording)
         self._meshes.reset(ReadMesh(fields, self.content.mesh, self.content.offers))
         self.undo_stack.clear()
