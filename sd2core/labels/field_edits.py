@@ -94,7 +94,7 @@ def offer(
     if TRACK not in {track.name for track in tracks}:
         tracks = (*tracks, LabelTrack(TRACK, "free"))
     after = tidied(replace(labels, tracks=tracks, spans=(*kept, *made)))
-    name = f"Suggest {len(made)} span{'s' * (len(made) != 1)}"
+    name = f"Suggest {len(made)} span{'s' * (len(made) != 1)}" if made else "Remove suggestions"
     return Edit(name, labels if after == labels else after, tuple(span.id for span in made))
 
 

@@ -48,7 +48,8 @@ def test_what_is_marked_or_was_turned_down_is_not_offered() -> None:
 
 def test_nothing_found_leaves_no_track_behind() -> None:
     some = offer(HERE, FRAMES, of_map((1.0, 2.0))).labels
-    assert offer(some, FRAMES, []).labels == HERE
+    none = offer(some, FRAMES, [])
+    assert (none.name, none.labels) == ("Remove suggestions", HERE)
     assert offer(HERE, FRAMES, []).labels is HERE
     assert reject(some, [5]).labels == HERE
 
