@@ -16,7 +16,7 @@ from sd2core.denoise.resample_to_model import check_map
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
 from sd2core.files.keys import key_of
-from sd2core.files.paths import files_at, user_cache
+from sd2core.files.paths import user_cache
 from sd2core.maps import DopplerMap
 from sd2core.progress import Progress, part_of, silent
 
@@ -53,16 +53,8 @@ def kept_map(key: str, make: Callable[[], DopplerMap]) -> DopplerMap:
 
 def mesh_identity(recording: Recording, digest: Callable[[Path], str] = cached_digest) -> str:
     """Hash of a recording's mesh, and of what stands and moves around it, and how it is read."""
-    assert recording.mesh is not None
-    reading = recording.mesh_options()
-    faces = reading.pop("faces", None)
-    parts = [digest(file) for file in files_at(recording.mesh)]
-    parts += [digest(Path(one.shape)) for one in recording.things if one.is_file]
-    parts += [digest(file) for one in recording.bodies for file in one.files]
-    identity: list[Any] = [parts, {key: str(value) for key, value in reading.items()}]
-    if faces is not None:
-        identity.append(digest(faces))
-    return key_of("inspect", {"mesh": identity})
+    reading = {key: str(value) for key, value in recording.mesh_options().items() if key != "faces"}
+    return key_of("inspect", {"mesh": [[*map(digest, recording.scene_files)], reading]})
 
 
 def synthetic_key(mesh: str, maker: Synthesizer, sensor: VirtualSensor, **asked: Any) -> str:

@@ -45,6 +45,11 @@ def signature(paths: Iterable[Path | str]) -> Signature:
     return entries
 
 
+def deep_signature(paths: Iterable[Path]) -> Signature:
+    """Signature of files, and of folders with all files in them."""
+    return signature(file for path in paths for file in _tree(path))
+
+
 class Digests:
     """Hashes of some files; those that have not changed are not read again.
 
@@ -69,7 +74,7 @@ class Digests:
 
     def look_at(self, path: Path) -> Signature:
         """Note the signature of a file or folder without hashing it."""
-        entries = signature(_tree(path))
+        entries = deep_signature([path])
         self.files += entries
         return entries
 
@@ -82,7 +87,7 @@ def cached_digest(path: Path) -> str:
     if not path.exists():
         return ""
     path = path.absolute()
-    if sum(entry[1] for entry in signature(_tree(path))) < _WORTH_KEEPING_BYTES:
+    if sum(entry[1] for entry in deep_signature([path])) < _WORTH_KEEPING_BYTES:
         return file_digest(path)
     place = _place(path)
     digests = Digests(*_kept(place))

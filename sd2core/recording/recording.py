@@ -20,6 +20,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_json, full_disk_named
 from sd2core.files.paths import (
     as_path,
+    files_at,
     free_path,
     is_absolute,
     located_path,
@@ -541,6 +542,14 @@ class Recording:
         from sd2core.io.bodies import load_scene
 
         return load_scene(self._present("mesh"), **self.mesh_options(), progress=progress)
+
+    @property
+    def scene_files(self) -> list[Path]:
+        """Files that the mesh, and what stands and moves around it, are read from."""
+        files = [] if self.mesh is None else files_at(self.mesh)
+        files += [Path(one.shape) for one in self.things if one.is_file]
+        files += [file for one in self.bodies for file in one.files]
+        return files if self.faces is None else [*files, self.faces]
 
     def mesh_options(self) -> dict[str, Any]:
         """Arguments with which :func:`sd2core.io.bodies.load_scene` reads the mesh."""

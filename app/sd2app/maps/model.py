@@ -40,6 +40,7 @@ from sd2core.doppler.body_error import body_error
 from sd2core.doppler.options import PRESETS
 from sd2core.doppler.synthesizer import FrameScattering, MapFrames, Synthesizer
 from sd2core.errors import Sd2Error
+from sd2core.files.digests import deep_signature
 from sd2core.maps import DopplerMap
 from sd2core.options.records import words_of
 from sd2core.options.synthesis import CHOSEN
@@ -190,7 +191,7 @@ class SynthesisModel(QObject):
             self._announce()
             return
         try:
-            self._synthesizers = SynthesizerCache(mesh, options)
+            self._synthesizers = SynthesizerCache(mesh, options, self._files)
             self._synthesizers.limbs = bool(self._wanting_limbs)
         except Sd2Error as error:
             self.failed.emit(str(error))
@@ -219,7 +220,7 @@ class SynthesisModel(QObject):
             self._stop()
         self._keep()
         options = replace(synthesizers.options, count=document.count)
-        self._synthesizers = synthesizers.among(mesh, options)
+        self._synthesizers = synthesizers.among(mesh, options, self._files)
         self._partial.mark_stale()
         if options != synthesizers.options:
             self._prefetcher.forget()
@@ -542,6 +543,12 @@ class SynthesisModel(QObject):
         if self._plan is None and self._may_choose():
             return None
         return final_quality(self._synthesizers, self._plan, self._accuracy.in_use)
+
+    @property
+    def _files(self) -> str:
+        """Signature of what the scene was read from: two meshes may be alike in some frames."""
+        recording = self._session.document.recording
+        return "" if recording is None else str(deep_signature(recording.scene_files))
 
     @property
     def _vertices(self) -> int:

@@ -53,27 +53,33 @@ class SynthesizerCache:
     """Makes a synthesizer per plan on demand, and keeps the newest.
 
     Those that count as many vertices share what is prepared, as far as they can.
-    ``options`` are those that no plan chooses. ``full`` is the synthesizer on the full mesh with
+    ``options`` are those that no plan chooses, ``files`` the signature of those that the mesh was
+    read from. ``full`` is the synthesizer on the full mesh with
     these options, for readouts of single vertices and for use without a plan; it shares what
     ``like`` has prepared, as far as it can.
     """
 
     def __init__(
-        self, mesh: MeshSequence, options: SynthesisOptions, like: Synthesizer | None = None
+        self,
+        mesh: MeshSequence,
+        options: SynthesisOptions,
+        files: str,
+        like: Synthesizer | None = None,
     ) -> None:
         self.mesh = mesh
         self.options = options
+        self._files = files
         self.full = Synthesizer(mesh, options, memory_budget_bytes=_BUDGET_BYTES, blocks_of=like)
         self.limbs = False  # True: maps are also split by the parts of the body
         self._made: OrderedDict[AccuracyPlan, Synthesizer] = OrderedDict()
         self._lock = threading.Lock()
 
-    def among(self, mesh: MeshSequence, options: SynthesisOptions) -> SynthesizerCache:
+    def among(self, mesh: MeshSequence, options: SynthesisOptions, files: str) -> SynthesizerCache:
         """Those of the same mesh among other things and people, or with other options.
 
         Whatever is the same is shared: of things and people that move, all but what they hide.
         """
-        other = SynthesizerCache(mesh, options, self.full)
+        other = SynthesizerCache(mesh, options, files, self.full)
         other.limbs = self.limbs
         if options == self.options and same_bodies(mesh, self.mesh):
             from sd2core.accuracy.trial import synthesizer_for
@@ -84,7 +90,7 @@ class SynthesizerCache:
 
     def key(self, plan: AccuracyPlan | None, sensor: VirtualSensor) -> Hashable:
         """Key of all that a final map depends on."""
-        return self._scene, plan and _key(plan), self.limbs, sensor
+        return self._files, self._scene, plan and _key(plan), self.limbs, sensor
 
     @functools.cached_property
     def _scene(self) -> str:

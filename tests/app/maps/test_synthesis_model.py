@@ -330,6 +330,27 @@ def test_a_place_that_was_left_comes_back_without_being_computed(context, qtbot,
     np.testing.assert_array_equal(context.synthetic.map.values, before)
 
 
+def test_what_was_kept_of_a_mesh_is_not_shown_of_one_that_differs_in_a_few_frames(
+    context, qtbot, ball
+):
+    usual = context.sensor.sensor
+    open_ball(context, qtbot, ball)
+    wait_until_done(context, qtbot)
+    context.edits.place_sensor(VirtualSensor(position_m=(0.4, 0.0, 0.0)))
+    wait_until_done(context, qtbot)
+    mended = dict(np.load(ball))
+    mended["vertices"][10:30, :, 2] += 0.1
+    np.savez(ball.with_name("mended.npz"), **mended)
+    open_ball(context, qtbot, ball.with_name("mended.npz"))
+    context.edits.place_sensor(usual)
+    wait_until_done(context, qtbot)
+    np.testing.assert_allclose(
+        context.synthetic.map.values,
+        Synthesizer(load_mesh(ball.with_name("mended.npz")), "paper").map(usual).values,
+        atol=1e-7,
+    )
+
+
 def test_work_for_a_place_that_is_left_again_does_not_come_after_what_was_kept(
     context, qtbot, ball, monkeypatch
 ):
