@@ -8,6 +8,7 @@ import sys
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -236,21 +237,18 @@ def test_movements_that_have_nothing_to_do_with_each_other_rarely_agree() -> Non
     assert passed <= 10
 
 
-def _check(*words: str) -> subprocess.CompletedProcess[str]:
+def _check(*words: str, where: Path | None = None) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "sd2core.cli", "record", "--check", *words]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    return subprocess.run(command, capture_output=True, text=True, check=False, cwd=where)
 
 
 @pytest.mark.slow
 def test_the_command_with_test_sources_records_nothing(tmp_path: Path) -> None:
-    done = _check("--camera", "test", "--radar", "test", "--seconds", "8", "--json")
-    told = json.loads(done.stdout)
-    findings = told["findings"]
+    done = _check("--camera", "test", "--radar", "test", "--seconds", "8", "--json", where=tmp_path)
+    findings = json.loads(done.stdout)["findings"]
     assert [one["name"] for one in findings] == ["motion", "range", "view", "agreement"]
-    assert all(one["passed"] for one in findings), findings
-    assert done.returncode == 0
-    assert told["place"]["range_m"] == pytest.approx(1.5, abs=0.15)
-    assert abs(told["place"]["azimuth_deg"]) < 3.0
+    assert done.returncode == (0 if all(one["passed"] for one in findings) else 1)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
@@ -265,13 +263,21 @@ def test_what_was_found_is_told_as_it_comes_and_q_ends_it() -> None:
         told = []
         for line in process.stdout:
             told.append(json.loads(line))
-            if told[-1]["event"] == "findings" and told[-1]["left_s"]:
+            # A busy machine takes longer until both have seen enough.
+            if told[-1]["event"] == "findings" and told[-1]["left_s"] and _all_passed(told[-1]):
                 process.stdin.write("q")
                 process.stdin.flush()
     kinds = [one["event"] for one in told]
     assert kinds.count("findings") >= 2
     assert "preview" in kinds
     assert told[-1]["left_s"] == 0
+    assert _all_passed(told[-1])
+    assert told[-1]["place"]["range_m"] == pytest.approx(1.5, abs=0.15)
+    assert abs(told[-1]["place"]["azimuth_deg"]) < 3.0
+
+
+def _all_passed(told: dict[str, Any]) -> bool:
+    return all(one["passed"] for one in told["findings"])
 
 
 @pytest.mark.slow
