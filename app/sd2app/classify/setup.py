@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -216,7 +216,7 @@ def division_of(data: Sequence[DataSource]) -> Split | None:
     from sd2core.datasets.labelled import people_of
     from sd2core.train.data import split_subjects
 
-    facts = _told_apart([one for source in data for one in source.facts])
+    facts = _told_apart(data)
     people = people_of(facts)
     if not people:
         return None
@@ -229,15 +229,18 @@ def division_of(data: Sequence[DataSource]) -> Split | None:
     return split_subjects(people, validation or None, test or None)
 
 
-def _told_apart(facts: Sequence[LabelledFacts]) -> list[LabelledFacts]:
-    """Facts of recordings that name nobody, each of another person, as the command takes them."""
-    from sd2core.datasets.people import told_apart
+def _told_apart(data: Sequence[DataSource]) -> list[LabelledFacts]:
+    """Facts of sources, whose people are called as the command calls them that takes all."""
+    from sd2core.datasets.labelled import labelled_facts, unfolded
 
-    single = [one for one in facts if one.kind == "recording" and len(one.subjects) == 1]
-    said = ["" if one.subjects == (one.path.stem,) else one.subjects[0] for one in single]
-    paths = [one.path for one in single]
-    names = {path: (name,) for path, name in zip(paths, told_apart(said, paths), strict=True)}
-    return [replace(one, subjects=names.get(one.path, one.subjects)) for one in facts]
+    known = {one.path: one for source in data for one in source.facts}
+    sources = unfolded([LabelledSource(one.path, one.person) for one in data if one.facts])
+    return [
+        facts
+        if (facts := known.get(one.path)) and one.subject in ("", facts.subjects[0])
+        else labelled_facts(one)
+        for one in sources
+    ]
 
 
 def why_not_together(data: Sequence[DataSource], maps: Sequence[str] = ()) -> str:

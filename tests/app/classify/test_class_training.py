@@ -5,11 +5,13 @@ from __future__ import annotations
 import shutil
 import signal
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import fake_class_command
 import pytest
+from scenes_of_people import scene
 from small_pairs import write_pairs
 
 from sd2app.classify.panel import recall_text
@@ -26,6 +28,7 @@ from sd2core.cli.command_parser import record_of
 from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
+from sd2core.labels.field_edits import rename_persons
 from sd2core.runs.command_folder import CommandFolder, last_output
 from sd2core.runs.pace import keep_pace
 from sd2core.runs.progress import ProgressTail
@@ -157,6 +160,27 @@ def test_who_is_learnt_from_is_who_the_command_learns_from(set_up, tmp_path, qtb
     assert parts["test"] == list(division.test)
     words = division_text(division, "sd2 classify eval")
     assert words.endswith("s4 kept for sd2 classify eval.")
+
+
+def test_two_recordings_of_one_name_show_others_here_as_for_the_command(set_up, tmp_path, qtbot):
+    from sd2core.cli.classify.data import clips_of
+
+    setup = (model := set_up.training()).setup
+    for folder in ("monday", "tuesday"):
+        (tmp_path / folder).mkdir()
+        made = scene(tmp_path / folder / "walk.sd2")
+        made.subject, made.bodies = "", (replace(made.bodies[0], person=""),)
+        made.labels = rename_persons(
+            made.labels, dict(zip(("anna", "bert"), made.persons, strict=True))
+        ).labels
+        made.save()
+        setup.add(made.folder)
+    known(model, qtbot)
+    division = setup.division
+    people = {*division.training, *division.validation, *division.test}
+    data = typed(setup.train_arguments(tmp_path / "m.safetensors")).data
+    assert people == {*clips_of(data, ("synthetic",)).subjects}
+    assert len(people) == 4
 
 
 def test_what_does_not_go_together_is_named(set_up, tmp_path, qtbot):
