@@ -13,6 +13,7 @@ from sd2app.maps.track_mouse import SeekingPlot
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.session import Session
 from sd2app.widgets.layouts import Part, row_of
+from sd2app.widgets.panel import ElidedLabel
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, clock_text, tick_step, ticks
 
 _BUTTONS = ("first_frame", "previous_frame", "play", "next_frame", "last_frame", "loop")
@@ -35,8 +36,7 @@ class TransportBar(QWidget):
         self._stretch.setToolTip("Play on beyond the span (Esc)")
         self._stretch.clicked.connect(looped.end)
         self._time = self._label("00:00.000 ")
-        self._frame = self._label("frame 162000 / 162000")
-        self._frame.setObjectName("muted")
+        self._frame = ElidedLabel(self, "muted", "frame 162000 / 162000")
         self._speed = self._label("0.25× ")
         self._speed.setAlignment(Qt.AlignmentFlag.AlignCenter)
         steps = [self._button(action(name)) for name in _BUTTONS]

@@ -220,10 +220,14 @@ _MIN_LETTERS = 7
 
 
 class ElidedLabel(QLabel):
-    """A label as narrow as need be; the whole text is in its tooltip and its accessible name."""
+    """A label as narrow as need be; the whole text is in its tooltip and its accessible name.
 
-    def __init__(self, parent: QWidget | None = None, role: str = "") -> None:
+    With the ``longest`` of its texts it takes room for that, so that nothing beside it moves.
+    """
+
+    def __init__(self, parent: QWidget | None = None, role: str = "", longest: str = "") -> None:
         super().__init__(parent)
+        self._longest = longest
         self.setObjectName(role)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
 
@@ -235,13 +239,13 @@ class ElidedLabel(QLabel):
             self.setAccessibleName(text)
 
     def minimumSizeHint(self) -> QSize:
-        """Size of a few words."""
-        return QSize(40, super().minimumSizeHint().height())
+        """Size of a few words; where the longest is known, it may go."""
+        return QSize(0 if self._longest else 40, super().minimumSizeHint().height())
 
     def sizeHint(self) -> QSize:
         """Size of the whole text."""
         metrics = self.fontMetrics()
-        return QSize(metrics.horizontalAdvance(self.text()) + 4, metrics.height())
+        return QSize(metrics.horizontalAdvance(self._longest or self.text()) + 4, metrics.height())
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Paint the text, elided where there is no room."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 from finding import button_of
 from kept_window import opened
@@ -15,6 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from sd2app.playback.views import TransportBar
 from sd2app.session.display import LAYOUTS
 from sd2app.widgets.panel import InnerPages
 
@@ -74,6 +77,20 @@ def test_words_of_all_panels_have_room(empty_window, qtbot, small_recording, siz
                 inner[0].turn_to(page)
             QApplication.processEvents()
             assert faults(window) == [], (panel, page)
+
+
+def test_nothing_of_the_last_line_is_painted_over_the_next(
+    empty_window, qtbot, small_recording
+) -> None:
+    window = opened(empty_window, qtbot, small_recording)
+    window.setMinimumSize(0, 0)
+    window.resize(560, 467)  # less than a small screen has with everything half as large again
+    QApplication.processEvents()
+    assert window.width() == 560
+    (bar,) = window.findChildren(TransportBar)
+    shown = [one for one in bar.findChildren(QWidget) if one.isVisible() and one.width()]
+    edges = sorted((one.x(), one.x() + one.width()) for one in shown)
+    assert all(end <= begin for (_, end), (begin, _) in pairwise(edges))
 
 
 def test_a_choice_without_effect_is_not_offered(empty_window, qtbot, small_recording) -> None:
