@@ -103,22 +103,16 @@ _LOOKED_AT = 4096
 _EXPECTED_TEXT = "labels of Audacity, MNE, Praat, or a table with a heading"
 
 
-def _write_own(
-    path: Path, labels: Labels, timebase: Timebase, media: Path | None = None
-) -> list[Loss]:
+def _write_own(path: Path, labels: Labels, timebase: Timebase, media: Path | None) -> list[Loss]:
     files.write_labels(path, labels, timebase=timebase, video=media)
     return []
 
 
-def _read_own(path: Path, observation: str | None) -> Labels:
-    return files.read_labels(path).labels
-
-
-_Read = Callable[[Path, str | None], Labels | LabelRows]
+_Read = Callable[[Path, Timebase | None, str | None], Labels | LabelRows]
 _Write = Callable[[Path, Labels, Timebase, Path | None], list[Loss]]
 
 _PROGRAMS: tuple[tuple[LabelFormat, _Read, _Write | None], ...] = (
-    (OWN, _read_own, _write_own),
+    (OWN, lambda path, *_: files.read_labels(path).labels, _write_own),
     (csv_table.FORMAT, csv_table.read, csv_table.write),
     (audacity.FORMAT, audacity.read, audacity.write),
     (elan.FORMAT, elan_reading.read, elan.write),
@@ -217,13 +211,13 @@ def read_label_file(
     chosen = format_for(path, writing=False) if format is None else _named(format)
     with errors_in(path):
         if chosen.name in _READ:
-            content = _READ[chosen.name](path, observation)
+            content = _READ[chosen.name](path, timebase, observation)
         else:
             content = _plug_in(chosen.name).use(
                 lambda program: program.read(path, timebase, observation), (Labels, LabelRows)
             )
         if isinstance(content, LabelRows):
-            return assembled(path, content, clock).beside(timebase)
+            return assembled(content, clock).beside(timebase)
         return LabelReading(content).beside(timebase)
 
 

@@ -15,7 +15,6 @@ from sd2core.labels.formats.losses import LabelFormat, Loss
 from sd2core.labels.formats.numbers import finite_number, positional
 from sd2core.labels.formats.rows import UNNAMED, LabelRows, Row
 from sd2core.labels.spans import Labels
-from sd2core.timebase import Timebase
 
 FORMAT = LabelFormat(
     name="audacity",
@@ -29,21 +28,8 @@ FORMAT = LabelFormat(
 _EXPECTED = "an Audacity label file: start, end and text in each line, separated by tabs"
 
 
-def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
-    """Write all tracks as one label track.
-
-    Parameters
-    ----------
-    path : Path
-    labels : Labels
-    timebase, media
-        Not used: the format has neither frames nor a video.
-
-    Returns
-    -------
-    list of Loss
-        Empty: what is lost depends on the format alone.
-    """
+def write(path: Path, labels: Labels, *_: object) -> list[Loss]:
+    """Write all tracks as one label track; what is lost depends on the format alone."""
     lines = [
         f"{positional(span.start_s, min_digits=6)}\t{positional(span.end_s, min_digits=6)}"
         f"\t{span.label}\n"
@@ -53,7 +39,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     return []
 
 
-def read(path: Path, observation: str | None = None) -> LabelRows:
+def read(path: Path, *_: object) -> LabelRows:
     """Read labels; a point label is a mark without a duration.
 
     Raises Sd2Error naming the line that is no label.
@@ -66,16 +52,16 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
         cells = line.split("\t", 2)
         if len(cells) < 2:
             raise Sd2Error(f"{path}, line {number} is {line[:100]!r}", _EXPECTED)
-        with result.entry():
-            start_s, end_s = (_seconds(path, number, cell) for cell in cells[:2])
+        with result.entry(f"line {number}"):
+            start_s, end_s = map(_seconds, cells[:2])
             text = cells[2] if len(cells) > 2 else ""
             result.rows.append(Row(f"line {number}", start_s, end_s, text or UNNAMED))
     return result
 
 
-def _seconds(path: Path, line: int, text: str) -> float:
+def _seconds(text: str) -> float:
     # Some locales of older versions export decimal commas; tabs separate, so they are plain.
     value = finite_number(text.replace(",", "."))
     if value is None:
-        raise Sd2Error(f"{path}, line {line}: a time is {text[:50]!r}", _EXPECTED)
+        raise Sd2Error(f"a time is {text[:50]!r}", _EXPECTED)
     return value

@@ -25,7 +25,7 @@ from sd2core.files.tables import counted
 from sd2core.files.texts import read_json
 from sd2core.labels.formats.lanes import Lane, edges_s, lanes_of, track_of
 from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss
-from sd2core.labels.formats.rows import LabelRows, Row, clean_name
+from sd2core.labels.formats.rows import LabelRows, Row, chosen_observation, clean_name
 from sd2core.labels.label_set import GESTURES, Label, LabelSet, with_own_keys
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
@@ -52,17 +52,10 @@ _EXPECTED = "a BORIS project (.boris) with observations"
 _NO_SUBJECT = "No focal subject"
 
 
-def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
+def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None) -> list[Loss]:
     """Write a project with one observation, called like the file; what it cannot hold is returned.
 
-    Parameters
-    ----------
-    path : Path
-    labels : Labels
-    timebase : Timebase
-        Of the video: frames of the events, and its length.
-    media : Path, optional
-        The video, linked relative to the file; without it, it is a live observation.
+    The video is linked relative to the file; without one it is a live observation.
     """
     now = datetime.now().isoformat(timespec="seconds")
     lanes = lanes_of(labels, edges_s)
@@ -112,24 +105,24 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     return _unwelcome(labels)
 
 
-def read(path: Path, observation: str | None = None) -> LabelRows:
+def read(path: Path, _: Timebase | None, observation: str | None) -> LabelRows:
     """Read the state events of one observation; point events are marks without a duration.
 
     The observation's id is needed when the project has several. Raises Sd2Error when the file is no
     project, or the observation is not certain.
     """
     project = _project(path)
-    name = _chosen(path, project["observations"], observation)
+    name = chosen_observation(project["observations"], observation)
     content = project["observations"][name]
     events = content.get("events") if isinstance(content, dict) else None
     if not isinstance(events, list):
         raise Sd2Error(f"The observation {name!r} in {path} has no events", _EXPECTED)
-    behaviours = [one for one in _entries(project, "behaviors_conf") if isinstance(one, dict)]
+    behaviours = _entries(project, "behaviors_conf")
     points = {
         str(one.get("code")) for one in behaviours if "point" in str(one.get("type")).casefold()
     }
     result = LabelRows(label_set=_label_set(project.get(_LABEL_SET), behaviours))
-    _add_rows(result, path, events, points, _start_s(content))
+    _add_rows(result, events, points, _start_s(content))
     subjects = [str(one.get("name", "")) for one in _entries(project, "subjects_conf")]
     used = {row.track for row in result.rows}
     ours = _LABEL_SET in project
@@ -172,7 +165,7 @@ def _project(path: Path) -> dict[str, Any]:
     return project
 
 
-def _entries(project: dict[str, Any], key: str) -> list[Any]:
+def _entries(project: dict[str, Any], key: str) -> list[dict[str, Any]]:
     section = project.get(key)
     entries = list(section.values()) if isinstance(section, dict) else []
     return [one for one in entries if isinstance(one, dict)]
@@ -186,28 +179,13 @@ def observations(path: Path) -> tuple[str, ...]:
     return tuple(_project(path)["observations"])
 
 
-def _chosen(path: Path, observations: dict[str, Any], wanted: str | None) -> str:
-    if wanted is not None and wanted in observations:
-        return wanted
-    if wanted is None and len(observations) == 1:
-        return next(iter(observations))
-    names = ", ".join(map(repr, list(observations)[:20])) or "none"
-    raise Sd2Error(
-        f"{path} has {len(observations)} observations: {names}",
-        "one observation" if wanted is None else f"the observation {wanted!r}",
-        "Name the one to read",
-    )
-
-
-def _add_rows(
-    taken: LabelRows, path: Path, events: list[Any], points: set[str], video_s: float
-) -> None:
+def _add_rows(taken: LabelRows, events: list[Any], points: set[str], video_s: float) -> None:
     """Add spans of events: each second one of a subject, behaviour and modifiers is a stop."""
     begun: dict[tuple[str, str, str], tuple[float, str]] = {}
     for number, event in enumerate(events, start=1):
         place = f"event {number}"
-        with taken.entry():
-            time_s, subject, code, modifiers, comment = _event(path, place, event)
+        with taken.entry(place):
+            time_s, subject, code, modifiers, comment = _event(place, event)
             time_s -= video_s  # when the video begins
             track = track_of(subject or _NO_SUBJECT)[0]
             key = (subject, code, modifiers)
@@ -224,19 +202,18 @@ def _add_rows(
     for (subject, code, _), (time_s, _) in begun.items():
         with taken.entry():
             raise Sd2Error(
-                f"{path}, {code!r} of {subject or _NO_SUBJECT!r} begins at {time_s:g} s and does"
-                " not end",
+                f"{code!r} of {subject or _NO_SUBJECT!r} begins at {time_s:g} s and does not end",
                 "a stop for every start",
                 "Mend it in BORIS: Observations, Fix unpaired events",
             )
 
 
-def _event(path: Path, place: str, event: Any) -> tuple[float, str, str, str, str]:
+def _event(place: str, event: Any) -> tuple[float, str, str, str, str]:
     if not isinstance(event, list) or len(event) < 3 or isinstance(event[0], bool):
-        raise Sd2Error(f"{path}, {place} is {str(event)[:100]!r}", "time, subject and behaviour")
+        raise Sd2Error(f"{place} is {str(event)[:100]!r}", "time, subject and behaviour")
     time_s = event[0] if isinstance(event[0], int | float) else math.nan
     if not abs(time_s) < _LAST_S:
-        raise Sd2Error(f"{path}, {place}: the time is {str(event[0])[:50]!r}", "seconds")
+        raise Sd2Error(f"the time is {str(event[0])[:50]!r}", "seconds")
     subject, code, modifiers, comment = (
         "" if one is None else str(one) for one in (*event[1:5], *[""] * (5 - len(event)))
     )

@@ -29,7 +29,7 @@ from sd2core.files.tables import as_cell, of_cell
 from sd2core.files.texts import read_text
 from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, hold_texts
 from sd2core.labels.formats.numbers import finite_number, whole_number
-from sd2core.labels.formats.rows import UNNAMED, LabelRows, Row
+from sd2core.labels.formats.rows import UNNAMED, LabelRows, Row, chosen_observation
 from sd2core.labels.spans import Labels
 from sd2core.labels.typed_times import seconds_of
 from sd2core.plausibility.clock import UNITS_S
@@ -84,18 +84,8 @@ _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 _EXPECTED = "a table with a heading that names label, start_s and end_s"
 
 
-def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
-    """Write a table; what it cannot hold is returned.
-
-    Parameters
-    ----------
-    path : Path
-    labels : Labels
-    timebase : Timebase
-        Of the recording: for the columns of frames.
-    media : Path, optional
-        Not used.
-    """
+def write(path: Path, labels: Labels, timebase: Timebase, *_: object) -> list[Loss]:
+    """Write a table; what it cannot hold is returned."""
     held, replaced = hold_texts(labels, _BANNED, FORMAT.title)
     text = io.StringIO(newline="")
     # Texts in quotes keep the spaces around them, whoever reads them.
@@ -120,7 +110,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     return replaced
 
 
-def read(path: Path, observation: str | None = None) -> LabelRows:
+def read(path: Path, _: Timebase | None, observation: str | None) -> LabelRows:
     """Read a table, of this program or another.
 
     Separators may be commas, semicolons, tabs or bars; decimal points may be commas where these do
@@ -134,21 +124,24 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
     result = LabelRows()
     whole: list[tuple[int, list[str]]] = []
     for line, cells in lines:
-        with result.entry():
-            _check_width(path, line, cells, heading, separator)
+        with result.entry(f"line {line}"):
+            _check_width(line, cells, heading, separator)
             whole.append((line, cells))
-    if "observation" in where:
-        whole = _of_observation(path, whole, where["observation"], observation)
+    column = where.get("observation")
+    if column is not None and (whole or observation is not None):
+        names = sorted({cells[column] for _, cells in whole})
+        name = chosen_observation(names, observation)
+        whole = [(line, cells) for line, cells in whole if cells[column] == name]
     units_s = {column: _named(heading[where[column]])[1] for column in _TIMES if column in where}
     numbers = _Numbers(path, whole, where, units_s)
     if not where.keys() & {"end_s", "duration_s", "start_frame"}:
         result.remarks.append(f"marks, as no column of ends is known ({', '.join(heading)[:200]})")
     for line, cells in whole:
-        with result.entry():
+        with result.entry(f"line {line}"):
             cell = {name: of_cell(cells[index]) for name, index in where.items()}
-            start_s, end_s, frames = _times(path, line, numbers, cell)
+            start_s, end_s, frames = _times(numbers, cell)
             known = cell.get("confidence")
-            confidence = numbers.of(line, "confidence", known) if known else None
+            confidence = numbers.of("confidence", known) if known else None
             label = cell["label"] or UNNAMED
             row = Row(f"line {line}", start_s, end_s, label, confidence=confidence, frames=frames)
             result.add_line(row, cell)
@@ -191,16 +184,14 @@ def _separator(path: Path, text: str) -> str:
     return fitting[0]
 
 
-def _check_width(
-    path: Path, line: int, cells: Sequence[str], heading: Sequence[str], separator: str
-) -> None:
+def _check_width(line: int, cells: Sequence[str], heading: Sequence[str], separator: str) -> None:
     if len(cells) == len(heading):
         return
     hint = "Mend that line, or export the table again"
     if len(cells) > len(heading) and separator == ",":
         hint = "Decimal commas in a table separated by commas? Save it with semicolons"
     raise Sd2Error(
-        f"{path}, line {line} has {len(cells)} columns, its heading {len(heading)}",
+        f"line {line} has {len(cells)} columns, its heading {len(heading)}",
         "as many as the heading",
         hint,
     )
@@ -253,21 +244,6 @@ def _columns(path: Path, heading: Sequence[str]) -> dict[str, int]:
     return columns
 
 
-def _of_observation(
-    path: Path, lines: list[tuple[int, list[str]]], column: int, wanted: str | None
-) -> list[tuple[int, list[str]]]:
-    names = sorted({cells[column] for _, cells in lines})
-    if wanted is None and len(names) <= 1:
-        return lines
-    if wanted not in names:
-        raise Sd2Error(
-            f"{path} holds the observations {', '.join(map(repr, names))}",
-            "one observation" if wanted is None else f"the observation {wanted!r}",
-            "Name the one to read",
-        )
-    return [(line, cells) for line, cells in lines if cells[column] == wanted]
-
-
 class _Numbers:
     """Numbers of one table, which agree on what a comma means."""
 
@@ -278,7 +254,7 @@ class _Numbers:
         where: dict[str, int],
         units_s: dict[str, float],
     ) -> None:
-        self._path, self._units_s = path, units_s
+        self._units_s = units_s
         columns = [where[one] for one in _TIMES if one in where]
         texts = [cells[column].strip() for _, cells in lines for column in columns]
         texts = [text for text in texts if _NUMBER.fullmatch(text) or _GROUPED.fullmatch(text)]
@@ -297,46 +273,36 @@ class _Numbers:
                 "Save it again with decimal points",
             )
 
-    def of(self, line: int, column: str, text: str) -> float:
+    def of(self, column: str, text: str) -> float:
         """The number in a cell, of a time also in hours, minutes and seconds."""
         if ":" in text and column.endswith("_s"):
-            if (seconds := seconds_of(text)) is None:
-                raise Sd2Error(
-                    f"{self._path}, line {line}: {column} is {text[:50]!r}",
-                    "seconds, or hours:minutes:seconds",
-                )
-            return seconds
-        plain = _NUMBER.fullmatch(text.strip())
-        value = finite_number(plain[0].replace(",", ".")) if plain else None
+            value, unit, expected = seconds_of(text), 1.0, "seconds, or hours:minutes:seconds"
+        else:
+            plain = _NUMBER.fullmatch(text.strip())
+            value = finite_number(plain[0].replace(",", ".")) if plain else None
+            unit, expected = self._units_s.get(column, 1.0), "a finite number"
         if value is None:
-            raise Sd2Error(
-                f"{self._path}, line {line}: {column} is {text[:50]!r}", "a finite number"
-            )
-        return value * self._units_s.get(column, 1.0)
+            raise Sd2Error(f"{column} is {text[:50]!r}", expected)
+        return value * unit
 
 
-def _times(
-    path: Path, line: int, numbers: _Numbers, cell: dict[str, str]
-) -> tuple[float, float, tuple[int, int] | None]:
+def _times(numbers: _Numbers, cell: dict[str, str]) -> tuple[float, float, tuple[int, int] | None]:
     """Start and end in seconds, or the frames that stand for them."""
     if "start_s" in cell and ({"end_s", "duration_s"} & cell.keys() or "start_frame" not in cell):
-        start_s = numbers.of(line, "start_s", cell["start_s"])
+        start_s = numbers.of("start_s", cell["start_s"])
         if "end_s" in cell:
-            return start_s, numbers.of(line, "end_s", cell["end_s"]), None
+            return start_s, numbers.of("end_s", cell["end_s"]), None
         if "duration_s" in cell:
-            return start_s, start_s + numbers.of(line, "duration_s", cell["duration_s"]), None
+            return start_s, start_s + numbers.of("duration_s", cell["duration_s"]), None
         return start_s, start_s, None  # a mark
-    first = _frame(path, line, "start_frame", cell["start_frame"])
-    end = (
-        _frame(path, line, "end_frame", cell["end_frame"])
-        if "end_frame" in cell
-        else _frame(path, line, "last_frame", cell["last_frame"]) + 1
-    )
+    first = _frame("start_frame", cell)
+    in_half_open = "end_frame" in cell
+    end = _frame("end_frame", cell) if in_half_open else _frame("last_frame", cell) + 1
     return 0.0, 0.0, (first, end)
 
 
-def _frame(path: Path, line: int, column: str, text: str) -> int:
-    number = whole_number(text.strip().removesuffix(".0"))  # pandas', where some are missing
+def _frame(column: str, cell: dict[str, str]) -> int:
+    number = whole_number(cell[column].strip().removesuffix(".0"))  # pandas', where some miss
     if number is None:
-        raise Sd2Error(f"{path}, line {line}: {column} is {text[:50]!r}", "a whole number from 0")
+        raise Sd2Error(f"{column} is {cell[column][:50]!r}", "a whole number from 0")
     return number

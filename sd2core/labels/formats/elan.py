@@ -61,22 +61,11 @@ _MIME = {".mp4": "video/mp4", ".mkv": "video/x-matroska", ".mov": "video/quickti
          ".avi": "video/x-msvideo", ".webm": "video/webm", ".wav": "audio/x-wav"}  # fmt: skip
 
 
-def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
+def write(path: Path, labels: Labels, _: Timebase, media: Path | None) -> list[Loss]:
     """Write an annotation document; what it cannot hold is returned.
 
-    Parameters
-    ----------
-    path : Path
-    labels : Labels
-    timebase : Timebase
-        Not used: the format has no frames.
-    media : Path, optional
-        The video, linked in full and relative to the file.
-
-    Raises
-    ------
-    Sd2Error
-        When a span ends after 2**32 - 1 ms, about 49 days.
+    The video is linked in full and relative to the file. Raises Sd2Error when a span ends after
+    2**32 - 1 ms, about 49 days.
     """
     held, replaced = hold_texts(labels, _BANNED, FORMAT.title)
     held, moved = _in_range(path, held)

@@ -37,7 +37,7 @@ _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#
 _EXPECTED = "an ELAN file (.eaf)"
 
 
-def read(path: Path, observation: str | None = None) -> LabelRows:
+def read(path: Path, *_: object) -> LabelRows:
     """Read the tiers of a document; what depends on an annotation becomes its note.
 
     Edges without a time are put evenly between those with one, as ELAN draws them. Raises Sd2Error
@@ -58,8 +58,8 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
         result.tracks.append(track_of(name))
         times_ms = slots.of_tier(tier)
         for annotation in tier.iter("ALIGNABLE_ANNOTATION"):
-            with result.entry():
-                result.rows.append(_row(path, tier, annotation, times_ms, shift_s, below))
+            with result.entry(place := f"annotation {annotation.get('ANNOTATION_ID', '')}"):
+                result.rows.append(_row(place, tier, annotation, times_ms, shift_s, below))
     if slots.placed:
         result.remarks.append(
             f"{counted(len(slots.placed), 'edge')} without a time put evenly between those with one"
@@ -118,7 +118,7 @@ def _dependents(document: Element) -> dict[str, list[tuple[str, str, str]]]:
 
 
 def _row(
-    path: Path,
+    place: str,
     tier: Element,
     annotation: Element,
     times_ms: dict[str, float],
@@ -126,12 +126,11 @@ def _row(
     below: dict[str, list[tuple[str, str, str]]],
 ) -> Row:
     name = annotation.get("ANNOTATION_ID", "")
-    place = f"annotation {name}"
     edges = [annotation.get(f"TIME_SLOT_REF{side}", "") for side in (1, 2)]
     missing = [edge for edge in edges if edge not in times_ms]
     if missing:
         raise Sd2Error(
-            f"{path}, {place}: the time slot {missing[0][:50]!r} has no time in numbers",
+            f"the time slot {missing[0][:50]!r} has no time in numbers",
             "annotations with a start and an end",
             "Align it in ELAN, or delete its tier",
         )
@@ -151,22 +150,18 @@ def _row(
         track_of(tier.get("TIER_ID", ""))[0],
         texts["note"] if ours else texts["note"].rstrip("\n"),
         texts["author"] or ("" if ours else tier.get("ANNOTATOR", "")),
-        _confidence(path, place, texts["confidence"]),
+        _confidence(texts["confidence"]),
         texts["origin"] or "import",
         whole_number(name[1:]) if name.startswith("a") else None,
         person=texts["person"],
     )
 
 
-def _confidence(path: Path, place: str, text: str) -> float | None:
-    if not text.strip():
-        return None
+def _confidence(text: str) -> float | None:
     try:
-        return float(text)
+        return float(text) if text.strip() else None
     except ValueError:
-        raise Sd2Error(
-            f"{path}, {place}: the confidence is {text[:50]!r}", "a number from 0 to 1"
-        ) from None
+        raise Sd2Error(f"the confidence is {text[:50]!r}", "a number from 0 to 1") from None
 
 
 def _label_set(document: Element) -> LabelSet:

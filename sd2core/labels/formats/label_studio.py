@@ -17,7 +17,8 @@ from urllib.parse import unquote, urlsplit
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import read_json
 from sd2core.labels.formats.losses import DEFAULT_TRACK, LabelFormat
-from sd2core.labels.formats.rows import UNNAMED, LabelRows, Row
+from sd2core.labels.formats.rows import UNNAMED, LabelRows, Row, chosen_observation
+from sd2core.timebase import Timebase
 
 FORMAT = LabelFormat(
     name="label-studio",
@@ -46,26 +47,18 @@ def observations(path: Path) -> tuple[str, ...]:
     return tuple(_tasks(path))
 
 
-def read(path: Path, observation: str | None = None) -> LabelRows:
+def read(path: Path, _: Timebase | None, observation: str | None) -> LabelRows:
     """Read the spans of one task; its name is needed when there are several.
 
     Regions of other kinds, such as boxes, are left out. Raises Sd2Error when the file is no export,
     or the task is not certain.
     """
     tasks = _tasks(path)
-    if observation is None and len(tasks) == 1:
-        observation = next(iter(tasks))
-    if observation is None or observation not in tasks:
-        names = ", ".join(map(repr, list(tasks)[:20])) or "none"
-        raise Sd2Error(
-            f"{path} has {len(tasks)} annotated tasks: {names}",
-            "one task" if observation is None else f"the task {observation!r}",
-            "Name the one to read, as an observation",
-        )
+    task = tasks[chosen_observation(tasks, observation, "annotated task")]
     result = LabelRows()
-    for place, region, author in _regions(path, result, tasks[observation]):
-        with result.entry():
-            result.rows.extend(_rows(path, place, region, author))
+    for place, region, author in _regions(result, task):
+        with result.entry(place):
+            result.rows.extend(_rows(place, region, author))
     return result
 
 
@@ -104,9 +97,7 @@ def _name(task: dict[str, Any]) -> str:
     return ""
 
 
-def _regions(
-    path: Path, taken: LabelRows, task: dict[str, Any]
-) -> Iterator[tuple[str, dict[str, Any], str]]:
+def _regions(taken: LabelRows, task: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], str]]:
     """Regions of a task, each with its place and author; cancelled annotations are left out."""
     annotations = task.get("annotations", task.get("completions"))
     if not isinstance(annotations, list):  # JSON-MIN has the regions of each control tag.
@@ -123,7 +114,7 @@ def _regions(
             regions = annotation.get("result") if isinstance(annotation, dict) else None
             if not isinstance(regions, list) or annotation.get("was_cancelled"):
                 why = "is cancelled" if isinstance(regions, list) else "has no result"
-                raise Sd2Error(f"{path}, annotation {number} {why}", _EXPECTED)
+                raise Sd2Error(f"annotation {number} {why}", _EXPECTED)
             by = annotation.get("completed_by", "")
             author = str(by.get("email", by.get("id", "")) if isinstance(by, dict) else by)
             for index, region in enumerate(regions, start=1):
@@ -131,11 +122,11 @@ def _regions(
                     yield f"annotation {number}, region {index}", region, author
 
 
-def _rows(path: Path, place: str, region: dict[str, Any], author: str) -> list[Row]:
+def _rows(place: str, region: dict[str, Any], author: str) -> list[Row]:
     kind, value = str(region.get("type")), region.get("value")
     value = value if isinstance(value, dict) else {}
     if kind not in _KINDS or not ("ranges" in value or {"start", "end"} <= value.keys()):
-        raise Sd2Error(f"{path}, {place} is {kind[:50]!r}", "a span of a timeline")
+        raise Sd2Error(f"{place} is {kind[:50]!r}", "a span of a timeline")
     names = value.get(kind)
     names = [str(one) for one in names] if isinstance(names, list) else []
     track = str(region.get("from_name") or DEFAULT_TRACK)
@@ -147,7 +138,7 @@ def _rows(path: Path, place: str, region: dict[str, Any], author: str) -> list[R
         ]
         if not all(isinstance(at, int | float) and abs(at) < 1e15 for at in edges):
             raise Sd2Error(
-                f"{path}, {place} is from {str(edges[0])[:50]!r} to {str(edges[1])[:50]!r}",
+                f"{place} is from {str(edges[0])[:50]!r} to {str(edges[1])[:50]!r}",
                 "seconds, or frames of a video",
             )
         frames = (max(int(edges[0]) - 1, 0), int(edges[1])) if "ranges" in value else None

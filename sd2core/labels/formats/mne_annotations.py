@@ -22,7 +22,6 @@ from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss
 from sd2core.labels.formats.numbers import finite_number, positional
 from sd2core.labels.formats.rows import LabelRows, Row
 from sd2core.labels.spans import Labels, Span
-from sd2core.timebase import Timebase
 
 FORMAT = LabelFormat(
     name="mne",
@@ -41,16 +40,8 @@ _BASIC = ("onset", "duration", "description")
 _EXTRAS = ("track", "overlap", "id", "note", "author", "confidence", "origin", "person")
 
 
-def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
-    """Write annotations with extra columns; what they cannot hold is returned.
-
-    Parameters
-    ----------
-    path : Path
-    labels : Labels
-    timebase, media
-        Not used: the format has neither frames nor a video.
-    """
+def write(path: Path, labels: Labels, *_: object) -> list[Loss]:
+    """Write annotations with extra columns; what they cannot hold is returned."""
     overlap = {track.name: track.overlap for track in labels.tracks}
     texts: dict[str, Callable[[Span], str]] = {
         "track": lambda span: span.track,
@@ -74,7 +65,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     return _changed(labels)
 
 
-def read(path: Path, observation: str | None = None) -> LabelRows:
+def read(path: Path, *_: object) -> LabelRows:
     """Read annotations; those without a duration are marks.
 
     Raises Sd2Error naming the line that is no annotation.
@@ -91,18 +82,18 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
         cells = line.split(",")
         if columns is None:
             columns = [*_BASIC, "ch_names"][: max(len(cells), 3)]
-        with result.entry():
+        with result.entry(f"line {number}"):
             if len(cells) != len(columns):
                 raise Sd2Error(
-                    f"{path}, line {number} has {len(cells)} columns: {line[:100]!r}",
+                    f"line {number} has {len(cells)} columns: {line[:100]!r}",
                     f"the {len(columns)} columns {', '.join(columns)}",
                     "Descriptions cannot hold commas: mend that line",
                 )
             cell = {name: decode(text) for name, text in zip(columns, cells, strict=True)}
-            start_s = _number(path, number, "onset", cell["onset"])
-            end_s = start_s + _number(path, number, "duration", cell["duration"])
+            start_s = _number("onset", cell["onset"])
+            end_s = start_s + _number("duration", cell["duration"])
             known = cell.get("confidence", "").strip()
-            confidence = _number(path, number, "confidence", known) if known else None
+            confidence = _number("confidence", known) if known else None
             row = Row(f"line {number}", start_s, end_s, cell["description"], confidence=confidence)
             result.add_line(row, cell)
     return result
@@ -154,11 +145,9 @@ def _changed(labels: Labels) -> list[Loss]:
     return losses
 
 
-def _number(path: Path, line: int, column: str, text: str) -> float:
+def _number(column: str, text: str) -> float:
     value = finite_number(text)
     if value is None:
-        raise Sd2Error(
-            f"{path}, line {line}: {column} is {text[:50]!r}",
-            "a finite number; of times, seconds since the first sample",
-        )
+        expected = "a finite number; of times, seconds since the first sample"
+        raise Sd2Error(f"{column} is {text[:50]!r}", expected)
     return value

@@ -8,14 +8,12 @@ A reader adds what a file says, entry by entry; an odd entry is left out and lis
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 from sd2core.errors import Sd2Error
 from sd2core.files.tables import counted
-from sd2core.files.texts import errors_in
 from sd2core.labels.formats.losses import DEFAULT_TRACK
 from sd2core.labels.formats.numbers import whole_number
 from sd2core.labels.label_set import GESTURES, LONGEST_NAME, LabelSet
@@ -80,12 +78,12 @@ class LabelRows:
     remarks: list[str] = field(default_factory=list)
 
     @contextmanager
-    def entry(self) -> Iterator[None]:
-        """Read one entry of the file; it is left out where that raises Sd2Error."""
+    def entry(self, place: str = "") -> Iterator[None]:
+        """Read one entry of the file, which stands at a place; left out where it is in error."""
         try:
             yield
         except Sd2Error as error:
-            self.odd.append(error)
+            self.odd.append(error.within(place) if place else error)
 
     def add_line(self, row: Row, cells: Mapping[str, str]) -> None:
         """Add a row of a table, with the texts of its other columns, as far as there are any.
@@ -210,7 +208,7 @@ class LabelReading:
         return replace(self, beyond=remark)
 
 
-def assembled(path: Path, content: LabelRows, clock: LabelClock) -> LabelReading:
+def assembled(content: LabelRows, clock: LabelClock) -> LabelReading:
     """Make labels of what a reader found.
 
     Ids are kept where they are positive and differ; the other spans are numbered after them, in
@@ -221,11 +219,11 @@ def assembled(path: Path, content: LabelRows, clock: LabelClock) -> LabelReading
     Sd2Error
         When frames or marks need a clock that is not known, or when nothing is left to be taken.
     """
-    _check_clock(path, content.rows, clock)
+    _check_clock(content.rows, clock)
     rows: list[Row] = []
     unnumbered: list[Span] = []
     for row in content.rows:
-        with content.entry(), errors_in(f"{path}, {row.place}"):
+        with content.entry(row.place):
             timed = _timed(row, clock)
             unnumbered.append(_span(timed))
             rows.append(timed)
@@ -246,8 +244,27 @@ def assembled(path: Path, content: LabelRows, clock: LabelClock) -> LabelReading
         LabelTrack(name, "free" if name in crowded else overlap or "exclusive")
         for name, overlap in overlaps.items()
     )
-    left_out = tuple(error.found.removeprefix(f"{path}, ") for error in content.odd)
+    left_out = tuple(error.found for error in content.odd)
     return LabelReading(Labels(made, spans, content.label_set), left_out, tuple(content.remarks))
+
+
+def chosen_observation(
+    names: Collection[str], wanted: str | None, kind: str = "observation"
+) -> str:
+    """Return which part of a file to read: the one wanted, or the only one.
+
+    Raises Sd2Error when that is not certain; ``kind`` is what the parts are.
+    """
+    if wanted is None and len(names) == 1:
+        return next(iter(names))
+    if wanted is not None and wanted in names:
+        return wanted
+    listed = ", ".join(map(repr, list(names)[:20])) or "none"
+    raise Sd2Error(
+        f"it has {len(names)} {kind}s: {listed}",
+        f"one {kind}" if wanted is None else f"the {kind} {wanted!r}",
+        "Name the one to read, as an observation",
+    )
 
 
 def clean_name(name: str) -> str:
@@ -258,20 +275,20 @@ def clean_name(name: str) -> str:
     return line[:LONGEST_NAME].strip() or UNNAMED
 
 
-def _check_clock(path: Path, rows: Iterable[Row], clock: LabelClock) -> None:
+def _check_clock(rows: Iterable[Row], clock: LabelClock) -> None:
     if clock.knows_frames:
         return
     for row in rows:
         if row.frames is not None:
             raise Sd2Error(
-                f"{path} gives frames and no seconds",
+                "it gives frames and no seconds",
                 "times in seconds",
                 "Read it together with its recording, which knows the times of frames, or with"
                 " their rate (--fps)",
             )
         if row.start_s == row.end_s and clock.mark_s is None:
             raise Sd2Error(
-                f"{path}, {row.place}: {row.label!r} at {row.start_s:g} s has no duration",
+                f"{row.place}: {row.label!r} at {row.start_s:g} s has no duration",
                 "spans with a start before the end",
                 "Read the file together with its recording, or with the rate of its frames (--fps):"
                 " such a mark becomes one frame; or give marks a length (--mark-s)",

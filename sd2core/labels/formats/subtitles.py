@@ -30,7 +30,7 @@ _VOICE = re.compile(r"<v(?:\.[^\s>]*)?\s+([^>]+)>")
 _TAG = re.compile(r"<[^>]*>")
 
 
-def read(path: Path, observation: str | None = None) -> LabelRows:
+def read(path: Path, *_: object) -> LabelRows:
     """Read all cues; one without a text is unnamed.
 
     Raises Sd2Error when the file has no cues.
@@ -44,8 +44,8 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
         if at is None or lines[0].startswith("NOTE"):
             continue
         cues += 1
-        with result.entry():
-            start_s, end_s = _times(path, cues, lines[at])
+        with result.entry(f"cue {cues}"):
+            start_s, end_s = _times(lines[at])
             text = "\n".join(lines[at + 1 :])
             voice = _VOICE.search(text)
             label = " ".join(html.unescape(_TAG.sub("", text)).split())
@@ -56,10 +56,10 @@ def read(path: Path, observation: str | None = None) -> LabelRows:
     return result
 
 
-def _times(path: Path, cue: int, line: str) -> tuple[float, float]:
+def _times(line: str) -> tuple[float, float]:
     first, _, rest = line.partition("-->")
     texts = first, (rest.split() or [""])[0]  # Settings of the cue stand behind.
     start_s, end_s = (seconds_of(text) if ":" in text else None for text in texts)
     if start_s is None or end_s is None:
-        raise Sd2Error(f"{path}, cue {cue} has the times {line[:100]!r}", "00:01.500 --> 00:02.500")
+        raise Sd2Error(f"its times are {line[:100]!r}", "00:01.500 --> 00:02.500")
     return start_s, end_s

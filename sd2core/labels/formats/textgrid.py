@@ -39,23 +39,8 @@ _TOKEN = re.compile(
 )
 
 
-def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = None) -> list[Loss]:
-    """Write a TextGrid from the first to the last instant of video and spans.
-
-    Parameters
-    ----------
-    path : Path
-    labels : Labels
-    timebase : Timebase
-        Of the video: for its first and last instant.
-    media : Path, optional
-        Not used.
-
-    Returns
-    -------
-    list of Loss
-        Empty: what is lost depends on the format alone.
-    """
+def write(path: Path, labels: Labels, timebase: Timebase, *_: object) -> list[Loss]:
+    """Write a TextGrid from the first to the last instant of video and spans."""
     start_s = min([timebase.start_s, *(span.start_s for span in labels.spans)])
     end_s = max([timebase.end_s, *(span.end_s for span in labels.spans)])
     lanes = lanes_of(labels, edges_s)
@@ -75,7 +60,7 @@ def write(path: Path, labels: Labels, timebase: Timebase, media: Path | None = N
     return []
 
 
-def read(path: Path, observation: str | None = None) -> LabelRows:
+def read(path: Path, *_: object) -> LabelRows:
     """Read all tiers; a point is a mark without a duration.
 
     Raises Sd2Error when the file is no TextGrid in text form, or ends too early.

@@ -53,7 +53,7 @@ def spans(found: LabelReading) -> list[tuple[float, float, str]]:
         ("a.txt", "1\t2\tA\n3\tx\tB\n5\t6\tC\n", "line 2: a time is 'x'"),
         ("a.txt", "# onset, duration, description\n1,1,A\n3,n/a,B\n5,1,C\n", "duration is 'n/a'"),
         ("a.vtt", "WEBVTT\n\n0:01.0 --> 0:02.0\nA\n\n0:03 --> x\nB\n\n0:05.0 --> 0:06.0\nC\n",
-         "cue 2 has the times"),
+         "cue 2: its times are"),
     ],
 )  # fmt: skip
 def test_one_odd_entry(tmp_path: Path, name: str, content: str, place: str) -> None:
@@ -66,7 +66,7 @@ def test_one_odd_entry(tmp_path: Path, name: str, content: str, place: str) -> N
 
 
 def test_nothing_left_to_be_read_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(Sd2Error, match=r"a\.csv, line 2: start_s is 'n/a'"):
+    with pytest.raises(Sd2Error, match=r"a\.csv: line 2: start_s is 'n/a'"):
         reading(tmp_path / "a.csv", "label,start,end\nA,n/a,2\nB,3,n/a\n")
 
 

@@ -167,7 +167,7 @@ def test_elan(tmp_path: Path, content: str, words: str) -> None:
         ("label,start_frame,end_frame\nwave,1,2\n", "gives frames and no seconds"),
         (
             "observation id,behavior,start (s),stop (s)\na,wave,1,2\nb,wave,1,2\n",
-            "holds the observations 'a', 'b'",
+            "has 2 observations: 'a', 'b'",
         ),
     ],
 )
