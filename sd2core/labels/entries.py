@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict, fields
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt
+from pydantic import BaseModel, BeforeValidator, ConfigDict
 
 from sd2core.labels.label_set import LabelSet
-from sd2core.labels.spans import Labels, LabelTrack, Origin, ShownFrames, Span
+from sd2core.labels.spans import Labels, LabelTrack, ShownFrames, Span
 from sd2core.timebase import Timebase
 
 
@@ -18,35 +18,14 @@ class Entry(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
-class FramesEntry(Entry):
-    """Entry of the :class:`ShownFrames` of a span."""
-
-    first: NonNegativeInt
-    last: NonNegativeInt
-    count: NonNegativeInt
+def _without_frames(entry: Any) -> Any:
+    if not isinstance(entry, dict):
+        return entry
+    return {name: value for name, value in entry.items() if name != "frames"}
 
 
-class SpanEntry(Entry):
-    """Entry of a :class:`Span`; ``frames`` are informative, the times count.
-
-    Files of before have a half-open pair of frames.
-    """
-
-    id: int
-    track: str
-    start_s: FiniteFloat
-    end_s: FiniteFloat
-    frames: FramesEntry | tuple[NonNegativeInt, NonNegativeInt] | None = None
-    label: str
-    note: str = ""
-    author: str = ""
-    confidence: Annotated[float, Field(ge=0, le=1)] | None = None
-    origin: Origin = "person"
-    person: str = ""
-
-    def made(self) -> Span:
-        """Make the span."""
-        return Span(**{name: getattr(self, name) for name in _SPAN_DEFAULTS})
+SpanEntry = Annotated[Span, BeforeValidator(_without_frames)]
+"""Entry of a span; its ``frames`` are informative, the times count."""
 
 
 class LabelsEntry(Entry):
@@ -58,21 +37,17 @@ class LabelsEntry(Entry):
 
     def made(self) -> Labels:
         """Make the labels."""
-        return Labels(self.tracks, tuple(entry.made() for entry in self.spans), self.label_set)
-
-
-_SPAN_DEFAULTS = {field.name: field.default for field in fields(Span)}
-"""Names of all fields; those that a span must have are never at their default."""
+        return Labels(self.tracks, self.spans, self.label_set)
 
 
 def span_entry(span: Span, frames: ShownFrames | None = None) -> dict[str, Any]:
     """Encode a span; fields at their defaults are left out."""
     entry: dict[str, Any] = {}
-    for name, default in _SPAN_DEFAULTS.items():
-        value = getattr(span, name)
-        if value != default:
-            entry[name] = value
-        if name == "end_s" and frames is not None:
+    for field in fields(span):
+        value = getattr(span, field.name)
+        if value != field.default:
+            entry[field.name] = value
+        if field.name == "end_s" and frames is not None:
             entry["frames"] = asdict(frames)
     return entry
 

@@ -186,8 +186,8 @@ def replay(records: list[bytes]) -> Kept:
         unsaved = 0 if edit.saved else unsaved + 1
         last, time_unix_s = edit.name, edit.time_unix_s
     # Only the end is checked: what is between was whole when it was written.
-    entry = LabelsEntry(label_set=label_set, tracks=tracks, spans=tuple(spans.values()))
-    return Kept(Path(first.recording), entry.made(), unsaved, last, time_unix_s, others)
+    labels = Labels(tracks, tuple(spans.values()), label_set)
+    return Kept(Path(first.recording), labels, unsaved, last, time_unix_s, others)
 
 
 SUFFIX = ".journal"

@@ -71,7 +71,7 @@ def read(path: Path, *_: object) -> LabelRows:
     tokens.number("xmax")
     result = LabelRows()
     has_tiers = tokens.next("flag", "flag <exists>") == "<exists>"
-    for _ in range(tokens.count("tiers") if has_tiers else 0):
+    for _tier_number in range(tokens.count("tiers") if has_tiers else 0):
         kind, name = tokens.text("class of a tier"), tokens.text("name of a tier")
         if kind not in ("IntervalTier", "TextTier"):
             raise Sd2Error(f"{path} has a tier of class {kind[:50]!r}", "IntervalTier or TextTier")
