@@ -12,18 +12,11 @@ from sd2core.errors import Sd2Error
 from sd2core.labels import field_edits
 from sd2core.labels.edits import (
     Edit,
-    create,
+    Edits,
     delete,
-    duplicate,
-    fill_gaps,
-    join_at,
     merge,
-    move,
-    nudge,
-    overwrite,
-    resize,
-    split,
 )
+from sd2core.labels.free_time import LabelledFrames
 from sd2core.labels.spans import ORIGINS, Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
@@ -87,42 +80,42 @@ def random_edit(labels: Labels, timebase: Timebase, rng: random.Random) -> Edit:
 
     side = rng.choice(("start", "end"))
     choices: list[Callable[[], Edit]] = [
-        lambda: create(labels, timebase, track, time_s(), time_s(), label),
-        lambda: create(labels, timebase, track, near_s(), near_s(), label),
-        lambda: overwrite(labels, timebase, track, near_s(), near_s(), label),
-        lambda: duplicate(labels, timebase, [span_id], time_s()),
+        lambda: Edits(labels, timebase).create(track, time_s(), time_s(), label),
+        lambda: Edits(labels, timebase).create(track, near_s(), near_s(), label),
+        lambda: Edits(labels, timebase).overwrite(track, near_s(), near_s(), label),
+        lambda: Edits(labels, timebase).duplicate([span_id], time_s()),
         lambda: delete(labels, some),
-        lambda: resize(labels, timebase, span_id, side, near_s()),
-        lambda: resize(labels, timebase, span_id, side, time_s()),
-        lambda: move(labels, timebase, [span_id], span_id, near_s()),
-        lambda: move(labels, timebase, [span_id], span_id, time_s()),
-        lambda: nudge(labels, timebase, [span_id], rng.randint(-12, 12)),
-        lambda: move(labels, timebase, some, span_id, near_s()),
-        lambda: nudge(labels, timebase, some, rng.randint(-12, 12)),
-        lambda: duplicate(labels, timebase, some, time_s()),
-        lambda: split(labels, timebase, span_id, near_s()),
+        lambda: Edits(labels, timebase).resize(span_id, side, near_s()),
+        lambda: Edits(labels, timebase).resize(span_id, side, time_s()),
+        lambda: Edits(labels, timebase).move([span_id], span_id, near_s()),
+        lambda: Edits(labels, timebase).move([span_id], span_id, time_s()),
+        lambda: Edits(labels, timebase).nudge([span_id], rng.randint(-12, 12)),
+        lambda: Edits(labels, timebase).move(some, span_id, near_s()),
+        lambda: Edits(labels, timebase).nudge(some, rng.randint(-12, 12)),
+        lambda: Edits(labels, timebase).duplicate(some, time_s()),
+        lambda: Edits(labels, timebase).split(span_id, near_s()),
         lambda: merge(labels, some),
-        lambda: join_at(labels, timebase, span_id, rng.choice(ids or [1]), near_s()),
+        lambda: Edits(labels, timebase).join_at(span_id, rng.choice(ids or [1]), near_s()),
         lambda: field_edits.set_field(labels, some, "label", label),
         lambda: field_edits.set_field(labels, some, "note", rng.choice(("", "blurred", "sure?"))),
         lambda: field_edits.set_field(labels, some, "confidence", rng.choice((None, 0.5, 1.0))),
         lambda: field_edits.set_field(labels, some, "author", "C"),
         lambda: field_edits.set_field(labels, some, "track", track),
-        lambda: field_edits.take(labels, timebase, some, track, label),
-        lambda: field_edits.set_overlap(labels, track, rng.choice(("exclusive", "free"))),
+        lambda: field_edits.take(LabelledFrames(labels, timebase), some, track, label),
+        lambda: field_edits.change_track(labels, track, overlap=rng.choice(("exclusive", "free"))),
         lambda: field_edits.move_track(labels, track, rng.randint(0, 2)),
-        lambda: field_edits.rename_track(labels, track, rng.choice(("Left", "Right", "Both"))),
-        lambda: field_edits.rename_label(labels, label, f"{label}'"),
+        lambda: field_edits.change_track(labels, track, name=rng.choice(("Left", "Right", "Both"))),
+        lambda: field_edits.change_label(labels, label, name=f"{label}'"),
         lambda: field_edits.add_label(labels, field_edits.new_label(labels.label_set)),
         lambda: field_edits.remove_label(labels, label, rng.choice((None, NAMES[0]))),
         lambda: field_edits.move_label(labels, label, rng.randint(0, 3)),
-        lambda: field_edits.set_colour(labels, label, rng.choice(("#0072b2", "#332288"))),
-        lambda: field_edits.set_key(labels, label, rng.choice(("", "1", "q", "Q"))),
+        lambda: field_edits.change_label(labels, label, colour=rng.choice(("#0072b2", "#332288"))),
+        lambda: field_edits.change_label(labels, label, key=rng.choice(("", "1", "q", "Q"))),
     ]
     if rng.random() < 0.01:
         choices = [
             lambda: field_edits.remove_track(labels, track),
-            lambda: fill_gaps(labels, timebase, track, label),
+            lambda: Edits(labels, timebase).fill_gaps(track, label),
             lambda: field_edits.add_track(labels, f"Track {rng.random()}", rng.choice(("free",))),
         ]
     try:

@@ -12,12 +12,11 @@ import numpy as np
 from sd2core.errors import Sd2Error
 from sd2core.labels.colours import OFFERED
 from sd2core.labels.edits import Edit
-from sd2core.labels.free_time import Frames, clip_to_free
+from sd2core.labels.free_time import LabelledFrames
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.matching import iou_of
 from sd2core.labels.spans import Labels, LabelTrack, Overlap, Span
 from sd2core.labels.suggest import LABEL, TRACK
-from sd2core.timebase import Timebase
 
 SpanField = Literal["label", "note", "author", "confidence", "track", "person"]
 
@@ -47,10 +46,7 @@ def set_field(labels: Labels, ids: Iterable[int], field: SpanField, value: Any) 
 
 def rename_persons(labels: Labels, names: Mapping[str, str]) -> Edit:
     """Give the spans of persons their new names, by the old ones."""
-    changed = (
-        replace(span, person=names[span.person]) for span in labels.spans if span.person in names
-    )
-    return Edit("Rename person", labels.with_spans(changed))
+    return _edit("Rename person", labels, replace(labels, spans=_renamed(labels, "person", names)))
 
 
 def _name(verb: str, count: int) -> str:
@@ -66,29 +62,20 @@ def pending(labels: Labels) -> tuple[Span, ...]:
     return tuple(span for span in labels.spans if span.origin == "suggestion")
 
 
-def offer(
-    labels: Labels, timebase: Timebase, suggested: Sequence[Span], declined: Sequence[Span] = ()
-) -> Edit:
-    """Put suggestions on a track of their own, in place of earlier ones.
+def offer(now: LabelledFrames, suggested: Sequence[Span], declined: Sequence[Span] = ()) -> Edit:
+    """Put suggestions on a track of their own, in place of earlier ones, their edges on frames.
 
-    Parameters
-    ----------
-    labels : Labels
-    timebase : Timebase
-        Of the recording.
-    suggested : sequence of Span
-        Suggestions, whose edges are put on frames. Those that overlap a labelled or a rejected span
-        by :data:`SAME_IOU` are left out.
-    declined : sequence of Span
-        Suggestions that were rejected.
+    Those that overlap a labelled span, or a rejected (``declined``) one, by :data:`SAME_IOU` are
+    left out.
     """
+    labels = now.labels
     kept = [one for one in labels.spans if one.origin != "suggestion" or one.track != TRACK]
     known = [*declined, *(one for one in kept if one.origin != "suggestion")]
     again = np.asarray((iou_of(suggested, known) >= SAME_IOU).any(axis=1))
-    frames, first = Frames.of(timebase), labels.next_id
+    first = labels.next_id
     made: list[Span] = []
     for span in (one for one, before in zip(suggested, again, strict=True) if not before):
-        start_s, end_s = frames.stretch(span.start_s, span.end_s)
+        start_s, end_s = now.stretch(span.start_s, span.end_s)
         made.append(replace(span, id=first + len(made), track=TRACK, start_s=start_s, end_s=end_s))
     tracks = labels.tracks
     if TRACK not in {track.name for track in tracks}:
@@ -99,21 +86,13 @@ def offer(
 
 
 def take(
-    labels: Labels,
-    timebase: Timebase,
-    ids: Iterable[int],
-    track: str,
-    label: str,
-    *,
-    keep_known: bool = False,
+    now: LabelledFrames, ids: Iterable[int], track: str, label: str, *, keep_known: bool = False
 ) -> Edit:
     """Accept suggestions as spans of the user, on a track and with a label.
 
     Parameters
     ----------
-    labels : Labels
-    timebase : Timebase
-        Of the recording.
+    now : LabelledFrames
     ids : iterable of int
         Suggestions. On another track than their own they are clipped like new spans to the longest
         free part, in this order; those for which there is none stay suggestions.
@@ -128,16 +107,15 @@ def take(
     Sd2Error
         When none can be accepted: no id is a suggestion that has free time.
     """
-    frames = Frames.of(timebase)
-    after, done, refusal = labels, [], None
+    labels, done, refusal = now.labels, [], None
     if track not in {one.name for one in labels.tracks}:
-        after = replace(labels, tracks=(LabelTrack(track), *labels.tracks))
+        now = replace(now, labels=replace(labels, tracks=(LabelTrack(track), *labels.tracks)))
     for span in [labels.span(one) for one in dict.fromkeys(ids)]:
         start_s, end_s = span.start_s, span.end_s
         try:
             _check_suggestion(span)
             if track != span.track:
-                start_s, end_s = clip_to_free(after, track, (start_s, end_s), frames)
+                start_s, end_s = now.clip_to_free(track, (start_s, end_s))
         except Sd2Error as error:
             refusal = refusal or error
             continue
@@ -146,11 +124,11 @@ def take(
         taken = replace(
             span, track=track, start_s=start_s, end_s=end_s, label=given, origin="person"
         )
-        after = after.with_spans([taken])
+        now = replace(now, labels=now.labels.with_spans([taken]))
         done.append(span.id)
     if refusal is not None and not done:
         raise refusal
-    return Edit(_name("Accept", len(done)), tidied(after), tuple(done))
+    return Edit(_name("Accept", len(done)), tidied(now.labels), tuple(done))
 
 
 def reject(labels: Labels, ids: Iterable[int]) -> Edit:
@@ -180,11 +158,16 @@ def add_track(labels: Labels, name: str, overlap: Overlap = "exclusive") -> Edit
     return _edit("Add track", labels, replace(labels, tracks=tracks))
 
 
-def rename_track(labels: Labels, old: str, new: str) -> Edit:
-    """Rename a track; its spans stay on it."""
-    tracks = _with_track(labels, old, replace(labels.track(old), name=new))
-    spans = tuple(replace(span, track=new) if span.track == old else span for span in labels.spans)
-    return _edit("Rename track", labels, replace(labels, tracks=tracks, spans=spans))
+def change_track(labels: Labels, old: str, **field: Any) -> Edit:
+    """Change the ``name`` of a track, which its spans follow, or its ``overlap``.
+
+    Raises Sd2Error when spans overlap on a track that forbids it; the message names two of them.
+    """
+    changed = replace(labels.track(old), **field)
+    tracks = tuple(changed if one.name == old else one for one in labels.tracks)
+    spans = _renamed(labels, "track", {old: changed.name})
+    step = "Rename track" if "name" in field else "Change overlaps of track"
+    return _edit(step, labels, replace(labels, tracks=tracks, spans=spans))
 
 
 def remove_track(labels: Labels, name: str) -> Edit:
@@ -205,21 +188,8 @@ def move_track(labels: Labels, name: str, place: int) -> Edit:
     return _edit("Move track", labels, replace(labels, tracks=tuple(tracks)))
 
 
-def set_overlap(labels: Labels, name: str, overlap: Overlap) -> Edit:
-    """Allow or forbid that spans of a track overlap.
-
-    Raises Sd2Error when spans overlap on a track that forbids it; the message names two of them.
-    """
-    tracks = _with_track(labels, name, replace(labels.track(name), overlap=overlap))
-    return _edit("Change overlaps of track", labels, replace(labels, tracks=tracks))
-
-
 def _edit(name: str, before: Labels, after: Labels) -> Edit:
     return Edit(name, before if after == before else after)
-
-
-def _with_track(labels: Labels, name: str, track: LabelTrack) -> tuple[LabelTrack, ...]:
-    return tuple(track if one.name == name else one for one in labels.tracks)
 
 
 CLASSES = ("horizontal", "vertical", "background")
@@ -248,27 +218,25 @@ def add_label(labels: Labels, label: Label) -> Edit:
     return _edit("Add label", labels, _with_set(labels, [*labels.label_set.labels, label]))
 
 
-def rename_label(labels: Labels, old: str, new: str) -> Edit:
-    """Rename a label, in the set and on its spans."""
-    changed = _with_label(labels, old, name=new)
-    spans = tuple(replace(span, label=new) if span.label == old else span for span in labels.spans)
-    return _edit("Rename label", labels, replace(changed, spans=spans))
+def change_label(labels: Labels, old: str, **field: str) -> Edit:
+    """Change the ``name``, ``colour`` (``#rrggbb``), ``key`` or ``gesture_class`` of a label.
+
+    Its spans follow a new name; an empty key or class removes it.
+    """
+    known = _known(labels, old)
+    changed = replace(known, **field)
+    offered = [changed if one == known else one for one in labels.label_set.labels]
+    spans = _renamed(labels, "label", {old: changed.name})
+    after = replace(_with_set(labels, offered), spans=spans)
+    return _edit(_STEPS[next(iter(field))], labels, after)
 
 
-def set_colour(labels: Labels, name: str, colour: str) -> Edit:
-    """Set the colour of a label, ``#rrggbb``."""
-    return _edit("Change colour of label", labels, _with_label(labels, name, colour=colour))
-
-
-def set_key(labels: Labels, name: str, key: str) -> Edit:
-    """Set the key of a label; an empty one removes it."""
-    return _edit("Change key of label", labels, _with_label(labels, name, key=key))
-
-
-def set_class(labels: Labels, name: str, gesture_class: str) -> Edit:
-    """Set the class that the classifier learns for a label; none with an empty one."""
-    changed = _with_label(labels, name, gesture_class=gesture_class)
-    return _edit("Change class of label", labels, changed)
+_STEPS = {
+    "name": "Rename label",
+    "colour": "Change colour of label",
+    "key": "Change key of label",
+    "gesture_class": "Change class of label",
+}
 
 
 def move_label(labels: Labels, name: str, place: int) -> Edit:
@@ -295,9 +263,19 @@ def remove_label(labels: Labels, name: str, instead: str | None = None) -> Edit:
         if instead == name:
             raise Sd2Error(f"Spans of {name!r} were to get that label itself", "another label")
         _known(labels, instead)
-        spans = tuple(replace(one, label=instead) if one.label == name else one for one in spans)
+        spans = _renamed(labels, "label", {name: instead})
         text = f"Remove label, {whose} become {instead}"
     return _edit(text, labels, replace(_with_set(labels, offered), spans=spans))
+
+
+def _renamed(labels: Labels, field: str, names: Mapping[str, str]) -> tuple[Span, ...]:
+    """All spans, those with a field of an old name with the new one."""
+    spans: list[Span] = []
+    for span in labels.spans:
+        old = getattr(span, field)
+        now: dict[str, Any] = {field: names.get(old, old)}
+        spans.append(span if now[field] == old else replace(span, **now))
+    return tuple(spans)
 
 
 def _known(labels: Labels, name: str) -> Label:
@@ -308,13 +286,6 @@ def _known(labels: Labels, name: str) -> Label:
             f"one of {', '.join(one.name for one in labels.label_set.labels)}",
         )
     return label
-
-
-def _with_label(labels: Labels, which: str, **fields: str) -> Labels:
-    known = _known(labels, which)
-    changed = replace(known, **fields)
-    offered = [changed if one == known else one for one in labels.label_set.labels]
-    return _with_set(labels, offered)
 
 
 def _with_set(labels: Labels, offered: list[Label]) -> Labels:

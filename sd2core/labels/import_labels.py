@@ -9,7 +9,7 @@ from typing import Literal
 
 from sd2core.errors import Sd2Error
 from sd2core.labels.edits import Edit
-from sd2core.labels.free_time import Frames
+from sd2core.labels.free_time import LabelledFrames
 from sd2core.labels.label_set import GESTURES, LONGEST_NAME, LabelSet, with_own_keys
 from sd2core.labels.spans import Labels, Span
 from sd2core.timebase import Timebase
@@ -34,7 +34,7 @@ class Incoming:
 
         Edges inside the recording stay where the file has them, on a frame or not.
         """
-        frames = Frames.of(timebase)
+        frames = LabelledFrames(labels, timebase)
         low_s, high_s = frames.whole
         kept, cut, outside = [], [], []
         for span in labels.spans:

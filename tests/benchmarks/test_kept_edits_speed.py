@@ -18,8 +18,6 @@ from test_labelling_speed import told
 from window_models import models_of
 from window_on_sample import window_on_sample
 
-from sd2core.labels.edits import nudge, resize
-
 SPANS, EDITS = 10_000, 200
 
 
@@ -58,8 +56,8 @@ def test_an_edit_in_the_window(
             c.label_edits.apply(
                 rng.choice(
                     [
-                        lambda labels, base: nudge(labels, base, [span.id], rng.choice((-1, 1))),
-                        lambda labels, base: resize(labels, base, span.id, "end", to_s),
+                        lambda now: now.nudge([span.id], rng.choice((-1, 1))),
+                        lambda now: now.resize(span.id, "end", to_s),
                     ]
                 )
             )

@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 from labelled import even, many_spans
 
-from sd2core.labels.edits import create, delete, move, nudge, resize, split
+from sd2core.labels.edits import Edits, delete
 from sd2core.labels.files import read_labels, write_labels
-from sd2core.labels.free_time import snap
+from sd2core.labels.free_time import LabelledFrames
 from sd2core.labels.journal import Journal, Kept
 from sd2core.labels.recovery import RecoveryPlace
 from sd2core.labels.spans import Labels
@@ -52,13 +52,17 @@ def test_one_edit(
         span = labels.spans[rng.randrange(len(labels.spans))]
         middle_s = (span.start_s + span.end_s) / 2
         choices = [
-            lambda: move(labels, FRAMES, [span.id], span.id, span.start_s + rng.uniform(-0.3, 0.3)),
-            lambda: resize(labels, FRAMES, span.id, "end", span.end_s + rng.uniform(-0.3, 0.3)),
-            lambda: nudge(labels, FRAMES, [span.id], 1),
+            lambda: Edits(labels, FRAMES).move(
+                [span.id], span.id, span.start_s + rng.uniform(-0.3, 0.3)
+            ),
+            lambda: Edits(labels, FRAMES).resize(
+                span.id, "end", span.end_s + rng.uniform(-0.3, 0.3)
+            ),
+            lambda: Edits(labels, FRAMES).nudge([span.id], 1),
             lambda: delete(labels, [span.id]),
         ]
         if FRAMES.frames_between(span.start_s, span.end_s)[1] > 2 and span.duration_s > 0.2:
-            choices.append(lambda: split(labels, FRAMES, span.id, middle_s))
+            choices.append(lambda: Edits(labels, FRAMES).split(span.id, middle_s))
         done = rng.choice(choices)()
         if journal:
             written.write(done.name, done.labels)
@@ -76,7 +80,9 @@ def test_one_edit(
 def test_a_new_span(benchmark: Any, capsys: pytest.CaptureFixture[str]) -> None:
     labels = delete(many_spans(SPANS), [SPANS // 2]).labels
     start_s = SPANS // 2 - 1.0
-    made = benchmark(lambda: create(labels, FRAMES, "Gestures", start_s, start_s + 0.5, "wave"))
+    made = benchmark(
+        lambda: Edits(labels, FRAMES).create("Gestures", start_s, start_s + 0.5, "wave")
+    )
     told(benchmark, capsys, "a new span")
     assert len(made.labels.spans) == SPANS
 
@@ -84,7 +90,7 @@ def test_a_new_span(benchmark: Any, capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.benchmark(group="labelling")
 def test_snapping(benchmark: Any, capsys: pytest.CaptureFixture[str]) -> None:
     labels = many_spans(SPANS)
-    found = benchmark(lambda: snap(labels, FRAMES, SPANS / 2 + 0.05, 0.1))
+    found = benchmark(lambda: LabelledFrames(labels, FRAMES).snap(SPANS / 2 + 0.05, 0.1))
     told(benchmark, capsys, "snapping")
     assert found in {edge for one in labels.spans for edge in (one.start_s, one.end_s)}
 

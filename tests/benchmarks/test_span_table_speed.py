@@ -15,7 +15,7 @@ from PySide6.QtCore import QItemSelectionModel, Qt
 from PySide6.QtWidgets import QTableView
 
 from sd2app.labels.table_model import COLUMNS, SpanFilter, SpanTableModel
-from sd2core.labels.edits import delete, resize
+from sd2core.labels.edits import Edits, delete
 from sd2core.labels.spans import Labels
 
 SPANS = 10_000
@@ -84,7 +84,7 @@ def test_following_an_edit_of_one_span(benchmark: Any, shown) -> None:
     labels, model, view = shown
     before = labels.labels
     span = before.spans[SPANS // 2]
-    longer = resize(before, FRAMES, span.id, "end", span.end_s + 0.1).labels
+    longer = Edits(before, FRAMES).resize(span.id, "end", span.end_s + 0.1).labels
     gone = delete(before, [span.id]).labels
     view.selectionModel().select(
         model.index(SPANS // 2, 0), QItemSelectionModel.SelectionFlag.SelectCurrent

@@ -12,10 +12,7 @@ from sd2app.labels.loop import SpanLoop
 from sd2app.maps.track_mouse import TimePlot
 from sd2app.widgets.time_axis import TimeScale
 from sd2core.errors import Sd2Error
-from sd2core.labels import edits
-from sd2core.labels.edits import Change, Edit, Side
-from sd2core.labels.free_time import snap
-from sd2core.labels.spans import Labels
+from sd2core.labels.edits import Change, Edit, Edits, Side
 
 MOVED_PX = 3.0
 """Way of the mouse from which a press is a drag."""
@@ -41,7 +38,7 @@ class LabelDragging(QObject):
     def __init__(self, edits: LabelEdits, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.labels, self._playback, self._edits = edits.labels, edits.playback, edits
-        self._before: Labels | None = None
+        self._before: Edits | None = None
         self._dragged: Edit | None = None
         edits.applying.connect(self.end_drag)
 
@@ -54,14 +51,14 @@ class LabelDragging(QObject):
         """Begin a drag; False where labels cannot be edited."""
         if self._edits.refused():
             return False
-        self._before, self._dragged = self.labels.labels, None
+        self._before, self._dragged = Edits(self.labels.labels, self._playback.timebase), None
         self.changed.emit()
         return True
 
     def drag_edge(self, span_id: int, side: Side, time_s: float, within_s: float) -> None:
         """Move an edge of a span to a time; spans within a distance attract it."""
         place_s = self._snapped(time_s, within_s, {span_id})
-        self._drag(lambda labels, base: edits.resize(labels, base, span_id, side, place_s))
+        self._drag(lambda now: now.resize(span_id, side, place_s))
 
     def drag_span(self, span_id: int, start_s: float, within_s: float) -> None:
         """Move a span to a start; either end snaps.
@@ -69,7 +66,7 @@ class LabelDragging(QObject):
         Where it is one of several selected spans, all of them move.
         """
         assert self._before is not None
-        length_s = self._before.span(span_id).duration_s
+        length_s = self._before.labels.span(span_id).duration_s
         ids = {span_id}
         if self.labels.is_selected(span_id):
             ids.update(span.id for span in self.labels.selected)
@@ -78,21 +75,21 @@ class LabelDragging(QObject):
             (self._snapped(start_s + length_s, within_s, ids), length_s),
         )
         near_s = min((at_s - offset_s for at_s, offset_s in ends), key=lambda t: abs(t - start_s))
-        self._drag(lambda labels, base: edits.move(labels, base, ids, span_id, near_s))
+        self._drag(lambda now: now.move(ids, span_id, near_s))
 
     def drag_new(
         self, track: str, from_s: float, to_s: float, within_s: float, *, cutting: bool = False
     ) -> None:
         """Draw a span between two times; ``cutting`` cuts away others there."""
         one_s, other_s = (self._snapped(time_s, within_s) for time_s in (from_s, to_s))
-        label, make = self.labels.label, edits.overwrite if cutting else edits.create
-        self._drag(lambda labels, base: make(labels, base, track, one_s, other_s, label))
+        label, make = self.labels.label, Edits.overwrite if cutting else Edits.create
+        self._drag(lambda now: make(now, track, one_s, other_s, label))
 
     def end_drag(self) -> None:
         """End the drag, as one step in the history."""
         before, self._before = self._before, None
         if before is not None and self._dragged is not None:
-            self._edits.make(self._dragged, before)
+            self._edits.make(self._dragged, before.labels)
         self._dragged = None
         self.changed.emit()
 
@@ -100,21 +97,20 @@ class LabelDragging(QObject):
         """Restore the labels from before the drag."""
         before, self._before, self._dragged = self._before, None, None
         if before is not None:
-            self.labels.set_labels(before)
+            self.labels.set_labels(before.labels)
         self.changed.emit()
 
     def _drag(self, change: Change) -> None:
         assert self._before is not None
         try:
-            self._dragged = change(self._before, self._playback.timebase)
+            self._dragged = change(self._before)
         except Sd2Error:
             return
         self.labels.set_labels(self._dragged.labels)
 
     def _snapped(self, time_s: float, within_s: float, held: Collection[int] = ()) -> float:
         assert self._before is not None
-        base = self._playback.timebase
-        return snap(self._before, base, time_s, within_s, ignore=held)
+        return self._before.snap(time_s, within_s, held)
 
 
 class SpanDragger(QObject):

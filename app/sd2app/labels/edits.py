@@ -15,7 +15,7 @@ from sd2app.session.undo import Assign
 from sd2core.errors import Sd2Error
 from sd2core.labels import edits, field_edits
 from sd2core.labels.comparison import changed_stretch
-from sd2core.labels.edits import Change, Edit, Side
+from sd2core.labels.edits import Change, Edit, Edits, Side
 from sd2core.labels.free_time import NoRoom
 from sd2core.labels.spans import Labels, Span
 from sd2core.recording.divergence import State
@@ -88,12 +88,12 @@ class LabelEdits(QObject):
     def give(self, field: Literal["label", "track", "person"], value: str) -> None:
         """Give the selected spans another label or track, or say whose they are (nobody's: "")."""
         ids = self._ids()
-        self.apply(lambda labels, base: field_edits.set_field(labels, ids, field, value))
+        self.apply(lambda now: field_edits.set_field(now.labels, ids, field, value))
 
     def _rename(self, names: dict[str, str]) -> None:
         """Call the persons whose spans are by their new names."""
         if any(span.person in names for span in self.labels.labels.spans):
-            self.apply(lambda labels, base: field_edits.rename_persons(labels, names))
+            self.apply(lambda now: field_edits.rename_persons(now.labels, names))
 
     def edge_here(self, side: Side) -> None:
         """Put an edge of the selected span at the frame on screen."""
@@ -102,7 +102,7 @@ class LabelEdits(QObject):
             return
         # The frame on screen is the first of the span, or its last.
         time_s = float(base.edges_s[self.playback.frame + (side == "end")])
-        self.apply(lambda labels, base: edits.resize(labels, base, chosen[0].id, side, time_s))
+        self.apply(lambda now: now.resize(chosen[0].id, side, time_s))
 
     def split(self) -> None:
         """Split the selected span, or the one on the track, at the frame on screen."""
@@ -110,22 +110,22 @@ class LabelEdits(QObject):
         among = self.labels.selected or (self.labels.labels.of_track(track) if track else ())
         here = [span for span in among if span.start_s < now_s < span.end_s]
         if here:
-            self.apply(lambda labels, base: edits.split(labels, base, here[0].id, now_s))
+            self.apply(lambda now: now.split(here[0].id, now_s))
 
     def delete(self) -> None:
         """Delete the selected spans."""
         if ids := self._ids():
-            self.apply(lambda labels, _: _deleted(labels, ids))
+            self.apply(lambda now: _deleted(now.labels, ids))
 
     def merge(self) -> None:
         """Merge the selected spans."""
         ids = self._ids()
-        self.apply(lambda labels, base: edits.merge(labels, ids))
+        self.apply(lambda now: edits.merge(now.labels, ids))
 
     def nudge(self, frames: int) -> None:
         """Move the selected spans together by some frames."""
         if ids := self._ids():
-            self.apply(lambda labels, base: edits.nudge(labels, base, ids, frames))
+            self.apply(lambda now: now.nudge(ids, frames))
 
     def duplicate(self) -> None:
         """Copy the selected spans to the frame on screen; behind them where it is within them."""
@@ -135,13 +135,13 @@ class LabelEdits(QObject):
         ids, now_s = self._ids(), self._now_s
         first_s, last_s = chosen[0].start_s, max(span.end_s for span in chosen)
         start_s = last_s if first_s <= now_s < last_s else now_s
-        self.apply(lambda labels, base: edits.duplicate(labels, base, ids, start_s))
+        self.apply(lambda now: now.duplicate(ids, start_s))
 
     def meet(self) -> None:
         """Make the two selected neighbours meet at the frame on screen."""
         ids, now_s = self._ids(), self._now_s
         if len(ids) == 2:
-            self.apply(lambda labels, base: edits.join_at(labels, base, ids[0], ids[1], now_s))
+            self.apply(lambda now: now.join_at(*ids, now_s))
 
     def fill_gaps(self) -> None:
         """Fill every gap of the track with a span of background."""
@@ -149,7 +149,7 @@ class LabelEdits(QObject):
         if track:
             named = (one.name for one in offered if one.gesture_class == "background")
             label = next(named, self.labels.label)
-            self.apply(lambda labels, base: edits.fill_gaps(labels, base, track, label))
+            self.apply(lambda now: now.fill_gaps(track, label))
 
     def restore(self) -> None:
         """Take over what an earlier session left unsaved, as one step."""
@@ -230,7 +230,7 @@ class LabelEdits(QObject):
         self.applying.emit()
         before = self.labels.labels
         try:
-            done = change(before, self.playback.timebase)
+            done = change(Edits(before, self.playback.timebase))
         except NoRoom as error:
             self.had_no_room.emit(str(error))
             return False

@@ -78,7 +78,7 @@ def import_labels(shell: Shell, edits: LabelEdits, path: Path | None = None) -> 
     taken, incoming, way, name = accepted(dialog), dialog.incoming, dialog.way, path.stem
     dialog.finish()
     if taken and incoming is not None:
-        edits.apply(lambda labels, _: take_in(labels, incoming, way, name))
+        edits.apply(lambda now: take_in(now.labels, incoming, way, name))
 
 
 def _frame_source(recording: Recording) -> dict[str, Any]:

@@ -15,17 +15,14 @@ from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.key_text import canonical, native
 from sd2app.widgets.record_table import Heading, Index, RecordTableModel
 from sd2core.labels.colours import OFFERED, Alike, alike
-from sd2core.labels.edits import Change
+from sd2core.labels.edits import Edit, Edits
 from sd2core.labels.field_edits import (
     CLASSES,
     add_label,
+    change_label,
     move_label,
     new_label,
     remove_label,
-    rename_label,
-    set_class,
-    set_colour,
-    set_key,
     set_label_set,
 )
 from sd2core.labels.label_set import Label, LabelSet
@@ -40,6 +37,7 @@ HEADINGS = (
     Heading("Class", "Class that the classifier learns for it; – for none", editable=True),
     Heading("Spans", "Number of spans with this label", number=True),
 )
+_FIELDS = ("name", "key", "colour", "gesture_class")
 NO_CLASS = "–"
 _COLOURS = {colour: name for name, colour in OFFERED}
 
@@ -82,36 +80,35 @@ class LabelSetModel(RecordTableModel[Label]):
         made = new_label(self.label_set)
         if made.key and self._keys.owner(made.key):
             made = replace(made, key="")
-        return self._apply(lambda labels, _: add_label(labels, made))
+        return self._apply(lambda now: add_label(now.labels, made))
 
     def move(self, row: int, towards: int) -> bool:
         """Put a label one place up (-1) or down (1)."""
         name = self.label_set.labels[row].name
-        return self._apply(lambda labels, _: move_label(labels, name, row + towards))
+        return self._apply(lambda now: move_label(now.labels, name, row + towards))
 
     def remove(self, row: int, instead: str | None = None) -> bool:
         """Remove a label; its spans keep it, or get another one."""
         name = self.label_set.labels[row].name
-        return self._apply(lambda labels, _: remove_label(labels, name, instead))
+        return self._apply(lambda now: remove_label(now.labels, name, instead))
 
     def use(self, label_set: LabelSet) -> bool:
         """Use another label set."""
-        return self._apply(lambda labels, _: set_label_set(labels, label_set))
+        return self._apply(lambda now: set_label_set(now.labels, label_set))
 
     def setData(self, index: Index, value: Any, role: int = Qt.ItemDataRole.EditRole) -> bool:
         """Make the edit typed; False, with the cell unchanged, where it was refused."""
         name, text = self.label_set.labels[index.row()].name, str(value).strip()
         if text == self.data(index, Qt.ItemDataRole.EditRole):
             return False
-        changes: dict[int, Change] = {
-            NAME: lambda labels, _: rename_label(labels, name, text),
-            KEY: lambda labels, _: set_key(
-                labels, name, self._keys.for_label(name, text) if text else ""
-            ),
-            COLOUR: lambda labels, _: set_colour(labels, name, text.lower()),
-            CLASS: lambda labels, _: set_class(labels, name, text),
-        }
-        return self._apply(changes[index.column()])
+        field = _FIELDS[index.column()]
+
+        def change(now: Edits) -> Edit:
+            given = self._keys.for_label(name, text) if field == "key" and text else text
+            given = text.lower() if field == "colour" else given
+            return change_label(now.labels, name, **{field: given})
+
+        return self._apply(change)
 
     def _refresh(self) -> None:
         labels = self._labels.labels
@@ -141,7 +138,7 @@ class LabelSetModel(RecordTableModel[Label]):
         return texts[column]
 
     def _edited_text(self, record: Label, column: int) -> str:
-        return (record.name, record.key, record.colour, record.gesture_class, "")[column]
+        return "" if column == SPANS else str(getattr(record, _FIELDS[column]))
 
     def _icon(self, record: Label, column: int) -> QIcon | None:
         return swatch_icon(record.colour) if column == COLOUR else None

@@ -5,8 +5,8 @@ from __future__ import annotations
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import Mark
 from sd2app.settings import Settings
-from sd2core.labels import edits
-from sd2core.labels.free_time import LONGEST_REACTION_S, seen_at
+from sd2core.labels.edits import Edits
+from sd2core.labels.free_time import LONGEST_REACTION_S, LabelledFrames
 
 LONGEST_MS = round(1000 * LONGEST_REACTION_S)
 REACTION = "reaction_ms"
@@ -78,17 +78,16 @@ class LabelMarking:
         reaction_s = (
             1e-3 * reaction_ms(self._settings) * playback.speed if playback.playing else 0.0
         )
-        return seen_at(self._labels.labels, playback.timebase, track, now_s, reaction_s)
+        now = LabelledFrames(self._labels.labels, playback.timebase)
+        return now.seen_at(track, now_s, reaction_s)
 
     def _end(self, mark: Mark, seen_s: float, *, cutting: bool = False) -> None:
         self._labels.set_marks(one for one in self._labels.marks if one != mark)
-        make = edits.overwrite if cutting else edits.create
+        make = Edits.overwrite if cutting else Edits.create
         # A reaction does not end what had not begun; going back and ending it there does.
         went_back = self._playback.time_s < mark.start_s
         end_s = seen_s if went_back else max(mark.start_s, seen_s)
-        made = self._edits.apply(
-            lambda labels, base: make(labels, base, mark.track, mark.start_s, end_s, mark.label)
-        )
+        made = self._edits.apply(lambda now: make(now, mark.track, mark.start_s, end_s, mark.label))
         self._made = self._labels.selected_ids if made else frozenset()
 
     def _forget(self) -> None:

@@ -15,7 +15,7 @@ from sd2app.widgets.record_table import NO_PARENT, Heading, Index, RecordTableMo
 from sd2app.widgets.text import counted
 from sd2core.errors import Sd2Error
 from sd2core.labels.comparison import same_ends
-from sd2core.labels.edits import Change, Side, resize
+from sd2core.labels.edits import Change, Side
 from sd2core.labels.field_edits import SpanField, set_field
 from sd2core.labels.spans import Span
 from sd2core.labels.typed_times import typed_duration_end, typed_end, typed_start
@@ -40,8 +40,8 @@ class Edge:
     def typed(self, text: str, spans: Sequence[Span]) -> Change:
         """Make the edit that moves the edge."""
         span_id = spans[0].id
-        return lambda labels, base: resize(
-            labels, base, span_id, self.side, self.when(text, labels.span(span_id), base)
+        return lambda now: now.resize(
+            span_id, self.side, self.when(text, now.labels.span(span_id), now.timebase)
         )
 
 
@@ -79,7 +79,7 @@ def _given(field: SpanField, value: Callable[[str], Any] = str.strip) -> Typed:
 
     def typed(text: str, spans: Sequence[Span]) -> Change:
         ids = [span.id for span in spans]
-        return lambda labels, _: set_field(labels, ids, field, value(text))
+        return lambda now: set_field(now.labels, ids, field, value(text))
 
     return typed
 

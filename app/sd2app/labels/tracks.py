@@ -46,7 +46,7 @@ class LabelTracks:
 
     def add(self, name: str, overlap: Overlap) -> bool:
         """Add a track for new spans; False where it was refused."""
-        done = self._edits.apply(lambda labels, _: field_edits.add_track(labels, name, overlap))
+        done = self._edits.apply(lambda now: field_edits.add_track(now.labels, name, overlap))
         if done:
             self._labels.set_track(name)
         return done
@@ -59,14 +59,14 @@ class LabelTracks:
         )
         new = text.strip()
         if accepted and self._edits.apply(
-            lambda labels, _: field_edits.rename_track(labels, old, new)
+            lambda now: field_edits.change_track(now.labels, old, name=new)
         ):
             self._labels.set_track(new)
 
     def remove(self) -> None:
         """Remove the track, and report the spans removed with it."""
         gone, count = self._labels.track, len(self._labels.labels.of_track(self._labels.track))
-        if self._edits.apply(lambda labels, _: field_edits.remove_track(labels, gone)) and count:
+        if self._edits.apply(lambda now: field_edits.remove_track(now.labels, gone)) and count:
             self._shell.note(
                 f"Removed {gone!r} with {counted(count, 'span')}; undo brings them back."
             )
@@ -76,13 +76,13 @@ class LabelTracks:
         track, names = self._labels.track, self._names
         place = names.index(track) + towards if track else -1
         if 0 <= place < len(names):
-            self._edits.apply(lambda labels, _: field_edits.move_track(labels, track, place))
+            self._edits.apply(lambda now: field_edits.move_track(now.labels, track, place))
 
     def toggle_overlap(self) -> None:
         """Allow or forbid that spans of the track overlap."""
         track = self._labels.track
         overlap: Overlap = "exclusive" if self.free else "free"
-        self._edits.apply(lambda labels, _: field_edits.set_overlap(labels, track, overlap))
+        self._edits.apply(lambda now: field_edits.change_track(now.labels, track, overlap=overlap))
 
     def put_spans(self, towards: Literal[-1, 1]) -> None:
         """Move the selected spans to the track below or above."""

@@ -170,9 +170,7 @@ class SuggestionsModel(ProblemModel):
         ids = [span.id for span in spans]
         track = self._labels.track or Labels().tracks[0].name
         given = label or self._labels.label
-        done = self._edits.apply(
-            lambda labels, base: take(labels, base, ids, track, given, keep_known=keep_known)
-        )
+        done = self._edits.apply(lambda now: take(now, ids, track, given, keep_known=keep_known))
         if done:
             self._go_on(spans[-1].start_s)
 
@@ -180,7 +178,7 @@ class SuggestionsModel(ProblemModel):
         if not spans:
             return
         ids = [span.id for span in spans]
-        if self._edits.apply(lambda labels, base: reject(labels, ids)):
+        if self._edits.apply(lambda now: reject(now.labels, ids)):
             self._declined = (*self._declined, *spans)
             self._go_on(spans[-1].start_s)
 
@@ -223,7 +221,7 @@ class SuggestionsModel(ProblemModel):
         declined = tuple(one for one in self._declined if (one.start_s, one.end_s) not in here)
         self._declined = declined
         before = self._labels.labels
-        self._edits.apply(lambda labels, base: offer(labels, base, result.spans, declined))
+        self._edits.apply(lambda now: offer(now, result.spans, declined))
         after = self._labels.labels
         self._made = (after, self._stack.index()) if after is not before else None
         self._go_on(self._playback.time_s)

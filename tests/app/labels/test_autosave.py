@@ -67,7 +67,7 @@ class Desk:
             self.marking.mark(label)
 
     def edit(self, rng: random.Random) -> bool:
-        return self.edits.apply(lambda labels, base: random_edit(labels, base, rng))
+        return self.edits.apply(lambda now: random_edit(now.labels, now.timebase, rng))
 
     def crash(self) -> None:
         """What the end of a process does."""
@@ -164,7 +164,7 @@ class TestEveryEdit:
 
     def test_nothing_is_written_where_nothing_changes(self, desk, root, recording) -> None:
         at = desk().open(recording)
-        at.edits.apply(lambda labels, base: core_edits.Edit("Nothing", labels))
+        at.edits.apply(lambda now: core_edits.Edit("Nothing", now.labels))
         at.edits.delete()
         assert not list(root.rglob("*.journal"))
         assert not at.document.modified
@@ -508,7 +508,7 @@ class TestTwoWindows:
         second.playback.seek_frame(5)
         for refused in (
             lambda: second.marking.mark("left-to-right"),
-            lambda: second.edits.apply(lambda labels, base: random_edit(labels, base, None)),
+            lambda: second.edits.apply(lambda now: random_edit(now.labels, now.timebase, None)),
             second.hand.begin_drag,
         ):
             second.said.clear()

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from sd2core.classify.spans import SpanOptions, predicted_spans
 from sd2core.errors import Sd2Error
 from sd2core.labels.field_edits import offer
+from sd2core.labels.free_time import LabelledFrames
 from sd2core.labels.spans import Labels
 from sd2core.labels.suggest import TRACK
 from sd2core.timebase import Timebase
@@ -98,7 +99,7 @@ def test_spans_never_overlap_and_begin_and_end_with_their_class(
 def test_they_are_offered_like_other_suggestions() -> None:
     clock = Timebase.regular(20, 10.0)
     spans = predicted_spans(sure([0] * 5 + [2] * 10 + [0] * 5), clock, CLASSES)
-    edit = offer(Labels(), clock, spans)
+    edit = offer(LabelledFrames(Labels(), clock), spans)
     assert [one.label for one in edit.labels.of_track(TRACK)] == ["vertical"]
 
 

@@ -10,14 +10,14 @@ from sd2core.errors import Sd2Error
 from sd2core.labels.field_edits import (
     SpanField,
     add_track,
+    change_track,
     move_track,
     reject,
     remove_track,
-    rename_track,
     set_field,
-    set_overlap,
     take,
 )
+from sd2core.labels.free_time import LabelledFrames
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
@@ -66,25 +66,25 @@ def test_bad_values_are_refused() -> None:
 
 class TestSuggestions:
     def test_accepted_it_is_a_persons(self) -> None:
-        edit = take(LABELS, FRAMES, [2], "Suggested", "wave", keep_known=True)
+        edit = take(LabelledFrames(LABELS, FRAMES), [2], "Suggested", "wave", keep_known=True)
         assert edit.labels.span(2) == replace(LABELS.span(2), origin="person")
         assert edit.name == "Accept suggestion"
 
     def test_on_another_track_it_takes_the_free_part(self) -> None:
-        after = take(LABELS, FRAMES, [2], "Gestures", "wave").labels
+        after = take(LabelledFrames(LABELS, FRAMES), [2], "Gestures", "wave").labels
         assert (after.span(2).track, after.span(2).start_s, after.span(2).end_s) == (
             "Gestures", 2.0, 2.5,
         )  # fmt: skip
 
     def test_without_room_the_refusal_says_where(self) -> None:
         with pytest.raises(Sd2Error, match=r"From 1\.600 to 1\.900 s every frame has a span"):
-            take(LABELS, FRAMES, [3], "Gestures", "wave")
+            take(LabelledFrames(LABELS, FRAMES), [3], "Gestures", "wave")
 
     def test_rejected_it_is_gone(self) -> None:
         assert [span.id for span in reject(LABELS, [2, 3]).labels.spans] == [1]
         for edit in (
             lambda: reject(LABELS, [1]),
-            lambda: take(LABELS, FRAMES, [1], "Gestures", "wave"),
+            lambda: take(LabelledFrames(LABELS, FRAMES), [1], "Gestures", "wave"),
         ):
             with pytest.raises(Sd2Error, match=r"Span 1 .*origin 'person'. Expected: a sugg"):
                 edit()
@@ -98,12 +98,12 @@ class TestTracks:
             add_track(LABELS, "Gestures")
 
     def test_renamed_with_its_spans(self) -> None:
-        after = rename_track(LABELS, "Suggested", "Model").labels
+        after = change_track(LABELS, "Suggested", name="Model").labels
         assert [span.track for span in after.spans] == ["Gestures", "Model", "Model"]
         assert after.tracks[1] == LabelTrack("Model", "free")
-        assert rename_track(after, "Model", "Suggested").labels == LABELS
+        assert change_track(after, "Model", name="Suggested").labels == LABELS
         with pytest.raises(Sd2Error, match="a name of its own"):
-            rename_track(LABELS, "Suggested", "Gestures")
+            change_track(LABELS, "Suggested", name="Gestures")
 
     def test_removed_with_its_spans(self) -> None:
         edit = remove_track(LABELS, "Suggested")
@@ -118,8 +118,8 @@ class TestTracks:
 
     def test_overlaps_forbidden_only_where_there_are_none(self) -> None:
         with pytest.raises(Sd2Error, match=r"Span 2 .* and Span 3 .* overlap"):
-            set_overlap(LABELS, "Suggested", "exclusive")
-        after = set_overlap(reject(LABELS, [3]).labels, "Suggested", "exclusive").labels
+            change_track(LABELS, "Suggested", overlap="exclusive")
+        after = change_track(reject(LABELS, [3]).labels, "Suggested", overlap="exclusive").labels
         assert after.track("Suggested").overlap == "exclusive"
 
 

@@ -13,9 +13,7 @@ from labelled import many_spans
 from sd2core.errors import Sd2Error
 from sd2core.labels.edits import (
     Edit,
-    duplicate,
-    move,
-    nudge,
+    Edits,
 )
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
@@ -37,7 +35,7 @@ LABELS = labels_of((1, 2), (2, 2.5), (3, 3.5), (5, 6))
 
 
 def test_they_move_by_what_the_one_in_the_hand_moves() -> None:
-    edit = move(LABELS, FRAMES, (2, 3), 3, 3.52)
+    edit = Edits(LABELS, FRAMES).move((2, 3), 3, 3.52)
     assert times(edit) == [(1, 2), (2.5, 3), (3.5, 4), (5, 6)]
     assert (edit.name, edit.ids) == ("Move 2 spans", (2, 3))
 
@@ -46,7 +44,7 @@ def test_they_move_by_what_the_one_in_the_hand_moves() -> None:
     ("start_s", "second"), [(9.0, (3.5, 4.0)), (0.0, (2.0, 2.5)), (2.6, (2.0, 2.5))]
 )
 def test_they_stop_as_a_whole_where_the_first_meets_a_neighbour(start_s, second) -> None:
-    edit = move(LABELS, FRAMES, (2, 3), 3, start_s)
+    edit = Edits(LABELS, FRAMES).move((2, 3), 3, start_s)
     found = times(edit)
     assert found[1] == second
     assert found[2] == (second[0] + 1, second[1] + 1)
@@ -55,26 +53,26 @@ def test_they_stop_as_a_whole_where_the_first_meets_a_neighbour(start_s, second)
 
 def test_they_do_not_leave_the_recording() -> None:
     everything = (1, 2, 3, 4)
-    assert times(move(LABELS, FRAMES, everything, 1, 99.0))[-1] == (9, 10)
-    assert times(move(LABELS, FRAMES, everything, 1, -99.0))[0] == (0, 1)
-    assert times(nudge(LABELS, FRAMES, everything, 99))[-1] == (9, 10)
-    assert times(nudge(LABELS, FRAMES, everything, -99))[0] == (0, 1)
+    assert times(Edits(LABELS, FRAMES).move(everything, 1, 99.0))[-1] == (9, 10)
+    assert times(Edits(LABELS, FRAMES).move(everything, 1, -99.0))[0] == (0, 1)
+    assert times(Edits(LABELS, FRAMES).nudge(everything, 99))[-1] == (9, 10)
+    assert times(Edits(LABELS, FRAMES).nudge(everything, -99))[0] == (0, 1)
 
 
 def test_a_nudge_goes_as_far_as_the_first_that_stops() -> None:
-    assert times(nudge(LABELS, FRAMES, (1, 3), 3)) == times(Edit("", LABELS))
-    assert times(nudge(LABELS, FRAMES, (2, 3), 20))[1:3] == [(3.5, 4), (4.5, 5)]
-    refused = nudge(LABELS, FRAMES, (1, 3), 3)
+    assert times(Edits(LABELS, FRAMES).nudge((1, 3), 3)) == times(Edit("", LABELS))
+    assert times(Edits(LABELS, FRAMES).nudge((2, 3), 20))[1:3] == [(3.5, 4), (4.5, 5)]
+    refused = Edits(LABELS, FRAMES).nudge((1, 3), 3)
     assert refused.labels is LABELS
 
 
 def test_copies_keep_their_distances_and_shorten_where_there_is_no_room() -> None:
-    edit = duplicate(LABELS, FRAMES, (2, 3), 7.0)
+    edit = Edits(LABELS, FRAMES).duplicate((2, 3), 7.0)
     assert times(edit)[-2:] == [(7, 7.5), (8, 8.5)]
     assert [edit.labels.span(one).label for one in edit.ids] == ["label 2", "label 3"]
-    assert times(duplicate(LABELS, FRAMES, (2, 3), 3.8))[3:5] == [(3.8, 4.3), (4.8, 5)]
+    assert times(Edits(LABELS, FRAMES).duplicate((2, 3), 3.8))[3:5] == [(3.8, 4.3), (4.8, 5)]
     with pytest.raises(Sd2Error, match="every frame has a span"):
-        duplicate(LABELS, FRAMES, (2, 3), 4.2)
+        Edits(LABELS, FRAMES).duplicate((2, 3), 4.2)
 
 
 @pytest.mark.slow
@@ -92,7 +90,7 @@ def test_touching_ones_still_touch_where_frames_are_uneven(times_s, edges, to_s,
     ids = [span.id for span in labels.spans]
     lead = data.draw(st.sampled_from(ids))
     try:
-        edit = move(labels, base, ids, lead, to_s)
+        edit = Edits(labels, base).move(ids, lead, to_s)
     except Sd2Error:
         assume(False)  # a span between frames further apart than it is long
     spans = edit.labels.spans
@@ -105,16 +103,16 @@ def test_touching_ones_still_touch_where_frames_are_uneven(times_s, edges, to_s,
 def test_several_go_as_far_as_one_alone_does(number: int, step: int) -> None:
     both = labels_of(*((2 * k, 2 * k + 1) for k in range(4)))
     start_s = both.span(number).start_s + step / 10
-    alone = move(both, FRAMES, (number,), number, start_s).labels.span(number)
+    alone = Edits(both, FRAMES).move((number,), number, start_s).labels.span(number)
     beside = Labels(TRACKS, (*both.spans, replace(both.span(number), id=9, track="Free")))
-    together = move(beside, FRAMES, (number, 9), number, start_s).labels
+    together = Edits(beside, FRAMES).move((number, 9), number, start_s).labels
     assert together.span(number) == alone
-    nudged = nudge(both, FRAMES, (number,), step).labels.span(number)
-    assert nudge(beside, FRAMES, (number, 9), step).labels.span(number) == nudged
+    nudged = Edits(both, FRAMES).nudge((number,), step).labels.span(number)
+    assert Edits(beside, FRAMES).nudge((number, 9), step).labels.span(number) == nudged
 
 
 def test_thousands_at_once() -> None:
     base, labels = Timebase.regular(90_000, 30.0), many_spans(3000)
-    edit = nudge(labels, base, [span.id for span in labels.spans], 3)
+    edit = Edits(labels, base).nudge([span.id for span in labels.spans], 3)
     assert edit.labels.spans[0].start_s == base.time_of(3)
     assert edit.name == "Nudge 3000 spans"

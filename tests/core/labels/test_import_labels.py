@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 
 from sd2core.errors import Sd2Error
 from sd2core.labels.formats import FORMATS, read_labels, would_lose, write_labels
-from sd2core.labels.free_time import Frames
+from sd2core.labels.free_time import LabelledFrames
 from sd2core.labels.import_labels import Incoming, free_name, take_in
 from sd2core.labels.label_set import GESTURES, Label, LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Span
@@ -54,7 +54,7 @@ def test_a_cut_that_leaves_no_frame_leaves_the_span_out() -> None:
 @given(any_labels())
 def test_every_span_is_taken_or_named(labels: Labels) -> None:
     found = Incoming.of(labels, FRAMES)
-    low_s, high_s = Frames.of(FRAMES).whole
+    low_s, high_s = LabelledFrames(Labels(), FRAMES).whole
     assert all(low_s <= span.start_s < span.end_s <= high_s for span in found.labels.spans)
     ids = {span.id for span in found.labels.spans}
     assert ids.isdisjoint(span.id for span in found.outside)

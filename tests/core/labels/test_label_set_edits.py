@@ -11,13 +11,10 @@ from hypothesis import strategies as st
 from sd2core.errors import Sd2Error
 from sd2core.labels.field_edits import (
     add_label,
+    change_label,
     move_label,
     new_label,
     remove_label,
-    rename_label,
-    set_class,
-    set_colour,
-    set_key,
     set_label_set,
 )
 from sd2core.labels.label_set import GESTURES, Label, LabelSet
@@ -47,24 +44,24 @@ def test_another_set_keeps_the_spans() -> None:
 
 
 def test_a_label_is_renamed_wherever_it_stands() -> None:
-    after = rename_label(LABELS, "up-to-down", "fall").labels
+    after = change_label(LABELS, "up-to-down", name="fall").labels
     assert [span.label for span in after.spans] == ["fall", "down-to-up", "fall"]
     assert named(after)[2] == "fall"
-    assert rename_label(after, "fall", "up-to-down").labels == LABELS
+    assert change_label(after, "fall", name="up-to-down").labels == LABELS
 
 
 def test_names_that_are_taken_or_unknown() -> None:
     with pytest.raises(Sd2Error, match="share the name background"):
-        rename_label(LABELS, "up-to-down", "background")
+        change_label(LABELS, "up-to-down", name="background")
     with pytest.raises(Sd2Error, match=f"The set {GESTURES.name!r} has no label 'fall'"):
-        rename_label(LABELS, "fall", "up")
+        change_label(LABELS, "fall", name="up")
 
 
 @given(fields=st.fixed_dictionaries({"key": st.sampled_from(["", "q", "ö"])}))
 def test_colour_key_and_class_change_alone(fields: dict[str, str]) -> None:
-    after = set_key(LABELS, "up-to-down", fields["key"]).labels
-    after = set_colour(after, "up-to-down", "#332288").labels
-    after = set_class(after, "up-to-down", "").labels
+    after = change_label(LABELS, "up-to-down", key=fields["key"]).labels
+    after = change_label(after, "up-to-down", colour="#332288").labels
+    after = change_label(after, "up-to-down", gesture_class="").labels
     expected = Label("up-to-down", "#332288", fields["key"], "")
     assert after.label_set.labels == (*GESTURES.labels[:2], expected, *GESTURES.labels[3:])
     assert after.spans == LABELS.spans
@@ -73,7 +70,7 @@ def test_colour_key_and_class_change_alone(fields: dict[str, str]) -> None:
 @pytest.mark.parametrize("key", ["1", "ab", " ", "\t"])
 def test_a_key_is_one_character_that_no_other_label_has(key: str) -> None:
     with pytest.raises(Sd2Error, match=r"share the key 1|The key of the label"):
-        set_key(LABELS, "up-to-down", key)
+        change_label(LABELS, "up-to-down", key=key)
 
 
 @given(name=st.sampled_from(NAMES), place=st.integers(0, 4))
@@ -126,11 +123,11 @@ def test_a_label_is_added_after_the_others() -> None:
 
 def test_what_changes_nothing_gives_the_very_same_labels() -> None:
     for edit in (
-        set_key(LABELS, "up-to-down", "3"),
-        set_colour(LABELS, "up-to-down", "#d55e00"),
-        set_class(LABELS, "up-to-down", "vertical"),
+        change_label(LABELS, "up-to-down", key="3"),
+        change_label(LABELS, "up-to-down", colour="#d55e00"),
+        change_label(LABELS, "up-to-down", gesture_class="vertical"),
         move_label(LABELS, "up-to-down", 2),
-        rename_label(LABELS, "up-to-down", "up-to-down"),
+        change_label(LABELS, "up-to-down", name="up-to-down"),
         set_label_set(LABELS, GESTURES),
     ):
         assert edit.labels is LABELS

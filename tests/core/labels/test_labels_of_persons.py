@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from sd2core.cutouts.source import CutSource
-from sd2core.labels.edits import merge, split
+from sd2core.labels.edits import Edits, merge
 from sd2core.labels.files import read_labels, write_labels
 from sd2core.labels.formats import write_labels as export
 from sd2core.labels.spans import Labels, Span
@@ -34,7 +34,7 @@ def test_what_cannot_hold_persons_says_so(tmp_path: Path) -> None:
 
 
 def test_parts_of_a_span_are_of_the_same_person() -> None:
-    parts = split(LABELS, CLOCK, 2, 2.0).labels
+    parts = Edits(LABELS, CLOCK).split(2, 2.0).labels
     assert [span.person for span in parts.spans] == ["", "anna", "anna"]
     whole = merge(parts, [2, 3]).labels
     assert whole == LABELS

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from labelled import uneven
 
-from sd2core.labels.free_time import seen_at
+from sd2core.labels.free_time import LabelledFrames
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
@@ -31,7 +31,7 @@ LABELS = Labels(
     ],
 )
 def test_the_frame_that_was_on_screen(track, now_s, reaction_s, seen_s) -> None:
-    assert seen_at(LABELS, FRAMES, track, now_s, reaction_s) == pytest.approx(seen_s)
+    assert LabelledFrames(LABELS, FRAMES).seen_at(track, now_s, reaction_s) == pytest.approx(seen_s)
 
 
 @given(seed=st.integers(0, 99), frame=st.integers(0, 119), reaction_s=st.floats(0, 1))
@@ -40,7 +40,7 @@ def test_it_is_always_a_frame_that_was_on_screen_by_then(seed, frame, reaction_s
     end_s = (base.time_of(40) + base.time_of(41)) / 2
     labels = Labels(TRACKS, (Span(1, "One", base.start_s, end_s, "x"),))
     now_s = base.time_of(frame)
-    seen_s = seen_at(labels, base, "One", now_s, reaction_s)
+    seen_s = LabelledFrames(labels, base).seen_at("One", now_s, reaction_s)
     assert seen_s in base.times_s
     assert seen_s <= now_s
     if now_s >= end_s:

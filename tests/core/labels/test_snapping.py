@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from labelled import imported, uneven
 
-from sd2core.labels.free_time import snap
+from sd2core.labels.free_time import LabelledFrames
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
@@ -21,15 +21,15 @@ LABELS = Labels(
 
 
 def test_spans_attract_within_the_distance() -> None:
-    assert snap(LABELS, FRAMES, 2.2, 0.25) == 2.0
-    assert snap(LABELS, FRAMES, 2.2, 0.1) == FRAMES.times_s[22]
-    assert snap(LABELS, FRAMES, 2.9, 0.25) == 3.0
-    assert snap(LABELS, FRAMES, 1.961, 0.25) == 1.96
+    assert LabelledFrames(LABELS, FRAMES).snap(2.2, 0.25) == 2.0
+    assert LabelledFrames(LABELS, FRAMES).snap(2.2, 0.1) == FRAMES.times_s[22]
+    assert LabelledFrames(LABELS, FRAMES).snap(2.9, 0.25) == 3.0
+    assert LabelledFrames(LABELS, FRAMES).snap(1.961, 0.25) == 1.96
 
 
 def test_spans_in_the_hand_do_not_attract() -> None:
-    assert snap(LABELS, FRAMES, 2.2, 0.25, ignore={1}) == 1.96
-    assert snap(LABELS, FRAMES, 2.2, 0.25, ignore={1, 2}) == FRAMES.times_s[22]
+    assert LabelledFrames(LABELS, FRAMES).snap(2.2, 0.25, ignore={1}) == 1.96
+    assert LabelledFrames(LABELS, FRAMES).snap(2.2, 0.25, ignore={1, 2}) == FRAMES.times_s[22]
 
 
 def test_on_a_tie_a_span_goes_before_a_suggestion() -> None:
@@ -40,17 +40,17 @@ def test_on_a_tie_a_span_goes_before_a_suggestion() -> None:
             Span(2, "Gestures", 2.5, 3.0, "up"),
         ),
     )
-    assert snap(labels, FRAMES, 2.25, 0.25) == 2.5
-    assert snap(labels, FRAMES, 2.25, 0.25, ignore={2}) == 2.0
+    assert LabelledFrames(labels, FRAMES).snap(2.25, 0.25) == 2.5
+    assert LabelledFrames(labels, FRAMES).snap(2.25, 0.25, ignore={2}) == 2.0
     both = labels.with_spans([Span(1, "Gestures", 1.0, 2.0, "up")])
-    assert snap(both, FRAMES, 2.25, 0.25) == 2.0, "the earlier one"
+    assert LabelledFrames(both, FRAMES).snap(2.25, 0.25) == 2.0, "the earlier one"
 
 
 @given(st.integers(0, 99), st.floats(-3, 12), st.floats(0, 1))
 def test_nothing_that_may_attract_is_nearer(seed: int, time_s: float, within_s: float) -> None:
     timebase = uneven(seed)
     labels = imported(timebase, seed)
-    found = snap(labels, timebase, time_s, within_s)
+    found = LabelledFrames(labels, timebase).snap(time_s, within_s)
     edges = [edge for span in labels.spans for edge in (span.start_s, span.end_s)]
     near = [edge for edge in edges if abs(edge - time_s) <= within_s]
     if near:

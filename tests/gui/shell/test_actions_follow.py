@@ -35,7 +35,7 @@ def test_every_action_follows_what_it_depends_on(labelled, fake_models, qtbot) -
         "delete": lambda: (c.labels.select([1]), c.label_edits.delete()),
         "undo": c.document.undo_stack.undo,
         "redo": c.document.undo_stack.redo,
-        "a track": lambda: c.label_edits.apply(lambda labels, _: add_track(labels, "More")),
+        "a track": lambda: c.label_edits.apply(lambda now: add_track(now.labels, "More")),
         "play": c.playback.play,
         "pause": c.playback.pause,
         "loop": lambda: c.playback.set_loop(not c.playback.loop),

@@ -14,7 +14,7 @@ from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.widgets.key_text import canonical, native
 from sd2app.widgets.record_table import Heading, Index, RecordTableModel
 from sd2core.labels.edits import Change
-from sd2core.labels.field_edits import set_key
+from sd2core.labels.field_edits import change_label
 
 _HEADINGS = (Heading("Menu"), Heading("What it does"), Heading("Keys", editable=True))
 KEYS = 2
@@ -70,7 +70,7 @@ class KeyListModel(RecordTableModel[KeyRow]):
             self._bindings.bind(at.action, (*kept, key))
         elif at.label:
             wanted = self._bindings.for_label(at.label, key)
-            self._apply(lambda labels, _: set_key(labels, at.label, wanted))
+            self._apply(lambda now: change_label(now.labels, at.label, key=wanted))
 
     def clear(self, row: int) -> None:
         """Take all keys of a row away."""
@@ -78,7 +78,7 @@ class KeyListModel(RecordTableModel[KeyRow]):
         if at.action:
             self._bindings.bind(at.action, ())
         elif at.label:
-            self._apply(lambda labels, _: set_key(labels, at.label, ""))
+            self._apply(lambda now: change_label(now.labels, at.label, key=""))
 
     def reset(self, row: int) -> None:
         """Give a row its usual keys back; errors are those of :meth:`change`."""
