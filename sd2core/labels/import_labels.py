@@ -60,51 +60,53 @@ class Incoming:
         counts = Counter(span.label for span in self.labels.spans)
         return {name: count for name, count in counts.items() if label_set.find(name) is None}
 
+    def set_after(self, label_set: LabelSet, way: Way) -> LabelSet:
+        """Return the label set of a recording after :meth:`take_into`.
 
-def take_in(labels: Labels, incoming: Incoming, way: Way, source: str) -> Edit:
-    """Import the labels of a file into a recording.
+        Adding brings those labels that only the file has.
+        """
+        theirs = self.labels.label_set
+        if way == "replace":
+            # A file that says nothing of labels is read with the default set.
+            return theirs if theirs != GESTURES else label_set
+        brought = (theirs.find(name) for name in self.unknown(label_set))
+        added = with_own_keys(
+            (one for one in brought if one is not None), (one.key for one in label_set.labels)
+        )
+        return replace(label_set, labels=(*label_set.labels, *added)) if added else label_set
 
-    Parameters
-    ----------
-    labels : Labels
-        Of the recording.
-    incoming : Incoming
-        Of the file.
-    way : {"replace", "add"}
+    def take_into(self, labels: Labels, way: Way, source: str) -> Edit:
+        """Import the labels of a file (``source``) into a recording.
+
         Replacing takes the tracks, spans and numbers of the file, and its label set where it brings
-        one of its own. Adding leaves all that is there: the file's tracks come below it, and what
-        the file says of labels that the set does not have is added to the set.
-    source : str
-        Name of the file, which tracks get whose names are taken.
-
-    Raises
-    ------
-    Sd2Error
-        When the file has no spans in the recording; one without any may replace all labels.
-    """
-    brought = incoming.labels
-    if refusal := incoming.refusal(way):
-        raise Sd2Error(f"{source} holds {refusal}", "at least one, to take it in")
-    name = f"Import {len(brought.spans)} span{'s' * (len(brought.spans) != 1)}"
-    label_set = set_after(labels.label_set, incoming, way)
-    if way == "replace":
-        after = replace(brought, label_set=label_set)
-        return Edit(name, labels if after == labels else after)
-    names = {track.name for track in labels.tracks}
-    called: dict[str, str] = {}
-    tracks = []
-    for track in brought.tracks:
-        if brought.of_track(track.name):
-            called[track.name] = free_name(track.name, source, names)
-            names.add(called[track.name])
-            tracks.append(replace(track, name=called[track.name]))
-    first = labels.next_id
-    spans = [
-        replace(span, id=first + number, track=called[span.track])
-        for number, span in enumerate(brought.spans)
-    ]
-    after = Labels((*labels.tracks, *tracks), (*labels.spans, *spans), label_set)
-    return Edit(name, after, tuple(span.id for span in spans))
+        one of its own. Adding leaves all that is there: the file's tracks come below it, with its
+        name where theirs are taken, and what the file says of labels that the set does not have is
+        added to the set. Raises Sd2Error when the file has no spans in the recording; one without
+        any may replace all labels.
+        """
+        brought = self.labels
+        if refusal := self.refusal(way):
+            raise Sd2Error(f"{source} holds {refusal}", "at least one, to take it in")
+        name = f"Import {len(brought.spans)} span{'s' * (len(brought.spans) != 1)}"
+        label_set = self.set_after(labels.label_set, way)
+        if way == "replace":
+            after = replace(brought, label_set=label_set)
+            return Edit(name, labels if after == labels else after)
+        names = {track.name for track in labels.tracks}
+        called: dict[str, str] = {}
+        tracks = []
+        for track in brought.tracks:
+            if brought.of_track(track.name):
+                called[track.name] = free_name(track.name, source, names)
+                names.add(called[track.name])
+                tracks.append(replace(track, name=called[track.name]))
+        first = labels.next_id
+        spans = [
+            replace(span, id=first + number, track=called[span.track])
+            for number, span in enumerate(brought.spans)
+        ]
+        after = Labels((*labels.tracks, *tracks), (*labels.spans, *spans), label_set)
+        return Edit(name, after, tuple(span.id for span in spans))
 
 
 def free_name(name: str, source: str, taken: Collection[str]) -> str:
@@ -119,19 +121,3 @@ def free_name(name: str, source: str, taken: Collection[str]) -> str:
         if free not in taken:
             return free
         number += 1
-
-
-def set_after(label_set: LabelSet, incoming: Incoming, way: Way) -> LabelSet:
-    """Return the label set of a recording after :func:`take_in`.
-
-    Adding brings those labels that only the file has.
-    """
-    theirs = incoming.labels.label_set
-    if way == "replace":
-        # A file that says nothing of labels is read with the default set.
-        return theirs if theirs != GESTURES else label_set
-    brought = (theirs.find(name) for name in incoming.unknown(label_set))
-    added = with_own_keys(
-        (one for one in brought if one is not None), (one.key for one in label_set.labels)
-    )
-    return replace(label_set, labels=(*label_set.labels, *added)) if added else label_set

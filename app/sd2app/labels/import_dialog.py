@@ -31,7 +31,7 @@ from sd2core.labels.formats import (
     read_label_file,
     readable_formats,
 )
-from sd2core.labels.import_labels import Incoming, Way, set_after, take_in
+from sd2core.labels.import_labels import Incoming, Way
 from sd2core.labels.spans import Labels
 from sd2core.options.records import words_of
 from sd2core.recording.recording import Recording
@@ -78,7 +78,7 @@ def import_labels(shell: Shell, edits: LabelEdits, path: Path | None = None) -> 
     taken, incoming, way, name = accepted(dialog), dialog.incoming, dialog.way, path.stem
     dialog.finish()
     if taken and incoming is not None:
-        edits.apply(lambda now: take_in(now.labels, incoming, way, name))
+        edits.apply(lambda now: incoming.take_into(now.labels, way, name))
 
 
 def _frame_source(recording: Recording) -> dict[str, Any]:
@@ -192,7 +192,7 @@ class LabelImportDialog(Dialog):
             ("Tracks", f"{len(tracks)}: {_names([track.name for track in tracks])}"),
             ("Labels", _names([f"{name} ({count})" for name, count in counts.items()]) or "none"),
         ]
-        if unknown := incoming.unknown(set_after(self._labels.label_set, incoming, self.way)):
+        if unknown := incoming.unknown(incoming.set_after(self._labels.label_set, self.way)):
             are = "It is" if len(unknown) == 1 else "They are"
             text = f"{_names(list(unknown))}. {are} kept and shown in grey."
             facts.append(("Not in the label set", text))

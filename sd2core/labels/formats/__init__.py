@@ -28,39 +28,11 @@ from sd2core.labels.formats import (
     subtitles,
     textgrid,
 )
-from sd2core.labels.formats.losses import (
-    ASPECTS,
-    Aspect,
-    LabelFormat,
-    Loss,
-    losses_by_format,
-    sentences,
-)
+from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, losses_by_format
 from sd2core.labels.formats.rows import LabelClock, LabelReading, LabelRows, assembled
 from sd2core.labels.spans import Labels
 from sd2core.plug_ins import Group, PlugIn
 from sd2core.timebase import Timebase
-
-__all__ = [
-    "ASPECTS",
-    "FORMATS",
-    "LABEL_PLUG_INS",
-    "Aspect",
-    "LabelFormat",
-    "LabelProgram",
-    "LabelReading",
-    "Loss",
-    "all_formats",
-    "format_for",
-    "is_own",
-    "observations",
-    "read_label_file",
-    "read_labels",
-    "readable_formats",
-    "sentences",
-    "would_lose",
-    "write_labels",
-]
 
 
 @dataclass(frozen=True)

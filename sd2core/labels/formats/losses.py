@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -116,8 +116,3 @@ def hold_texts(labels: Labels, banned: re.Pattern[str], title: str) -> tuple[Lab
     where = counted(count, "note or author", "notes or authors")
     words = f"{title} cannot hold control characters: replaced in {where}"
     return replace(labels, spans=spans), [Loss("characters", count, words)]
-
-
-def sentences(losses: Iterable[Loss]) -> str:
-    """Join losses, each with its full stop."""
-    return " ".join(f"{loss.sentence}." for loss in losses)

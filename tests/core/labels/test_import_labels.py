@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from sd2core.errors import Sd2Error
 from sd2core.labels.formats import FORMATS, read_labels, would_lose, write_labels
 from sd2core.labels.free_time import LabelledFrames
-from sd2core.labels.import_labels import Incoming, free_name, take_in
+from sd2core.labels.import_labels import Incoming, free_name
 from sd2core.labels.label_set import GESTURES, Label, LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
@@ -71,9 +71,9 @@ def test_adding_changes_nothing_that_is_there(here: Labels, brought: Labels) -> 
     found = Incoming.of(brought, FRAMES)
     if not found.labels.spans:
         with pytest.raises(Sd2Error, match="file holds no spans"):
-            take_in(here, found, "add", "file")
+            found.take_into(here, "add", "file")
         return
-    done = take_in(here, found, "add", "file")
+    done = found.take_into(here, "add", "file")
     assert done.labels.tracks[: len(here.tracks)] == here.tracks
     assert set(here.spans) <= set(done.labels.spans)
     assert done.labels.label_set.labels[: len(here.label_set.labels)] == here.label_set.labels
@@ -85,19 +85,19 @@ def test_adding_changes_nothing_that_is_there(here: Labels, brought: Labels) -> 
 def test_replacing_takes_the_file_as_it_is_and_keeps_the_set_it_does_not_have() -> None:
     own = LabelSet("Own", (Label("wave", "#112233", "w"),))
     here = replace(HERE, label_set=own)
-    done = take_in(here, Incoming.of(file_of((1.0, 2.0, "wave")), FRAMES), "replace", "ben")
+    done = Incoming.of(file_of((1.0, 2.0, "wave")), FRAMES).take_into(here, "replace", "ben")
     assert done.name == "Import 1 span"
     assert done.labels.label_set == own
     assert [span.label for span in done.labels.spans] == ["wave"]
     theirs = file_of((1.0, 2.0, "push"), label_set=LabelSet("Theirs", (Label("push", "#445566"),)))
-    assert take_in(here, Incoming.of(theirs, FRAMES), "replace", "ben").labels == theirs
-    assert take_in(theirs, Incoming.of(theirs, FRAMES), "replace", "ben").labels is theirs
+    assert Incoming.of(theirs, FRAMES).take_into(here, "replace", "ben").labels == theirs
+    assert Incoming.of(theirs, FRAMES).take_into(theirs, "replace", "ben").labels is theirs
 
 
 def test_added_tracks_have_names_of_their_own_and_labels_bring_their_colours() -> None:
     theirs = LabelSet("Theirs", (Label("push", "#445566", "1"), Label("unused", "#000000", "u")))
     brought = file_of((1.0, 2.0, "push"), label_set=theirs)
-    done = take_in(HERE, Incoming.of(brought, FRAMES), "add", "ben")
+    done = Incoming.of(brought, FRAMES).take_into(HERE, "add", "ben")
     assert [track.name for track in done.labels.tracks] == ["Gestures", "Gestures (ben)"]
     assert [(span.id, span.track) for span in done.labels.spans] == [
         (7, "Gestures"),
@@ -106,13 +106,13 @@ def test_added_tracks_have_names_of_their_own_and_labels_bring_their_colours() -
     # Its key is taken by another label, its colour is not.
     assert done.labels.label_set.find("push") == Label("push", "#445566")
     assert done.labels.label_set.find("unused") is None
-    again = take_in(done.labels, Incoming.of(brought, FRAMES), "add", "ben").labels
+    again = Incoming.of(brought, FRAMES).take_into(done.labels, "add", "ben").labels
     assert again.tracks[-1].name == "Gestures (ben, 2)"
 
 
 def test_an_empty_file_is_not_added() -> None:
     with pytest.raises(Sd2Error, match="ben holds no spans"):
-        take_in(HERE, Incoming.of(Labels(), FRAMES), "add", "ben")
+        Incoming.of(Labels(), FRAMES).take_into(HERE, "add", "ben")
 
 
 def test_names_stay_within_what_a_name_may_be() -> None:
