@@ -15,11 +15,11 @@ import numpy as np
 from PySide6.QtCore import QObject, Signal, SignalInstance
 
 from sd2app.accuracy.model import AccuracyModel
-from sd2app.background.latest import Emit, delayed
+from sd2app.background.latest import Emit, ReportingModel, delayed
 from sd2app.background.quoting import quoted
 from sd2app.maps.partial_map import FINAL, Part, PartialMap, View, empty_map
 from sd2app.maps.quality import (
-    CompilerModel,
+    Compiler,
     MaskPrefetcher,
     Postprocess,
     QualityLevel,
@@ -42,6 +42,7 @@ from sd2core.doppler.synthesizer import FrameScattering, MapFrames, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import deep_signature
 from sd2core.maps import DopplerMap
+from sd2core.numerics.compiled import kernels_ready
 from sd2core.options.records import words_of
 from sd2core.options.synthesis import CHOSEN
 from sd2core.sensor import Vector, VirtualSensor
@@ -53,7 +54,7 @@ _REST_MS = 300
 """Pause of a drag that counts as rest."""
 
 
-class SynthesisModel(QObject):
+class SynthesisModel(ReportingModel):
     """Recomputes when the sensor moves: a preview at once, the final quality at rest.
 
     While the sensor is dragged, one sweep runs at a time and the newest
@@ -69,7 +70,6 @@ class SynthesisModel(QObject):
     completed = Signal()
     refining = Signal()  # the map at rest is not complete yet
     painted = Signal(object)  # Part that came onto the map
-    failed = Signal(str)
 
     def __init__(self, session: Session, accuracy: AccuracyModel, parent: QObject) -> None:
         super().__init__(parent)
@@ -82,7 +82,7 @@ class SynthesisModel(QObject):
         self._reader = FrameReader(session)
         self._synthesizers: SynthesizerCache | None = None
         self._prefetcher = MaskPrefetcher(self)
-        self._prefetcher.failed.connect(lambda error: self.failed.emit(str(error)))
+        self._prefetcher.failed.connect(super()._fail)
         # Asked for by the window and taken by the thread.
         self._next_sweep: deque[tuple[Callable[..., Part], Postprocess | None]] = deque(maxlen=1)
         self._woken = threading.Event()  # by another sweep, or the end of what is made of one
@@ -90,8 +90,9 @@ class SynthesisModel(QObject):
         self._runner = ListedRunner("synthesis", session.jobs, self, self._finish, self._fail)
         self._runner.partial.connect(self._receive)
         self._runner.cancelled.connect(self._say_quality)
-        self._compiler = CompilerModel(session.jobs, self)
-        self._compiler.finished.connect(self._follow)
+        self._compiler = Compiler("compile", session.jobs, self)
+        for signal in (self._compiler.finished, self._compiler.cancelled):
+            signal.connect(self._follow)
         self._rest = delayed(self._settle, _REST_MS, self)
         session.sensor.changed.connect(self._follow)
         session.sensor.dragging_changed.connect(self._follow)
@@ -307,9 +308,7 @@ class SynthesisModel(QObject):
     def close(self) -> None:
         """Stop computing."""
         self._stop()
-        self._compiler.stop()
-        self._runner.close()
-        self._prefetcher.close()
+        super().close()
 
     def _stop(self) -> None:
         self._rest.stop()
@@ -445,7 +444,7 @@ class SynthesisModel(QObject):
     def _may_choose(self) -> bool:
         """True if the plans are for another sensor and the kernels are compiled."""
         decided = self._accuracy.is_decided(self._sensor, self._budget_ms())
-        return self._compiler.ready and not decided
+        return kernels_ready() and not decided
 
     def _take_plan(self) -> None:
         """Follow the plans; what was made by another stays until it is replaced."""
@@ -521,7 +520,7 @@ class SynthesisModel(QObject):
 
     def _fail(self, error: Exception) -> None:
         self._sweeping = False
-        self.failed.emit(str(error))
+        super()._fail(error)
 
     # --- helpers --------------------------------------------------------------------------
 

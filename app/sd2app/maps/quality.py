@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
-import subprocess
 import threading
+import time
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject
 
 from sd2app.accuracy.text import InUse
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, Part, View, pieces
-from sd2app.session.tasks import Job, TaskList
+from sd2app.session.tasks import ListedRunner
 from sd2core.body.parts import body_parts
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.synthesizer import Synthesizer, Visibility
@@ -283,7 +283,7 @@ def refine(
             run(FINAL, part, final_size, final)
 
 
-_POLL_MS = 500
+_POLL_S = 0.2
 
 
 class MaskPrefetcher(LatestRunner):
@@ -322,46 +322,19 @@ class MaskPrefetcher(LatestRunner):
         self.prefetched_for = sensor
 
 
-class CompilerModel(QObject):
-    """Starts the compiler where there is no machine code yet, and says how far it is."""
-
-    finished = Signal()
-
-    def __init__(self, jobs: TaskList, parent: QObject) -> None:
-        super().__init__(parent)
-        self._process: subprocess.Popen[bytes] | None = None
-        self._jobs = jobs
-        self._job: Job | None = None
-        self._poll = QTimer(self, interval=_POLL_MS)
-        self._poll.timeout.connect(self._watch)
-
-    @property
-    def ready(self) -> bool:
-        """True once the machine code is there."""
-        return kernels_ready()
-
-    @property
-    def busy(self) -> bool:
-        """True while machine code is being compiled."""
-        return not self.ready and self._process is not None and self._process.poll() is None
+class Compiler(ListedRunner):
+    """Waits for the compiler where there is no machine code yet, and says how far it is."""
 
     def start(self) -> None:
         """Compile what is not compiled: a map waits for it."""
-        self._process = process = compile_in_background()
-        if process is not None and self.busy and self._job is None:
-            self._job = self._jobs.start("Compiling, once after installing", process.terminate)
-            self._poll.start()
+        process = compile_in_background()
+        if process is None or kernels_ready() or process.poll() is not None or self.busy:
+            return
 
-    def stop(self) -> None:
-        """Stop waiting."""
-        self._poll.stop()
-        if self._job is not None:
-            self._jobs.finish(self._job)
-            self._job = None
+        def wait(emit: Emit) -> None:
+            while not kernels_ready() and process.poll() is None:
+                emit(kernels_compiled())
+                time.sleep(_POLL_S)
 
-    def _watch(self) -> None:
-        if not self.busy:
-            self.stop()
-            self.finished.emit()
-        elif self._job is not None:
-            self._jobs.report(self._job, *kernels_compiled())
+        self.cancelled.connect(process.terminate)
+        self.submit(wait, "Compiling, once after installing")

@@ -17,6 +17,7 @@ from swinging_recordings import recording
 from window_models import build_models
 
 from sd2app.command_line import main as run
+from sd2app.maps import model as map_model
 from sd2app.maps import quality as map_quality
 from sd2app.maps.partial_map import FINAL, ROUGH
 from sd2app.settings import Settings
@@ -172,7 +173,8 @@ def test_without_machine_code_exact_waits_for_the_compiler(context, qtbot, ball,
     state = {"ready": False, "exit": None, "compiled": (0, 11)}
     compiler = SimpleNamespace(poll=lambda: state["exit"], terminate=lambda: None)
     asked = []
-    monkeypatch.setattr(map_quality, "kernels_ready", lambda: state["ready"])
+    for module in (map_quality, map_model):
+        monkeypatch.setattr(module, "kernels_ready", lambda: state["ready"])
     monkeypatch.setattr(map_quality, "kernels_compiled", lambda: state["compiled"])
     monkeypatch.setattr(
         map_quality, "compile_in_background", lambda: asked.append(True) or compiler
@@ -196,7 +198,8 @@ def test_without_machine_code_exact_waits_for_the_compiler(context, qtbot, ball,
 
 def test_a_compiler_that_fails_does_not_keep_exact_away(context, qtbot, ball, monkeypatch):
     compiler = SimpleNamespace(poll=lambda: 1)
-    monkeypatch.setattr(map_quality, "kernels_ready", lambda: False)
+    for module in (map_quality, map_model):
+        monkeypatch.setattr(module, "kernels_ready", lambda: False)
     monkeypatch.setattr(map_quality, "compile_in_background", lambda: compiler)
     open_ball(context, qtbot, ball)
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=30_000)
