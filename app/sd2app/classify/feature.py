@@ -15,7 +15,7 @@ from sd2app.classify.panel import ClassPanel
 from sd2app.classify.strip import ClassStrip
 from sd2app.classify.text import classifier_page, learned_text, network_text
 from sd2app.classify.training import ClassTraining
-from sd2app.denoise.validity import MapValidity
+from sd2app.denoise.model import DenoiseModel
 from sd2app.feature import Action, Drop, Feature, Shell, report
 from sd2app.labels.actions import editing
 from sd2app.labels.edits import LabelEdits
@@ -48,7 +48,7 @@ class ClassifyFeature(Feature):
         self,
         session: Session,
         shell: Shell,
-        validity: MapValidity,
+        denoise: DenoiseModel,
         labels: LabelsModel,
         edits: LabelEdits,
         library: ClassifierLibrary,
@@ -58,7 +58,7 @@ class ClassifyFeature(Feature):
     ) -> None:
         self._session, self._shell, self._suggest = session, shell, suggest
         self._labels, self._edits = labels, edits
-        self.model = ClassifyModel(session, validity, labels, library, parent)
+        self.model = ClassifyModel(session, denoise, labels, library, parent)
         self.training = ClassTraining(
             session.settings, self.model.use, parent, command=command or COMMAND_IN_FOLDER
         )

@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, Signal, SignalInstance
 from sd2app.background.latest import LatestRunner, ReportingModel, delayed
 from sd2app.background.model_worker.client import ClassifierLibrary, RemoteClassifier
 from sd2app.classify.track import ClassReading, ClassTrack
-from sd2app.denoise.validity import MapValidity
+from sd2app.denoise.model import DenoiseModel
 from sd2app.labels.model import LabelsModel
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
@@ -52,7 +52,7 @@ class ClassifyModel(ReportingModel):
     def __init__(
         self,
         session: Session,
-        validity: MapValidity,
+        denoise: DenoiseModel,
         labels: LabelsModel,
         library: ClassifierLibrary,
         parent: QObject,
@@ -64,7 +64,7 @@ class ClassifyModel(ReportingModel):
         self._in_favour = (maps.denoised, maps.real, maps.synthetic)
         self._maps = (maps.synthetic, maps.denoised, maps.real)
         self._labels, self._library = labels, library
-        self.track = ClassTrack(validity.is_current, session.results, self)
+        self.track = ClassTrack(denoise.is_current, session.results, self)
         # The classifier that is in use or being loaded, and the card of the one in use.
         self.path: Path | None = next(iter(self._settings.paths(_MODEL)), None)
         self.card: ClassifierCard | None = None
@@ -84,7 +84,7 @@ class ClassifyModel(ReportingModel):
         for track in self._maps:
             track.came_or_went.connect(self._follow)
         self._playback.frame_changed.connect(lambda _: self.moved.emit())
-        validity.changed.connect(self.counts_changed)
+        denoise.current_changed.connect(self.counts_changed)
         self.counts_changed.connect(self.moved)
 
     # --- what is known --------------------------------------------------------------------

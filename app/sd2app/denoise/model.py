@@ -18,6 +18,7 @@ from sd2app.maps.model import SynthesisModel
 from sd2app.maps.partial_map import Part
 from sd2app.maps.quality import Postprocess
 from sd2app.session.content import NO_MODEL, UNSAID, DenoiserChoice
+from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2core.cli.denoise import Denoise
 from sd2core.denoise.files import default_name
@@ -44,6 +45,7 @@ class DenoiseModel(ReportingModel):
     """Follows the recording's choice, loads the model in the background, and uses it."""
 
     changed = Signal()  # choice, model or comparison
+    current_changed = Signal()  # which maps are of the sensor's present place
     noted = Signal(str)
 
     def __init__(
@@ -79,6 +81,9 @@ class DenoiseModel(ReportingModel):
         self._synthetic.changed.connect(self._watch)
         for signal in (self._synthetic.changed, self.changed):
             signal.connect(self._keep_place)
+        moved = session.sensor.changed, synthesis.moving_changed
+        for signal in (*moved, synthesis.completed, synthesis.painted):
+            signal.connect(self.current_changed)
 
     # --- what is known --------------------------------------------------------------------
 
@@ -107,6 +112,14 @@ class DenoiseModel(ReportingModel):
     def can_export(self) -> bool:
         """True if there is a map to write."""
         return self._loaded is not None and self._synthesis.complete
+
+    def is_current(self, track: MapModel) -> bool:
+        """True while a map is of the sensor's place, and it rests; only two follow the sensor."""
+        maps = self._session.maps
+        if track not in (maps.synthetic, maps.denoised):
+            return True
+        rests = not self._synthesis.moving and self._synthesis.shows_sensor
+        return rests and (track is maps.synthetic or self.map.shows_source)
 
     def available(self) -> Sequence[ModelCard]:
         """Models that can be chosen by name, and the one that is chosen."""

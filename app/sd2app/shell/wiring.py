@@ -16,7 +16,6 @@ from sd2app.commands.feature import CommandsFeature
 from sd2app.dataset_export.feature import DatasetExportFeature
 from sd2app.denoise.feature import DenoiseFeature
 from sd2app.denoise.text import track_words
-from sd2app.denoise.validity import MapValidity
 from sd2app.feature import Feature, Shell
 from sd2app.figures.feature import FiguresFeature
 from sd2app.fit.feature import FitFeature
@@ -93,7 +92,7 @@ class Features:
         self.classify = ClassifyFeature(
             session,
             shell,
-            MapValidity(session, maps.synthesis, denoise.model, parent),
+            denoise.model,
             labels.model,
             labels.edits,
             parts.classifiers or core_classifiers(process),

@@ -22,10 +22,10 @@ from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
 
-class MapValidity(QObject):
-    """Validity of maps, as the test says."""
+class Denoise(QObject):
+    """Tells which maps are of the sensor's place, as the test says."""
 
-    changed = Signal()
+    current_changed = Signal()
 
     def __init__(self):
         super().__init__()
@@ -42,7 +42,7 @@ def a_map(kind, seed=0):
 
 @pytest.fixture
 def set_up(qtbot):
-    fake, labels, validity = FakeClassifiers("a"), LabelsModel(), MapValidity()
+    fake, labels, denoise = FakeClassifiers("a"), LabelsModel(), Denoise()
     session = build_session(owner := QObject(), Settings.forgetful())
     tracks = [session.maps.synthetic, session.maps.denoised, session.maps.real]
     tracks[2].title = "Radar (simulated)"
@@ -51,7 +51,7 @@ def set_up(qtbot):
     made = []
 
     def model():
-        made.append(ClassifyModel(session, validity, labels, fake.library, owner))
+        made.append(ClassifyModel(session, denoise, labels, fake.library, owner))
         return made[-1]
 
     def settle():
@@ -59,7 +59,7 @@ def set_up(qtbot):
 
     (path,) = fake.cards
     yield SimpleNamespace(
-        model=model, fake=fake, tracks=tracks, playback=playback, validity=validity,
+        model=model, fake=fake, tracks=tracks, playback=playback, denoise=denoise,
         labels=labels, settle=settle, path=path,
     )  # fmt: skip
     fake.gate.set()
@@ -76,7 +76,7 @@ def test_the_frame_on_screen_is_followed(set_up):
     for frame in (0, 17, 59):
         set_up.playback.seek_frame(frame)
         assert model.reading.shares == pytest.approx(told[frame])
-    set_up.validity.others = [set_up.tracks[1]]
+    set_up.denoise.others = [set_up.tracks[1]]
     assert not model.reading.current
     # What the sensor does is nothing to the radar's own map.
     set_up.tracks[2].set_map(doppler)
