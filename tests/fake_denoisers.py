@@ -48,11 +48,9 @@ class FakeDenoiser:
     """Causal; it remembers half of its answer."""
 
     equals_batch = True
-    frame_rate_hz = 30.0
 
     def __init__(self, library, card, gain):
         self.library, self.card, self.gain = library, card, gain
-        self.parts = card.parts
 
     def denoise(self, doppler):
         self.library.asked.append((len(doppler.timebase), threading.current_thread().name))
@@ -61,7 +59,7 @@ class FakeDenoiser:
         if self.library.failure is not None:
             raise self.library.failure
         # With parts, the answer is to the last of them.
-        values = fading(input_of(doppler, self.parts)[:, -32:].T, self.gain)
+        values = fading(input_of(doppler, self.card.parts)[:, -32:].T, self.gain)
         if doppler.present is not None:
             values[:, ~doppler.present] = 0.0
         meta = {"denoiser": {"name": self.card.name}, "input": doppler.meta}
@@ -74,7 +72,6 @@ class FakeDenoiser:
 class FakeLive:
     def __init__(self, denoiser):
         self.denoiser = denoiser
-        self.equals_batch = denoiser.equals_batch
         self.before = 0.0
         denoiser.library.sessions += 1
 

@@ -112,22 +112,22 @@ class LiveDenoiseModel(QObject):
         if late < -1 or late > _JUMP_S * source.timebase.frames_per_s * self._playback.speed:
             self._begin_at(frame)
         covered, start, stop = self._synthetic.covered, self._next, frame + 1
-        if denoiser.parts and not (source.limbs and source.limbs.of_everybody):
+        if denoiser.card.parts and not (source.limbs and source.limbs.of_everybody):
             return
         if stop <= start or (covered is not None and not covered[start:stop].all()):
             return
-        energies, session = input_of(source.between(start, stop), denoiser.parts), self._session
+        energies, session = (
+            input_of(source.between(start, stop), denoiser.card.parts),
+            self._session,
+        )
         present = source.present_mask[start:stop]
 
         def work(emit: object) -> _Stepped:
             live = session or denoiser.live()
             began = time.perf_counter()
-            answers = [
-                live.step(frame, bool(is_present))
-                for frame, is_present in zip(energies, present, strict=True)
-            ]
+            answers = live.advance(energies, present)
             cost_s = (time.perf_counter() - began) / len(answers)
-            return _Stepped(live, start, np.stack(answers, axis=1), cost_s)
+            return _Stepped(live, start, answers.T, cost_s)
 
         self._runner.submit(work)
 
@@ -140,10 +140,10 @@ class LiveDenoiseModel(QObject):
         shown.put(stepped.start, stepped.values, self._fresh)
         self._fresh = False
         # A model that looks at a window of frames knows no later ones here.
-        past = "" if stepped.session.equals_batch else ", from past frames only"
-        source = self._synthetic.map
-        if source is not None and not is_regular(source.times_s, self._denoiser.frame_rate_hz):
-            past += f", as if at {self._denoiser.frame_rate_hz:g} frames/s"
+        past = "" if self._denoiser.equals_batch else ", from past frames only"
+        source, rate_hz = self._synthetic.map, self._denoiser.card.frame_rate_hz
+        if source is not None and not is_regular(source.times_s, rate_hz):
+            past += f", as if at {rate_hz:g} frames/s"
         shown.track.set_status(
             f"{shown.words} · live, frame by frame{past}: {1e3 * stepped.cost_s:.1f} ms a frame"
         )

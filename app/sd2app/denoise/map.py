@@ -134,7 +134,7 @@ class DenoisedMap(BackgroundModel):
         source, denoiser = self._synthetic.map, self.denoiser
         if source is None or denoiser is None:
             return False
-        return bool(denoiser.parts) and not (source.limbs and source.limbs.of_everybody)
+        return bool(denoiser.card.parts) and not (source.limbs and source.limbs.of_everybody)
 
     @property
     def shows_source(self) -> bool:
@@ -337,13 +337,13 @@ class DenoisedMap(BackgroundModel):
             return False
         assert source is not None
         assert denoiser is not None
-        rate_hz = denoiser.frame_rate_hz
+        rate_hz = denoiser.card.frame_rate_hz
         if not (denoiser.equals_batch and is_regular(source.times_s, rate_hz)):
             return False
         self._report(frames - order.next)
         start = order.next
         stop = min(start + AT_ONCE, frames)
-        energies = input_of(source.between(start, stop), denoiser.parts).copy()
+        energies = input_of(source.between(start, stop), denoiser.card.parts).copy()
         present = source.present_mask[start:stop]
 
         def work(emit: object) -> _Answer:

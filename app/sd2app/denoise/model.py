@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,14 +32,6 @@ _PATIENCE_MS = 2000
 """Longest delay of the first model, which waits for the synthetic map."""
 
 
-@dataclass(frozen=True, eq=False)
-class Loaded:
-    """A loaded model with its card."""
-
-    card: ModelCard
-    denoiser: RemoteDenoiser
-
-
 class DenoiseModel(ReportingModel):
     """Follows the recording's choice, loads the model in the background, and uses it."""
 
@@ -61,8 +52,8 @@ class DenoiseModel(ReportingModel):
         self.path: Path | None = None  # of the model that is in use or being loaded
         self.problem = ""  # why the chosen model is not in use; empty where it is
         self._choice = UNSAID
-        self._loaded: Loaded | None = None
-        self._before: Loaded | None = None
+        self._loaded: RemoteDenoiser | None = None
+        self._before: RemoteDenoiser | None = None
         self._comparing = False
         self.textured = session.settings.flag(_TEXTURED, False)  # by the user
         self._awake = False
@@ -173,7 +164,7 @@ class DenoiseModel(ReportingModel):
         """
         if self._loaded is None:
             raise Sd2Error("No model denoises this recording", "one", "Choose it under Model")
-        made = self._loaded.denoiser.denoise(self._synthesis.whole_map())
+        made = self._loaded.denoise(self._synthesis.whole_map())
         texture = self._loaded.card.texture
         if self.textured and texture is not None:
             made = texture.on(made, TEXTURE_SEED)
@@ -248,7 +239,7 @@ class DenoiseModel(ReportingModel):
             self._set_model(self._before)
         elif self._awake:
             library = self._library
-            self._runner.submit(lambda emit: Loaded(library.describe(path), library.load(path)))
+            self._runner.submit(lambda emit: library.load(path))
 
     def _watch(self) -> None:
         if self._synthetic.map is None:
@@ -277,7 +268,7 @@ class DenoiseModel(ReportingModel):
 
     # --- the model ------------------------------------------------------------------------
 
-    def _set_model(self, loaded: Loaded | None) -> None:
+    def _set_model(self, loaded: RemoteDenoiser | None) -> None:
         if self._loaded is not None and loaded is not self._loaded:
             self._before = self._loaded
         self._loaded = loaded
@@ -288,7 +279,7 @@ class DenoiseModel(ReportingModel):
         else:
             texture = loaded.card.texture if self.textured else None
             words = ("drawn · " if texture is not None else "") + origin_words(loaded.card)
-            self.map.use(loaded.denoiser, words, texture=texture, known=loaded.card.known)
+            self.map.use(loaded, words, texture=texture, known=loaded.card.known)
         self._show_before()
         self.changed.emit()
 
@@ -299,7 +290,7 @@ class DenoiseModel(ReportingModel):
         if shown is None:
             self.before_map.use(None)
         else:
-            self.before_map.use(shown.denoiser, track_words(shown.card))
+            self.before_map.use(shown, track_words(shown.card))
 
     def _fail(self, error: Exception) -> None:
         self._set_model(None)

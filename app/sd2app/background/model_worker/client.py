@@ -142,24 +142,25 @@ class _Remote:
 class RemoteDenoiser(_Remote):
     """Stand-in for a ``TrainedDenoiser`` that works in the model process."""
 
-    equals_batch: bool
-    frame_rate_hz: float
+    equals_batch: bool  # frame by frame it gives the whole map
+
+    def __init__(self, process: ModelProcess, path: Path) -> None:
+        self.card = describe_model(path)
+        super().__init__(process, path)
 
     def denoise(self, doppler: DopplerMap) -> DopplerMap:
         """Denoised map: an estimate of a radar's map from a synthetic one."""
         # What the model does not take need not travel.
-        given = replace(doppler, uncertainty=None, limbs=doppler.limbs if self.parts else None)
+        given = replace(doppler, uncertainty=None, limbs=doppler.limbs if self.card.parts else None)
         denoised: DopplerMap = self._process.ask("call", self._ready(), "denoise", given)
         return replace(denoised, timebase=doppler.timebase)
 
     def live(self) -> RemoteLive:
         """Session for live frames; it replaces the session before."""
-        return RemoteLive(self._process, self._ready(), self.equals_batch)
+        return RemoteLive(self._process, self._ready())
 
     def _load(self) -> int:
-        number, *known = self._process.ask("load", self._path)
-        # Frame by frame it gives the whole map; its frame rate; parts of the body that it takes.
-        self.equals_batch, self.frame_rate_hz, self.parts = known
+        number, self.equals_batch = self._process.ask("load", self._path)
         return int(number)
 
 
@@ -210,14 +211,6 @@ class RemoteClasses(_RemoteSession):
 
 class RemoteLive(_RemoteSession):
     """Session that takes frames and answers each of them."""
-
-    def __init__(self, process: ModelProcess, model: int, equals_batch: bool) -> None:
-        super().__init__(process, model)
-        self.equals_batch = equals_batch
-
-    def step(self, energies: NDArray[np.float32], present: bool = True) -> NDArray[np.float32]:
-        """Answer to the next frame (features,)."""
-        return self._ask("step", energies, present)
 
     def advance(
         self, energies: NDArray[np.float32], present: NDArray[np.bool_]

@@ -38,13 +38,12 @@ class Worker:
         self._live: dict[int, Any] = {}
         self._next = 0
 
-    def load(self, path: Path) -> tuple[int, bool, float, tuple[str, ...]]:
-        """Number of a denoiser, and what a ``RemoteDenoiser`` knows of it."""
+    def load(self, path: Path) -> tuple[int, bool]:
+        """Number of a denoiser, and if frame by frame it gives what it gives of a whole map."""
         from sd2core.denoise.files import load_model
 
         model = load_model(path)
-        number = self._keep(self._models, model)
-        return number, model.live().equals_batch, model.card.frame_rate_hz, model.card.parts
+        return self._keep(self._models, model), model.live().equals_batch
 
     def load_classifier(self, path: Path) -> int:
         """Number of a classifier."""
