@@ -141,10 +141,11 @@ class LimbHand:
         if hit is None:
             vertex = self._surface.vertex_at(x_px, y_px)
             return None if vertex is None else self._model.part_of(vertex)
-        other = self._scene.person_of(hit[0])
+        movables = self._scene.movables
+        other = movables.person_of(hit[0])
         if other is None:
             return None
-        return self._model.part_of(self._scene.people.vertex_near(other, hit[1]), other + 1)
+        return self._model.part_of(movables.people[other].vertex_near(hit[1]), other + 1)
 
     def click(self, x_px: float, y_px: float, keys: Qt.KeyboardModifier) -> None:
         """Choose the part under the pointer, or with nothing there everybody."""

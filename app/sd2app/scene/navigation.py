@@ -100,7 +100,7 @@ class Navigator:
         scene, pose = self._scene, self._scene.pose
         if self.sensor_at(x_px, y_px):
             return None
-        hit = scene.movable_under(x_px, y_px)
+        hit = scene.movables.under(pose.position, pose.ray(x_px, y_px))
         if hit is None or not scene.mesh_shown:
             return hit
         x, y, depth = pose.project(scene.body.points).T
@@ -235,7 +235,7 @@ class Navigator:
             at = drag_level(now, pose, x_px, y_px)
         if at is not None:
             held.moved_m = at - held.at_m
-            self._scene.shift_movable(held.number, held.moved_m)
+            self._scene.movables.shift(held.number, held.moved_m)
             self._edits.drag_in_scene(triple(held.moved_m))
             self._changed()
 
@@ -252,7 +252,7 @@ class Navigator:
     def _show_hot(self) -> None:
         self._scene.set_hot(self.hovers_sensor or self._held is not None)
         held = self._held_thing
-        self._scene.set_hot_movable(self.thing if held is None else held.number)
+        self._scene.movables.set_hot(self.thing if held is None else held.number)
         self._changed()
 
 

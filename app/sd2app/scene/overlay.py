@@ -154,10 +154,11 @@ class Overlay(Canvas):
 
     def _words_of_held(self, number: int, moved_m: Sequence[float]) -> str:
         """Where the foot of a dragged thing is, or by how much a body is moved from its file's."""
-        things, people = self._scene.things.things, self._scene.people.meshes
-        if number < len(things):
-            return _place_words(np.add(things[number].position_m, moved_m))
-        placed = people[number - len(things)].placed
+        movables = self._scene.movables
+        other = movables.person_of(number)
+        if other is None:
+            return _place_words(np.add(movables.things[number].thing.position_m, moved_m))
+        placed = movables.people[other].mesh.placed
         before_m = (0.0, 0.0, 0.0) if placed is None else placed.moved_m
         return f"moved by {_place_words(np.add(before_m, moved_m))}"
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from sd2app.scene.colours import SceneColours, fractions, mixed
 from sd2app.scene.parts import Body, Shape
-from sd2app.scene.things import Movables
 from sd2core.figures.colours import rgb
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.things import Surface
@@ -20,86 +19,56 @@ PERSON_COLOURS = ("#d08a3c", "#5f9e6e", "#9b74b3", "#c4627c", "#4f98ad")
 """Of the second person of a scene, the third and so on; from the sixth they repeat."""
 
 
-class People(Movables):
-    """Bodies beside the first one, one of which may be lit up or shifted while it is dragged."""
+class Person(Body):
+    """A body beside the first one."""
 
-    def __init__(self, renderer: vtkRenderer) -> None:
+    def __init__(
+        self, renderer: vtkRenderer, mesh: MeshSequence, number: int, frame: int, floor_m: float
+    ) -> None:
         super().__init__(renderer)
-        self.meshes: tuple[MeshSequence, ...] = ()
-        self._shapes: list[Body] = []
-        self._present: list[bool] = []
+        self.mesh, self.actors = mesh, (self.actor, self.shadow)
+        self._own_colour = PERSON_COLOURS[number % len(PERSON_COLOURS)]
         self._limb_colours: Sequence[str] = ()
-        self._limbs: Sequence[NDArray[np.intp] | None] = ()
+        self._limb: NDArray[np.intp] | None = None
         self._frame: int | None = None
+        self.present = False
+        self.set_topology(mesh.frame(frame), mesh.faces)
+        self.set_floor(floor_m)
+        self.show_frame(frame)
 
     @property
-    def points_m(self) -> NDArray[np.float64]:
-        """All vertices of those that are there, (n, 3)."""
-        return np.concatenate([np.zeros((0, 3)), *(one.points for one in self._shown())])
-
-    def set_meshes(self, meshes: tuple[MeshSequence, ...], frame: int, floor_m: float) -> None:
-        """Show others, in one of their frames."""
-        for shape in self._shapes:
-            self._renderer.RemoveActor(shape.actor)
-            self._renderer.RemoveActor(shape.shadow)
-        self.meshes, self._hot, self._shapes, self._frame = meshes, None, [], None
-        for mesh in meshes:
-            shape = Body(self._renderer)
-            shape.set_topology(mesh.frame(frame), mesh.faces)
-            shape.set_floor(floor_m)
-            self._shapes.append(shape)
-        self.show_frame(frame)
-        if self._colours is not None:
-            self.set_colours(self._colours)
+    def surface(self) -> Surface | None:
+        """Vertices and faces as they are drawn; None where nothing can be met."""
+        if not self.present or self.mesh.faces is None:
+            return None
+        return self.points.astype(np.float64), self.mesh.faces
 
     def show_frame(self, frame: int, shown: bool = True) -> None:
-        """Move all to another frame; nobody is drawn unless ``shown``."""
-        self._present = [shown and bool(mesh.presence.present[frame]) for mesh in self.meshes]
-        for mesh, shape, present in zip(self.meshes, self._shapes, self._present, strict=True):
-            shape.show(present)
-            if present and frame != self._frame:
-                shape.set_vertices(mesh.frame(frame))
+        """Move to another frame; nobody is drawn unless ``shown``."""
+        self.present = shown and bool(self.mesh.presence.present[frame])
+        self.show(self.present)
+        if self.present and frame != self._frame:
+            self.set_vertices(self.mesh.frame(frame))
         self._frame = frame if shown else None
 
-    def set_limbs(self, colours: Sequence[str], limbs: Sequence[NDArray[np.intp]]) -> None:
-        """Colour limbs of some: of each the number of a colour by vertex, from 1, or 0."""
-        self._limb_colours, self._limbs = colours, limbs
-        if self._colours is not None:
-            self.set_colours(self._colours)
+    def set_limbs(self, colours: Sequence[str], limb: NDArray[np.intp] | None) -> None:
+        """Colour limbs: the number of a colour by vertex, from 1, or 0; None: no limb."""
+        self._limb_colours, self._limb = colours, limb
 
-    def vertex_near(self, number: int, place_m: NDArray[np.float64]) -> int:
-        """Vertex of one that is nearest to a place."""
-        return int(np.linalg.norm(self._shapes[number].points - place_m, axis=1).argmin())
+    def vertex_near(self, place_m: NDArray[np.float64]) -> int:
+        """Vertex that is nearest to a place."""
+        return int(np.linalg.norm(self.points - place_m, axis=1).argmin())
 
-    def shift(self, number: int, offset_m: ArrayLike) -> None:
-        """Draw one elsewhere than it is."""
-        self._shapes[number].place(np.eye(3), np.asarray(offset_m, np.float64))
-
-    def set_colours(self, colours: SceneColours) -> None:
-        """Colours of the theme."""
-        self._colours = colours
-        for number, shape in enumerate(self._shapes):
-            own = PERSON_COLOURS[number % len(PERSON_COLOURS)]
-            own = mixed(own, colours.sensor, 0.4 if number == self._hot else 0.0)
-            shape.set_colour(own)
-            limb = self._limbs[number] if number < len(self._limbs) else None
-            if limb is not None and len(limb) == len(shape.points):
-                shades = np.stack([rgb(shade) for shade in (own, *self._limb_colours)])
-                shape.set_point_colours(shades[limb].astype(np.uint8))
-            else:
-                shape.clear_point_colours()
-            shape.shadow.GetProperty().SetColor(*fractions(colours.shadow))
-
-    def _to_meet(self) -> Sequence[Surface | None]:
-        return [
-            (shape.points.astype(np.float64), mesh.faces)
-            if present and mesh.faces is not None
-            else None
-            for mesh, shape, present in zip(self.meshes, self._shapes, self._present, strict=True)
-        ]
-
-    def _shown(self) -> list[Body]:
-        return [one for one, present in zip(self._shapes, self._present, strict=True) if present]
+    def set_colours(self, colours: SceneColours, hot: bool) -> None:
+        """Colours of the theme; ``hot`` while the pointer is on it or drags it."""
+        own = mixed(self._own_colour, colours.sensor, 0.4 if hot else 0.0)
+        self.set_colour(own)
+        if self._limb is not None and len(self._limb) == len(self.points):
+            shades = np.stack([rgb(shade) for shade in (own, *self._limb_colours)])
+            self.set_point_colours(shades[self._limb].astype(np.uint8))
+        else:
+            self.clear_point_colours()
+        self.shadow.GetProperty().SetColor(*fractions(colours.shadow))
 
 
 _OPACITY = 0.12
@@ -109,10 +78,9 @@ _CELLS, _CELL_M = 8, 0.5
 class Walls:
     """Pieces of planes; nothing is picked of them."""
 
-    def __init__(self, renderer: vtkRenderer) -> None:
-        self._renderer = renderer
+    def __init__(self, renderer: vtkRenderer, colours: SceneColours) -> None:
+        self._renderer, self._colours = renderer, colours
         self.shapes: list[Shape] = []
-        self._colours: SceneColours | None = None
 
     def set_walls(self, walls: Sequence[Wall], around_m: NDArray[np.float64]) -> None:
         """Show other walls, each about the foot of the perpendicular from a point."""
@@ -127,8 +95,7 @@ class Walls:
             lines = Shape(self._renderer, points, segments=segments)
             lines.look.SetOpacity(0.3)
             self.shapes += [face, lines]
-        if self._colours is not None:
-            self.set_colours(self._colours)
+        self.set_colours(self._colours)
 
     def set_colours(self, colours: SceneColours) -> None:
         """Colours of the theme."""

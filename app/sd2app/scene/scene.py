@@ -15,8 +15,8 @@ from sd2app.scene.body import Extent
 from sd2app.scene.camera import EyePose, Margins, Preset, triple
 from sd2app.scene.colours import Colouring, SceneColours, fractions, mesh_colours, range_limits
 from sd2app.scene.parts import Body, GroundGrid, InertialMarkers, Markers, SensorGlyph, Shape
-from sd2app.scene.people import People, Walls
-from sd2app.scene.things import Things
+from sd2app.scene.people import Walls
+from sd2app.scene.things import Movables
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.things import Surroundings
 from sd2core.sensor import VirtualSensor
@@ -64,9 +64,8 @@ class Scene:
         self.sensor_glyph = SensorGlyph(renderer)
         self.markers = Markers(renderer, self.colours)
         self.inertial = InertialMarkers(renderer)
-        self.things = Things(renderer)
-        self.people = People(renderer)
-        self.walls = Walls(renderer)
+        self.movables = Movables(renderer, self.colours)
+        self.walls = Walls(renderer, self.colours)
         self._inertial_rows = np.zeros(0, np.intp)
         self._set_extent(_NOTHING)
         self.set_colours(self.colours)
@@ -144,29 +143,16 @@ class Scene:
 
     def set_things(self, around: Surroundings | None) -> None:
         """Show what stands around the body."""
-        self.things.set_surfaces(*((around.surfaces, around.things) if around else ((), ())))
+        self.movables.set_things(*((around.surfaces, around.things) if around else ((), ())))
         self.walls.set_walls(around.walls if around else (), self.extent.centre_m)
         self._framed = None
         self._lay_ground()
 
     def set_people(self, meshes: tuple[MeshSequence, ...], frame: int) -> None:
         """Show the bodies beside the first one."""
-        self.people.set_meshes(meshes, frame, self.extent.floor_m)
+        self.movables.set_people(meshes, frame, self.extent.floor_m)
         self._framed = None
         self._lay_ground()
-
-    def movable_under(self, x_px: float, y_px: float) -> tuple[int, NDArray[np.float64]] | None:
-        """Number of the thing or other body at a pixel, and where; bodies count on after things."""
-        eye_m, ray = self.pose.position, self.pose.ray(x_px, y_px)
-        thing, person = self.things.under(eye_m, ray), self.people.under(eye_m, ray)
-        if person is not None:
-            person = person[0] + len(self.things.surfaces), person[1]
-        hits = [one for one in (thing, person) if one is not None]
-        return min(hits, key=lambda one: float(np.linalg.norm(one[1] - eye_m)), default=None)
-
-    def person_of(self, movable: int) -> int | None:
-        """Number of the other body that a movable is, from 0; None of a thing."""
-        return None if movable < (things := len(self.things.surfaces)) else movable - things
 
     def set_limbs(
         self, limbs: Sequence[tuple[str, str]], vertex_limbs: Sequence[NDArray[np.intp]]
@@ -177,20 +163,10 @@ class Scene:
         """
         first, *others = vertex_limbs or (None,)
         self.change_colours(limbs=tuple(limbs), vertex_limb=first)
-        self.people.set_limbs([colour for _, colour in limbs], others)
-
-    def shift_movable(self, number: int, offset_m: NDArray[np.float64]) -> None:
-        """Draw a thing or another body elsewhere than it is."""
-        if (person := self.person_of(number)) is None:
-            self.things.shift(number, offset_m)
-        else:
-            self.people.shift(person, offset_m)
-
-    def set_hot_movable(self, number: int | None) -> None:
-        """Light up a thing or another body."""
-        person = None if number is None else self.person_of(number)
-        self.things.set_hot(number if person is None else None)
-        self.people.set_hot(person)
+        for number, person in enumerate(self.movables.people):
+            limb = others[number] if number < len(others) else None
+            person.set_limbs([colour for _, colour in limbs], limb)
+        self.movables.set_colours(self.colours)
 
     def set_inertial(self, vertices: Iterable[int]) -> None:
         """Show inertial sensors on vertices of the mesh."""
@@ -211,8 +187,7 @@ class Scene:
         self.sensor_glyph.set_colours(colours, self._hot)
         self.markers.set_colours(colours)
         self.inertial.set_colours(colours)
-        self.things.set_colours(colours)
-        self.people.set_colours(colours)
+        self.movables.set_colours(colours)
         self.walls.set_colours(colours)
         self.body.shadow.GetProperty().SetColor(*fractions(colours.shadow))
         self._stale_colours = True
@@ -247,8 +222,7 @@ class Scene:
         if self._sensor_away_m < _FAR_OFF_M:
             points.append(_box(sensor, 0.25))
             points.append(np.array([[sensor[0], body.floor_m, sensor[2]]]))
-        points += [self._near(self.markers.positions_m), self._near(self.things.points_m)]
-        points.append(self._near(self.people.points_m))
+        points += [self._near(self.markers.positions_m), self._near(self.movables.points_m)]
         return np.concatenate(points)
 
     @property
@@ -326,7 +300,7 @@ class Scene:
             self._colour_mesh()
         for shape in (
             self.camera_glyph, self.markers, *self.sensor_glyph.shapes, *self.ground.shapes,
-            *self.things.shapes, *self.walls.shapes,
+            *self.walls.shapes, *(one for thing in self.movables.things for one in thing.shapes),
         ):  # fmt: skip
             shape.set_pixel_scale(pixel_scale)
         if self.has_mesh and self.body.drawn_as_dots:
@@ -415,7 +389,7 @@ class Scene:
         for place in (np.zeros(3), np.asarray(self.sensor.position_m)):
             if np.linalg.norm(self.extent.centre_m - place) < _FAR_OFF_M:
                 low, high = np.minimum(low, place), np.maximum(high, place)
-        for places in (self.markers.positions_m, self.things.points_m, self.people.points_m):
+        for places in (self.markers.positions_m, self.movables.points_m):
             if len(near := self._near(places)):
                 low, high = np.minimum(low, near.min(axis=0)), np.maximum(high, near.max(axis=0))
         covered = shapes.grid_rectangle(low[[0, 2]], high[[0, 2]])

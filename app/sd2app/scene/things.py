@@ -1,4 +1,4 @@
-"""Things around the body in the scene: grey and translucent, with their edges; found by a ray."""
+"""Things around the body in the scene, found by a ray like the people beside them."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from sd2app.scene.colours import SceneColours, mixed
 from sd2app.scene.parts import Shape
+from sd2app.scene.people import Person
+from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.things import Surface, Thing
 
 _OPACITY = 0.38
@@ -17,92 +19,107 @@ _SHARP_COSINE = 0.9
 _NEAREST_M = 0.01
 
 
-class Movables:
-    """Surfaces of which the pointer finds one, which is lit up while it is on it or drags it."""
+class ThingShapes:
+    """A thing, grey and translucent, with its edges."""
 
-    def __init__(self, renderer: vtkRenderer) -> None:
-        self._renderer = renderer
-        self._colours: SceneColours | None = None
+    def __init__(self, renderer: vtkRenderer, thing: Thing, surface: Surface) -> None:
+        self.thing, self.surface, self.present = thing, surface, True
+        vertices, faces = surface
+        self.points = vertices
+        self._face = Shape(renderer, vertices, triangles=faces, lit=True)
+        self._face.look.SetInterpolationToFlat()
+        self._face.look.SetOpacity(_OPACITY)
+        self._edge = Shape(renderer, vertices, segments=sharp_edges(vertices, faces))
+        self.shapes = self._face, self._edge
+        self.actors = tuple(shape.actor for shape in self.shapes)
+
+    def place(self, linear: NDArray[np.float64], offset: NDArray[np.float64]) -> None:
+        """Draw it elsewhere than it is."""
+        for shape in self.shapes:
+            shape.place(linear, offset)
+
+    def set_colours(self, colours: SceneColours, hot: bool) -> None:
+        """Colours of the theme; ``hot`` while the pointer is on it or drags it."""
+        self._face.set_colour(mixed(colours.plain, colours.sensor, 0.35 if hot else 0.0))
+        faint = mixed(colours.muted, colours.background, 0.2)
+        self._edge.set_colour(colours.sensor if hot else faint)
+
+
+class Movables:
+    """Things, then people beside the first one, by their numbers.
+
+    The pointer finds one, which is lit up while it is on it or drags it.
+    """
+
+    def __init__(self, renderer: vtkRenderer, colours: SceneColours) -> None:
+        self._renderer, self._colours = renderer, colours
+        self.things: tuple[ThingShapes, ...] = ()
+        self.people: tuple[Person, ...] = ()
         self._hot: int | None = None
 
-    def set_hot(self, number: int | None) -> None:
-        """Light up the one that the pointer is on or drags."""
-        if number != self._hot and self._colours is not None:
-            self._hot = number
-            self.set_colours(self._colours)
+    @property
+    def _all(self) -> tuple[ThingShapes | Person, ...]:
+        return *self.things, *self.people
 
-    def set_colours(self, colours: SceneColours) -> None:
-        """Colours of the theme."""
-        raise NotImplementedError
+    @property
+    def points_m(self) -> NDArray[np.float64]:
+        """All vertices of those that are there, (n, 3)."""
+        return np.concatenate([np.zeros((0, 3)), *(one.points for one in self._all if one.present)])
+
+    def set_things(self, surfaces: Sequence[Surface], things: Sequence[Thing]) -> None:
+        """Show other things, which have these surfaces."""
+        self._remove(self.things)
+        self.things = tuple(
+            ThingShapes(self._renderer, thing, surface)
+            for thing, surface in zip(things, surfaces, strict=True)
+        )
+        self.set_colours(self._colours)
+
+    def set_people(self, meshes: Sequence[MeshSequence], frame: int, floor_m: float) -> None:
+        """Show other people, in one of their frames."""
+        self._remove(self.people)
+        self.people = tuple(
+            Person(self._renderer, mesh, number, frame, floor_m)
+            for number, mesh in enumerate(meshes)
+        )
+        self.set_colours(self._colours)
+
+    def _remove(self, gone: Sequence[ThingShapes | Person]) -> None:
+        self._hot = None
+        for one in gone:
+            for actor in one.actors:
+                self._renderer.RemoveActor(actor)
+
+    def person_of(self, number: int) -> int | None:
+        """Number of a person among the people, from 0; None of a thing."""
+        return number - len(self.things) if number >= len(self.things) else None
 
     def under(
         self, eye_m: NDArray[np.float64], ray: NDArray[np.float64]
     ) -> tuple[int, NDArray[np.float64]] | None:
         """Number of the nearest one that a ray meets, and where; None if it meets none."""
         met = [
-            np.inf if surface is None else first_meeting(eye_m, ray, *surface)
-            for surface in self._to_meet()
+            np.inf if one.surface is None else first_meeting(eye_m, ray, *one.surface)
+            for one in self._all
         ]
-        if not met or not np.isfinite(nearest := min(met)):
-            return None
-        return met.index(nearest), eye_m + nearest * ray
-
-    def _to_meet(self) -> Sequence[Surface | None]:
-        """Surface of each; None of one that cannot be met."""
-        raise NotImplementedError
-
-
-class Things(Movables):
-    """Surfaces of things, one of which may be lit up or shifted while it is dragged."""
-
-    def __init__(self, renderer: vtkRenderer) -> None:
-        super().__init__(renderer)
-        self.things: tuple[Thing, ...] = ()
-        self.surfaces: tuple[Surface, ...] = ()
-        self._shapes: list[tuple[Shape, Shape]] = []
-
-    @property
-    def shapes(self) -> list[Shape]:
-        """Faces and edges of all."""
-        return [shape for pair in self._shapes for shape in pair]
-
-    @property
-    def points_m(self) -> NDArray[np.float64]:
-        """All vertices, (n, 3)."""
-        return np.concatenate([np.zeros((0, 3)), *(vertices for vertices, _ in self.surfaces)])
-
-    def set_surfaces(self, surfaces: Sequence[Surface], things: tuple[Thing, ...] = ()) -> None:
-        """Show other things, which have these surfaces."""
-        for shape in self.shapes:
-            self._renderer.RemoveActor(shape.actor)
-        self.surfaces, self.things, self._hot = tuple(surfaces), things, None
-        self._shapes = []
-        for vertices, faces in surfaces:
-            face = Shape(self._renderer, vertices, triangles=faces, lit=True)
-            face.look.SetInterpolationToFlat()
-            face.look.SetOpacity(_OPACITY)
-            edge = Shape(self._renderer, vertices, segments=sharp_edges(vertices, faces))
-            self._shapes.append((face, edge))
-        if self._colours is not None:
-            self.set_colours(self._colours)
+        nearest = min(met, default=np.inf)
+        return (met.index(nearest), eye_m + nearest * ray) if np.isfinite(nearest) else None
 
     def shift(self, number: int, offset_m: ArrayLike) -> None:
         """Draw one elsewhere than it is."""
-        for shape in self._shapes[number]:
-            shape.place(np.eye(3), np.asarray(offset_m, np.float64))
+        self._all[number].place(np.eye(3), np.asarray(offset_m, np.float64))
+
+    def set_hot(self, number: int | None) -> None:
+        """Light up the one that the pointer is on or drags."""
+        if number != self._hot:
+            self._hot = number
+            self.set_colours(self._colours)
 
     def set_colours(self, colours: SceneColours) -> None:
         """Colours of the theme."""
         self._colours = colours
-        for number, (face, edge) in enumerate(self._shapes):
-            hot = number == self._hot
-            face.set_colour(mixed(colours.plain, colours.sensor, 0.35 if hot else 0.0))
-            edge.set_colour(
-                colours.sensor if hot else mixed(colours.muted, colours.background, 0.2)
-            )
-
-    def _to_meet(self) -> Sequence[Surface | None]:
-        return self.surfaces
+        for number, one in enumerate(self._all):
+            one.set_colours(colours, number == self._hot)
 
 
 def sharp_edges(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> NDArray[np.int32]:

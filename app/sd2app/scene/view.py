@@ -239,7 +239,7 @@ class SceneView(QWidget):
     def _at_something(self, place: tuple[float, float]) -> bool:
         """True at what is no body."""
         at_marker, thing = self.navigator.marker_at(*place) is not None, self.navigator.thing
-        at_thing = thing is not None and self.scene.person_of(thing) is None
+        at_thing = thing is not None and self.scene.movables.person_of(thing) is None
         return at_marker or at_thing or self.navigator.sensor_at(*place)
 
     # What changed
@@ -314,7 +314,7 @@ class SceneView(QWidget):
         with self._explaining():
             self.scene.set_people(others, self._frame or 0)
         self.limb_hand.show()
-        named = [one.name for one in self.scene.things.things]
+        named = [one.thing.name for one in self.scene.movables.things]
         self.overlay.thing_names = named + ([] if mesh is None else list(mesh.persons[1:]))
         self.navigator.look_again()
         self.request_render()
@@ -355,7 +355,8 @@ class SceneView(QWidget):
         if frame != self._frame:
             self._frame = frame
             self.scene.set_vertices(mesh.frame(frame))
-        self.scene.people.show_frame(frame, covered)
+        for person in self.scene.movables.people:
+            person.show_frame(frame, covered)
         if self._stale_scattering:
             self._fetch_scattering()
 

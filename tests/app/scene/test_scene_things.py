@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
+from sd2app.palette import palette_for
 from sd2app.scene.camera import EyePose, drag_level
-from sd2app.scene.things import Things, sharp_edges
+from sd2app.scene.colours import SceneColours
+from sd2app.scene.things import Movables, sharp_edges
 from sd2core.mesh.things import SHELF, Thing
 
 
@@ -26,11 +28,11 @@ def test_an_open_surface_ends_in_edges() -> None:
 
 
 def test_a_ray_meets_the_nearest_thing_before_the_eye() -> None:
-    things = Things(vtkRenderer())
+    things = Movables(vtkRenderer(), SceneColours.of(palette_for(False), False))
     eye, ahead = np.zeros(3), np.array([0.0, 0.0, 1.0])
     assert things.under(eye, ahead) is None
     boxes = [Thing("box", (0, 0.25, z)) for z in (5.0, 3.0, -2.0)]
-    things.set_surfaces([box.placed() for box in boxes])
+    things.set_things([box.placed() for box in boxes], boxes)
     found = things.under(eye, ahead)
     assert found is not None
     assert found[0] == 1

@@ -83,13 +83,13 @@ def test_a_second_body_is_added_moved_named_and_undone(window, qtbot):
     made = Synthesizer(document.mesh, maker.options).map(models.sensor.sensor)
     np.testing.assert_array_equal(made.values, both)
     view = window.findChild(SceneView)
-    assert len(view.scene.people.meshes) == 1
+    assert len(view.scene.movables.people) == 1
     for _ in range(5):
         window.action("undo").trigger()
     assert bodies(window) == ()
     assert document.mesh.others == ()
     np.testing.assert_array_equal(shown(window, qtbot), alone)
-    assert view.scene.people.meshes == ()
+    assert view.scene.movables.people == ()
     window.action("redo").trigger()
     press(window, "Remove")
     assert bodies(window) == ()
@@ -125,7 +125,7 @@ def pointed_at(window, qtbot) -> tuple[QWidget, QPoint, np.ndarray]:
     scene = view.scene
     qtbot.waitUntil(lambda: scene.pose.size_px == (view.width(), view.height()), timeout=5_000)
     qtbot.wait(300)  # until the view shows both
-    middle = scene.people.points_m.mean(axis=0)
+    middle = scene.movables.points_m.mean(axis=0)
     x, y, _ = scene.pose.project(middle)[0]
     start = QPoint(round(x), round(y))
     widget = view.childAt(start)

@@ -91,7 +91,7 @@ def test_a_wall_is_added_typed_and_undone_and_the_map_follows(window, qtbot):
     assert document.mesh.surroundings is None
     assert document.mesh.vertices is mesh.vertices
     np.testing.assert_array_equal(shown(window, qtbot), free)
-    assert window.findChild(SceneView).scene.things.surfaces == ()
+    assert window.findChild(SceneView).scene.movables.things == ()
     window.action("redo").trigger()
     press(window, "Remove")
     assert things(window) == ()
@@ -104,7 +104,7 @@ def test_it_is_dragged_on_its_level_and_with_shift_upwards(window, qtbot):
     view = window.findChild(SceneView)
     scene, stack = view.scene, models.document.undo_stack
     qtbot.waitUntil(lambda: scene.pose.size_px == (view.width(), view.height()), timeout=5_000)
-    middle = scene.things.points_m.mean(axis=0)
+    middle = scene.movables.points_m.mean(axis=0)
     x, y, _ = scene.pose.project(middle)[0]
     start = QPoint(round(x), round(y))
     widget, count = view.childAt(start), stack.count()
@@ -113,7 +113,7 @@ def test_it_is_dragged_on_its_level_and_with_shift_upwards(window, qtbot):
     assert widget.cursor().shape() == Qt.CursorShape.OpenHandCursor
     pose, before = scene.pose, things(window)[0]
     level, moved = (
-        scene.things.under(pose.position, pose.ray(start.x(), start.y()))[1],
+        scene.movables.under(pose.position, pose.ray(start.x(), start.y()))[1],
         QPoint(40, 15),
     )
     QTest.mousePress(widget, LEFT, Qt.KeyboardModifier.NoModifier, start)
@@ -124,11 +124,11 @@ def test_it_is_dragged_on_its_level_and_with_shift_upwards(window, qtbot):
     qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     assert things(window) == (after,)  # the history waits
     assert stack.count() == count
-    shown = scene.things.surfaces
+    shown = scene.movables.things
     QTest.mouseRelease(widget, LEFT, Qt.KeyboardModifier.NoModifier, start + moved)
     assert things(window) == (after,)
     by_m = np.subtract(after.position_m, before.position_m)
-    np.testing.assert_allclose(scene.things.points_m, shown[0][0] + by_m, atol=1e-6)
+    np.testing.assert_allclose(scene.movables.points_m, shown[0].points + by_m, atol=1e-6)
     assert after.position_m[1] == before.position_m[1]
     by = np.subtract(after.position_m, before.position_m)
     assert np.linalg.norm(by) > 0.05
@@ -149,7 +149,7 @@ def test_it_is_dragged_on_its_level_and_with_shift_upwards(window, qtbot):
     window.action("undo").trigger()
     window.action("undo").trigger()
     assert things(window) == (before,)
-    np.testing.assert_allclose(scene.things.points_m.mean(axis=0), middle)
+    np.testing.assert_allclose(scene.movables.points_m.mean(axis=0), middle)
 
 
 def pixel_of(pose, point_m) -> QPoint:
@@ -166,8 +166,8 @@ def test_the_map_follows_a_thing_while_it_is_dragged_and_settles(window, qtbot, 
     qtbot.waitUntil(lambda: scene.pose.size_px == (view.width(), view.height()), timeout=5_000)
     view.grab()
     pose = scene.pose
-    start = pixel_of(pose, scene.things.points_m.mean(axis=0))
-    held_m = scene.things.under(pose.position, pose.ray(start.x(), start.y()))[1]
+    start = pixel_of(pose, scene.movables.points_m.mean(axis=0))
+    held_m = scene.movables.under(pose.position, pose.ray(start.x(), start.y()))[1]
     there = pixel_of(pose, held_m - [1.5, 0.0, 0.0])
     written = []
     monkeypatch.setattr(
