@@ -18,11 +18,15 @@ Vector = NDArray[np.float64]
 
 _STEEPEST_DEG = 89.5
 _NEAREST_M = 0.05
+_IN_FRONT_M = 0.01
+"""Depth from which something is in front of the eye."""
 _FARTHEST_M = 500.0
 _ORBIT_DEG_PER_PX = 0.35
 _MIN_PX_PER_M = 4.0
 _FARTHEST_DRAG_M = 60.0
 
+Surface = tuple[NDArray[np.floating], NDArray[np.int32]]
+"""Vertices (V, 3), metres, and triangles (F, 3)."""
 Preset = Literal["overview", "camera", "sensor", "side", "top"]
 """Ready-made views."""
 
@@ -114,6 +118,30 @@ class EyePose:
         """Size of a pixel at a point's depth; infinite behind the eye."""
         depth = float((np.asarray(point, np.float64) - self.position) @ self.axes[2])
         return depth / self.pixels_per_tangent if depth > 1e-6 else math.inf
+
+    def foremost(self, surface: Surface, x_px: float, y_px: float) -> tuple[float, int] | None:
+        """Depth of a surface at a pixel, and the nearest corner of the triangle there; None beside.
+
+        By areas in homogeneous coordinates, as triangles may reach behind the eye.
+        """
+        vertices, faces = surface
+        tangents, relative = self.tangents(x_px, y_px), vertices - self.position
+        x, y, depth = (relative @ axis for axis in self.axes)
+        x, y = x - tangents[0] * depth, y - tangents[1] * depth  # the pixel's ray is at 0, 0
+        a, b, c = faces.T
+        # Of two corners and the ray, by the third corner: of one sign where it goes through.
+        areas = np.stack([x[i] * y[j] - x[j] * y[i] for i, j in ((b, c), (c, a), (a, b))])
+        inside = (areas >= 0).all(axis=0) | (areas <= 0).all(axis=0)
+        rows = np.flatnonzero(inside & areas.any(axis=0))
+        weights = areas[:, rows] / areas[:, rows].sum(axis=0)
+        depths = (weights * depth[faces[rows].T]).sum(axis=0)
+        depths[depths <= _IN_FRONT_M] = np.inf
+        if not np.isfinite(depths.min(initial=np.inf)):
+            return None
+        corners = faces[rows[depths.argmin()]]
+        ahead = np.where(depth[corners] > 0, depth[corners], np.nan)
+        nearest = np.nanargmin(np.hypot(x[corners], y[corners]) / ahead)
+        return float(depths.min()), int(corners[nearest])
 
     def framed(self, points: ArrayLike, margins: Margins) -> EyePose:
         """Pose of the same direction, as near as all points fit inside the margins."""

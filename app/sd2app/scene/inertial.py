@@ -46,7 +46,8 @@ class InertialHand:
         mesh, scene = self._session.document.mesh, self._scene
         if mesh is None or mesh.faces is None or not scene.mesh_shown:
             return None
-        return vertex_under(scene.pose.project(scene.body.points), mesh.faces, x_px, y_px)
+        hit = scene.pose.foremost((scene.body.points, mesh.faces), x_px, y_px)
+        return None if hit is None else hit[1]
 
     def sensor_at(self, x_px: float, y_px: float) -> str | None:
         """Place of the sensor whose marker is under the pointer, the nearest to it."""
@@ -98,30 +99,6 @@ class InertialHand:
         return True
 
 
-def vertex_under(
-    pixels: NDArray[np.floating], faces: NDArray[np.int32], x_px: float, y_px: float
-) -> int | None:
-    """Corner of the foremost triangle at a pixel, the nearest to it; None where there is none.
-
-    ``pixels``, shape (V, 3), are those of the vertices, and how far they are in front of the eye.
-    """
-    corners = (pixels[:, :2] - (x_px, y_px))[faces]  # (F, 3, 2)
-    following = np.roll(corners, -1, axis=1)
-    # Twice the areas of the triangles of two corners and the pixel: of one sign inside.
-    areas = corners[..., 0] * following[..., 1] - corners[..., 1] * following[..., 0]  # (F, 3)
-    inside = (areas >= 0).all(axis=1) | (areas <= 0).all(axis=1)
-    depths = pixels[:, 2][faces]
-    rows = np.flatnonzero(inside & (depths > _NEAREST_M).all(axis=1) & areas.any(axis=1))
-    if not rows.size:
-        return None
-    # Each area belongs to the corner across; the inverse of the depth is linear in the picture.
-    weights = np.roll(areas[rows], 2, axis=1)
-    weights = weights / weights.sum(axis=1, keepdims=True)
-    foremost = rows[(weights / depths[rows]).sum(axis=1).argmax()]
-    nearest = np.hypot(*corners[foremost].T).argmin()
-    return int(faces[foremost, nearest])
-
-
 LIMB_HINT = "Click shows its Doppler alone  ·  Ctrl or Shift: several"
 _SEVERAL = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
 
@@ -141,11 +118,10 @@ class LimbHand:
         if hit is None:
             vertex = self._surface.vertex_at(x_px, y_px)
             return None if vertex is None else self._model.part_of(vertex)
-        movables = self._scene.movables
-        other = movables.person_of(hit[0])
+        other = self._scene.movables.person_of(hit.number)
         if other is None:
             return None
-        return self._model.part_of(movables.people[other].vertex_near(hit[1]), other + 1)
+        return self._model.part_of(hit.vertex, other + 1)
 
     def click(self, x_px: float, y_px: float, keys: Qt.KeyboardModifier) -> None:
         """Choose the part under the pointer, or with nothing there everybody."""

@@ -15,6 +15,7 @@ from PySide6.QtCore import Qt
 
 from sd2app.scene.camera import Vector, drag_along, drag_in_view, drag_level, triple
 from sd2app.scene.scene import Scene
+from sd2app.scene.things import Met
 from sd2app.session.undo import Edits
 
 _BUTTONS = (Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton, Qt.MouseButton.RightButton)
@@ -95,17 +96,17 @@ class Navigator:
             return None
         return held.number, triple(held.at_m + held.moved_m), triple(held.moved_m)
 
-    def thing_at(self, x_px: float, y_px: float) -> tuple[int, Vector] | None:
-        """Number of the thing or other body under the pointer; not if the first is before it."""
+    def thing_at(self, x_px: float, y_px: float) -> Met | None:
+        """The thing or other body under the pointer; not if the first is before it."""
         scene, pose = self._scene, self._scene.pose
         if self.sensor_at(x_px, y_px):
             return None
-        hit = scene.movables.under(pose.position, pose.ray(x_px, y_px))
+        hit = scene.movables.under(pose, x_px, y_px)
         if hit is None or not scene.mesh_shown:
             return hit
         x, y, depth = pose.project(scene.body.points).T
         beneath = depth[np.hypot(x - x_px, y - y_px) <= _BODY_PX]
-        return None if (beneath < pose.project(hit[1])[0, 2]).any() else hit
+        return None if (beneath < pose.project(hit.place_m)[0, 2]).any() else hit
 
     def marker_at(self, x_px: float, y_px: float) -> int | None:
         """Number of the planned place within reach of a pointer, the nearest to it."""
@@ -219,8 +220,8 @@ class Navigator:
     def _take_thing(self, x_px: float, y_px: float) -> bool:
         hit = None if self.marker_at(x_px, y_px) is not None else self.thing_at(x_px, y_px)
         if hit is not None:
-            self._held_thing = _HeldThing(*hit, np.zeros(3), (x_px, y_px))
-            self._edits.begin_scene_drag(hit[0])
+            self._held_thing = _HeldThing(hit.number, hit.place_m, np.zeros(3), (x_px, y_px))
+            self._edits.begin_scene_drag(hit.number)
         return hit is not None
 
     def _drag_thing(
@@ -241,7 +242,7 @@ class Navigator:
 
     def _look(self, x_px: float, y_px: float) -> None:
         marker, hit = self.marker_at(x_px, y_px), self.thing_at(x_px, y_px)
-        thing = None if hit is None or marker is not None else hit[0]
+        thing = None if hit is None or marker is not None else hit.number
         self._hover(self.sensor_at(x_px, y_px), marker, thing)
 
     def _hover(self, sensor: bool, marker: int | None, thing: int | None) -> None:

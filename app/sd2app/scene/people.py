@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
+from sd2app.scene.camera import Surface
 from sd2app.scene.colours import SceneColours, fractions, mixed
 from sd2app.scene.parts import Body, Shape
 from sd2core.figures.colours import rgb
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.mesh.things import Surface
 from sd2core.mesh.walls import Wall
 
 PERSON_COLOURS = ("#d08a3c", "#5f9e6e", "#9b74b3", "#c4627c", "#4f98ad")
@@ -39,9 +39,8 @@ class Person(Body):
     @property
     def surface(self) -> Surface | None:
         """Vertices and faces as they are drawn; None where nothing can be met."""
-        if not self.present or self.mesh.faces is None:
-            return None
-        return self.points.astype(np.float64), self.mesh.faces
+        faces = self.mesh.faces
+        return (self.points, faces) if self.present and faces is not None else None
 
     def show_frame(self, frame: int, shown: bool = True) -> None:
         """Move to another frame; nobody is drawn unless ``shown``."""
@@ -54,10 +53,6 @@ class Person(Body):
     def set_limbs(self, colours: Sequence[str], limb: NDArray[np.intp] | None) -> None:
         """Colour limbs: the number of a colour by vertex, from 1, or 0; None: no limb."""
         self._limb_colours, self._limb = colours, limb
-
-    def vertex_near(self, place_m: NDArray[np.float64]) -> int:
-        """Vertex that is nearest to a place."""
-        return int(np.linalg.norm(self.points - place_m, axis=1).argmin())
 
     def set_colours(self, colours: SceneColours, hot: bool) -> None:
         """Colours of the theme; ``hot`` while the pointer is on it or drags it."""

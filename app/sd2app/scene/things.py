@@ -1,22 +1,23 @@
-"""Things around the body in the scene, found by a ray like the people beside them."""
+"""Things around the body in the scene, found by the pointer like the people beside them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
+from sd2app.scene.camera import EyePose, Surface
 from sd2app.scene.colours import SceneColours, mixed
 from sd2app.scene.parts import Shape
 from sd2app.scene.people import Person
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.mesh.things import Surface, Thing
+from sd2core.mesh.things import Thing
 
 _OPACITY = 0.38
 _SHARP_COSINE = 0.9
-_NEAREST_M = 0.01
 
 
 class ThingShapes:
@@ -43,6 +44,14 @@ class ThingShapes:
         self._face.set_colour(mixed(colours.plain, colours.sensor, 0.35 if hot else 0.0))
         faint = mixed(colours.muted, colours.background, 0.2)
         self._edge.set_colour(colours.sensor if hot else faint)
+
+
+class Met(NamedTuple):
+    """What is at a pixel: number of a thing or person, its nearest vertex, and the place."""
+
+    number: int
+    vertex: int
+    place_m: NDArray[np.float64]
 
 
 class Movables:
@@ -94,16 +103,17 @@ class Movables:
         """Number of a person among the people, from 0; None of a thing."""
         return number - len(self.things) if number >= len(self.things) else None
 
-    def under(
-        self, eye_m: NDArray[np.float64], ray: NDArray[np.float64]
-    ) -> tuple[int, NDArray[np.float64]] | None:
-        """Number of the nearest one that a ray meets, and where; None if it meets none."""
+    def under(self, pose: EyePose, x_px: float, y_px: float) -> Met | None:
+        """The one that is foremost at a pixel, and its vertex and place there; None beside all."""
         met = [
-            np.inf if one.surface is None else first_meeting(eye_m, ray, *one.surface)
-            for one in self._all
+            (*hit, number)
+            for number, one in enumerate(self._all)
+            if one.surface is not None and (hit := pose.foremost(one.surface, x_px, y_px))
         ]
-        nearest = min(met, default=np.inf)
-        return (met.index(nearest), eye_m + nearest * ray) if np.isfinite(nearest) else None
+        if not met:
+            return None
+        depth, vertex, number = min(met)
+        return Met(number, vertex, pose.position + depth * pose.ray(x_px, y_px))
 
     def shift(self, number: int, offset_m: ArrayLike) -> None:
         """Draw one elsewhere than it is."""
@@ -135,25 +145,3 @@ def sharp_edges(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> N
     # Two unit normals add up to 2 cos(half the angle between them).
     sharp = np.linalg.norm(total, axis=1) < 2.0 * np.sqrt(0.5 * (1.0 + _SHARP_COSINE))
     return unique[sharp | (counts != 2)].astype(np.int32)
-
-
-def first_meeting(
-    eye_m: NDArray[np.float64],
-    ray: NDArray[np.float64],
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int32],
-) -> float:
-    """Multiple of a ray at which it first meets a surface; infinite if it never does.
-
-    After T. Möller and B. Trumbore, *Fast, minimum storage ray/triangle intersection*, 1997.
-    """
-    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
-    across = np.cross(ray, c - a)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        scale = 1.0 / ((b - a) * across).sum(axis=1)
-        u = ((eye_m - a) * across).sum(axis=1) * scale
-        up = np.cross(eye_m - a, b - a)
-        v = (up @ ray) * scale
-        along = (up * (c - a)).sum(axis=1) * scale
-        meets = (u >= 0) & (v >= 0) & (u + v <= 1) & (along > _NEAREST_M)
-    return float(along[meets].min(initial=np.inf))

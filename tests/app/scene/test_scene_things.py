@@ -29,15 +29,16 @@ def test_an_open_surface_ends_in_edges() -> None:
 
 def test_a_ray_meets_the_nearest_thing_before_the_eye() -> None:
     things = Movables(vtkRenderer(), SceneColours.of(palette_for(False), False))
-    eye, ahead = np.zeros(3), np.array([0.0, 0.0, 1.0])
-    assert things.under(eye, ahead) is None
+    pose = EyePose((0.0, 0.0, 5.0))  # it looks ahead from the origin
+    x, y = np.divide(pose.size_px, 2)
+    assert things.under(pose, x, y) is None
     boxes = [Thing("box", (0, 0.25, z)) for z in (5.0, 3.0, -2.0)]
     things.set_things([box.placed() for box in boxes], boxes)
-    found = things.under(eye, ahead)
+    found = things.under(pose, x, y)
     assert found is not None
-    assert found[0] == 1
-    np.testing.assert_allclose(found[1], [0, 0, 2.75])
-    assert things.under(eye, np.array([0.5, 0.0, 1.0])) is None
+    assert found.number == 1
+    np.testing.assert_allclose(found.place_m, [0, 0, 2.75], atol=1e-9)
+    assert things.under(pose, x + 0.5 * pose.pixels_per_tangent, y) is None
 
 
 def test_a_level_drag_stays_under_the_pointer() -> None:

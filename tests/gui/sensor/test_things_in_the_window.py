@@ -113,7 +113,7 @@ def test_it_is_dragged_on_its_level_and_with_shift_upwards(window, qtbot):
     assert widget.cursor().shape() == Qt.CursorShape.OpenHandCursor
     pose, before = scene.pose, things(window)[0]
     level, moved = (
-        scene.movables.under(pose.position, pose.ray(start.x(), start.y()))[1],
+        scene.movables.under(pose, start.x(), start.y()).place_m,
         QPoint(40, 15),
     )
     QTest.mousePress(widget, LEFT, Qt.KeyboardModifier.NoModifier, start)
@@ -167,7 +167,7 @@ def test_the_map_follows_a_thing_while_it_is_dragged_and_settles(window, qtbot, 
     view.grab()
     pose = scene.pose
     start = pixel_of(pose, scene.movables.points_m.mean(axis=0))
-    held_m = scene.movables.under(pose.position, pose.ray(start.x(), start.y()))[1]
+    held_m = scene.movables.under(pose, start.x(), start.y()).place_m
     there = pixel_of(pose, held_m - [1.5, 0.0, 0.0])
     written = []
     monkeypatch.setattr(
