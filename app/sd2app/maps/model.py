@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -17,8 +18,11 @@ from PySide6.QtCore import QObject, Signal, SignalInstance
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.background.latest import Emit, ReportingModel, delayed
 from sd2app.background.quoting import quoted
-from sd2app.maps.partial_map import FINAL, Part, PartialMap, View, empty_map
+from sd2app.maps.partial_map import FINAL, PREVIEW, Part, PartialMap, View, empty_map
 from sd2app.maps.quality import (
+    ALL_WORDS,
+    AT_ONCE,
+    ROUGH_WORDS,
     Compiler,
     MaskPrefetcher,
     Postprocess,
@@ -26,10 +30,7 @@ from sd2app.maps.quality import (
     SynthesizerCache,
     budget_ms,
     compute_part,
-    final_quality,
     final_words,
-    is_swept_whole,
-    preview_quality,
     refine,
 )
 from sd2app.maps.readout import FrameReader, Readout
@@ -38,7 +39,7 @@ from sd2app.session.tasks import ListedRunner
 from sd2core.cli.synth import Synth
 from sd2core.doppler.body_error import body_error
 from sd2core.doppler.options import PRESETS
-from sd2core.doppler.synthesizer import FrameScattering, MapFrames, Synthesizer
+from sd2core.doppler.synthesizer import FrameScattering, MapFrames, Synthesizer, Visibility
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import deep_signature
 from sd2core.maps import DopplerMap
@@ -419,8 +420,7 @@ class SynthesisModel(ReportingModel):
         self.refining.emit()
         view, rough, vertices = self.frames_in_view(), self._preview_quality(), self._vertices
         # Much of a long clip can wait until it is known how it is to be done.
-        long = not is_swept_whole(vertices, len(quality))
-        only_view = final is None and not self._compiler.busy and long
+        only_view = final is None and not self._compiler.busy and not self._is_short
         self._runner.submit(
             lambda emit: refine(
                 sensor, quality, view, rough, final, vertices, emit, only_view=only_view
@@ -525,15 +525,32 @@ class SynthesisModel(ReportingModel):
     # --- helpers --------------------------------------------------------------------------
 
     def _preview_quality(self) -> QualityLevel:
+        """Quality for what moves, and where no frame is computed yet."""
         assert self._synthesizers is not None
-        return preview_quality(
-            self._synthesizers,
-            self._plan,
-            self._accuracy.while_dragging,
-            self._prefetcher.prefetched_for,
-            self._sensor,
-            stays=self.shows_sensor,
-        )
+        synthesizers, dragging = self._synthesizers, self._accuracy.while_dragging
+
+        def preview(
+            synthesizer: Synthesizer, words: str, visibility: Visibility | None
+        ) -> QualityLevel:
+            parts_of = synthesizers.parts_of
+            return QualityLevel(lambda: synthesizer, PREVIEW, words, visibility, parts_of)
+
+        synthesizer = synthesizers.ready(dragging.plan) if dragging is not None else None
+        if dragging is not None and synthesizer is not None:
+            words, reuse_m = f"while dragging: {dragging.accuracy}", dragging.plan.mask_reuse_m
+            if reuse_m == 0:
+                return preview(synthesizer, words, None)
+            masks_of, here_m = self._prefetcher.prefetched_for, self._sensor.position_m
+            if masks_of is not None and math.dist(masks_of.position_m, here_m) <= reuse_m:
+                return preview(synthesizer, words, "frozen")
+        # The masks of rest serve until one for dragging is known.
+        newest = synthesizers.ready(self._plan) or synthesizers.full
+        if synthesizers.options.visibility == "none":
+            return preview(newest, ALL_WORDS, "none")
+        # Where the sensor stays, and things move, they are as good.
+        if dragging is not None and not self.shows_sensor:
+            return preview(newest, ROUGH_WORDS, "facing")
+        return preview(newest, "preview: visibility of the nearest place", "frozen")
 
     def _final_quality(self) -> QualityLevel | None:
         """Quality that the tolerance asks for; None until it is chosen."""
@@ -541,7 +558,14 @@ class SynthesisModel(ReportingModel):
             return None
         if self._plan is None and self._may_choose():
             return None
-        return final_quality(self._synthesizers, self._plan, self._accuracy.in_use)
+        synthesizers, plan = self._synthesizers, self._plan
+        return QualityLevel(
+            lambda: synthesizers.of(plan),
+            FINAL,
+            final_words(synthesizers, self._accuracy.in_use),
+            parts_of=synthesizers.parts_of,
+            key_of=functools.partial(synthesizers.key, plan),
+        )
 
     @property
     def _files(self) -> str:
@@ -554,10 +578,14 @@ class SynthesisModel(ReportingModel):
         assert self._synthesizers is not None
         return self._synthesizers.mesh.vertex_count
 
+    @property
+    def _is_short(self) -> bool:
+        """True if the clip is swept whole while the sensor is dragged."""
+        return self._vertices * self._partial.frames <= AT_ONCE
+
     def _swept(self) -> View:
         """Frames that follow a drag: the whole clip when it is short, else those in view."""
-        frames = self._partial.frames
-        return (0, frames) if is_swept_whole(self._vertices, frames) else self.frames_in_view()
+        return (0, self._partial.frames) if self._is_short else self.frames_in_view()
 
     def _budget_ms(self) -> float:
         start, stop = self._swept()

@@ -17,7 +17,7 @@ from PySide6.QtCore import QObject
 
 from sd2app.accuracy.text import InUse
 from sd2app.background.latest import Emit, LatestRunner
-from sd2app.maps.partial_map import FINAL, PREVIEW, ROUGH, Part, View, pieces
+from sd2app.maps.partial_map import FINAL, ROUGH, Part, View, pieces
 from sd2app.session.tasks import ListedRunner
 from sd2core.body.parts import body_parts
 from sd2core.doppler.options import SynthesisOptions
@@ -43,8 +43,8 @@ view."""
 _KEPT = 3
 """Number of kept synthesizers: for the rest, for dragging, and the one before."""
 
-_ROUGH_WORDS = "preview: vertices facing the sensor"
-_ALL_WORDS = "all vertices of the point cloud"
+ROUGH_WORDS = "preview: vertices facing the sensor"
+ALL_WORDS = "all vertices of the point cloud"
 Postprocess = Callable[[Part], Any]
 """Makes something more of a part, while the next is computed."""
 
@@ -159,57 +159,11 @@ def budget_ms(frames: int) -> float:
     return float(_MAP_BUDGET_MS / 2 ** (steps / 2))
 
 
-def preview_quality(
-    synthesizers: SynthesizerCache,
-    plan: AccuracyPlan | None,
-    dragging: InUse | None,
-    masks_of: VirtualSensor | None,
-    sensor: VirtualSensor,
-    *,
-    stays: bool = False,
-) -> QualityLevel:
-    """Quality for what moves, and where no frame is computed yet.
-
-    ``plan`` is in use at rest: its masks serve until one for dragging is known. Masks for
-    dragging were made for ``masks_of``. Where the sensor ``stays``, and things move, those of rest
-    are as good.
-    """
-    synthesizer = synthesizers.ready(dragging.plan) if dragging is not None else None
-    parts_of = synthesizers.parts_of
-    if dragging is not None and synthesizer is not None:
-        words, reuse_m = f"while dragging: {dragging.accuracy}", dragging.plan.mask_reuse_m
-        if reuse_m == 0:
-            return QualityLevel(lambda: synthesizer, PREVIEW, words, None, parts_of)
-        if masks_of is not None and math.dist(masks_of.position_m, sensor.position_m) <= reuse_m:
-            return QualityLevel(lambda: synthesizer, PREVIEW, words, "frozen", parts_of)
-    newest = synthesizers.ready(plan) or synthesizers.full
-    if synthesizers.options.visibility == "none":
-        return QualityLevel(lambda: newest, PREVIEW, _ALL_WORDS, "none", parts_of)
-    if dragging is not None and not stays:
-        return QualityLevel(lambda: newest, PREVIEW, _ROUGH_WORDS, "facing", parts_of)
-    words = "preview: visibility of the nearest place"
-    return QualityLevel(lambda: newest, PREVIEW, words, "frozen", parts_of)
-
-
-def final_quality(
-    synthesizers: SynthesizerCache, plan: AccuracyPlan | None, in_use: InUse | None
-) -> QualityLevel:
-    """Quality of the plan in use; exact without a plan."""
-    words = final_words(synthesizers, in_use)
-    return QualityLevel(
-        lambda: synthesizers.of(plan),
-        FINAL,
-        words,
-        parts_of=synthesizers.parts_of,
-        key_of=functools.partial(synthesizers.key, plan),
-    )
-
-
 def final_words(synthesizers: SynthesizerCache, in_use: InUse | None) -> str:
     """Text about the quality of a map of the plan in use."""
     if in_use is not None:
         return in_use.accuracy
-    return _ALL_WORDS if synthesizers.options.visibility == "none" else "exact visibility"
+    return ALL_WORDS if synthesizers.options.visibility == "none" else "exact visibility"
 
 
 def compute_part(
@@ -231,16 +185,11 @@ def compute_part(
     quality, words = level.quality, level.words
     if level.visibility == "frozen" and stretch.quality == "facing":
         # No mask is kept.
-        quality, words = ROUGH, _ROUGH_WORDS
+        quality, words = ROUGH, ROUGH_WORDS
     return Part(
         sensor, start, stretch.values, stretch.limbs, quality, words, synthesizer.unit,
         level.key_of(sensor), shares,
     )  # fmt: skip
-
-
-def is_swept_whole(vertices: int, frames: int) -> bool:
-    """True if a clip is short enough to be recomputed whole while the sensor is dragged."""
-    return vertices * frames <= AT_ONCE
 
 
 def refine(
