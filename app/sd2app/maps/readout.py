@@ -14,7 +14,7 @@ from sd2core.doppler.synthesizer import FrameScattering, Synthesizer, Visibility
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.scattering.amplitude import range_weight
 from sd2core.scattering.beam import share_in_beam
-from sd2core.sensor import Vector, VirtualSensor
+from sd2core.sensor import Vector
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,6 @@ class FrameReader:
         """Drop what was read of an earlier recording."""
         newest = lru_cache(maxsize=1)
         self._scattering_of, self._torso_of = newest(Synthesizer.frame), newest(_torso_m)
-        self._readout_of = newest(_readout)
 
     def index(self) -> int | None:
         """Frame of the mesh on screen, None where there is no person."""
@@ -65,33 +64,22 @@ class FrameReader:
         torso_m, index, mesh = self.torso_m(), self.index(), self._document.mesh
         if frame is None or torso_m is None or index is None or mesh is None:
             return None
-        return self._readout_of(frame, mesh, index, torso_m, self._sensor.sensor, v_max_mps)
+        sensor, within = self._sensor.sensor, None
+        seen_mps = np.abs(frame.velocity_mps[frame.visible])
+        if sensor.beam is not None:
+            echo = frame.visible * range_weight(frame.range_m, 4.0, 1.0)
+            within = share_in_beam(sensor, mesh.frame(index).T, echo)
+        return Readout(
+            torso_range_m=float(np.linalg.norm(np.subtract(sensor.position_m, torso_m))),
+            visible_share=float(frame.visible.mean()),
+            beyond_share=float((seen_mps > v_max_mps).mean()) if seen_mps.size else 0.0,
+            share_in_beam=within,
+        )
 
 
 def _torso_m(mesh: MeshSequence, frame: int) -> Vector:
     x, y, z = np.median(mesh.frame(frame), axis=0)
     return float(x), float(y), float(z)
-
-
-def _readout(
-    frame: FrameScattering,
-    mesh: MeshSequence,
-    index: int,
-    torso_m: Vector,
-    sensor: VirtualSensor,
-    v_max_mps: float,
-) -> Readout:
-    seen_mps = np.abs(frame.velocity_mps[frame.visible])
-    within = None
-    if sensor.beam is not None:
-        echo = frame.visible * range_weight(frame.range_m, 4.0, 1.0)
-        within = share_in_beam(sensor, mesh.frame(index).T, echo)
-    return Readout(
-        torso_range_m=float(np.linalg.norm(np.subtract(sensor.position_m, torso_m))),
-        visible_share=float(frame.visible.mean()),
-        beyond_share=float((seen_mps > v_max_mps).mean()) if seen_mps.size else 0.0,
-        share_in_beam=within,
-    )
 
 
 def reading_lines(reading: Reading) -> tuple[str, ...]:

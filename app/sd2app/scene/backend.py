@@ -1,4 +1,4 @@
-"""Interface of the two renderers of the scene, and the choice between them.
+"""The choice between the two renderers of the scene, and what they share.
 
 ``gl`` draws into the window itself (pyvistaqt's QtInteractor): best where a
 GPU draws. ``image`` draws off-screen and paints the picture: with software
@@ -13,11 +13,9 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 from PySide6.QtGui import QGuiApplication, QOffscreenSurface, QOpenGLContext
-from PySide6.QtWidgets import QWidget
-from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from sd2app.system_libraries import loads
 
@@ -41,26 +39,6 @@ Prepare = Callable[[tuple[float, float], float], None]
 
 class NoOpenGL(RuntimeError):
     """OpenGL does not work here; the message is for the user."""
-
-
-class Backend(Protocol):
-    """A widget that shows what its renderer holds."""
-
-    name: str
-    renderer: vtkRenderer
-
-    @property
-    def widget(self) -> QWidget:
-        """Shows the picture; who filters its events handles the mouse."""
-
-    def start(self, prepare: Prepare) -> None:
-        """Draw from now on."""
-
-    def request_render(self) -> None:
-        """Draw again in the next turn of the event loop, once, if visible."""
-
-    def shut_down(self) -> None:
-        """Release everything of VTK; the widget stays, blank."""
 
 
 def chosen_backend() -> BackendName:

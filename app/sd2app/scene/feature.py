@@ -41,22 +41,15 @@ _VIEWS: tuple[tuple[str, Preset, str, str], ...] = (
     ("view_top", "top", "from above", "See sensor and body from above"),
 )
 
-_SHORT = {
-    "velocity": "velocity",
-    "range": "range",
-    "visibility": "visibility",
-    "plain": "plain",
-}
-
 
 class SceneBar(QWidget):
     """Bar over the 3D view: colour of the mesh, dots and ready-made views."""
 
     def __init__(self, display: DisplayModel, action: Callable[[str], QAction]) -> None:
         super().__init__()
-        colour = Choice(
-            "What the colour of the mesh means (1 to 4)", self, _SHORT, display.set_mesh_colour
-        )
+        texts = {colour: colour for colour, *_ in _COLOURS}
+        tip = "What the colour of the mesh means (1 to 4)"
+        colour = Choice(tip, self, texts, display.set_mesh_colour)
         views = QMenu(self)
         views.addActions([action(name) for name, *_ in _VIEWS])
         look = outlined("Look from", "Where to look at the scene from", views, self, look="")

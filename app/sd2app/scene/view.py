@@ -13,7 +13,7 @@ from PySide6.QtCore import QEvent, QObject, QPointF, QSize, Qt
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QMouseEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QLabel, QMenu, QWidget
 
-from sd2app.scene.backend import Backend, NoOpenGL, chosen_backend
+from sd2app.scene.backend import NoOpenGL, chosen_backend
 from sd2app.scene.camera import Preset
 from sd2app.scene.colours import SceneColours
 from sd2app.scene.inertial import LIMB_HINT, PLACING_HINT, InertialHand, LimbHand
@@ -30,10 +30,14 @@ if TYPE_CHECKING:
     from sd2app.imu.model import ImuModel
     from sd2app.maps.limbs import LimbsModel
     from sd2app.maps.model import SynthesisModel
+    from sd2app.scene.offscreen_backend import ImageBackend
+    from sd2app.scene.opengl_backend import InteractorBackend
     from sd2app.sensor.placements import PlacementsModel
     from sd2app.session.session import Session
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.mesh.things import Surroundings
+
+    Backend = InteractorBackend | ImageBackend
 
 _MOUSE = (
     QEvent.Type.MouseMove,

@@ -13,9 +13,9 @@ from PySide6.QtWidgets import QComboBox, QFormLayout, QGridLayout, QLabel, QWidg
 from sd2app.maps.model import SynthesisModel
 from sd2app.sensor.beam import BeamForm
 from sd2app.session.session import Session
-from sd2app.widgets.inputs import CheckBox, Choice, NumberBox, option_box
+from sd2app.widgets.inputs import CheckBox, Choice, NumberBox, action_button, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, grid_of, pane, row_of
-from sd2app.widgets.panel import outlined, rule, sentence, show_words, title
+from sd2app.widgets.panel import rule, sentence, show_words, title
 from sd2core.cli.importing import Content, SensorPlace
 from sd2core.radar_config import RadarConfig, range_in_words
 from sd2core.sensor import aimed_at, position_from_spherical, spherical_from_position
@@ -56,8 +56,9 @@ class SensorPanel(QWidget):
         self.setObjectName("page")
         self._session, self._synthesis, self._radar = session, synthesis, radar
         self._too_far = sentence("", "warning")
-        self._capture = self._capture_part(self._button(align, "Find…"))
-        buttons = (self._button(aim, "Aim at body"), self._button(to_camera, "To camera"))
+        self._capture = self._capture_part(action_button(align, "Find…", outlined=True))
+        short = (aim, "Aim at body"), (to_camera, "To camera")
+        buttons = [action_button(action, text, outlined=True) for action, text in short]
         head = row_of(title("Placement"), STRETCH, *buttons)
         placement = head, self._placement_form(), self._too_far, BeamForm(session, warn)
         seen = title("What it sees"), self._readout_form()
@@ -71,13 +72,6 @@ class SensorPanel(QWidget):
         self._refresh_capture()
 
     # --- building -------------------------------------------------------------------------
-
-    def _button(self, action: QAction, text: str) -> QWidget:
-        button = outlined(text, action.toolTip(), action.trigger, self)
-        button.setEnabled(action.isEnabled())
-        action.enabledChanged.connect(button.setEnabled)
-        action.changed.connect(lambda: button.setToolTip(action.toolTip()))
-        return button
 
     def _placement_form(self) -> QGridLayout:
         grid = grid_of(gaps_px=(6, 3), wide=(1, 3))

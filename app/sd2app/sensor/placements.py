@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from functools import lru_cache
+from typing import NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 
@@ -50,7 +51,7 @@ class PlacementsModel(ReportingModel):
         self.planned = Planned()  # empty until the places are computed
         self.shown = True  # in the scene
         self._request: _Request | None = None
-        self._body: tuple[MeshSequence, BodyExtent] | None = None
+        self._extent_of = lru_cache(maxsize=1)(BodyExtent.of)
         self._runner = LatestRunner("placements", self, self._receive, self._fail)
         self._runner.partial.connect(self._receive)
         self._document.opened.connect(self._follow)
@@ -127,32 +128,25 @@ class PlacementsModel(ReportingModel):
         if request is None:
             self._runner.cancel()
         else:
-            known = self._body
-            self._runner.submit(lambda emit: _compute_view(request, known, emit))
+            self._runner.submit(lambda emit: self._plan_around(request, emit))
         self.changed.emit()
 
-    def _receive(self, result: Any) -> None:
-        self._body, self.planned = result
+    def _plan_around(self, request: _Request, emit: Emit) -> Planned:
+        """Compute in the background: the places first, then what they see."""
+        body, places = self._extent_of(request.mesh), request.plan.places()
+        sensors = tuple(place.sensor(body.target_m) for place in places)
+        emit(Planned(places, sensors))
+        coverage = body.coverage(sensors, lambda done, total: emit(None))
+        return Planned(places, sensors, coverage)
+
+    def _receive(self, planned: Planned) -> None:
+        self.planned = planned
         self.changed.emit()
 
     def _fail(self, error: Exception) -> None:
         self.planned = Planned()
         super()._fail(error)
         self.changed.emit()
-
-
-def _compute_view(
-    request: _Request, known: tuple[MeshSequence, BodyExtent] | None, emit: Emit
-) -> tuple[tuple[MeshSequence, BodyExtent], Planned]:
-    """Compute in the background: the places first, then what they see."""
-    body = known if known is not None and known[0] is request.mesh else None
-    if body is None:
-        body = (request.mesh, BodyExtent.of(request.mesh))
-    places = request.plan.places()
-    sensors = tuple(place.sensor(body[1].target_m) for place in places)
-    emit((body, Planned(places, sensors)))
-    coverage = body[1].coverage(sensors, lambda done, total: emit(None))
-    return body, Planned(places, sensors, coverage)
 
 
 def count_text(model: PlacementsModel) -> str:
