@@ -6,85 +6,48 @@ Colours of a sensor's axes have 4.5:1 on panels and wells, and differ to the col
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+
+class _Colour:
+    """A colour of a palette: in the light theme, and in the dark one."""
+
+    def __init__(self, light: str, dark: str) -> None:
+        self._of_theme = light, dark
+
+    def __get__(self, palette: Palette, owner: type[Palette]) -> str:
+        return self._of_theme[palette.dark]
 
 
-@dataclass(frozen=True)
 class Palette:
-    """Named colours as ``#rrggbb``."""
+    """Named colours of a theme as ``#rrggbb``."""
 
-    window: str
-    panel: str
-    well: str
-    border: str
-    frame: str
-    text: str
-    muted: str
-    disabled: str
-    accent: str
-    accent_text: str
-    synthetic: str
-    denoised: str
-    before: str
-    real: str
-    level: str
-    hatch: str
-    warning: str
-    overlay: str
-    axis_x: str
-    axis_y: str
-    axis_z: str
-    inertial: str
+    def __init__(self, dark: bool) -> None:
+        self.dark = dark
+
+    window = _Colour("#f3f4f6", "#17191d")
+    panel = _Colour("#ffffff", "#1e2126")
+    well = _Colour("#e9ebee", "#121417")
+    border = _Colour("#d3d7dd", "#343941")
+    frame = _Colour("#7b828c", "#6b727d")
+    text = _Colour("#1d2127", "#e7e9ec")
+    muted = _Colour("#5a6370", "#a0a8b3")
+    disabled = _Colour("#626974", "#868e99")
+    accent = _Colour("#1f66d1", "#79b0ff")
+    accent_text = _Colour("#ffffff", "#0e1116")
+    synthetic = _Colour("#1f66d1", "#79b0ff")
+    denoised = _Colour("#0b7a5b", "#4fd0a2")
+    before = _Colour("#8a4bb0", "#cfa2ee")
+    real = _Colour("#b4520b", "#f5a45a")
+    level = _Colour("#f7f8f9", "#17191d")
+    hatch = _Colour("#9aa1ab", "#5a616c")
+    warning = _Colour("#a33a00", "#ffb07a")
+    overlay = _Colour("#2fc6a8", "#2fc6a8")
+    axis_x = _Colour("#b83a00", "#ff8a4c")
+    axis_y = _Colour("#00786b", "#46e0b0")
+    axis_z = _Colour("#4b3bc8", "#9a9cff")
+    inertial = _Colour("#ffd21f", "#ffd21f")
 
 
-LIGHT = Palette(
-    window="#f3f4f6",
-    panel="#ffffff",
-    well="#e9ebee",
-    border="#d3d7dd",
-    frame="#7b828c",
-    text="#1d2127",
-    muted="#5a6370",
-    disabled="#626974",
-    accent="#1f66d1",
-    accent_text="#ffffff",
-    synthetic="#1f66d1",
-    denoised="#0b7a5b",
-    before="#8a4bb0",
-    real="#b4520b",
-    level="#f7f8f9",
-    hatch="#9aa1ab",
-    warning="#a33a00",
-    overlay="#2fc6a8",
-    axis_x="#b83a00",
-    axis_y="#00786b",
-    axis_z="#4b3bc8",
-    inertial="#ffd21f",
-)
-DARK = Palette(
-    window="#17191d",
-    panel="#1e2126",
-    well="#121417",
-    border="#343941",
-    frame="#6b727d",
-    text="#e7e9ec",
-    muted="#a0a8b3",
-    disabled="#868e99",
-    accent="#79b0ff",
-    accent_text="#0e1116",
-    synthetic="#79b0ff",
-    denoised="#4fd0a2",
-    before="#cfa2ee",
-    real="#f5a45a",
-    level="#17191d",
-    hatch="#5a616c",
-    warning="#ffb07a",
-    overlay="#2fc6a8",
-    axis_x="#ff8a4c",
-    axis_y="#46e0b0",
-    axis_z="#9a9cff",
-    inertial="#ffd21f",
-)
+LIGHT, DARK = Palette(False), Palette(True)
 
 
 def palette_for(dark: bool) -> Palette:
