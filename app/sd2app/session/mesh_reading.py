@@ -11,7 +11,6 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.background.latest import Emit
 from sd2app.session.content import OfferedCure, offers_of, words_of
 from sd2app.session.tasks import ListedRunner, TaskList
-from sd2core.errors import Sd2Error
 from sd2core.io.bodies import with_bodies
 from sd2core.mesh.bodies import Body
 from sd2core.mesh.sequence import MeshSequence
@@ -45,9 +44,8 @@ class MeshReader(QObject):
     def __init__(self, jobs: TaskList, parent: QObject) -> None:
         super().__init__(parent)
         self._kept: list[ReadMesh] = []  # the newest first
-        self._awaited: list[tuple[Body, Callable[[], object]]] = []  # and what is done then
-        self._bodies = ListedRunner("bodies", jobs, self, self._take_bodies)
-        self._bodies.cancelled.connect(lambda: self._awaited.clear())
+        self._jobs = jobs
+        self._bodies: list[tuple[Body, ListedRunner]] = []  # and what reads the file of each
         self._take: Callable[[ReadMesh], object] = self._tell  # what is done with the next one
         self._refuse: Callable[[Exception], object] = self._say
         self._runner = ListedRunner(
@@ -56,9 +54,9 @@ class MeshReader(QObject):
 
     def reset(self, read: ReadMesh) -> None:
         """Begin with the mesh of another recording."""
-        for runner in (self._runner, self._bodies):
+        for runner in self._runners():
             runner.cancel()
-        self._kept, self._awaited = [read], []
+        self._kept = [read]
 
     def keep(self, read: ReadMesh) -> None:
         """Have a mesh ready, the last but one no more."""
@@ -81,34 +79,16 @@ class MeshReader(QObject):
         self._submit(replace(recording, **fields))
 
     def read_body(self, mesh: MeshSequence, body: Body, then: Callable[[], object]) -> None:
-        """Read the file of another body beside a mesh, and call ``then``: it is then at hand.
-
-        Those that are awaited already are waited for together.
-        """
-        self._awaited.append((body, then))
-        bodies = [one for one, _ in self._awaited]
-
-        def read(emit: Emit) -> list[Exception | None]:
-            errors: list[Exception | None] = []
-            for one in bodies:
-                emit((len(errors), len(bodies)))
-                try:
-                    with_bodies(mesh, [one])
-                    errors.append(None)
-                except (Sd2Error, OSError) as error:
-                    errors.append(error)
-            return errors
-
-        self._bodies.submit(read, f"Reading {body.file_name}")
+        """Read the file of another body beside a mesh, and call ``then``: it is then at hand."""
+        runner = ListedRunner("body", self._jobs, self, lambda _: then(), self._say)
+        for done in (runner.finished, runner.failed):
+            done.connect(lambda _: runner.close())
+        self._bodies.append((body, runner))
+        runner.submit(lambda emit: with_bodies(mesh, [body]), f"Reading {body.file_name}")
 
     def awaits(self, body: Body) -> bool:
         """True while the file of a body is read."""
-        return any(one == body for one, _ in self._awaited)
-
-    def _take_bodies(self, errors: list[Exception | None]) -> None:
-        awaited, self._awaited = self._awaited, []
-        for (_, then), error in zip(awaited, errors, strict=True):
-            then() if error is None else self._say(error)
+        return any(one == body and runner.busy for one, runner in self._bodies)
 
     def follow(self, recording: Recording) -> None:
         """Say that the mesh of a recording's fields is ready, at once or once it is read."""
@@ -128,9 +108,12 @@ class MeshReader(QObject):
 
     def close(self) -> None:
         """Stop reading, for good."""
-        for runner in (self._runner, self._bodies):
+        for runner in self._runners():
             runner.close()
         self._kept = []
+
+    def _runners(self) -> list[ListedRunner]:
+        return [self._runner, *(runner for _, runner in self._bodies)]
 
     def _submit(self, asked: Recording) -> None:
         def read(emit: Emit) -> ReadMesh:
