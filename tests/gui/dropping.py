@@ -26,9 +26,9 @@ def hover(window: MainWindow, *paths: Path) -> DropOverlay:
 def drop(window: MainWindow, *paths: Path, on: int = 0) -> None:
     """Drag files to one of the fields and let go."""
     overlay = hover(window, *paths)
-    where = overlay.mapTo(window, overlay.field(on).center())
+    where = overlay.mapTo(window, overlay.fields[on].geometry().center())
     how = (Qt.DropAction.CopyAction, _mime(paths), LEFT, NONE)
-    QApplication.sendEvent(window, QDragMoveEvent(where.toPoint(), *how))
+    QApplication.sendEvent(window, QDragMoveEvent(where, *how))
     assert overlay.current == on
     QApplication.sendEvent(window, QDropEvent(QPointF(where), *how))
     assert not overlay.isVisible()

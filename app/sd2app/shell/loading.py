@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QFrame, QWidget
+from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
+from PySide6.QtGui import QPaintEvent
+from PySide6.QtWidgets import QFrame, QLabel, QWidget
 
 from sd2app.background.latest import delayed
 from sd2app.feature import Drop
-from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
-from sd2app.widgets.panel import ProgressBar, outlined, sentence, title
+from sd2app.widgets.panel import ProgressBar, outlined, say, sentence, title
 
 if TYPE_CHECKING:
     from sd2app.session.document import DocumentModel
@@ -89,68 +89,42 @@ class LoadingCover(QFrame):
         return False
 
 
-_GAP_PX = 16
-_COVER = 235
-"""Opacity of what covers the window, of 255."""
+_MAX_DROPS = 2
 
 
-class DropOverlay(Canvas):
+class DropOverlay(QFrame):
     """A field for each thing that a drop can do, side by side; the one below the pointer does."""
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
+        self.setObjectName("drops")
         self._covered = parent
-        self._paths: Sequence[Path] = ()
         self.drops: Sequence[Drop] = ()
         self.current = 0
+        self.fields = [QLabel(self) for _ in range(_MAX_DROPS)]
+        for field in self.fields:
+            field.setAlignment(Qt.AlignmentFlag.AlignCenter)
+            field.setWordWrap(True)
+        self.setLayout(row_of(*((one, 1) for one in self.fields), spacing_px=16, margins_px=16))
         self.hide()
 
     def offer(self, paths: Sequence[Path], drops: Sequence[Drop]) -> None:
         """Cover the parent with what can be done."""
-        self._paths, self.drops, self.current = paths, drops, 0
+        self.drops, self.current = drops, 0
         self.setAccessibleName("; ".join(one.text for one in drops))
+        names = escape(", ".join(path.name for path in paths))
+        for place, field in enumerate(self.fields):
+            field.setVisible(place < len(drops))
+            if place < len(drops):
+                field.setText(f"<big><big>{escape(drops[place].text)}</big></big><p>{names}</p>")
         self.setGeometry(self._covered.rect())
         self.raise_()
         self.show()
 
     def point(self, at: QPointF) -> None:
         """Choose the field below the pointer, a place of this widget."""
-        for place in range(len(self.drops)):
-            if self.field(place).adjusted(-_GAP_PX, -_GAP_PX, _GAP_PX, _GAP_PX).contains(at):
+        for place, field in enumerate(self.fields[: len(self.drops)]):
+            if field.geometry().contains(at.toPoint()):
                 self.current = place
-        self.update()
-
-    def field(self, place: int) -> QRectF:
-        """Rectangle of a field."""
-        width = (self.width() - _GAP_PX) / len(self.drops) - _GAP_PX
-        left = _GAP_PX + place * (width + _GAP_PX)
-        return QRectF(left, _GAP_PX, width, self.height() - 2 * _GAP_PX)
-
-    def paint(self, painter: QPainter) -> None:
-        """Paint the fields, the current one in the accent colour."""
-        colours = self.palette()
-        cover = colours.window().color()
-        cover.setAlpha(_COVER)
-        painter.fillRect(self.rect(), cover)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        names = ", ".join(path.name for path in self._paths)
-        for place, drop in enumerate(self.drops):
-            chosen, field = place == self.current, self.field(place)
-            edge = colours.highlight().color() if chosen else colours.mid().color()
-            tint = QColor(edge)
-            tint.setAlpha(40 if chosen else 0)
-            painter.setPen(QPen(edge, 3 if chosen else 1, Qt.PenStyle.DashLine))
-            painter.setBrush(tint)
-            painter.drawRoundedRect(field, 8, 8)
-            painter.setPen(colours.windowText().color())
-            font = self.font()
-            font.setPointSizeF(1.5 * font.pointSizeF())
-            painter.setFont(font)
-            flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
-            inner = field.adjusted(24, 24, -24, -24)
-            box = painter.boundingRect(inner, int(flags), drop.text)
-            painter.drawText(inner, int(flags), drop.text)
-            painter.setFont(self.font())
-            below = inner.adjusted(0, box.bottom() - inner.top() + 8, 0, 0)
-            top = Qt.AlignmentFlag.AlignHCenter | Qt.TextFlag.TextWordWrap
-            painter.drawText(below, int(top), names)
+        for place, field in enumerate(self.fields):
+            say(field, field.text(), "chosen" if place == self.current else "drop")

@@ -106,6 +106,11 @@ def _style_sheet(c: Palette) -> str:
     QLabel#badge {{
         color: {c.warning}; border: 1px solid {c.warning}; border-radius: 4px; padding: 1px 6px;
     }}
+    QFrame#drops {{ background: #eb{c.window[1:]}; }}
+    QLabel#drop {{ border: 1px dashed {c.frame}; border-radius: 8px; }}
+    QLabel#chosen {{
+        background: #28{c.accent[1:]}; border: 3px dashed {c.accent}; border-radius: 8px;
+    }}
     QToolButton {{ border: 1px solid transparent; border-radius: 4px; padding: 4px; }}
     /* What opens a menu at once has room for the arrow. */
     QToolButton[popupMode="2"] {{ padding-right: 18px; }}
