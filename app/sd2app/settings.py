@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 from PySide6.QtCore import QByteArray, QSettings
+
+from sd2core.errors import Sd2Error
+from sd2core.files.texts import parse_json
 
 T = TypeVar("T")
 
@@ -59,6 +63,18 @@ class Settings:
             return default if value is None else type(default)(value)  # type: ignore[call-arg]
         except (TypeError, ValueError):
             return default
+
+    def table(self, name: str) -> dict[str, Any]:
+        """A table that was kept as JSON; empty where it is none, or is damaged."""
+        try:
+            table = parse_json(self.stored(name, "{}"), "The setting", "a table")
+        except Sd2Error:
+            return {}
+        return table if isinstance(table, dict) else {}
+
+    def keep_table(self, name: str, table: Mapping[str, Any]) -> None:
+        """Remember a table."""
+        self.set_value(name, json.dumps(table))
 
     def paths(self, name: str) -> list[Path]:
         """A list of paths."""

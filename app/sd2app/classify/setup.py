@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,6 @@ from sd2core.cli.classify.comparison import Table
 from sd2core.cli.classify.train import Train
 from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.errors import Sd2Error
-from sd2core.files.texts import parse_json
 from sd2core.options.records import words_of
 from sd2core.runs.pace import known_pace_s
 
@@ -103,8 +101,8 @@ class ClassSetup(RunSetup[DataSource]):
             values.set("model", _DEFAULTS["model"])
         if values["delay_s"] not in DELAYS_S:
             values.set("delay_s", DELAY_S)
-        people = _people(settings.stored(_PEOPLE, "{}"))
-        data = [DataSource(path, people.get(str(path), "")) for path in settings.paths(_DATA)]
+        people = settings.table(_PEOPLE)
+        data = [DataSource(path, str(people.get(str(path), ""))) for path in settings.paths(_DATA)]
         super().__init__(settings, values, _DATA, data, parent)
 
     def look_into(self, source: DataSource) -> DataSource:
@@ -123,7 +121,7 @@ class ClassSetup(RunSetup[DataSource]):
     def keep(self, data: tuple[DataSource, ...]) -> None:
         """Learn from this data, and remember it with its people."""
         people = {str(one.path): one.person for one in data if one.person}
-        self._settings.set_value(_PEOPLE, json.dumps(people))
+        self._settings.keep_table(_PEOPLE, people)
         super().keep(data)
 
     @property
@@ -196,15 +194,6 @@ class ClassSetup(RunSetup[DataSource]):
     @property
     def _sources(self) -> tuple[LabelledSource, ...]:
         return tuple(LabelledSource(one.path, one.person) for one in self.data)
-
-
-def _people(text: str) -> dict[str, str]:
-    """Stored names of people by the paths of their sources."""
-    try:
-        people = parse_json(text, "The setting", "names of people")
-        return {str(path): str(name) for path, name in people.items()}
-    except (Sd2Error, AttributeError):
-        return {}
 
 
 def division_of(data: Sequence[DataSource]) -> Split | None:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.settings import Settings
-from sd2core.errors import Sd2Error
-from sd2core.files.texts import parse_json
 
 HEADER_PX = 24
 """Height of the title row of a map, which is all of a folded one."""
@@ -55,7 +52,7 @@ class Arrangement(QObject):
     def __init__(self, names: Sequence[str], settings: Settings, parent: QObject) -> None:
         super().__init__(parent)
         self._settings = settings
-        kept = _read(settings.stored(_KEPT, ""))
+        kept = _read(settings.table(_KEPT))
         order = [name for name in kept if name in names]
         self.order = order + [name for name in names if name not in order]
         self._rows = {name: kept.get(name, Row()) for name in names}
@@ -94,17 +91,16 @@ class Arrangement(QObject):
             self._keep()
 
     def _keep(self) -> None:
-        kept = {name: self._rows[name] for name in self.order}
-        self._settings.set_value(_KEPT, json.dumps(kept))
+        self._settings.keep_table(_KEPT, {name: self._rows[name] for name in self.order})
         self.changed.emit()
 
 
-def _read(text: str) -> Mapping[str, Row]:
-    """Rows by name, as they were kept; none where the text is damaged."""
+def _read(kept: Mapping[str, Any]) -> Mapping[str, Row]:
+    """Rows by name, as they were kept; none where they are damaged."""
     try:
         return {
-            str(name): Row(None if px is None else int(px), bool(folded))
-            for name, (px, folded) in parse_json(text or "{}", "The setting", "rows").items()
+            name: Row(None if px is None else int(px), bool(folded))
+            for name, (px, folded) in kept.items()
         }
-    except (Sd2Error, ValueError, TypeError, AttributeError, OverflowError):
+    except (ValueError, TypeError, OverflowError):
         return {}

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from sd2app.settings import Settings
-from sd2core.errors import Sd2Error
 from sd2core.files.recording_json import MeshReading
-from sd2core.files.texts import parse_json
 from sd2core.recording.recording import Recording
 
 _NAME = "mesh_readings"
@@ -28,27 +25,20 @@ class MeshReadings:
             "reading": recording.mesh_reading.model_dump(mode="json", exclude_none=True),
             "faces": None if recording.faces is None else str(recording.faces),
         }
-        kept, key = self._kept(), _key(paths)
+        kept, key = self._settings.table(_NAME), _key(paths)
         if kept.get(key) != content:
             listed = {key, *map(_key, self._settings.recent)}
             kept = {one: value for one, value in kept.items() if one in listed}
-            self._settings.set_value(_NAME, json.dumps(kept | {key: content}))
+            self._settings.keep_table(_NAME, kept | {key: content})
 
     def fields(self, paths: Sequence[Path]) -> dict[str, Any] | None:
         """Fields of a recording by which the mesh was read; None where that is not known."""
-        content = self._kept().get(_key(paths), {})
+        content = self._settings.table(_NAME).get(_key(paths), {})
         try:
             faces, reading = content["faces"], MeshReading.model_validate(content["reading"])
             return {"mesh_reading": reading, "faces": None if faces is None else Path(faces)}
         except (TypeError, KeyError, ValueError):
             return None
-
-    def _kept(self) -> dict[str, Any]:
-        try:
-            kept = parse_json(self._settings.stored(_NAME, "{}"), "The setting", "readings")
-        except Sd2Error:
-            return {}
-        return kept if isinstance(kept, dict) else {}
 
 
 def _key(paths: Sequence[Path]) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
@@ -12,7 +12,6 @@ from sd2app.labels.model import LabelsModel
 from sd2app.settings import Settings
 from sd2app.widgets.key_text import canonical, native
 from sd2core.errors import Sd2Error
-from sd2core.files.texts import parse_json
 
 _CHOSEN = "keys"
 _RESERVED = {
@@ -40,7 +39,7 @@ class KeyBindings(QObject):
         super().__init__(parent)
         self._actions = {one.id: one for one in actions}
         self._labels, self._settings = labels, settings
-        self._chosen = _stored(settings.stored(_CHOSEN, "{}"), self._actions)
+        self._chosen = _stored(settings.table(_CHOSEN), self._actions)
         self._of_labels: dict[str, str] = {}
         self._keys: dict[str, tuple[str, ...]] = {}
         self._follow()
@@ -123,7 +122,7 @@ class KeyBindings(QObject):
         self._store()
 
     def _store(self) -> None:
-        self._settings.set_value(_CHOSEN, json.dumps(self._chosen))
+        self._settings.keep_table(_CHOSEN, self._chosen)
         self._follow()
 
     def _follow_labels(self) -> None:
@@ -154,15 +153,11 @@ class KeyBindings(QObject):
         return tuple(key for key in self._usual(action_id) if key not in taken)
 
 
-def _stored(text: str, known: Mapping[str, object]) -> dict[str, tuple[str, ...]]:
+def _stored(content: Mapping[str, Any], known: Mapping[str, object]) -> dict[str, tuple[str, ...]]:
     """What was stored, as far as it can be understood; of two with one key the first has it."""
-    try:
-        content = parse_json(text, "The setting", "keys of actions")
-    except Sd2Error:
-        return {}
     chosen: dict[str, tuple[str, ...]] = {}
     taken: set[str] = set(_RESERVED)
-    for action_id, keys in content.items() if isinstance(content, dict) else ():
+    for action_id, keys in content.items():
         if action_id not in known or not isinstance(keys, list):
             continue
         kept = dict.fromkeys(canonical(key) for key in keys if isinstance(key, str))
