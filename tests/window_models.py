@@ -13,7 +13,7 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QMenu
 
 from sd2app.feature import Action
-from sd2app.session.session import Session, build_session
+from sd2app.session.session import Session
 from sd2app.settings import Settings
 from sd2app.shell.menus import in_order
 from sd2app.shell.parts import Parts
@@ -28,7 +28,7 @@ def models_of(window: MainWindow) -> SimpleNamespace:
 
 def build_models(parent: QObject, settings: Settings, parts: Parts | None = None) -> Any:
     """Models without a window."""
-    session, shell = build_session(parent, settings), NoShell()
+    session, shell = Session(parent, settings), NoShell()
     parts = replace(parts or Parts(), pictures=Path(os.devnull))  # keeps none
     features = Features(session, shell, parts, parent)
     return _named(session, features, shell=shell)
@@ -37,7 +37,7 @@ def build_models(parent: QObject, settings: Settings, parts: Parts | None = None
 def all_actions() -> tuple[Action, ...]:
     """Actions of all features in the order of the menus; they belong to nothing that is open."""
     parent = QObject()
-    session = build_session(parent, Settings.forgetful())
+    session = Session(parent, Settings.forgetful())
     features = Features(session, NoShell(), Parts(), parent)
     return in_order(action for feature in features for action in feature.actions())
 

@@ -68,25 +68,41 @@ class Maps:
         }
 
 
-@dataclass(frozen=True)
 class Session:
-    """One recording at work: document, clock, sensor, display, maps and undoable edits."""
+    """One recording at work: document, clock, sensor, display, maps and undoable edits.
 
-    settings: Settings
-    jobs: TaskList
-    document: DocumentModel
-    playback: PlaybackModel
-    video: VideoModel
-    sensor: SensorModel
-    display: DisplayModel
-    span: TimeWindow
-    pointer: PointerModel
-    maps: Maps
-    placing: Mode  # a click on the body places an inertial sensor
-    aligning: Mode  # grips on what was measured move it in time
-    edits: Edits
-    layouts: Layouts
-    results: ByteBudget  # of places and models that were left, by :attr:`MapModel.key`
+    At first nothing is open.
+    """
+
+    def __init__(self, parent: QObject, settings: Settings) -> None:
+        self.settings = settings
+        self.jobs = TaskList(parent)
+        self.document = DocumentModel(self.jobs, parent)
+        self.playback = PlaybackModel(parent)
+        self.video = VideoModel(self.playback, parent)
+        self.sensor = SensorModel(parent)
+        self.display = DisplayModel(parent)
+        self.span = TimeWindow(parent)
+        self.pointer = PointerModel(parent)
+        self.maps = Maps(
+            MapModel("Synthetic", parent, "synthetic"),
+            MapModel("Denoised", parent, "denoised"),
+            MapModel("Denoised before", parent),
+            MapModel("Real", parent, "radar"),
+        )
+        self.placing = Mode(parent)  # a click on the body places an inertial sensor
+        self.aligning = Mode(parent)  # grips on what was measured move it in time
+        self.edits = Edits(self.document, self.sensor)
+        self.layouts = Layouts(settings, parent)
+        self.results = ByteBudget(_RESULTS_BYTES)
+        """Of places and models that were left, by :attr:`MapModel.key`."""
+        self.document.grown.connect(self.extend)
+        self.document.opened.connect(self.aligning.end)
+        self.playback.frame_changed.connect(self._turn_page)
+
+    def _turn_page(self) -> None:
+        if self.playback.playing:
+            self.span.reveal(self.playback.time_s)
 
     def has_content(self) -> bool:
         """True while something is open."""
@@ -141,38 +157,3 @@ class Session:
         if radar_map is not None and (new or real.map is None) and not chosen:
             real.set_reference(reference_of(radar_map.values, radar_map.null_bins))
         real.set_map(radar_map)
-
-
-def build_session(parent: QObject, settings: Settings) -> Session:
-    """Make the shared models, with nothing open."""
-    jobs = TaskList(parent)
-    document, playback = DocumentModel(jobs, parent), PlaybackModel(parent)
-    sensor, span = SensorModel(parent), TimeWindow(parent)
-    playback.frame_changed.connect(
-        lambda _: playback.playing and span.reveal(playback.time_s)  # turn the page
-    )
-    session = Session(
-        settings=settings,
-        jobs=jobs,
-        document=document,
-        playback=playback,
-        video=VideoModel(playback, parent),
-        sensor=sensor,
-        display=DisplayModel(parent),
-        span=span,
-        pointer=PointerModel(parent),
-        maps=Maps(
-            MapModel("Synthetic", parent, "synthetic"),
-            MapModel("Denoised", parent, "denoised"),
-            MapModel("Denoised before", parent),
-            MapModel("Real", parent, "radar"),
-        ),
-        placing=Mode(parent),
-        aligning=Mode(parent),
-        edits=Edits(document, sensor),
-        layouts=Layouts(settings, parent),
-        results=ByteBudget(_RESULTS_BYTES),
-    )
-    document.grown.connect(session.extend)
-    document.opened.connect(session.aligning.end)
-    return session

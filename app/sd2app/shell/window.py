@@ -133,7 +133,7 @@ class MainWindow(QMainWindow):
         # Imported here so that the skeleton is on screen before NumPy, PyAV,
         # numba and VTK are loaded.
         from sd2app.playback.views import TransportBar
-        from sd2app.session.session import build_session
+        from sd2app.session.session import Session
         from sd2app.shell.keys.bindings import KeyBindings
         from sd2app.shell.layout_tabs import LayoutTabs
         from sd2app.shell.menus import Menus, in_order
@@ -143,7 +143,7 @@ class MainWindow(QMainWindow):
         self._drops = DropOverlay(self._centre)
         self.messages = MessagesModel(self)
         self.note, self.warn = self.messages.note, self.messages.warn
-        self.session = s = build_session(self, self._settings)
+        self.session = s = Session(self, self._settings)
         s.display.set_dark(is_dark(self._settings.dark))
         self.features = Features(s, self, self._parts, self)
         files = self.features.files

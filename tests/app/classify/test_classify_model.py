@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.text import classifier_page, reading_text
 from sd2app.labels.model import LabelsModel
-from sd2app.session.session import build_session
+from sd2app.session.session import Session
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import Label, LabelSet
@@ -43,7 +43,7 @@ def a_map(kind, seed=0):
 @pytest.fixture
 def set_up(qtbot):
     fake, labels, denoise = FakeClassifiers("a"), LabelsModel(), Denoise()
-    session = build_session(owner := QObject(), Settings.forgetful())
+    session = Session(owner := QObject(), Settings.forgetful())
     tracks = [session.maps.synthetic, session.maps.denoised, session.maps.real]
     tracks[2].title = "Radar (simulated)"
     playback = session.playback

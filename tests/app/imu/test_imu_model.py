@@ -17,7 +17,7 @@ from sd2app.imu import model as module
 from sd2app.imu.model import ImuModel, place_words
 from sd2app.imu.text import reading_lines, status_parts
 from sd2app.session.content import recording_of
-from sd2app.session.session import build_session
+from sd2app.session.session import Session
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
 from sd2core.imu.files import read_signals, write_signals
@@ -43,7 +43,7 @@ class Desk:
 
     def __init__(self, qtbot: Any, parent: QObject) -> None:
         self.qtbot, self.said = qtbot, list[str]()
-        self.session = build_session(parent, Settings.forgetful())
+        self.session = Session(parent, Settings.forgetful())
         self.session.document.opened.connect(self.session.attach)
         self.model = ImuModel(self.session, parent)
         self.model.failed.connect(self.said.append)
@@ -348,7 +348,7 @@ def test_values_are_those_of_the_nearest_sample() -> None:
 
 def test_folding_is_remembered(qtbot: Any) -> None:
     parent, settings = QObject(), Settings.forgetful()
-    session = build_session(parent, settings)
+    session = Session(parent, settings)
     model = ImuModel(session, parent)
     assert not model.folded
     model.set_folded(True)

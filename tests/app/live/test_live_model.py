@@ -14,7 +14,7 @@ from PySide6.QtCore import QObject
 from sd2app.live.model import LiveModel
 from sd2app.live.setup import ListenRequest, ListenSetup
 from sd2app.live.text import frames_text, level_text
-from sd2app.session.session import Session, build_session
+from sd2app.session.session import Session
 from sd2app.settings import Settings
 from sd2core.files.resources import resource_path
 from sd2core.fmcw.processing import doppler_map
@@ -31,7 +31,7 @@ LIMIT_MS = 60_000
 @pytest.fixture
 def session(qtbot) -> Iterator[Session]:
     parent = QObject()
-    made = build_session(parent, Settings.forgetful())
+    made = Session(parent, Settings.forgetful())
     # As the window does it.
     made.document.opened.connect(made.attach)
     made.document.opened.connect(lambda: made.follow_capture(new=True))

@@ -7,7 +7,7 @@ import pytest
 from PySide6.QtCore import QObject
 from swinging_recordings import recording
 
-from sd2app.session.session import build_session
+from sd2app.session.session import Session
 from sd2app.settings import Settings
 from sd2core.fmcw import doppler_map
 from sd2core.io.radar.infineon import write_capture
@@ -19,7 +19,7 @@ from sd2core.sensor import VelocityAxis
 def session(qtbot, tmp_path):
     """The shared models with a recording whose radar has a silent second receiver."""
     parent = QObject()
-    session = build_session(parent, Settings())
+    session = Session(parent, Settings())
     document = session.document
     document.changed.connect(session.follow_capture)
     open_here(document, recording(tmp_path / "anna.sd2", silent_receivers=1).folder, qtbot)

@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 from sd2app.commands.feature import CommandWindow
 from sd2app.commands.model import CommandForms
 from sd2app.commands.refining import MeshRefining
-from sd2app.session.session import build_session
+from sd2app.session.session import Session
 from sd2app.settings import Settings
 from sd2app.widgets.panel import Fold
 
@@ -43,7 +43,7 @@ def window(qtbot, qapp, tmp_path: Path) -> Iterator[tuple[CommandForms, CommandW
     parent = QWidget()
     qtbot.addWidget(parent)
     forms.choose("synth")
-    refining = MeshRefining(build_session(parent, forms._settings), forms)
+    refining = MeshRefining(Session(parent, forms._settings), forms)
     window = CommandWindow(forms, refining, Surroundings(parent), parent)  # type: ignore[arg-type]
     window.show()
     qtbot.waitExposed(window)
