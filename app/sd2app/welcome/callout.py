@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QSize, Qt, QTimer
 from PySide6.QtGui import QAction, QKeyEvent, QKeySequence, QPainter, QPaintEvent, QRegion
@@ -22,14 +22,6 @@ _END = (
 )
 
 
-class Candidate(NamedTuple):
-    """A place for the callout, and what it hides of the thing that it is about."""
-
-    hidden_px2: int
-    moved_px: int
-    place: QRect
-
-
 def beside(target: QRect, size: QSize, room: QRect) -> QRect:
     """Place beside a target within the room, where it hides least of it."""
     middle = QRect(QPoint(0, 0), size)
@@ -44,15 +36,19 @@ def beside(target: QRect, size: QSize, room: QRect) -> QRect:
         room.bottomRight(),
         room.topLeft(),
     )
-    candidates: list[Candidate] = []
-    for corner in wanted:
-        place = QRect(corner, size)
-        place.moveLeft(max(min(place.left(), room.right() - size.width()), room.left()))
-        place.moveTop(max(min(place.top(), room.bottom() - size.height()), room.top()))
-        common = place & target
-        hidden = max(common.width(), 0) * max(common.height(), 0)
-        candidates.append(Candidate(hidden, (place.topLeft() - corner).manhattanLength(), place))
-    return min(candidates, key=lambda one: one[:2]).place
+
+    def held(corner: QPoint) -> QPoint:
+        return QPoint(
+            max(min(corner.x(), room.right() - size.width()), room.left()),
+            max(min(corner.y(), room.bottom() - size.height()), room.top()),
+        )
+
+    def cost(corner: QPoint) -> tuple[int, int]:
+        common = QRect(held(corner), size) & target
+        hidden_px2 = max(common.width(), 0) * max(common.height(), 0)
+        return hidden_px2, (held(corner) - corner).manhattanLength()
+
+    return QRect(held(min(wanted, key=cost)), size)
 
 
 class Ring(QWidget):
@@ -131,7 +127,7 @@ class TourCallout(QFrame):
             self._ring.hide()
             return
         self._title.setText(f"✓ {head}" if tour.done else head)
-        self._words.setText(words.format_map(_Keys(self._action, self._label_key)))
+        self._words.setText(re.sub(r"{(\w+)}", lambda found: self._keys(found[1]), words))
         self._at.setText("" if step is None else f"{tour.kept + 1} of {len(tour.steps)}")
         self.back.setVisible(step is not None and tour.kept > 0)
         self.skip.setVisible(step is not None)
@@ -139,6 +135,14 @@ class TourCallout(QFrame):
         self._target = None
         self._following.start()
         self._place()
+
+    def _keys(self, name: str) -> str:
+        """Keys of an action by its id; the words of the menu for one without."""
+        if name == "label":
+            return self._label_key()
+        action = self._action(name)
+        keys = action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
+        return keys or f"“{action.text().replace('&', '')}”"
 
     def _place(self) -> None:
         """Stand beside what the step is about, wherever that is by now."""
@@ -164,21 +168,6 @@ class TourCallout(QFrame):
         self.setGeometry(place)
         self.show()
         self.raise_()
-
-
-class _Keys(dict[str, str]):
-    """Keys of actions by their ids; the words of the menu for one without."""
-
-    def __init__(self, action: Callable[[str], QAction], label_key: Callable[[], str]) -> None:
-        super().__init__()
-        self._action, self._label_key = action, label_key
-
-    def __missing__(self, name: str) -> str:
-        if name == "label":
-            return self._label_key()
-        action = self._action(name)
-        keys = action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
-        return keys or f"“{action.text().replace('&', '')}”"
 
 
 def _shown(window: QWidget, names: Iterable[str], before: QWidget | None) -> QWidget | None:
