@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from PySide6.QtCore import QEvent, QKeyCombination, QModelIndex, QObject, Qt, Signal
+from PySide6.QtCore import QEvent, QKeyCombination, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -13,8 +13,6 @@ from PySide6.QtWidgets import (
     QHeaderView,
     QLineEdit,
     QPushButton,
-    QStyledItemDelegate,
-    QStyleOptionViewItem,
     QWidget,
 )
 
@@ -50,8 +48,7 @@ class KeysDialog(Dialog):
         self._search = SearchLine("Search actions and keys", self)
         self._search.textChanged.connect(self._find)
         self._table = KeyTable(model, self)
-        self._cells = KeyCells(self._take, self._table)
-        self._table.setItemDelegateForColumn(KEYS, self._cells)
+        self._table.activated.connect(lambda: self._begin())
         self._table.selectionModel().currentRowChanged.connect(self._refresh)
         bindings.changed.connect(self._refresh)
         model.modelReset.connect(self._refresh)
@@ -86,14 +83,25 @@ class KeysDialog(Dialog):
         self._refresh()
 
     def _begin(self, besides: bool = False) -> None:
+        """Wait for a key in the current row."""
         self._warning.clear()
-        self._cells.besides = besides
-        self._table.edit(self._table.currentIndex().siblingAtColumn(KEYS))
+        if not self._change.isEnabled():
+            return
+        table, cell, field = self._table, self._model.index(self._row, KEYS), KeyCapture(self)
 
-    def _take(self, row: int, key: str) -> None:
-        change, besides = self._model.change, self._cells.besides
-        self._attempt(lambda _: change(row, key, besides=besides))
-        self._cells.besides = False
+        def end() -> None:
+            table.setFocus()
+            field.hide()
+            field.deleteLater()
+
+        def take(key: str) -> None:
+            end()
+            self._attempt(lambda _: self._model.change(cell.row(), key, besides=besides))
+
+        field.given_up.connect(end)
+        field.captured.connect(take)
+        table.setIndexWidget(cell, field)
+        field.setFocus()
 
     def _attempt(self, change: Callable[[int], None]) -> None:
         """Change the current row, or say why that is refused."""
@@ -122,6 +130,7 @@ class KeyTable(CellTable):
     def __init__(self, model: KeyListModel, parent: QWidget) -> None:
         super().__init__("Keys", parent=parent)
         self.setModel(model)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self.setTabKeyNavigation(False)
         header = self.horizontalHeader()
@@ -135,42 +144,10 @@ class KeyTable(CellTable):
         if event.key() == Qt.Key.Key_Escape:
             event.ignore()
             return
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            self.setCurrentIndex(self.currentIndex().siblingAtColumn(KEYS))
-        super().keyPressEvent(event)
-
-
-class KeyCells(QStyledItemDelegate):
-    """Waits for a key in the cell."""
-
-    def __init__(self, take: Callable[[int, str], None], parent: QWidget) -> None:
-        super().__init__(parent)
-        self._take = take
-        self.besides = False
-
-    def createEditor(
-        self, parent: QWidget, option: QStyleOptionViewItem, index: QModelIndex
-    ) -> QWidget:
-        """A field that takes the next key."""
-        field, row = KeyCapture(parent), index.row()
-
-        def captured(key: str) -> None:
-            self.closeEditor.emit(field)
-            self._take(row, key)
-
-        field.captured.connect(captured)
-        field.given_up.connect(lambda: self.closeEditor.emit(field))
-        return field
-
-    def eventFilter(self, watched: QObject, event: object) -> bool:
-        """Tab and Return are keys like others here."""
-        return False
-
-    def setEditorData(self, editor: QWidget, index: QModelIndex) -> None:
-        """It begins empty."""
-
-    def setModelData(self, editor: QWidget, model: object, index: QModelIndex) -> None:
-        """The key has been taken already."""
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_F2):
+            self.activated.emit(self.currentIndex())
+        else:
+            super().keyPressEvent(event)
 
 
 class KeyCapture(QLineEdit):

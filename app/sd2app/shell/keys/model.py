@@ -16,7 +16,7 @@ from sd2app.widgets.record_table import Heading, Index, RecordTableModel
 from sd2core.labels.edits import Change
 from sd2core.labels.field_edits import change_label
 
-_HEADINGS = (Heading("Menu"), Heading("What it does"), Heading("Keys", editable=True))
+_HEADINGS = (Heading("Menu"), Heading("What it does"), Heading("Keys"))
 KEYS = 2
 
 
@@ -132,12 +132,6 @@ class KeyListModel(RecordTableModel[KeyRow]):
 
     def _tip(self, record: KeyRow, column: int) -> str:
         return record.tip
-
-    def flags(self, index: Index) -> Qt.ItemFlag:
-        """Return which keys can be changed: all but those of the mouse."""
-        flags = super().flags(index)
-        fixed = index.isValid() and not self.can_change(index.row())
-        return flags & ~Qt.ItemFlag.ItemIsEditable if fixed else flags
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         """Return text, tip or font of a cell; keys that the user chose are bold."""
