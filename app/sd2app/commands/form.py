@@ -48,7 +48,7 @@ class CommandForm(QWidget):
         attempt = shell.attempt
         tip = "In the background; the window can be used meanwhile"
         self._start = outlined("Start", tip, partial(attempt, forms.start), self, look="primary")
-        self._copy = copy_button(lambda: forms.line, self, attempt=attempt)
+        self._copy = copy_button(lambda: forms.line, self)
         buttons = side_by_side(self._start, self._copy, spacing_px=6)
         head = row_of(title("Command"), (self._choice, 1), spacing_px=8)
         foot = self._problem, self._line, buttons

@@ -65,9 +65,7 @@ class StudySetupView(QWidget):
         self._start = outlined(
             "Start", "", partial(shell.attempt, runs.begin), self, look="primary"
         )
-        self._copy = copy_button(
-            lambda: quoted(runs.arguments(Path(TABLE_NAME))), self, attempt=shell.attempt
-        )
+        self._copy = copy_button(lambda: quoted(runs.arguments(Path(TABLE_NAME))), self)
         tip = "Run a STUDY.toml, or go on with it: folds, shares, denoisers, speeds, more video"
         plan = outlined("Run a plan…", tip, open_plan, self)
         tip = "Show a study.json, or a matrix of sd2 classify eval"

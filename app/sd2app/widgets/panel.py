@@ -38,33 +38,17 @@ def title(text: str, name: str = "") -> QLabel:
 
 
 def copy_button(
-    line: Callable[[], str],
-    parent: QWidget,
-    tip: str = "The same as a command for a terminal",
-    attempt: Callable[[Callable[[], object]], object] | None = None,
+    line: Callable[[], str], parent: QWidget, tip: str = "The same as a command for a terminal"
 ) -> QToolButton:
-    """A button *Copy command*, which puts a command line on the clipboard.
-
-    Parameters
-    ----------
-    line : callable
-        Says the command line.
-    parent : QWidget
-    tip : str
-    attempt : callable
-        Calls what may fail, and says why it did; by default in a box of its own.
-    """
-
-    def in_a_box(work: Callable[[], object]) -> None:
-        try:
-            work()
-        except Sd2Error as error:
-            QMessageBox.warning(parent, "Copy command", str(error))
+    """A button *Copy command*, which puts a command line on the clipboard, or says why not."""
 
     def copy() -> None:
-        QApplication.clipboard().setText(line())
+        try:
+            QApplication.clipboard().setText(line())
+        except (Sd2Error, OSError) as error:
+            QMessageBox.warning(parent, "Copy command", str(error))
 
-    return outlined("Copy command", tip, lambda: (attempt or in_a_box)(copy), parent)
+    return outlined("Copy command", tip, copy, parent)
 
 
 def sentence(text: str, role: str = "muted") -> QLabel:

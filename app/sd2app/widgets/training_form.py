@@ -89,7 +89,7 @@ class TrainingForm(QWidget):
             self.column.addWidget(label)
         attempt, tip = self._shell.attempt, "Train in a background process"
         self._start = outlined("Start training", tip, partial(attempt, start), self, look="primary")
-        self._copy = copy_button(command, self, attempt=attempt)
+        self._copy = copy_button(command, self)
         self.column.addLayout(side_by_side(self._start, self._copy, spacing_px=6))
 
     def below_row(self, one: Any) -> QWidget | None:
