@@ -35,7 +35,6 @@ from sd2core.io.kinds import kind_of
 from sd2core.io.things import with_things, with_walls
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
-from sd2core.mesh.bodies import Body
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.options.synthesis import HowCounted
 from sd2core.radar_config import CLUTTER, Clutter
@@ -93,9 +92,9 @@ class DocumentModel(QObject):
         self._maps = ListedRunner("radar", jobs, self, self._receive_map)
         for runner in (self._runner, self._reader, self._maps):
             runner.failed.connect(lambda error: self.failed.emit(words_of(error)))
-        self._meshes = MeshReader(jobs, self)
-        self._meshes.ready.connect(self._exchange_mesh)
-        self._meshes.failed.connect(self.failed)
+        self.meshes = MeshReader(jobs, self)
+        self.meshes.ready.connect(self._exchange_mesh)
+        self.meshes.failed.connect(self.failed)
 
     # --- what is there --------------------------------------------------------------------
 
@@ -226,23 +225,6 @@ class DocumentModel(QObject):
         assert self._asked is not None
         self._start(replace(self._asked, cure=cure))
 
-    def keep_mesh(self, read: ReadMesh) -> None:
-        """Have a mesh ready that was read elsewhere, for its fields to be assigned."""
-        self._meshes.keep(read)
-
-    def read_mesh(self, fields: Mapping[str, Any], then: Callable[..., object]) -> None:
-        """Read a mesh by other fields of the recording, in the background.
-
-        ``then`` is called with all fields that it depends on, which can be assigned at once.
-        """
-        if self.recording is not None:
-            self._meshes.read(self.recording, fields, then)
-
-    def read_body(self, body: Body, then: Callable[[], object]) -> None:
-        """Read the file of another body of the scene in the background, and call ``then``."""
-        if self.mesh is not None:
-            self._meshes.read_body(self.mesh, body, then)
-
     def decline_offers(self) -> None:
         """Leave the mesh as it was read."""
         self._offer(())
@@ -307,7 +289,7 @@ class DocumentModel(QObject):
 
     def close(self) -> None:
         """Stop all work and let go of the files."""
-        for runner in (self._runner, self._reader, self._maps, self._meshes):
+        for runner in (self._runner, self._reader, self._maps, self.meshes):
             runner.close()
         if self.content is not None:
             self.content.close()
@@ -374,7 +356,7 @@ class DocumentModel(QObject):
         # Chosen for the one before.
         self.clutter, self.count = CLUTTER, PRESETS["paper"].count
         fields = mesh_fields(self.content.recording)
-        self._meshes.reset(ReadMesh(fields, self.content.mesh, self.content.offers))
+        self.meshes.reset(ReadMesh(fields, self.content.mesh, self.content.offers))
         self.undo_stack.clear()
         if unsaved:
             self.undo_stack.resetClean()
@@ -402,9 +384,9 @@ class DocumentModel(QObject):
             recording.camera = content.recording.camera  # which the mesh brings
         recording.simulated |= content.recording.simulated
         self.content, self._shown = replace(content, recording=recording), _files(recording)
-        self._meshes.keep(ReadMesh(read_by, content.mesh, content.offers))
+        self.meshes.keep(ReadMesh(read_by, content.mesh, content.offers))
         if read_by != mesh_fields(recording):  # edited meanwhile
-            self._meshes.follow(recording)
+            self.meshes.follow(recording)
         self._surround()
         self.same_recording = True
         self.opened.emit()
@@ -428,7 +410,7 @@ class DocumentModel(QObject):
         if _files(recording) != files:
             self._read_parts()
         elif mesh_fields(recording) != mesh:
-            self._meshes.follow(recording)
+            self.meshes.follow(recording)
         self._surround()
         self.changed.emit()
         if _channel(recording) != channel:
@@ -463,8 +445,8 @@ class DocumentModel(QObject):
             if bodies != tuple(body.placed for body in mesh.others):
                 ready = [body for body in bodies if at_hand(body, mesh)]
                 for body in bodies:
-                    if body not in ready and not self._meshes.awaits(body):
-                        self.read_body(body, self._surround_by_read)
+                    if body not in ready and not self.meshes.awaits(body):
+                        self.meshes.read_body(content.mesh, body, self._surround_by_read)
                 mesh = with_bodies(mesh, ready, person=recording.subject)
             if recording.walls != (() if around is None else around.walls):
                 mesh = with_walls(mesh, recording.walls)

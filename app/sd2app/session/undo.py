@@ -143,7 +143,9 @@ class Edits:
 
     def add_body(self, body: Body) -> None:
         """Put another body into the scene, a step once its file was read."""
-        self._document.read_body(body, partial(self.add_to_scene, body))
+        document, add = self._document, partial(self.add_to_scene, body)
+        if document.mesh is not None:
+            document.meshes.read_body(document.mesh, body, add)
 
     def change_in_scene(self, number: int, one: Thing | Body | Wall) -> None:
         """Replace one by another, or by itself elsewhere; labels follow the name of a person."""
@@ -276,11 +278,13 @@ class Edits:
 
     def read_mesh(self, text: str, fields: Mapping[str, Any]) -> None:
         """Read another mesh, or the same one another way; a step once it was read."""
-        self._document.read_mesh(fields, partial(self._change, text))
+        recording = self._document.recording
+        if recording is not None:
+            self._document.meshes.read(recording, fields, partial(self._change, text))
 
     def take_mesh(self, text: str, read: ReadMesh) -> None:
         """Show a mesh that was read already, as one step."""
-        self._document.keep_mesh(read)
+        self._document.meshes.keep(read)
         self._change(text, read.fields)
 
     def cure_mesh(self, cure: Cure) -> None:
