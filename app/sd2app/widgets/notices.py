@@ -32,7 +32,7 @@ class Notice(QFrame):
         super().__init__()
         self.setObjectName("notice")
         self.setAccessibleName(name)
-        self._words = self._closed = ("", "")
+        self._words = ("", "")
         self._title, self._text = title("", name), sentence("")
         self._title.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self._text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
@@ -56,21 +56,19 @@ class Notice(QFrame):
 
     def show_words(self, head: str, text: str, role: str = "muted") -> None:
         """Show words, nothing without them; what the user closed stays closed until it changes."""
-        before, self._words = self.text, (head, text)
-        if self._words != self._closed:
-            self._closed = ("", "")
+        if (head, text) == self._words:
+            return
+        self._words = (head, text)
         show_words(self._title, head)
         say(self._text, text, role)
-        self._text.setVisible(bool(text))
-        self.setVisible(bool(text) and self._words != self._closed)
+        self.setVisible(bool(text))
         if isinstance(stack := self.parentWidget(), NoticeStack):
             stack.place()
-        if self.text and self.text != before:
+        if text:
             QAccessible.updateAccessibility(QAccessibleEvent(self, QAccessible.Event.Alert))
             self.announced.emit(self.text)
 
     def _dismiss(self) -> None:
-        self._closed = self._words
         self.hide()
         if self._close is not None:
             self._close()

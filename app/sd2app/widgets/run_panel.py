@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any, Generic, NamedTuple
 
 from PySide6.QtGui import QHideEvent, QShowEvent
@@ -42,7 +41,6 @@ class RunPanel(QWidget):
         self.setObjectName("page")
         self._runs, self._setup, self._run = runs, setup, run
         self._tip, self._open, self._what = tip, open_other, new
-        self._paths: list[Path | None] = [None]
         self._list = Choice(tip, self)
         self._list.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self._list.activated.connect(self._choose)
@@ -55,31 +53,24 @@ class RunPanel(QWidget):
         self._refresh()
 
     def _refresh(self) -> None:
-        here = self._here
+        here = self._runs.run.path if self._runs.run is not None else None
         self._setup.setVisible(here is None)
         self._run.setVisible(here is not None)
         self._new.setVisible(here is not None)
-        self._paths = [None, *(one.path for one in self._runs.known)]
-        self._texts = [self._what, *(one.title for one in self._runs.known)]
-        if here is not None and here not in self._paths:
-            # Just begun: it is not in the list yet.
-            self._paths.insert(1, here)
-            self._texts.insert(1, here.name)
-        if self._open is not None:
-            self._texts.append(self._open[0])
+        known = {one.path: one.title for one in self._runs.known}
+        begun = {} if here is None or here in known else {here: here.name}  # just so
+        titles = {None: self._what} | begun | known
+        other = () if self._open is None else (self._open[0],)
+        self._paths = list(titles)
         self._list.setToolTip(str(here) if here is not None else self._tip)
-        self._list.offer(self._texts, self._paths.index(here))
-
-    @property
-    def _here(self) -> Path | None:
-        return self._runs.run.path if self._runs.run is not None else None
+        self._list.offer([*titles.values(), *other], self._paths.index(here))
 
     def _choose(self, at: int) -> None:
         if at < len(self._paths):
             self._runs.select(self._paths[at])
         elif self._open is not None:
             self._open[1]()
-            self._list.offer(self._texts, self._paths.index(self._here))
+            self._refresh()
 
     def showEvent(self, event: QShowEvent) -> None:
         """Read the runs again, and follow them while the panel is shown."""

@@ -41,7 +41,6 @@ class KeyBindings(QObject):
         self._labels, self._settings = labels, settings
         self._chosen = _stored(settings.table(_CHOSEN), self._actions)
         self._of_labels: dict[str, str] = {}
-        self._keys: dict[str, tuple[str, ...]] = {}
         self._follow()
         labels.choices_changed.connect(self._follow_labels)
 
@@ -52,7 +51,7 @@ class KeyBindings(QObject):
 
     def keys_of(self, action_id: str) -> tuple[str, ...]:
         """The keys that do an action now."""
-        return self._keys[action_id]
+        return tuple(key for key in self._wanted(action_id) if key not in self._of_labels)
 
     def lent(self, action_id: str) -> Mapping[str, str]:
         """Keys of an action that a label has taken, each with the label's name."""
@@ -132,10 +131,6 @@ class KeyBindings(QObject):
 
     def _follow(self) -> None:
         self._of_labels = self._label_keys()
-        self._keys = {
-            one: tuple(key for key in self._wanted(one) if key not in self._of_labels)
-            for one in self._actions
-        }
         self.changed.emit()
 
     def _label_keys(self) -> dict[str, str]:

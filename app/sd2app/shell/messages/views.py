@@ -34,10 +34,10 @@ class MessageNotice(Notice):
         if len(lines) > len(shown):
             shown.append(f"{len(lines) - len(shown)} more: View → Messages")
         head = f"{len(lines)} things went wrong" if several else ""
-        if (head, "\n".join(shown)) == self._words:
-            return
-        self._closed = ("", "")  # the same may be said again
+        before = self._words
         self.show_words(head, "\n".join(shown), "warning" if messages.failed else "plain")
+        if self._words == before:
+            return
         self._timer.stop()
         if lines:
             self._timer.start(_FAILURE_MS if messages.failed else _REMARK_MS)
