@@ -58,7 +58,7 @@ class LiveBar(StateBar):
         text = frames_text(live.counts, live.pictures, live.pictures_dropped)
         say(self._frames, text, "" if whole else "warning")
         parts = (level_text(live.level_db), latency_text(live.latency_s))
-        listening = live.state == "listening"
+        listening = live.state == "running"
         self._numbers.setText(" · ".join(filter(None, parts)) if listening else "")
         shown = {
             "stop": live.busy,

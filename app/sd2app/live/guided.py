@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 
 from sd2app.live.process import COMMAND, SteeredCommand
 from sd2app.live.setup import ListenRequest
@@ -29,11 +29,10 @@ class Step:
 class GuidedModel(SteeredCommand):
     """``sd2 record --protocol`` beside the window."""
 
-    warned = Signal(str)
+    first_event = "session"
 
     def __init__(self, parent: QObject, command: Sequence[str] = COMMAND) -> None:
         super().__init__(parent, command)
-        self.request: ListenRequest | None = None
         self.step: Step | None = None
         self.title = self.consent = ""
         self.missing: tuple[str, ...] = ()  # names of takes, once it has ended
@@ -51,8 +50,6 @@ class GuidedModel(SteeredCommand):
         match event["event"]:
             case "session":
                 self.title, self.consent = event["title"], event["consent"]
-                if self.state == "starting":
-                    self._set_state("running")
             case "step":
                 self.step = Step(**{name: event[name] for name in _STEP if name in event})
             case "stored":

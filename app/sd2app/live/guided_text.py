@@ -27,7 +27,7 @@ def headline(model: GuidedModel) -> str:
     step = model.step
     if model.state == "failed":
         return "The session has failed"
-    if model.state == "ended":
+    if model.state == "stopped":
         return "Thank you" if not model.missing else "Stopped"
     if model.state == "stopping" or step is None:
         return "One moment…"
@@ -52,7 +52,7 @@ def detail(model: GuidedModel) -> str:
     step = model.step
     if model.state == "failed":
         return model.text
-    if model.state == "ended":
+    if model.state == "stopped":
         if not model.missing:
             return "Nothing is missing."
         lacking = f"{counted(len(model.missing), 'take')} missing: {', '.join(model.missing)}"

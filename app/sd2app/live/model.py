@@ -7,15 +7,15 @@ import time
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 from PySide6.QtGui import QImage
 
 from sd2app.background.latest import delayed
-from sd2app.live.process import COMMAND, LiveProcess, why_it_ended
+from sd2app.live.process import COMMAND, SteeredCommand
 from sd2app.live.setup import ListenRequest
 from sd2app.session.content import Content
 from sd2app.session.session import Session
@@ -26,33 +26,28 @@ from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import FILE_NAME, open_recording
 from sd2core.timebase import Timebase
 
-State = Literal["idle", "opening", "starting", "listening", "stopping", "stopped", "failed"]
-
 _TELL_MS = 100
 """Numbers that change faster cannot be read."""
 _LATENCIES = 100
 
 
-class LiveModel(QObject):
+class LiveModel(SteeredCommand):
     """``sd2 listen`` in a process of its own, so that no frame is lost while the window is busy.
+
+    Its ``changed``, of state, counts, level and latency, comes at most ten times a second.
 
     Its columns are added to the map on screen as they come. Where the user opens another recording
     meanwhile, listening goes on, and :meth:`show` comes back to it.
     """
 
-    changed = Signal()  # state, counts, level, latency; at most ten times a second
-    state_changed = Signal()
-    warned = Signal(str)
+    first_event = "listening"
 
     def __init__(self, session: Session, parent: QObject, command: Sequence[str] = COMMAND) -> None:
-        super().__init__(parent)
-        self._session, self._document, self._command = session, session.document, list(command)
-        self.state: State = "idle"
-        self.request: ListenRequest | None = None
+        super().__init__(parent, command)
+        self._session, self._document = session, session.document
         self.counts = Counts()
         self.pictures = self.pictures_dropped = 0  # of the camera
         self.level_db: float | None = None  # of the newest column
-        self.text = ""  # why it failed
         self._map: DopplerMap | None = None
         self._new: list[tuple[float, list[float]]] = []  # columns not on the map yet
         self.received_unix_s = 0.0  # of the newest column
@@ -60,7 +55,6 @@ class LiveModel(QObject):
         self._reference = 0.0  # that was set here: the strongest bin so far is 0 dB
         self._is_linked = True  # false until the recording names its video
         self._is_shown = True  # false where the recording cannot be read
-        self._process: LiveProcess | None = None
         self._teller = delayed(self.changed.emit, _TELL_MS, self)
         self._painted = delayed(self._note_latency, 0, self)
         self._document.changed.connect(self._begin_when_open)
@@ -68,11 +62,6 @@ class LiveModel(QObject):
         self._document.opened.connect(self._leave_with_recording)
 
     # --- what is known --------------------------------------------------------------------
-
-    @property
-    def busy(self) -> bool:
-        """True while it listens, is about to, or stores what it has received."""
-        return self.state in ("opening", "starting", "listening", "stopping")
 
     @property
     def on_screen(self) -> bool:
@@ -107,7 +96,7 @@ class LiveModel(QObject):
         self.pictures = self.pictures_dropped = 0
         self._latencies_s.clear()
         if not (request.folder / FILE_NAME).is_file():
-            self._launch()
+            self._listen()
             return
         self._set_state("opening")
         # Columns are of this filter; the others look ahead, or are the user's choice afterwards.
@@ -126,9 +115,8 @@ class LiveModel(QObject):
         """Stop, and keep what was received."""
         if self.state == "opening":
             self._set_state("stopped")
-        elif self._process is not None and self.busy:
-            self._set_state("stopping")
-            self._process.stop()
+        else:
+            super().stop()
 
     def dismiss(self) -> None:
         """Forget it, once it has ended."""
@@ -150,9 +138,7 @@ class LiveModel(QObject):
     def close(self) -> None:
         """Stop, and wait until all that was received is stored."""
         self._teller.stop()
-        if self._process is not None:
-            self._process.close()
-            self._process, self.state = None, "stopped"
+        super().close()
 
     # --- the process ----------------------------------------------------------------------
 
@@ -165,23 +151,20 @@ class LiveModel(QObject):
             return  # about to be made
         if radar_map is not None:
             self._map = radar_map
-        self._launch()
+        self._listen()
 
     def _fail_to_open(self, reason: str) -> None:
         if self.state == "opening":
             self.text = reason
             self._set_state("failed")
 
-    def _launch(self) -> None:
+    def _listen(self) -> None:
         assert self.request is not None
         self._new, self._is_shown = [], True
         self._is_linked = not self.request.camera
-        command = [*self._command, *self.request.words()]
-        self._process = LiveProcess(command, self, self._take, self._show_taken, self._end)
-        self._set_state("starting")
-        self._process.start()
+        self._launch(self.request.words())
 
-    def _show_taken(self) -> None:
+    def _taken(self) -> None:
         try:
             self._show_new()
         except (Sd2Error, OSError) as error:
@@ -193,9 +176,6 @@ class LiveModel(QObject):
 
     def _take(self, event: dict[str, Any]) -> None:
         match event["event"]:
-            case "listening":
-                if self.state == "starting":
-                    self._set_state("listening")
             case "doubt":
                 self.warned.emit(str(event["text"]))
             case "column":
@@ -220,18 +200,13 @@ class LiveModel(QObject):
         self._is_linked = bool(event.get("linked", True))
 
     def _end(self, code: int, error_text: str) -> None:
-        self._process = None
         if self.on_screen:
             try:
                 self._document.end_growth()
             except (Sd2Error, OSError) as error:
                 self.warned.emit(str(error))
             self._show_video()
-        if code == 0:
-            self._set_state("stopped")
-        else:
-            self.text = why_it_ended(error_text)
-            self._set_state("failed")
+        super()._end(code, error_text)
 
     # --- on screen ------------------------------------------------------------------------
 
@@ -312,12 +287,6 @@ class LiveModel(QObject):
     def _note_latency(self) -> None:
         """Note how long the newest frame took: the window has just been painted."""
         self._latencies_s.append(time.time() - self.received_unix_s)
-
-    def _set_state(self, state: State) -> None:
-        if state != self.state:
-            self.state = state
-            self.state_changed.emit()
-            self.changed.emit()
 
 
 def _pixels(jpeg: bytes) -> NDArray[np.uint8]:

@@ -6,8 +6,8 @@ import base64
 import contextlib
 import json
 import sys
-from collections.abc import Callable, Sequence
-from typing import Any, Literal
+from collections.abc import Sequence
+from typing import Any, ClassVar, Literal
 
 from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, Signal
 from PySide6.QtGui import QImage
@@ -18,156 +18,127 @@ from sd2core.placements.placements import Place
 from sd2core.processes import ONE_THREAD
 
 COMMAND = (sys.executable, "-m", "sd2core.cli")
-State = Literal["idle", "starting", "running", "stopping", "ended", "failed"]
+CHECK_S = 60.0
+State = Literal["idle", "opening", "starting", "running", "stopping", "stopped", "failed"]
 
 _STOP_MS = 10_000
 """By then, all that waited to be stored is stored, or never will be."""
 
 
-class LiveProcess:
-    """A process that tells lines of JSON, and is steered by keys as on a terminal.
+class SteeredCommand(QObject):
+    """A command that tells lines of JSON, and is steered by keys as on a terminal.
 
-    Parameters
-    ----------
-    command : sequence of str
-        Program and words.
-    parent : QObject
-    take : callable
-        Called with every event that it tells.
-    taken : callable
-        Called once those that had come were taken.
-    ended : callable
-        Called at the end with the exit status, and what was said on standard error.
+    A subclass takes its events.
     """
 
-    def __init__(
-        self,
-        command: Sequence[str],
-        parent: QObject,
-        take: Callable[[dict[str, Any]], object],
-        taken: Callable[[], object],
-        ended: Callable[[int, str], object],
-    ) -> None:
-        self._command, self._take, self._taken, self._ended = command, take, taken, ended
-        self._process = process = QProcess(parent)
+    changed = Signal()
+    state_changed = Signal()
+    warned = Signal(str)
+
+    first_event: ClassVar[str]
+    """With it the command has begun its work."""
+
+    def __init__(self, parent: QObject, command: Sequence[str] = COMMAND) -> None:
+        super().__init__(parent)
+        self._command = list(command)
+        self._process: QProcess | None = None
+        self.state: State = "idle"
+        self.text = ""  # why it failed
+        self.request: ListenRequest | None = None
+
+    @property
+    def busy(self) -> bool:
+        """True until it has ended."""
+        return self.state in ("opening", "starting", "running", "stopping")
+
+    def press(self, key: str) -> None:
+        """Press a key, as on a terminal."""
+        if self._process is not None and self.state == "running":
+            self._process.write(key.encode())
+
+    def stop(self) -> None:
+        """End it; what is stored is kept."""
+        if self._process is not None and self.state != "stopping":
+            self._press_stop(self._process)
+            self._set_state("stopping")
+
+    def close(self) -> None:
+        """End it with what shows it, and wait until all that was received is stored."""
+        if (process := self._process) is not None:
+            process.blockSignals(True)
+            self._press_stop(process)
+            if not process.waitForFinished(_STOP_MS):
+                process.kill()
+                process.waitForFinished(_STOP_MS)
+            self._process, self.state = None, "stopped"
+
+    def _launch(self, words: Sequence[str]) -> None:
+        self.text = ""
+        self._process = process = QProcess(self)
         environment = QProcessEnvironment.systemEnvironment()
         for name, value in {**ONE_THREAD, "PYTHONIOENCODING": "utf-8"}.items():
             environment.insert(name, value)
         process.setProcessEnvironment(environment)
         process.readyReadStandardOutput.connect(self._read)
-        process.finished.connect(self._end)
+        process.finished.connect(self._finish)
         process.errorOccurred.connect(self._fail_to_start)
+        self._set_state("starting")
+        program, *first = self._command
+        process.start(program, [*first, *words])
 
-    def start(self) -> None:
-        """Begin."""
-        program, *words = self._command
-        self._process.start(program, words)
-
-    def press(self, key: str) -> None:
-        """Press a key."""
-        self._process.write(key.encode())
-
-    def stop(self) -> None:
-        """Press the key that stops."""
-        self.press("q")
-        self._process.closeWriteChannel()
-
-    def close(self) -> None:
-        """Stop, and wait until all that was received is stored; nothing more is called."""
-        self._process.blockSignals(True)
-        self.stop()
-        if not self._process.waitForFinished(_STOP_MS):
-            self._process.kill()
-            self._process.waitForFinished(_STOP_MS)
+    def _press_stop(self, process: QProcess) -> None:
+        process.write(b"q")
+        process.closeWriteChannel()
 
     def _read(self) -> None:
-        while self._process.canReadLine():
+        process = self._process
+        while process is not None and process.canReadLine():
             # A line that another program wrote, or half of one, is left out.
             with contextlib.suppress(ValueError, KeyError, TypeError):
-                self._take(json.loads(bytes(self._process.readLine().data())))
+                event = json.loads(bytes(process.readLine().data()))
+                self._take(event)
+                if event["event"] == self.first_event and self.state == "starting":
+                    self._set_state("running")
         self._taken()
 
-    def _end(self, code: int) -> None:
+    def _finish(self, code: int) -> None:
         self._read()
-        error_text = bytes(self._process.readAllStandardError().data()).decode("utf-8", "replace")
-        self._process.deleteLater()
-        self._ended(code, error_text)
+        if self._process is not None:
+            said = bytes(self._process.readAllStandardError().data())
+            self._end(code, said.decode("utf-8", "replace"))
 
     def _fail_to_start(self, error: QProcess.ProcessError) -> None:
-        if error == QProcess.ProcessError.FailedToStart:
+        if error == QProcess.ProcessError.FailedToStart and self._process is not None:
             why = self._process.errorString()
-            self._process.deleteLater()
-            self._ended(1, f"{self._command[0]} cannot be started: {why}")
-
-
-class SteeredCommand(QObject):
-    """A command that records or watches, with its state; a subclass takes its events."""
-
-    changed = Signal()
-    state_changed = Signal()
-
-    def __init__(self, parent: QObject, command: Sequence[str] = COMMAND) -> None:
-        super().__init__(parent)
-        self._command = list(command)
-        self._process: LiveProcess | None = None
-        self.state: State = "idle"
-        self.text = ""  # why it failed
-
-    @property
-    def busy(self) -> bool:
-        """True until it has ended."""
-        return self.state in ("starting", "running", "stopping")
-
-    def press(self, key: str) -> None:
-        """Press a key, as on a terminal."""
-        if self._process is not None and self.state == "running":
-            self._process.press(key)
-
-    def stop(self) -> None:
-        """End it; what is stored is kept."""
-        if self._process is not None and self.state != "stopping":
-            self._process.stop()
-            self._set_state("stopping")
-
-    def close(self) -> None:
-        """End it at once, with what shows it."""
-        if self._process is not None:
-            self._process.close()
-            self._process, self.state = None, "ended"
-
-    def _launch(self, words: Sequence[str]) -> None:
-        self.text = ""
-        command = [*self._command, *words]
-        self._process = LiveProcess(command, self, self._take, self.changed.emit, self._end)
-        self._set_state("starting")
-        self._process.start()
+            self._end(1, f"{self._command[0]} cannot be started: {why}")
 
     def _take(self, event: dict[str, Any]) -> None:
         raise NotImplementedError
 
-    def _end(self, code: int, error_text: str) -> None:
-        self._process = None
-        self.text = why_it_ended(error_text) if code else ""
-        self._set_state("failed" if code else "ended")
-
-    def _set_state(self, state: State) -> None:
-        self.state = state
-        self.state_changed.emit()
+    def _taken(self) -> None:
+        """Follow the events that had come."""
         self.changed.emit()
 
+    def _end(self, code: int, error_text: str) -> None:
+        if self._process is not None:
+            self._process.deleteLater()
+            self._process = None
+        silent = "It ended without saying why."
+        self.text = (error_text.strip().removeprefix("sd2: ") or silent) if code else ""
+        self._set_state("failed" if code else "stopped")
 
-def why_it_ended(error_text: str) -> str:
-    """Reason of a failure, from what was said on standard error."""
-    return error_text.strip().removeprefix("sd2: ") or "It ended without saying why."
-
-
-CHECK_S = 60.0
+    def _set_state(self, state: State) -> None:
+        if state != self.state:
+            self.state = state
+            self.state_changed.emit()
+            self.changed.emit()
 
 
 class PlaceCheck(SteeredCommand):
     """``sd2 record --check`` beside the window."""
 
     pictured = Signal(QImage)
+    first_event = "findings"
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)
@@ -189,8 +160,6 @@ class PlaceCheck(SteeredCommand):
                 self.findings = tuple(Answer(**one) for one in event["findings"])
                 self.place = None if event["place"] is None else Place(**event["place"])
                 self.left_s = event["left_s"]
-                if self.state == "starting":
-                    self._set_state("running")
 
     def _end(self, code: int, error_text: str) -> None:
         # The exit code tells bad findings, too.

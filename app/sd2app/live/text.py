@@ -16,9 +16,9 @@ def title_text(live: LiveModel) -> str:
             return f"Opening {name}…"
         case "starting":
             return f"Beginning to record {name}…"
-        case "listening" if not live.counts.recorded:
+        case "running" if not live.counts.recorded:
             return "Waiting for the first frame…"
-        case "listening":
+        case "running":
             return f"Recording {name}"
         case "stopping":
             return f"Storing what was received in {name}…"

@@ -92,7 +92,7 @@ def test_keys_steer_a_session_that_ends_in_labelled_recordings(
     assert wait_for("countdown").number == 1
     qtbot.waitUntil(lambda: model.step.gesture == "wave", timeout=LIMIT_MS)
     QTest.keyClick(view, Qt.Key.Key_S)
-    qtbot.waitUntil(lambda: model.state == "ended", timeout=LIMIT_MS)
+    qtbot.waitUntil(lambda: model.state == "stopped", timeout=LIMIT_MS)
     assert model.missing == ("anna-wave-1",)
     assert {one.name for one in folder.iterdir()} == {"anna-left-to-right-1.sd2", "consent.json"}
     (span,) = open_recording(folder / "anna-left-to-right-1.sd2").labelled.spans
@@ -104,7 +104,7 @@ def test_keys_steer_a_session_that_ends_in_labelled_recordings(
     QTest.keyClick(view, Qt.Key.Key_F11)
     assert view.isFullScreen()
     QTest.keyClick(view, Qt.Key.Key_Escape)
-    qtbot.waitUntil(lambda: model.state == "ended", timeout=LIMIT_MS)
+    qtbot.waitUntil(lambda: model.state == "stopped", timeout=LIMIT_MS)
     assert model.missing == ("anna-wave-1",)
     QTest.keyClick(view, Qt.Key.Key_Escape)
     assert not view.isVisible()
@@ -143,7 +143,7 @@ def test_what_is_read_at_every_moment(model) -> None:
         ("That was the last take", "4", "A makes it once more."),
     ]
     assert progress_text(model) == "Take 3 of 3"
-    model.state, model.missing, model.not_agreed = "ended", ("p1-wave-1", "p2-wave-1"), ("p2",)
+    model.state, model.missing, model.not_agreed = "stopped", ("p1-wave-1", "p2-wave-1"), ("p2",)
     assert detail(model) == "2 takes missing: p1-wave-1, p2-wave-1\nNot agreed: p2"
 
 

@@ -106,7 +106,7 @@ def test_it_ends_when_told_and_begins_again(check, parent, qtbot) -> None:
     check.start(request)
     qtbot.waitUntil(lambda: bool(check.findings), timeout=LIMIT_MS)
     _click(dialog, "Stop")
-    qtbot.waitUntil(lambda: check.state == "ended", timeout=LIMIT_MS)
+    qtbot.waitUntil(lambda: check.state == "stopped", timeout=LIMIT_MS)
     assert [one.name for one in check.findings] == ["motion", "range", "view", "agreement"]
     marks = [one.accessibleName() for one in dialog.findChildren(QLabel)]
     assert marks.count("good") == sum(one.passed for one in check.findings)
@@ -123,7 +123,7 @@ def test_what_is_bad_is_marked_and_no_place_can_be_taken_over(check, parent) -> 
     bad = {"name": "view", "passed": False, "sentence": "Nothing moves.", "numbers": {}}
     check._take({"event": "findings", "findings": [bad], "place": None, "left_s": 0})
     check._end(1, "")
-    assert check.state == "ended"
+    assert check.state == "stopped"
     labels = {one.accessibleName(): one for one in dialog.findChildren(QLabel)}
     assert labels["bad"].text() == "✗"
     (take,) = (one for one in dialog.findChildren(QToolButton) if one.text() == "Take over")
