@@ -70,7 +70,7 @@ class ListenDialog(Dialog):
         self._protocol = Choice("Protocol", self, dict(_PROTOCOLS), self._choose_protocol)
         self._file = ElidedLabel(self)
         self._folder = ElidedLabel(self)
-        self._address = QLineEdit(setup.address, self)
+        self._address = QLineEdit(setup.chosen.address, self)
         self._address.setAccessibleName("Address of this computer")
         self._address.setPlaceholderText("127.0.0.1:4098, which only this computer reaches")
         self._address.textEdited.connect(lambda text: setup.choose("address", text))
@@ -101,7 +101,7 @@ class ListenDialog(Dialog):
             ("Into", row_of((self._folder, 1), self._button(self._ask_folder), spacing_px=8)),
             gaps_px=(16, 12),
         )
-        self._copy = copy_button(lambda: setup.line, self)
+        self._copy = copy_button(lambda: setup.chosen.line, self)
         foot = with_help("Record", buttons, self._copy)
         self.setLayout(column_of(form, STRETCH, self._message, foot, spacing_px=16, margins_px=16))
         setup.changed.connect(self._refresh)
@@ -112,48 +112,48 @@ class ListenDialog(Dialog):
         return outlined("Choose…", "Choose another", run, self)
 
     def _refresh(self) -> None:
-        setup = self._setup
-        is_radar = setup.way == DCA1000
-        self._way.show_value(setup.way)
-        _show_file(self._camera, setup.camera)
-        _show_file(self._protocol, setup.protocol)
+        chosen = self._setup.chosen
+        is_radar = chosen.way == DCA1000
+        self._way.show_value(chosen.way)
+        _show_file(self._camera, chosen.camera)
+        _show_file(self._protocol, chosen.protocol)
         for part in (self._file_name, self._file, self._file_button):
-            part.setVisible(setup.needs_setup or setup.way == REPLAY)
-        self._file_name.setText("Configuration" if setup.needs_setup else "Capture")
-        chosen = setup.setup if setup.needs_setup else setup.replay
-        self._file.setText(str(chosen) if chosen is not None else _NONE)
+            part.setVisible(chosen.needs_setup or chosen.way == REPLAY)
+        self._file_name.setText("Configuration" if chosen.needs_setup else "Capture")
+        file = chosen.setup if chosen.needs_setup else chosen.replay
+        self._file.setText(str(file) if file is not None else _NONE)
         for widget in (self._address_name, self._address, self._hint):
             widget.setVisible(is_radar)
-        self._folder.setText(str(setup.folder))
-        self._check.setEnabled(bool(setup.camera) and not setup.problem_of_radar)
-        self._forget.setVisible(setup.place is not None and bool(setup.camera))
-        checked = "not checked" if setup.place is None else setup.place.words
-        self._place.setText(checked if setup.camera else "is checked with a camera")
-        words, role = setup.problem, "muted"
-        if not words and setup.continues and setup.protocol:
-            words = f"{setup.folder.name} exists: takes that it lacks are recorded."
-        elif not words and setup.continues:
-            words = f"{setup.folder.name} exists: frames are added to it, if it is of this radar."
+        self._folder.setText(str(chosen.folder))
+        self._check.setEnabled(bool(chosen.camera) and not chosen.problem_of_radar)
+        self._forget.setVisible(chosen.place is not None and bool(chosen.camera))
+        checked = "not checked" if chosen.place is None else chosen.place.words
+        self._place.setText(checked if chosen.camera else "is checked with a camera")
+        words, role = chosen.problem, "muted"
+        if not words and chosen.continues and chosen.protocol:
+            words = f"{chosen.folder.name} exists: takes that it lacks are recorded."
+        elif not words and chosen.continues:
+            words = f"{chosen.folder.name} exists: frames are added to it, if it is of this radar."
         say(self._message, words, role)
         for button in (self._begin, self._copy):
-            button.setEnabled(not setup.problem)
-        self._begin.setText("Continue" if setup.continues else "Record")
+            button.setEnabled(not chosen.problem)
+        self._begin.setText("Continue" if chosen.continues else "Record")
 
     def _choose_camera(self, camera: str) -> None:
         if camera == "file":
-            camera = str(ask_file(self, "Video to play", _VIDEOS, "") or self._setup.camera)
+            camera = str(ask_file(self, "Video to play", _VIDEOS, "") or self._setup.chosen.camera)
         self._setup.choose("camera", camera)
-        _show_file(self._camera, self._setup.camera)
+        _show_file(self._camera, self._setup.chosen.camera)
 
     def _choose_protocol(self, protocol: str) -> None:
         if protocol == "file":
-            protocol = str(ask_file(self, "Protocol", TOML, "") or self._setup.protocol)
+            protocol = str(ask_file(self, "Protocol", TOML, "") or self._setup.chosen.protocol)
         self._setup.choose("protocol", protocol)
-        _show_file(self._protocol, self._setup.protocol)
+        _show_file(self._protocol, self._setup.chosen.protocol)
 
     def _edit_protocol(self) -> None:
         try:
-            draft = ProtocolDraft(self._setup.protocol or PAPER, self)
+            draft = ProtocolDraft(self._setup.chosen.protocol or PAPER, self)
         except Sd2Error as error:
             QMessageBox.warning(self, "Protocol", str(error))
             return
@@ -162,23 +162,23 @@ class ListenDialog(Dialog):
 
     def _check_place(self) -> None:
         check = PlaceCheck(self)
-        again = partial(check.start, self._setup.request())
+        again = partial(check.start, self._setup.chosen)
         again()
         accepted(CheckDialog(check, again, self._setup.choose_place, self))
         check.deleteLater()
 
     def _ask_file(self) -> None:
-        setup = self._setup
-        if setup.needs_setup:
-            start = str(setup.setup or "")
+        setup, chosen = self._setup, self._setup.chosen
+        if chosen.needs_setup:
+            start = str(chosen.setup or "")
             if path := ask_file(self, "Configuration that the radar runs with", _SETUPS, start):
                 setup.choose("setup", path)
-        elif path := ask_file(self, "Capture", _captures(), str(setup.replay or "")):
+        elif path := ask_file(self, "Capture", _captures(), str(chosen.replay or "")):
             setup.choose("replay", path)
 
     def _ask_folder(self) -> None:
-        start = str(self._setup.folder)
-        kind = "Folder of a session (*)" if self._setup.protocol else "Recording (*.sd2)"
+        start = str(self._setup.chosen.folder)
+        kind = "Folder of a session (*)" if self._setup.chosen.protocol else "Recording (*.sd2)"
         if folder := ask_new(self, "Record into", start, kind):
             self._setup.choose_folder(folder)
 

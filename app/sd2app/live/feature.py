@@ -106,12 +106,14 @@ class LiveFeature(Feature):
     def _ask(self) -> None:
         window = self._shell.dialog_parent
         setup = ListenSetup(self._session.settings, window)
-        listens = accepted(ListenDialog(setup, window)) and not setup.problem
+        listens, chosen = accepted(ListenDialog(setup, window)), setup.chosen
         setup.deleteLater()
-        if listens and setup.protocol:
-            self._guide(setup.request())
-        elif listens and self._shell.may_discard():
-            self.model.start(setup.request())
+        if not listens or chosen.problem:
+            return
+        if chosen.protocol:
+            self._guide(chosen)
+        elif self._shell.may_discard():
+            self.model.start(chosen)
 
     def _guide(self, request: ListenRequest) -> None:
         """Run a session in a window of its own; what is open stays open."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass
 from itertools import count
 from pathlib import Path
 
@@ -32,13 +32,13 @@ _ENDINGS = {DCA1000: (".cfg", ".json"), TI: (".cfg",)}
 
 @dataclass(frozen=True)
 class ListenRequest:
-    """Radar by a DCA1000 or by name, or capture that is replayed; a camera; where frames go."""
+    """Radar, or capture that is replayed; a camera; where frames go."""
 
-    folder: Path  # the recording
+    folder: Path  # the recording, or that of the session
+    way: str = REPLAY  # kind of source, one of :func:`ways`
     setup: Path | None = None  # configuration of the radar
     address: str = ""  # of this computer, with or without a port; empty: of this computer alone
-    replay: Path | None = None
-    radar: str = ""  # by name
+    replay: Path | None = None  # capture
     camera: str = ""  # as of `sd2 record`; empty: none
     protocol: str = ""  # of a guided session, likewise
     place: Place | None = None  # of the radar, as seen from the person
@@ -49,7 +49,7 @@ class ListenRequest:
             take = Record(
                 camera=self.camera,
                 radar=self._named_radar,
-                setup=self.setup,
+                setup=self._needed_setup,
                 out=self.folder,
                 json=steered,
                 protocol=self.protocol or None,
@@ -58,10 +58,10 @@ class ListenRequest:
             )
             return words_of("record", take)
         command = Listen(
-            dca1000=None if self.replay or self.radar else self.address,
-            replay=self.replay,
-            radar=self.radar or None,
-            setup=self.setup,
+            dca1000=self.address if self.way == DCA1000 else None,
+            replay=self.replay if self.way == REPLAY else None,
+            radar=None if self.way in (DCA1000, REPLAY) else self.way,
+            setup=self._needed_setup,
             out=self.folder,
             json=steered,
             columns=steered,
@@ -71,48 +71,15 @@ class ListenRequest:
     def check_words(self, seconds: float) -> list[str]:
         """Words of the ``sd2`` command that says what radar and camera see of the place."""
         look = Record(
-            camera=self.camera, radar=self._named_radar, setup=self.setup, check=True,
+            camera=self.camera, radar=self._named_radar, setup=self._needed_setup, check=True,
             seconds=seconds, json=True, previews=True,
         )  # fmt: skip
         return words_of("record", look)
 
     @property
-    def _named_radar(self) -> str:
-        return self.radar or str(self.replay or self.address or LOOPBACK)
-
-
-def ways() -> tuple[str, ...]:
-    """Kinds of sources: a DCA1000, a replay, and radars by name."""
-    return DCA1000, REPLAY, TEST, A121, TI, *LIVE_RADARS.names()
-
-
-class ListenSetup(QObject):
-    """Choices, of which all but the recording's name are kept from one time to the next."""
-
-    changed = Signal()
-
-    def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
-        super().__init__(parent)
-        self._choices = StoredChoices(settings, "listen", _DEFAULTS, {"way": ways()})
-        beside = Path(self._choices["beside"] or Path.home())
-        beside = beside if beside.is_dir() else Path.home()
-        self.place: Place | None = None
-        self._recording, self._session = free_name(beside), free_name(beside, "session", "")
-
-    @property
-    def way(self) -> str:
-        """Kind of source, one of :func:`ways`."""
-        return str(self._choices["way"])
-
-    @property
-    def address(self) -> str:
-        """Address of this computer that a DCA1000 sends to; empty: this computer alone."""
-        return str(self._choices["address"])
-
-    @property
-    def setup(self) -> Path | None:
-        """Configuration that the radar runs with."""
-        return Path(self._choices["setup"]) if self._choices["setup"] else None
+    def line(self) -> str:
+        """Command for a terminal that records the same."""
+        return quoted(self.words(steered=False))
 
     @property
     def needs_setup(self) -> bool:
@@ -120,43 +87,12 @@ class ListenSetup(QObject):
         return self.way in _ENDINGS
 
     @property
-    def replay(self) -> Path | None:
-        """Capture to be replayed."""
-        return Path(self._choices["replay"]) if self._choices["replay"] else None
+    def _needed_setup(self) -> Path | None:
+        return self.setup if self.needs_setup else None
 
     @property
-    def camera(self) -> str:
-        """Camera that is filmed with, as of ``sd2 record``; empty: none."""
-        return str(self._choices["camera"])
-
-    @property
-    def protocol(self) -> str:
-        """Protocol of a guided session, as of ``sd2 record``; empty: one recording."""
-        return str(self._choices["protocol"])
-
-    @property
-    def folder(self) -> Path:
-        """The recording, or the folder of the session."""
-        return self._session if self.protocol else self._recording
-
-    def choose(self, name: str, value: object) -> None:
-        """Choose ``way``, ``address``, ``setup``, ``replay``, ``camera`` or ``protocol``."""
-        if self._choices.set(name, str(value).strip()):
-            self.changed.emit()
-
-    def choose_place(self, place: Place | None) -> None:
-        """Choose the radar's place as seen from the person, for this time."""
-        self.place = place
-        self.changed.emit()
-
-    def choose_folder(self, folder: Path) -> None:
-        """Choose the folder of the recording or of the session."""
-        if self.protocol:
-            self._session = folder
-        else:
-            self._recording = folder_named(folder)
-        self._choices.set("beside", str(self.folder.parent))
-        self.changed.emit()
+    def _named_radar(self) -> str:
+        return {DCA1000: self.address or LOOPBACK, REPLAY: str(self.replay)}.get(self.way, self.way)
 
     @property
     def continues(self) -> bool:
@@ -195,22 +131,58 @@ class ListenSetup(QObject):
             return f"{self.setup.name} is no .cfg of the mmWave SDK{known}."
         return ""
 
-    @property
-    def line(self) -> str:
-        """Command for a terminal that records the same."""
-        return quoted(self.request().words(steered=False))
 
-    def request(self) -> ListenRequest:
-        """What was chosen."""
-        place = self.place if self.camera else None
-        made = ListenRequest(self.folder, camera=self.camera, protocol=self.protocol, place=place)
-        if self.way == REPLAY:
-            return replace(made, replay=self.replay)
-        if self.way == TI:
-            return replace(made, radar=TI, setup=self.setup)
-        if self.way != DCA1000:
-            return replace(made, radar=self.way)
-        return replace(made, setup=self.setup, address=self.address)
+def ways() -> tuple[str, ...]:
+    """Kinds of sources: a DCA1000, a replay, and radars by name."""
+    return DCA1000, REPLAY, TEST, A121, TI, *LIVE_RADARS.names()
+
+
+class ListenSetup(QObject):
+    """Choices, of which all but the recording's name are kept from one time to the next."""
+
+    changed = Signal()
+
+    def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._choices = StoredChoices(settings, "listen", _DEFAULTS, {"way": ways()})
+        beside = Path(self._choices["beside"] or Path.home())
+        beside = beside if beside.is_dir() else Path.home()
+        self._place: Place | None = None
+        self._recording, self._session = free_name(beside), free_name(beside, "session", "")
+
+    @property
+    def chosen(self) -> ListenRequest:
+        """What is chosen so far."""
+        chosen = self._choices
+        return ListenRequest(
+            self._session if chosen["protocol"] else self._recording,
+            chosen["way"],
+            Path(chosen["setup"]) if chosen["setup"] else None,
+            chosen["address"],
+            Path(chosen["replay"]) if chosen["replay"] else None,
+            chosen["camera"],
+            chosen["protocol"],
+            self._place,
+        )
+
+    def choose(self, name: str, value: object) -> None:
+        """Choose ``way``, ``address``, ``setup``, ``replay``, ``camera`` or ``protocol``."""
+        if self._choices.set(name, str(value).strip()):
+            self.changed.emit()
+
+    def choose_place(self, place: Place | None) -> None:
+        """Choose the radar's place as seen from the person, for this time."""
+        self._place = place
+        self.changed.emit()
+
+    def choose_folder(self, folder: Path) -> None:
+        """Choose the folder of the recording or of the session."""
+        if self._choices["protocol"]:
+            self._session = folder
+        else:
+            self._recording = folder_named(folder)
+        self._choices.set("beside", str(self.chosen.folder.parent))
+        self.changed.emit()
 
 
 def free_name(beside: Path, kind: str = "live", suffix: str = SUFFIX) -> Path:

@@ -256,29 +256,29 @@ def test_what_cannot_be_shown_is_said_once(session, tmp_path, qtbot):
 def test_a_set_up_says_what_is_missing_and_remembers(tmp_path, qtbot):
     settings = Settings.forgetful()
     setup = ListenSetup(settings)
-    assert "Choose the .cfg or .json" in setup.problem
+    assert "Choose the .cfg or .json" in setup.chosen.problem
     (tmp_path / "profile.cfg").touch()
     setup.choose("setup", tmp_path / "gone.cfg")
-    assert "does not exist" in setup.problem
+    assert "does not exist" in setup.chosen.problem
     setup.choose("setup", tmp_path / "profile.cfg")
-    assert setup.problem == ""
+    assert setup.chosen.problem == ""
     setup.choose("address", " 192.168.33.30 ")
     setup.choose_folder(tmp_path / "walk")
-    assert setup.request().words() == [
+    assert setup.chosen.words() == [
         "listen", "--dca1000", "192.168.33.30", "--setup", str(tmp_path / "profile.cfg"),
         "--out", str(tmp_path / "walk.sd2"), "--columns", "--json",
     ]  # fmt: skip
     setup.choose("way", "replay")
-    assert "capture" in setup.problem
+    assert "capture" in setup.chosen.problem
     (tmp_path / "live-1.sd2").mkdir()
     again = ListenSetup(settings)
-    assert (again.way, again.setup) == ("replay", tmp_path / "profile.cfg")
-    assert again.folder == tmp_path / "live-2.sd2"
+    assert (again.chosen.way, again.chosen.setup) == ("replay", tmp_path / "profile.cfg")
+    assert again.chosen.folder == tmp_path / "live-2.sd2"
 
 
 @pytest.mark.slow
 def test_what_is_filmed_is_shown_as_it_comes_and_then_with_its_video(session, tmp_path, qtbot):
-    request = ListenRequest(tmp_path / "take.sd2", radar="test", camera="test")
+    request = ListenRequest(tmp_path / "take.sd2", way="test", camera="test")
     model = heard(session, request, qtbot, 20)
     qtbot.waitUntil(lambda: session.video.picture is not None, timeout=LIMIT_MS)
     assert session.video.picture.shape == (180, 320, 3)
@@ -296,7 +296,7 @@ def test_what_is_filmed_is_shown_as_it_comes_and_then_with_its_video(session, tm
 
 @pytest.mark.slow
 def test_edits_made_while_filming_are_not_lost(session, tmp_path, qtbot):
-    request = ListenRequest(tmp_path / "take.sd2", radar="test", camera="test")
+    request = ListenRequest(tmp_path / "take.sd2", way="test", camera="test")
     model = heard(session, request, qtbot, 20)
     warnings = []
     model.warned.connect(warnings.append)
@@ -311,13 +311,13 @@ def test_a_board_that_is_started_from_here_needs_a_cfg(tmp_path):
     setup = ListenSetup(Settings.forgetful())
     setup.choose("way", "ti")
     setup.choose_folder(tmp_path / "take")
-    assert "Choose the .cfg" in setup.problem
+    assert "Choose the .cfg" in setup.chosen.problem
     for name, problem in (("walk.mmwave.json", "is no .cfg of the mmWave SDK."), ("walk.cfg", "")):
         (tmp_path / name).touch()
         setup.choose("setup", tmp_path / name)
-        assert setup.problem.endswith(problem)
-    assert setup.problem == ""
-    words = setup.request().words()
+        assert setup.chosen.problem.endswith(problem)
+    assert setup.chosen.problem == ""
+    words = setup.chosen.words()
     assert words[:5] == ["listen", "--radar", "ti", "--setup", str(tmp_path / "walk.cfg")]
 
 
@@ -325,11 +325,11 @@ def test_a_camera_makes_it_another_command(tmp_path):
     setup = ListenSetup(Settings.forgetful())
     setup.choose("way", "test")
     setup.choose_folder(tmp_path / "take")
-    assert setup.request().words()[0] == "listen"
+    assert setup.chosen.words()[0] == "listen"
     setup.choose("camera", "0")
-    words = setup.request().words()
+    words = setup.chosen.words()
     assert (words[0], words[words.index("--camera") + 1]) == ("record", "0")
     assert words[words.index("--radar") + 1] == "test"
-    assert setup.problem == ""
+    assert setup.chosen.problem == ""
     (tmp_path / "take.sd2").mkdir()
-    assert "is not continued" in setup.problem
+    assert "is not continued" in setup.chosen.problem

@@ -59,7 +59,7 @@ def model(parent) -> Iterator[GuidedModel]:
 
 
 def _request(protocol: Path, folder: Path) -> ListenRequest:
-    return ListenRequest(folder, radar="test", camera="test", protocol=str(protocol))
+    return ListenRequest(folder, way="test", camera="test", protocol=str(protocol))
 
 
 @pytest.mark.slow
@@ -222,17 +222,17 @@ def test_the_dialog_offers_protocols_and_sets_a_session_up(
 def test_a_session_has_a_folder_of_its_own_and_words_of_its_own(tmp_path) -> None:
     settings = Settings.forgetful()
     setup = ListenSetup(settings)
-    assert setup.folder.suffix == ".sd2"
+    assert setup.chosen.folder.suffix == ".sd2"
     setup.choose("protocol", PAPER)
     setup.choose("camera", "test")
     setup.choose("way", "test")
     setup.choose_folder(tmp_path / "session")
-    assert (setup.folder, setup.problem) == (tmp_path / "session", "")
-    words = setup.request().words()
+    assert (setup.chosen.folder, setup.chosen.problem) == (tmp_path / "session", "")
+    words = setup.chosen.words()
     assert words[:1] == ["record"]
     assert words[words.index("--protocol") + 1] == PAPER
     assert "--previews" not in words
     (tmp_path / "session").mkdir()
-    assert setup.continues
+    assert setup.chosen.continues
     setup.choose("protocol", str(tmp_path / "none.toml"))
-    assert "There is no protocol" in setup.problem
+    assert "There is no protocol" in setup.chosen.problem

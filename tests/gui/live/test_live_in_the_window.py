@@ -147,7 +147,7 @@ def test_a_radar_alone_has_no_empty_pane_and_its_message_leaves_with_it(
 def test_a_camera_that_is_filmed_has_its_pane(empty_window, qtbot, tmp_path):
     window, folder = empty_window, tmp_path / "walk.sd2"
     live, video = window.features.live.model, window.findChild(VideoView)
-    live.start(ListenRequest(folder, radar="test", camera="test"))
+    live.start(ListenRequest(folder, way="test", camera="test"))
     qtbot.waitUntil(lambda: live.on_screen and live.pictures > 30, timeout=LIMIT_MS)
     qtbot.waitUntil(video.isVisible, timeout=LIMIT_MS)
     live.stop()

@@ -49,7 +49,7 @@ def test_the_command_records_the_same(parent, qtbot) -> None:
         QTest.mouseClick(button_of(dialog, "Copy command"), LEFT)
         command = copied_record()
         assert isinstance(command, kind)
-        assert (command.out, command.radar, command.json) == (setup.folder, "test", False)
+        assert (command.out, command.radar, command.json) == (setup.chosen.folder, "test", False)
 
 
 def test_what_cannot_be_recorded_cannot_be_copied_as_a_command(parent, tmp_path) -> None:
@@ -59,7 +59,7 @@ def test_what_cannot_be_recorded_cannot_be_copied_as_a_command(parent, tmp_path)
     begin = button_of(dialog, "Record")
     for way in ("test", "replay"):  # of which no capture is chosen
         setup.choose("way", way)
-        assert copy.isEnabled() == (not setup.problem) == begin.isEnabled()
+        assert copy.isEnabled() == (not setup.chosen.problem) == begin.isEnabled()
     assert not copy.isEnabled()
 
 
@@ -88,19 +88,19 @@ def test_the_place_that_is_found_goes_with_what_is_recorded(parent, qtbot) -> No
     once_asked(CheckDialog, watch)
     _click(record, "Check…")
     assert seen  # pictures came
-    place = setup.place
+    place = setup.chosen.place
     assert place is not None
     assert place.range_m == pytest.approx(1.5, abs=0.3)
-    words = setup.request().words()
+    words = setup.chosen.words()
     assert words[words.index("--placement") + 1] == f"{place.range_m},{place.azimuth_deg},0.0"
     assert any(place.words in one.text() for one in record.findChildren(QLabel))
     _click(record, "✕")
-    assert "--placement" not in setup.request().words()
+    assert "--placement" not in setup.chosen.words()
 
 
 @pytest.mark.slow
 def test_it_ends_when_told_and_begins_again(check, parent, qtbot) -> None:
-    request = ListenRequest(Path("none.sd2"), radar="test", camera="test")
+    request = ListenRequest(Path("none.sd2"), way="test", camera="test")
     dialog = CheckDialog(check, lambda: check.start(request), lambda _: None, parent)
     dialog.show()
     check.start(request)
@@ -136,6 +136,6 @@ def test_what_is_bad_is_marked_and_no_place_can_be_taken_over(check, parent) -> 
 def test_why_it_cannot_be_checked_is_said(check, parent, qtbot, tmp_path) -> None:
     dialog = CheckDialog(check, lambda: None, lambda _: None, parent)
     dialog.show()
-    check.start(ListenRequest(tmp_path / "a.sd2", radar="test", camera=str(tmp_path / "none.mp4")))
+    check.start(ListenRequest(tmp_path / "a.sd2", way="test", camera=str(tmp_path / "none.mp4")))
     qtbot.waitUntil(lambda: check.state == "failed", timeout=LIMIT_MS)
     assert any("none.mp4" in one.text() for one in dialog.findChildren(QLabel))

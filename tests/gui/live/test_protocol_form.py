@@ -110,7 +110,7 @@ def test_a_protocol_is_made_out_of_the_papers(parent, qtbot, monkeypatch, tmp_pa
 
     once_asked(ProtocolDialog, lambda dialog: _closing_on_failure(dialog, fill))
     _click(record, "Edit…")
-    assert setup.protocol == str(file)
+    assert setup.chosen.protocol == str(file)
     made = read_protocol(file)
     assert (made.title, made.people, made.consent) == ("Waves", ("anna", "ben"), "You are filmed.")
     assert (made.repetitions, made.take_s, made.pause_s, made.order) == (2, 4.0, 1.5, "fixed")
