@@ -205,12 +205,3 @@ class CommandFolder(RunFolder):
     @property
     def _of_yesterday(self) -> tuple[Path, Path]:
         return self.path / "stop", self.path / "end.json"
-
-
-def commands_in(place: Path) -> list[CommandFolder]:
-    """Folders of commands in a folder, the newest first."""
-    if not place.is_dir():
-        return []
-    folders = [CommandFolder(path) for path in place.iterdir() if path.is_dir()]
-    known = [one for one in folders if one.exists]
-    return sorted(known, key=lambda one: one.facts.get("started_unix_s", 0.0), reverse=True)

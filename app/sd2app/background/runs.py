@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
@@ -15,7 +15,9 @@ from sd2app.background.run_setup import RunSetup
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
 from sd2core.processes import ProcessId
+from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder
 from sd2core.runs.control import Command
+from sd2core.runs.folder import LIVE, State
 
 _LIST_MS = 3000
 
@@ -23,28 +25,30 @@ Run = TypeVar("Run", bound=RunMonitor[Any])
 
 
 class KnownRun(NamedTuple):
-    """A run on disk, with its title in the list."""
+    """A run on disk."""
 
     path: Path
-    title: str
-    live: bool
+    name: str
+    started_unix_s: float
+    state: State
 
-
-class Messages(NamedTuple):
-    """Remarks about a run of one kind; ``{}`` stands for its name."""
-
-    busy: str  # why no other can be started
-    found: str  # under way when the program starts
-    finished: str  # while nobody watched
-    failed: str
+    @property
+    def live(self) -> bool:
+        """True while a process works on it."""
+        return self.state in LIVE
 
 
 class Runs(QObject, Generic[Run]):
     """A run in view, or a new one that is being set up, and the others in a list.
 
-    ``follow`` makes the monitor of a folder. The run in view is remembered in the settings under
-    ``remembered``. Subclasses look for runs in :meth:`find`.
+    They are in a ``folder``; ``command`` is the program that runs ``sd2`` commands. Subclasses say
+    what follows a run.
     """
+
+    monitor: ClassVar[type[RunMonitor[Any]]]
+    remembered: ClassVar[str]
+    """Setting that names the run in view."""
+    shown_by: ClassVar[str] = "The Train panel"
 
     changed = Signal()
     listed = Signal()  # the runs on disk have been looked at again
@@ -53,15 +57,13 @@ class Runs(QObject, Generic[Run]):
 
     def __init__(
         self,
-        follow: Callable[..., Run],
         settings: Settings,
-        remembered: str,
-        sentences: Messages,
+        folder: Path,
         parent: QObject | None = None,
+        command: Sequence[str] = COMMAND_IN_FOLDER,
     ) -> None:
         super().__init__(parent)
-        self._monitor_of, self._sentences = follow, sentences
-        self._settings, self._remembered = settings, remembered
+        self._settings, self._folder, self._command = settings, folder, tuple(command)
         self.run: Run | None = None  # in view; none while a new one is being set up
         self.under_way = False  # true while the run in view has a process
         self.known: tuple[KnownRun, ...] = ()  # on disk, the newest first
@@ -75,9 +77,25 @@ class Runs(QObject, Generic[Run]):
 
     # --- what subclasses say ----------------------------------------------------------------
 
-    def find(self) -> Sequence[KnownRun]:
+    def candidates(self) -> Iterable[Path]:
+        """Folders that may be those of runs; asked in the background."""
+        return self._folder.iterdir() if self._folder.is_dir() else ()
+
+    def find(self) -> list[KnownRun]:
         """Look for runs on disk, in the background; the newest first."""
-        return ()
+        known = []
+        for path in self.candidates():
+            try:
+                state, about = self.monitor.folders(path).state_and_about()
+            except (Sd2Error, OSError):
+                continue  # none, damaged, or deleted meanwhile
+            started_unix_s = float(about.get("started_unix_s", 0.0))
+            known.append(KnownRun(path, self.name_of(path, about), started_unix_s, state))
+        return sorted(known, key=lambda one: one.started_unix_s, reverse=True)
+
+    def name_of(self, path: Path, about: Mapping[str, Any]) -> str:
+        """What a run is called in the list, by its folder and the description there."""
+        return path.name
 
     # --- what is known ----------------------------------------------------------------------
 
@@ -91,7 +109,7 @@ class Runs(QObject, Generic[Run]):
     def busy(self) -> str:
         """Reason why no other run can be started; empty when one can."""
         other = self.run if self.under_way else self.live
-        return self._sentences.busy.format(other.path.name) if other is not None else ""
+        return f"{other.path.name} is under way. Wait for it, or stop it." if other else ""
 
     @property
     def mark(self) -> str:
@@ -137,11 +155,22 @@ class Runs(QObject, Generic[Run]):
         if path is None:
             self.follow(None)
         elif self.run is None or self.run.path != path:
-            self.follow(self._monitor_of(path, self))
+            self.follow(self.monitor(path, self))  # type: ignore[arg-type]
+
+    def start_command(self, path: Path, words: Sequence[str], **about: Any) -> None:
+        """Start an ``sd2`` command in a folder, and show it.
+
+        Raises Sd2Error if another is under way or it cannot be started, OSError if the folder
+        cannot be made.
+        """
+        if self.busy:
+            raise Sd2Error(self.busy)
+        self.follow_new(path, CommandFolder(path).start(words, about, self._command))
 
     def follow_new(self, path: Path, process: ProcessId) -> None:
         """Show a run whose process was just started."""
-        self.follow(self._monitor_of(path, self, process=process), under_way=True)
+        run = self.monitor(path, self, process=process)
+        self.follow(run, under_way=True)  # type: ignore[arg-type]
         self.refresh()
 
     def tell(self, word: Command) -> None:
@@ -175,7 +204,7 @@ class Runs(QObject, Generic[Run]):
             self.run.close()
             self.run.deleteLater()
         self.run, self.under_way = run, under_way
-        self._settings.set_value(self._remembered, "" if run is None else str(run.path))
+        self._settings.set_value(self.remembered, "" if run is None else str(run.path))
         if run is not None:
             run.changed.connect(self.changed)
             run.phase_changed.connect(self._notice)
@@ -197,10 +226,11 @@ class Runs(QObject, Generic[Run]):
 
     def say_ended(self, run: Run) -> None:
         """Tell the user how a run ended that nobody watched."""
+        name, there = run.path.name, self.shown_by
         if run.phase == "finished":
-            self.noted.emit(self._sentences.finished.format(run.path.name))
+            self.noted.emit(f"{name} is done. {there} shows what came of it.")
         elif run.phase in ("failed", "died"):
-            self.failed.emit(self._sentences.failed.format(run.path.name))
+            self.failed.emit(f"{name} did not come to its end. {there} says more.")
 
     def _list(self, known: tuple[KnownRun, ...]) -> None:
         if known != self.known:
@@ -215,11 +245,15 @@ class Runs(QObject, Generic[Run]):
         live = self.live
         if live is not None:
             self.select(live.path)
-            self.noted.emit(self._sentences.found.format(live.path.name))
+            self.say_found(live.path.name)
             return
-        last = self._settings.stored(self._remembered, "")
+        last = self._settings.stored(self.remembered, "")
         if last and Path(last).is_dir():  # its disk may be away
             self.select(Path(last))
+
+    def say_found(self, name: str) -> None:
+        """Tell the user of a run that is under way when the program starts."""
+        self.noted.emit(f"{name} is under way. {self.shown_by} shows it.")
 
     def _attempt(self, work: Callable[[], None]) -> None:
         try:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
 
 from sd2app.background.latest import LatestRunner
-from sd2app.background.runs import KnownRun, Messages, Runs
+from sd2app.background.runs import Runs
 from sd2app.batch.results import BatchResults
 from sd2app.batch.run import BatchMonitor, plan_of
 from sd2app.batch.setup import BatchSetupModel
@@ -27,13 +27,6 @@ if TYPE_CHECKING:
     from sd2core.batch.estimate import BatchEstimate
     from sd2core.batch.plan import BatchPlan
 
-_SENTENCES = Messages(
-    busy="A process is at work in {} already.",
-    found="{} is at work. File → Batch… shows it.",
-    finished="{} has come to its end. File → Batch… opens results.",
-    failed="{} did not come to its end. File → Batch… says more.",
-)
-
 
 class BatchModel(Runs[BatchMonitor]):
     """One batch in view, or a new one that is being set up.
@@ -42,12 +35,14 @@ class BatchModel(Runs[BatchMonitor]):
     None until it has been asked for and computed.
     """
 
+    monitor, remembered = BatchMonitor, "batch/last"
+    shown_by = "File → Batch…"
+
     def __init__(
         self, settings: Settings, parent: QObject, command: Sequence[str] = COMMAND
     ) -> None:
-        super().__init__(BatchMonitor, settings, "batch/last", _SENTENCES, parent)
-        self._command = tuple(command)
-        self._last = settings.stored("batch/last", "")
+        self._last = settings.stored(self.remembered, "")
+        super().__init__(settings, Path(self._last), parent, command)
         self.setup = BatchSetupModel(settings, self)
         self.results = BatchResults(self)
         self.estimate: BatchEstimate | None = None
@@ -102,11 +97,9 @@ class BatchModel(Runs[BatchMonitor]):
 
     # --- one batch after another ------------------------------------------------------------
 
-    def find(self) -> Sequence[KnownRun]:
-        """Look for the last batch, which may lie elsewhere by now."""
-        folder = BatchFolder(Path(self._last))
-        known = self._last and folder.exists
-        return [KnownRun(folder.path, folder.path.name, folder.live)] if known else ()
+    def candidates(self) -> Iterable[Path]:
+        """Folder of the last batch, which may lie anywhere."""
+        return (Path(self._last),) if self._last else ()
 
     def open_batch(self, path: Path) -> None:
         """Show a batch of another folder, such as a terminal's; Sd2Error if there is none."""

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QObject
 
 from sd2app.background.quoting import quoted
-from sd2app.background.runs import KnownRun, Runs, free_folder
+from sd2app.background.runs import Runs, free_folder
 from sd2app.classify.run import MODEL_NAME, ClassRun
 from sd2app.classify.setup import ClassSetup
 from sd2app.settings import Settings
-from sd2app.training.command_runs import SENTENCES, known_commands
 from sd2core.classify.files import user_classifiers_folder
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
-from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder
+from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 
 
 class ClassTraining(Runs[ClassRun]):
@@ -26,6 +26,8 @@ class ClassTraining(Runs[ClassRun]):
     ``runs`` below it. ``command`` is the program that runs ``sd2`` commands in a folder.
     """
 
+    monitor, remembered = ClassRun, "classify/train/run"
+
     def __init__(
         self,
         settings: Settings,
@@ -34,9 +36,9 @@ class ClassTraining(Runs[ClassRun]):
         folder: Path | None = None,
         command: Sequence[str] = COMMAND_IN_FOLDER,
     ) -> None:
-        super().__init__(ClassRun, settings, "classify/train/run", SENTENCES, parent)
-        self._use, self._command = use, tuple(command)
-        self._folder = folder or user_classifiers_folder()
+        self._classifiers = folder or user_classifiers_folder()
+        super().__init__(settings, self._classifiers / "runs", parent, command)
+        self._use = use
         self.setup = ClassSetup(settings, self)
         self.follow_setup(self.setup)
         self._used: Path | None = None
@@ -56,18 +58,18 @@ class ClassTraining(Runs[ClassRun]):
         """Command for a terminal that does what is set up."""
         return quoted(self.setup.train_arguments(Path(MODEL_NAME)))
 
-    def find(self) -> Sequence[KnownRun]:
-        """Read the folder of runs."""
-        return known_commands(self._folder / "runs", "Training")
+    def name_of(self, path: Path, about: Mapping[str, Any]) -> str:
+        """What all of them are."""
+        return "Training"
 
     def train(self) -> None:
         """Begin as set up; Sd2Error if it cannot start, OSError if its folder cannot be made."""
         if self.why_not_train:
             raise Sd2Error(self.why_not_train)
         data = [one.path for one in self.setup.data]
-        path = free_folder(self._folder / "runs", str(self.setup.value("model")), data)
+        path = free_folder(self._folder, str(self.setup.value("model")), data)
         words = [*self.setup.train_arguments(path / MODEL_NAME), "--progress-json"]
-        self.follow_new(path, CommandFolder(path).start(words, {"what": "train"}, self._command))
+        self.start_command(path, words, what="train")
 
     def use_model(self) -> None:
         """Keep the model of the run in view among the classifiers, and classify with it.
@@ -77,7 +79,7 @@ class ClassTraining(Runs[ClassRun]):
         run = self.run
         if run is None or run.result is None:
             return
-        kept = self._folder / f"{run.path.name}.safetensors"
+        kept = self._classifiers / f"{run.path.name}.safetensors"
         with atomic_write(kept) as stream:
             stream.write(run.result.read_bytes())
         self._use(kept)

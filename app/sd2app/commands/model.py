@@ -15,26 +15,19 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.quoting import quoted
 from sd2app.background.run_monitor import CommandRun, History
-from sd2app.background.runs import KnownRun, Messages, Runs, free_folder
+from sd2app.background.runs import Runs, free_folder
 from sd2app.settings import Settings
-from sd2app.training.command_runs import known_commands
 from sd2core.cli import build_parser
 from sd2core.cli.command_parser import Command, commands_of
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path, user_data
 from sd2core.files.tables import capitalised
 from sd2core.options.records import Option, OptionRecord, typed_options, words_of
-from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder, last_output
+from sd2core.runs.command_folder import COMMAND_IN_FOLDER, last_output
 
 _OF_TERMINALS = {"json", "progress_json"}
 _OPENED = ("recording", "recordings", "mesh", "path", "paths")
 """Names of arguments that the open recording is for."""
-_SENTENCES = Messages(
-    busy="{} is under way. Wait for it, or stop it.",
-    found="{} is under way. File → Any command… shows it.",
-    finished="{} is done. File → Any command… shows what it printed.",
-    failed="{} did not come to its end. File → Any command… says more.",
-)
 
 
 class ProgressHistory(History):
@@ -70,6 +63,9 @@ class CommandForms(Runs[AnyCommandRun]):
     ``command`` runs ``sd2`` commands in a folder. ``folder`` holds the runs.
     """
 
+    monitor, remembered = AnyCommandRun, "commands/run"
+    shown_by = "File → Any command…"
+
     ended = Signal(object)  # a run came to its end while it was in view
 
     def __init__(
@@ -79,9 +75,7 @@ class CommandForms(Runs[AnyCommandRun]):
         folder: Path | None = None,
         command: Sequence[str] = COMMAND_IN_FOLDER,
     ) -> None:
-        super().__init__(AnyCommandRun, settings, "commands/run", _SENTENCES, parent)
-        self._folder = folder or user_data("commands")
-        self._command = tuple(command)
+        super().__init__(settings, folder or user_data("commands"), parent, command)
         self._texts: dict[str, dict[str, str]] = {}  # by the command's name
         self._chosen = ""
         self.opened: Path | None = None  # what is open in the window
@@ -183,26 +177,19 @@ class CommandForms(Runs[AnyCommandRun]):
 
     def start(self) -> None:
         """Start the command; Sd2Error if it cannot be, OSError if its folder cannot be made."""
-        if self.busy:
-            raise Sd2Error(self.busy)
         words, record = self.words, self.record
         if any(one.name == "progress_json" for one in typed_options(self.chosen.record)):
             words.append("--progress-json")
         path = free_folder(self._folder, self.chosen.name, ())
         paths = {name: getattr(record, name, None) for name in ("mesh", "out")}
-        about = {"what": self.chosen.name}
-        about |= {name: str(plain_path(path)) for name, path in paths.items() if path is not None}
-        self.follow_new(path, CommandFolder(path).start(words, about, self._command))
+        about = {name: str(plain_path(path)) for name, path in paths.items() if path is not None}
+        self.start_command(path, words, what=self.chosen.name, **about)
 
     def follow(self, run: AnyCommandRun | None, under_way: bool = False) -> None:
         """Show a run, and say when it has come to its end."""
         super().follow(run, under_way)
         if run is not None:
             run.ended.connect(lambda: self.ended.emit(run))
-
-    def find(self) -> Sequence[KnownRun]:
-        """Read the folder of commands."""
-        return known_commands(self._folder)
 
     @property
     def _typed(self) -> dict[str, str]:

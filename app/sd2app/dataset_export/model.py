@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.background.quoting import quoted
-from sd2app.background.runs import KnownRun, Messages, Runs, free_folder
+from sd2app.background.runs import Runs, free_folder
 from sd2app.dataset_export.run import Exported, ExportRun
 from sd2app.session.tasks import Job, TaskList
 from sd2app.settings import Settings
@@ -26,7 +26,7 @@ from sd2core.options.records import words_of
 from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.progress import Cancelled
 from sd2core.recording.recording import is_recording, open_recording
-from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder, commands_in
+from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder
 from sd2core.runs.pace import known_pace_s
 from sd2core.sensor import VelocityAxis
 
@@ -41,14 +41,6 @@ MAPS: dict[str, tuple[MapKind, ...]] = {
     "radar": ("simulated", "real"),
 }
 """Kinds of maps that are chosen together; a radar's map is simulated or real."""
-
-_SENTENCES = Messages(
-    busy="",
-    found="{} is being written. File → Export data set… shows how far it is.",
-    finished="",
-    failed="{} was not written to its end: its process is gone. Export it again; what is complete"
-    " is kept.",
-)
 
 
 @dataclass(frozen=True)
@@ -102,6 +94,9 @@ class ExportModel(Runs[ExportRun]):
     ``failed`` also says what was left out.
     """
 
+    monitor, remembered = ExportRun, "run"
+    shown_by = "File → Export data set…"
+
     def __init__(
         self,
         jobs: TaskList,
@@ -110,9 +105,8 @@ class ExportModel(Runs[ExportRun]):
         folder: Path | None = None,
     ) -> None:
         # Its folder is deleted at the end of an export: there is no last one to remember.
-        super().__init__(ExportRun, Settings.forgetful(), "run", _SENTENCES, parent)
-        self._jobs, self._command = jobs, tuple(command)
-        self._folder = folder or user_data("exports")
+        super().__init__(Settings.forgetful(), folder or user_data("exports"), parent, command)
+        self._jobs = jobs
         self.choice = ExportChoice()
         self.problem = ""  # why these choices cannot be exported
         self.places = 0  # planned besides the recordings' own sensors, the most of any
@@ -233,11 +227,10 @@ class ExportModel(Runs[ExportRun]):
 
     # --- following ------------------------------------------------------------------------
 
-    def find(self) -> Sequence[KnownRun]:
-        """Look for what is being written, or has been meanwhile."""
+    def candidates(self) -> Iterable[Path]:
+        """Folders of what is being written, or has been meanwhile."""
         # One that has ended is there again where its folder could not be deleted.
-        runs = [one for one in commands_in(self._folder) if one.path not in self._over]
-        return [KnownRun(one.path, one.path.name, one.live) for one in runs]
+        return (path for path in super().candidates() if path not in self._over)
 
     def _take_up(self) -> None:
         one = self.live or next(iter(self.known), None)
@@ -253,7 +246,7 @@ class ExportModel(Runs[ExportRun]):
             self._count()
         self.follow(run, under_way=True)  # until it is known, and said, how it has ended
         if one.live:
-            self.noted.emit(_SENTENCES.found.format(run.out.name))
+            self.say_found(run.out.name)
 
     def follow(self, run: ExportRun | None, under_way: bool = False) -> None:
         """Show an export among the tasks; after its end, look for one that ended unseen."""
@@ -281,7 +274,10 @@ class ExportModel(Runs[ExportRun]):
             if result.left_out:
                 self.failed.emit("\n".join(f"Left out: {one}" for one in result.left_out))
         elif run.phase == "died":
-            self.failed.emit(_SENTENCES.failed.format(run.out.name))
+            self.failed.emit(
+                f"{run.out.name} was not written to its end: its process is gone. Export it again;"
+                " what is complete is kept."
+            )
         elif run.phase == "failed":
             self.failed.emit(run.text.splitlines()[-1])
         run.folder.discard()

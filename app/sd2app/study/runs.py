@@ -10,15 +10,14 @@ from typing import Any, ClassVar
 from PySide6.QtCore import QObject
 
 from sd2app.background.run_monitor import CommandRun
-from sd2app.background.runs import KnownRun, Runs, free_folder
+from sd2app.background.runs import Runs, free_folder
 from sd2app.classify.setup import ClassSetup
 from sd2app.settings import Settings, StoredChoices
-from sd2app.training.command_runs import SENTENCES, known_commands
 from sd2app.training.run import StepHistory
 from sd2core.classify.files import user_classifiers_folder
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import read_json
-from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder
+from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 
 RESULT_NAME = "study.json"
 TABLE_NAME = "study"
@@ -74,6 +73,8 @@ class StudyRun(CommandRun):
 class StudyRuns(Runs[StudyRun]):
     """Studies, one under way at a time: of the labelled data of a set-up, or of a plan."""
 
+    monitor, remembered = StudyRun, "study/run"
+
     def __init__(
         self,
         settings: Settings,
@@ -82,9 +83,9 @@ class StudyRuns(Runs[StudyRun]):
         folder: Path | None = None,
         command: Sequence[str] = COMMAND_IN_FOLDER,
     ) -> None:
-        super().__init__(StudyRun, settings, "study/run", SENTENCES, parent)
-        self.data, self._command = data, tuple(command)
-        self._folder = (folder or user_classifiers_folder()) / "studies"
+        folder = (folder or user_classifiers_folder()) / "studies"
+        super().__init__(settings, folder, parent, command)
+        self.data = data
         defaults = {name: "yes" if name == "quick" else "no" for name in SWITCHES}
         self._switches = StoredChoices(
             settings, "study", defaults, dict.fromkeys(SWITCHES, ("yes", "no"))
@@ -109,10 +110,6 @@ class StudyRuns(Runs[StudyRun]):
         """Arguments of ``sd2 classify table`` for what is set up."""
         return self.data.table(out, **{name: self.is_on(name) for name in SWITCHES})
 
-    def find(self) -> Sequence[KnownRun]:
-        """Read the folder of studies."""
-        return known_commands(self._folder)
-
     def begin(self) -> None:
         """Study the labelled data; Sd2Error if it cannot start, OSError without a folder."""
         if self.why_not:
@@ -125,8 +122,6 @@ class StudyRuns(Runs[StudyRun]):
         """Run a plan, or go on with it; raises as :meth:`begin`, also if the plan is wrong."""
         from sd2core.study.plan import read_study
 
-        if self.busy:
-            raise Sd2Error(self.busy)
         out = Path(read_study(plan).out)
         path = free_folder(self._folder, plan.stem, [plan])
         self._start(path, ["study", str(plan.absolute()), "--progress-json"], out)
@@ -134,12 +129,8 @@ class StudyRuns(Runs[StudyRun]):
     def again(self) -> None:
         """Go on with the study in view, which was stopped: what it has trained is kept."""
         run = self.run
-        if run is None or run.under_way:
-            return
-        if self.busy:
-            raise Sd2Error(self.busy)
-        self._start(run.path, [str(word) for word in run.about.get("arguments", ())], run.out)
+        if run is not None and not run.under_way:
+            self._start(run.path, [str(word) for word in run.about.get("arguments", ())], run.out)
 
     def _start(self, path: Path, arguments: list[str], out: Path) -> None:
-        about = {"what": "study", "out": str(out)}
-        self.follow_new(path, CommandFolder(path).start(arguments, about, self._command))
+        self.start_command(path, arguments, what="study", out=str(out))

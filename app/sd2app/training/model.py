@@ -2,39 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from PySide6.QtCore import QObject
 
 from sd2app.background.quoting import quoted
-from sd2app.background.runs import KnownRun, Messages, Runs, free_folder
+from sd2app.background.runs import Runs, free_folder
 from sd2app.settings import Settings
 from sd2app.training.pair_maker import PairMaker
 from sd2app.training.run import TrainingMonitor
 from sd2app.training.setup import TrainingSetupModel
 from sd2app.training.text import model_name
-from sd2app.widgets.text import clock_text
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_data
 from sd2core.options.records import given_of, words_of
 from sd2core.options.training import Train, TrainConfig
 from sd2core.processes import ONE_THREAD
 from sd2core.runs.command_folder import COMMAND, launch
-from sd2core.runs.folder import LIVE
-from sd2core.train.folder import RunStatus, TrainingFolder, runs_in
+from sd2core.train.folder import TrainingFolder
 
 Closing = Literal["ask", "keep", "stop"]
 
 CLOSING: tuple[Closing, ...] = ("ask", "keep", "stop")
 """Choices for a run under way when the window is closed."""
-_SENTENCES = Messages(
-    busy="{} is being trained. Wait for it, or stop it.",
-    found="{} is being trained. The Train panel shows it.",
-    finished="{} is trained. The Train panel puts its model to use.",
-    failed="{} could not be trained to its end. The Train panel says more.",
-)
 
 
 class TrainingModel(Runs[TrainingMonitor]):
@@ -44,6 +36,8 @@ class TrainingModel(Runs[TrainingMonitor]):
     say, or in the user's data directory.
     """
 
+    monitor, remembered = TrainingMonitor, "training/run"
+
     def __init__(
         self,
         settings: Settings,
@@ -51,14 +45,12 @@ class TrainingModel(Runs[TrainingMonitor]):
         command: Sequence[str] = COMMAND,
         folder: Path | None = None,
     ) -> None:
-        super().__init__(TrainingMonitor, settings, "training/run", _SENTENCES, parent)
-        self._command = tuple(command)
         chosen = settings.stored("training/folder", "")
-        self._folder = folder or (Path(chosen) if chosen else user_data("runs"))
-        self._statuses: dict[Path, tuple[object, RunStatus]] = {}
+        folder = folder or (Path(chosen) if chosen else user_data("runs"))
+        super().__init__(settings, folder, parent, command)
         self.setup = TrainingSetupModel(settings, self)
         self.follow_setup(self.setup)
-        self.pair_maker = PairMaker(self._folder.parent / "pairs", self, command)
+        self.pair_maker = PairMaker(folder.parent / "pairs", self, command)
         self.pair_maker.changed.connect(self.changed)
         self.pair_maker.made.connect(self.setup.add)
         self.pair_maker.failed.connect(self.failed)
@@ -140,37 +132,9 @@ class TrainingModel(Runs[TrainingMonitor]):
         self.pair_maker.close()
         super().close()
 
-    # --- listing --------------------------------------------------------------------------
-
-    def find(self) -> Sequence[KnownRun]:
-        """Read the status of every run in the folder."""
-        try:
-            folders = runs_in(self._folder)
-        except Sd2Error:
-            return ()  # there has been no run yet
-        runs = [(one.path, status) for one in folders if (status := self._status(one)) is not None]
-        runs.sort(key=lambda one: one[1].started_unix_s, reverse=True)
-        return [KnownRun(path, _title(status), status.state in LIVE) for path, status in runs]
-
-    def _status(self, run: TrainingFolder) -> RunStatus | None:
-        """Status of a run; None where it is damaged, or deleted meanwhile."""
-        try:
-            stamps = [
-                path.stat().st_mtime_ns if path.exists() else 0
-                for path in (run.progress, run.description, run.best)
-            ]
-            # Without this every look would read all that every run has ever told.
-            live = run.live
-            kept = self._statuses.get(run.path)
-            if kept is not None and kept[0] == (stamps, live):
-                return kept[1]
-            status = run.status()
-        except (Sd2Error, OSError):
-            return None
-        # Otherwise it ended, or began, between two looks.
-        if (status.state in LIVE) == live:
-            self._statuses[run.path] = ((stamps, live), status)
-        return status
+    def name_of(self, path: Path, about: Mapping[str, Any]) -> str:
+        """Name of its kind of model."""
+        return model_name(str(about.get("model", "")))
 
 
 def train_arguments(config: TrainConfig, run: Path) -> list[str]:
@@ -194,9 +158,3 @@ def _new_run(folder: Path, config: TrainConfig) -> Path:
     start = config.model.start
     name = config.model.name if start is None else start.stem
     return free_folder(folder, name, config.data.pairs)
-
-
-def _title(status: RunStatus) -> str:
-    when = clock_text(status.started_unix_s)
-    state = {"died": "ended unexpectedly", "running": "training"}.get(status.state, status.state)
-    return f"{when} · {model_name(status.model)} · {state}"

@@ -16,7 +16,7 @@ from sd2app.widgets.dialogs import may_delete
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import ProgressBar, outlined, sentence, show_words, title
-from sd2app.widgets.run_text import time_text
+from sd2app.widgets.run_text import time_text, title_of
 
 
 class RunPanel(QWidget):
@@ -57,7 +57,7 @@ class RunPanel(QWidget):
         self._setup.setVisible(here is None)
         self._run.setVisible(here is not None)
         self._new.setVisible(here is not None)
-        known = {one.path: one.title for one in self._runs.known}
+        known = {one.path: title_of(one) for one in self._runs.known}
         begun = {} if here is None or here in known else {here: here.name}  # just so
         titles = {None: self._what} | begun | known
         other = () if self._open is None else (self._open[0],)

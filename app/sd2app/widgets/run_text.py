@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from sd2app.background.run_monitor import UNDER_WAY, Phase, RunMonitor
-from sd2app.widgets.text import about, exact_text
+from sd2app.background.runs import KnownRun
+from sd2app.widgets.text import about, clock_text, exact_text
 
 PHASES: dict[Phase, str] = {
     "starting": "Starting…",
@@ -21,8 +22,15 @@ PHASES: dict[Phase, str] = {
     "died": "Ended unexpectedly",
     "gone": "Cancelled",
 }
+_STATES = {"starting": "under way", "running": "under way", "died": "ended unexpectedly"}
 AT_WORK: tuple[Phase, ...] = ("running", "pausing", "paused", "resuming")
 """Phases in which a run has begun and is not about to end."""
+
+
+def title_of(run: KnownRun) -> str:
+    """A run in a list: when it was started, what it is, and where it stands."""
+    state = _STATES.get(run.state, run.state)
+    return " · ".join((clock_text(run.started_unix_s), run.name, state))
 
 
 def time_text(run: RunMonitor[Any]) -> str:

@@ -304,7 +304,7 @@ def test_a_batch_outlives_the_model_and_is_found_again(qtbot, made, meshes):
     second.noted.connect(said.append)
     second.look_for_runs()
     until(qtbot, second, "running")
-    assert any("is at work" in words for words in said)
+    assert any("is under way" in words for words in said)
     until(qtbot, second, "finished")
     assert any("come to its end" in words for words in said)
 

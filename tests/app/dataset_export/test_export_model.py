@@ -29,7 +29,7 @@ from sd2core.imu.mounting import PLACES
 from sd2core.io.mesh import save_mesh
 from sd2core.placements.placements import PlacementGrid
 from sd2core.recording.recording import Recording
-from sd2core.runs.command_folder import commands_in
+from sd2core.runs.command_folder import CommandFolder
 
 FAKE = Path(__file__).resolve().parents[2] / "fake_export.py"
 
@@ -47,7 +47,7 @@ def made(qtbot, tmp_path: Path):
     yield make
     for model in models:
         model.close()
-    for folder in commands_in(tmp_path / "exports"):
+    for folder in map(CommandFolder, (tmp_path / "exports").glob("*")):
         with suppress(Sd2Error):
             folder.tell("stop")
         qtbot.waitUntil(lambda folder=folder: not folder.live, timeout=20_000)
@@ -197,7 +197,7 @@ def test_it_outlives_the_window_and_is_found_by_the_next(made, people, qtbot) ->
     first.close()
     with qtbot.waitSignal(second.noted, timeout=20_000) as noted:
         second.look_for_runs()
-    assert noted.args[0].startswith("set.h5 is being written.")
+    assert noted.args[0].startswith("set.h5 is under way.")
     assert second.under_way
     assert second.choice == choice
     qtbot.waitUntil(
@@ -220,7 +220,7 @@ def test_what_was_written_meanwhile_is_said(made, people, qtbot, tmp_path) -> No
     begun(first, people, qtbot)
     first.close()
     (people / "set.h5.go").touch()
-    (folder,) = commands_in(tmp_path / "exports")
+    (folder,) = map(CommandFolder, (tmp_path / "exports").iterdir())
     # Its code is there a moment before its process has ended.
     qtbot.waitUntil(lambda: folder.code is not None and not folder.live, timeout=20_000)
     said: list[str] = []

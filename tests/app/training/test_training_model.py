@@ -77,7 +77,7 @@ def test_a_run_from_start_to_end(made, qtbot) -> None:
     assert model.run.phase == "starting"
     wait_for(qtbot, model, "finished")
     run = model.run
-    assert said == [f"{run.folder.path.name} is trained. The Train panel puts its model to use."]
+    assert said == [f"{run.folder.path.name} is done. The Train panel shows what came of it."]
     assert [point.epoch for point in run.history.epoch_points] == [1, 2, 3]
     assert run.history.best.validation_rmse == pytest.approx(0.4)
     assert run.history.share == 1.0
@@ -91,8 +91,8 @@ def test_one_at_a_time(made, qtbot) -> None:
     model.start()
     wait_for(qtbot, model, "running")
     qtbot.waitUntil(lambda: any(one.live for one in model.known))
-    assert "is being trained" in model.why_not_start
-    with pytest.raises(Sd2Error, match="is being trained"):
+    assert "is under way" in model.why_not_start
+    with pytest.raises(Sd2Error, match="is under way"):
         model.start()
     model.tell("stop")
     wait_for(qtbot, model, "stopped")
@@ -204,7 +204,7 @@ def test_the_next_window_finds_the_run(made, qtbot) -> None:
     second = made()
     with qtbot.waitSignal(second.noted, timeout=5_000) as said:
         second.look_for_runs()
-    assert said.args == [f"{path.name} is being trained. The Train panel shows it."]
+    assert said.args == [f"{path.name} is under way. The Train panel shows it."]
     assert second.run.folder.path == path
     wait_for(qtbot, second, "running")
     assert second.run.history.best.epoch == 1

@@ -93,7 +93,7 @@ def test_a_run_outlives_its_window_and_is_found_by_the_next(made, qtbot, tmp_pat
     training = models_of(again).training
     qtbot.waitUntil(lambda: training.run is not None and training.run.phase == "running")
     assert training.run.folder.path == path
-    assert again.messages.text == f"{path.name} is being trained. The Train panel shows it."
+    assert again.messages.text == f"{path.name} is under way. The Train panel shows it."
     assert training.run.history.best.epoch == 1
     training.tell("stop")
     qtbot.waitUntil(lambda: training.run.phase == "stopped", timeout=15_000)
