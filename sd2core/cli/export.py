@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from sd2core.datasets.recording_sources import Making
     from sd2core.datasets.source import LazySource
     from sd2core.datasets.writing import Written
-    from sd2core.options.kinds import MapKind
 
 _LINE_EVERY_S = 0.1
 
@@ -127,16 +126,11 @@ def _export(options: Export) -> int:
       sd2 export recordings/ --out set.zarr --dry-run
     """
     from sd2core.datasets.layout import format_of
-    from sd2core.datasets.options import dataset_options
     from sd2core.datasets.sources import gather
 
     format_of(options.out)
-    spans = None
-    if options.segments == "spans":
-        spans = SpanOptions(**picked(options, "margin_s", "shortest_s", "length"))
     provenance = {"command": shlex.join(["sd2", *sys.argv[1:]])}
-    wanted = dataset_options(options, spans, provenance)
-    making = _making(options, wanted.kinds)
+    wanted, making = dataset_and_making(options, provenance)
     sources = gather(options.inputs, making, subjects=options.subjects, label_files=options.labels)
     for remark in (text for one in sources for text in one.remarks):
         print(f"sd2: {remark}", file=sys.stderr)
@@ -167,18 +161,26 @@ def _export(options: Export) -> int:
     return 1 if written.failed else 0
 
 
-def _making(options: Export, kinds: tuple[MapKind, ...]) -> Making:
+def dataset_and_making(
+    options: Export, provenance: dict[str, Any] | None = None
+) -> tuple[DatasetOptions, Making]:
+    """What a data set holds and how its maps are made; Sd2Error where that cannot be."""
+    from sd2core.datasets.options import dataset_options
     from sd2core.datasets.recording_sources import Making
     from sd2core.datasets.simulating import Simulation
     from sd2core.doppler.options import chosen_options
     from sd2core.io.radar import named_radar
     from sd2core.placements.placements import read_placements
 
+    spans = None
+    if options.segments == "spans":
+        spans = SpanOptions(**picked(options, "margin_s", "shortest_s", "length"))
+    wanted = dataset_options(options, spans, provenance)
     placements: Any = options.placements
     if placements not in (None, "planned"):
         placements = read_placements(Path(placements))
-    return Making(
-        kinds=kinds,
+    making = Making(
+        kinds=wanted.kinds,
         synthesis=chosen_options(
             Synthesis(**given(options, ("bins", "v_max_mps", "null_bins", "count")))
         ),
@@ -186,6 +188,7 @@ def _making(options: Export, kinds: tuple[MapKind, ...]) -> Making:
         simulation=None if options.simulate is None else Simulation(named_radar(options.simulate)),
         **picked(options, "tolerance", "model", "texture", "limbs", "imu"),
     )
+    return wanted, making
 
 
 def _dry_run(

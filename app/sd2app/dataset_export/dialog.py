@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl
@@ -73,8 +74,8 @@ class ExportDialog(Dialog):
         self._sensors = Choice(
             "From which sensors the maps are seen",
             self,
-            {False: "each recording's own", True: ""},
-            lambda planned: model.choose(planned=planned),
+            {None: "each recording's own", "planned": ""},
+            lambda placements: model.choose(placements=placements),
         )
         self._inertial = CheckBox(
             "", self, lambda wanted: model.choose(imu=model.imu_places if wanted else ())
@@ -83,8 +84,8 @@ class ExportDialog(Dialog):
         self._cut = Choice(
             "What a segment is",
             self,
-            {False: "windows of", True: "each labelled span, filled up to"},
-            lambda spans: model.choose(spans=spans),
+            {"windows": "windows of", "spans": "each labelled span, filled up to"},
+            lambda segments: model.choose(segments=segments),
         )
         self._margin = option_box(Export, "margin_s", " s around", decimals=1, step=0.1)
         self._margin.valueChanged.connect(lambda value: model.choose(margin_s=round(value, 3)))
@@ -93,7 +94,10 @@ class ExportDialog(Dialog):
         self._length.valueChanged.connect(lambda _: self._choose_frames())
         self._overlap.valueChanged.connect(lambda _: self._choose_frames())
         self._format = Choice(
-            "Format of the data set", self, _FORMATS, lambda ending: model.choose(ending=ending)
+            "Format of the data set",
+            self,
+            _FORMATS,
+            lambda ending: model.choose(out=model.choice.out.with_suffix(ending)),
         )
         where = row_of((self._place, 1), self._this, self._other, spacing_px=8)
         self._overlap_word = QLabel("overlap", self)
@@ -137,19 +141,19 @@ class ExportDialog(Dialog):
 
     def _refresh(self) -> None:
         model = self._model
-        choice = model.choice
-        place = choice.place
+        choice, place = model.choice, model.place
+        spans = choice.segments == "spans"
         self._place.setText("nothing yet" if place is None else str(place))
         self._this.setVisible(self._opened is not None and place != self._opened)
         several = place is not None and not is_recording(place)
         self._form.setRowVisible(self._people, several)
         if not self._people.hasFocus():
-            self._people.setText(", ".join(choice.subjects))
+            self._people.setText(", ".join(choice.subjects or ()))
         for name, box in self._boxes.items():
-            box.show_checked(name in choice.maps)
+            box.show_checked({*MAPS[name]} <= {*choice.kinds})
         planned = counted(model.places, "planned place")
         self._sensors.setItemText(1, f"its own, and {planned}")
-        self._sensors.show_value(choice.planned)
+        self._sensors.show_value(choice.placements)
         self._sensors.setToolTip(
             "From which sensors the maps are seen" if model.places
             else "No places are planned: Edit → Placements…"
@@ -161,14 +165,14 @@ class ExportDialog(Dialog):
             if model.imu_places
             else "No recording has one at a named place of the body: Edit → Place inertial sensor…"
         )
-        self._cut.show_value(choice.spans)
+        self._cut.show_value(choice.segments)
         self._margin.show_value(choice.margin_s)
-        self._margin.setVisible(choice.spans)
+        self._margin.setVisible(spans)
         for one in (self._overlap_word, self._overlap):
-            one.setVisible(not choice.spans)
-        self._length.show_value(choice.length)
-        self._overlap.show_value(choice.overlap)
-        self._format.show_value(choice.ending)
+            one.setVisible(not spans)
+        self._length.show_value(choice.segment_frames)
+        self._overlap.show_value(choice.overlap_frames)
+        self._format.show_value(choice.out.suffix)
         available = {self._sensors: model.places > 0, self._inertial: bool(model.imu_places)}
         for field in (
             self._this, self._other, self._sensors, self._inertial, self._cut, self._length,
@@ -185,7 +189,7 @@ class ExportDialog(Dialog):
             self._labels.setText("")
             self._splits.setText("")
         else:
-            parts = (size_words(forecast, model.choice.length), model.time)
+            parts = (size_words(forecast, model.choice.segment_frames), model.time)
             self._size.setText(" · ".join(filter(None, parts)))
             self._labels.setText(label_words(forecast))
             self._splits.setText(split_words(forecast))
@@ -238,31 +242,31 @@ class ExportDialog(Dialog):
     # --- what is clicked ------------------------------------------------------------------
 
     def _choose_maps(self, _: bool) -> None:
-        chosen = frozenset(name for name, box in self._boxes.items() if box.isChecked())
-        self._model.choose(maps=chosen)
+        chosen = (MAPS[name] for name, box in self._boxes.items() if box.isChecked())
+        self._model.choose(kinds=tuple(chain(*chosen)))
 
     def _choose_frames(self) -> None:
         length = round(self._length.value())
         overlap = min(round(self._overlap.value()), length - 1)
-        self._model.choose(length=length, overlap=overlap)
+        self._model.choose(segment_frames=length, overlap_frames=overlap)
 
     def _name_people(self) -> None:
         names = tuple(part.strip() for part in self._people.text().split(",") if part.strip())
-        self._model.choose(subjects=names)
+        self._model.choose(subjects=names or None)
 
     def _ask_place(self) -> None:
         if path := ask_folder(self, "A recording, or a folder of recordings"):
             self._model.begin(path)
 
     def _ask_out(self) -> None:
-        choice, start = self._model.choice, str(self._model.usual_out)
+        ending, start = self._model.choice.out.suffix, str(self._model.usual_out)
         # A folder is not asked for by its own name: one that is there can be gone on with.
         name, _ = QFileDialog.getSaveFileName(
-            self, "Export data set", start, f"Data set (*{choice.ending})",
+            self, "Export data set", start, f"Data set (*{ending})",
             options=QFileDialog.Option.DontConfirmOverwrite,
         )  # fmt: skip
         if name:
-            self._model.start(with_suffix(Path(name), choice.ending))
+            self._model.start(with_suffix(Path(name), ending))
 
     def _show_folder(self) -> None:
         result = self._model.result

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pydantic import TypeAdapter
 from PySide6.QtCore import QObject
@@ -17,23 +18,20 @@ from sd2app.dataset_export.run import Exported, ExportRun
 from sd2app.session.tasks import Job, TaskList
 from sd2app.settings import Settings
 from sd2app.widgets.text import about, counted
-from sd2core.cli.export import Export
+from sd2core.cli.export import Export, dataset_and_making
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_data
 from sd2core.imu.mounting import PLACES
 from sd2core.maps import MapKind
 from sd2core.options.records import words_of
-from sd2core.pairs.segments import LENGTH, OVERLAP
 from sd2core.progress import Cancelled
 from sd2core.recording.recording import is_recording, open_recording
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder
-from sd2core.runs.pace import known_pace_s
-from sd2core.sensor import VelocityAxis
+from sd2core.runs.pace import Kind, known_pace_s
 
 if TYPE_CHECKING:
     # Imported where it is used: it takes long to load, and the window starts without.
     from sd2core.datasets.forecast import Counting, Forecast
-    from sd2core.datasets.recording_sources import Making
 
 MAPS: dict[str, tuple[MapKind, ...]] = {
     "synthetic": ("synthetic",),
@@ -43,48 +41,11 @@ MAPS: dict[str, tuple[MapKind, ...]] = {
 """Kinds of maps that are chosen together; a radar's map is simulated or real."""
 
 
-@dataclass(frozen=True)
-class ExportChoice:
-    """Choices for a data set."""
-
-    place: Path | None = None  # a recording, or a folder of recordings
-    maps: frozenset[str] = frozenset(MAPS)  # some of MAPS
-    planned: bool = False  # also from all places that each recording plans
-    subjects: tuple[str, ...] = ()  # person of each recording; empty: each of a different person
-    length: int = LENGTH  # frames
-    overlap: int = OVERLAP  # frames
-    spans: bool = False  # one segment of each labelled span, instead of windows
-    margin_s: float = 0.0  # kept before and after each span
-    ending: Literal[".zarr", ".h5", ".npz"] = ".zarr"
-    imu: tuple[str, ...] = ()  # named places of inertial sensors; empty: none are exported
-
-    @property
-    def kinds(self) -> tuple[MapKind, ...]:
-        """Kinds of maps that are wanted."""
-        return tuple(kind for name, kinds in MAPS.items() if name in self.maps for kind in kinds)
-
-    @property
-    def making(self) -> Making:
-        """Options for the maps."""
-        from sd2core.datasets.recording_sources import Making
-
-        placements: Literal["planned"] | None = "planned" if self.planned else None
-        return Making(kinds=self.kinds, placements=placements, imu=self.imu)
-
-    @property
-    def sources(self) -> tuple[object, ...]:
-        """Choices that decide which sources there are."""
-        return self.place, self.maps, self.planned, self.subjects, self.imu
-
-
-CHOICE = TypeAdapter(ExportChoice)
-"""Reads and writes choices as JSON holds them."""
-
-
 class _Counted(NamedTuple):
-    sources: tuple[object, ...]
+    sources: tuple[object, ...]  # what decides which there are
     counting: Counting
     forecast: Forecast
+    pace: Kind
 
 
 class ExportModel(Runs[ExportRun]):
@@ -107,7 +68,7 @@ class ExportModel(Runs[ExportRun]):
         # Its folder is deleted at the end of an export: there is no last one to remember.
         super().__init__(Settings.forgetful(), folder or user_data("exports"), parent, command)
         self._jobs = jobs
-        self.choice = ExportChoice()
+        self.choice = Export(inputs=(), out=Path("set.zarr"))  # under another name
         self.problem = ""  # why these choices cannot be exported
         self.places = 0  # planned besides the recordings' own sensors, the most of any
         self.imu_places: tuple[str, ...] = ()  # named ones that the recordings have sensors at
@@ -116,6 +77,11 @@ class ExportModel(Runs[ExportRun]):
         self._runner = LatestRunner("count segments", self, self._receive, self._refuse)
         self._job: Job | None = None
         self._over: set[Path] = set()
+
+    @property
+    def place(self) -> Path | None:
+        """A recording, or a folder of recordings; None: not chosen yet."""
+        return next(iter(self.choice.inputs), None)
 
     @property
     def forecast(self) -> Forecast | None:
@@ -128,10 +94,11 @@ class ExportModel(Runs[ExportRun]):
         if self.run is not None:
             left_s = self.run.history.left_s
             return "" if left_s is None else f"{about(left_s)} left"
-        each_s = known_pace_s(self.choice.making.pace_kind)
-        if each_s is None or self.forecast is None:
+        counted = self._counted
+        each_s = None if counted is None or self.counting else known_pace_s(counted.pace)
+        if each_s is None or counted is None:
             return "the first view tells how long it takes"
-        return about(each_s * self.forecast.segments)
+        return about(each_s * counted.forecast.segments)
 
     @property
     def counting(self) -> bool:
@@ -148,18 +115,22 @@ class ExportModel(Runs[ExportRun]):
         """Choose a recording or a folder and read it again; other choices stay."""
         self._counted = None
         self._look_into(place)
-        planned = self.choice.planned and self.places > 0
-        imu = self.imu_places if self.choice.imu else ()
         self.result = None
-        self.choice = replace(self.choice, place=place, planned=planned, subjects=(), imu=imu)
+        self.choice = replace(
+            self.choice,
+            inputs=() if place is None else (place,),
+            placements=self.choice.placements if self.places else None,
+            imu=self.imu_places if self.choice.imu else (),
+            subjects=None,
+        )
         self._count()
 
-    def choose(self, **changes: object) -> None:
-        """Choose something else."""
-        choice = replace(self.choice, **changes)  # type: ignore[arg-type]
+    def choose(self, **changes: Any) -> None:
+        """Choose something else: options of ``sd2 export``."""
+        choice = replace(self.choice, **changes)
         if choice == self.choice:
             return
-        same = replace(choice, ending=self.choice.ending) == self.choice
+        same = replace(choice, out=self.choice.out) == self.choice
         self.choice, self.result = choice, None
         if same:  # the format changes no count
             self.changed.emit()
@@ -169,8 +140,8 @@ class ExportModel(Runs[ExportRun]):
     @property
     def usual_out(self) -> Path:
         """Data set beside what it is of."""
-        place = self.choice.place or Path()
-        return place.parent / f"{place.stem}-set{self.choice.ending}"
+        place = self.place or Path()
+        return place.parent / f"{place.stem}-set{self.choice.out.suffix}"
 
     @property
     def line(self) -> str:
@@ -179,30 +150,16 @@ class ExportModel(Runs[ExportRun]):
 
     def command(self, out: Path) -> Export:
         """Options of ``sd2 export`` for what is chosen."""
-        choice = self.choice
-        return Export(
-            inputs=() if choice.place is None else (choice.place,),
-            out=out,
-            kinds=choice.kinds,
-            segment_frames=choice.length,
-            overlap_frames=choice.overlap,
-            segments="spans" if choice.spans else "windows",
-            margin_s=choice.margin_s if choice.spans else 0.0,
-            placements="planned" if choice.planned else None,
-            imu=choice.imu,
-            subjects=choice.subjects or None,
-        )
+        spans = self.choice.segments == "spans"
+        return replace(self.choice, out=out, margin_s=self.choice.margin_s if spans else 0.0)
 
     def start(self, out: Path) -> None:
         """Have the data set written, in a process of its own; goes on with one begun there."""
         if not self.ready:
             return
         command = replace(self.command(out), progress_json=True)
-        about = {
-            "what": "export",
-            "out": str(out),
-            "choice": CHOICE.dump_python(self.choice, mode="json"),
-        }
+        choice = TypeAdapter(Export).dump_python(self.choice, mode="json")
+        about = {"what": "export", "out": str(out), "choice": choice}
         path = free_folder(self._folder, "export", [out])
         try:
             # It may use all processors: it gives way to whatever else wants them.
@@ -238,11 +195,11 @@ class ExportModel(Runs[ExportRun]):
             return
         run = ExportRun(one.path, self)
         try:
-            self.choice = CHOICE.validate_python(run.choice)
+            self.choice = TypeAdapter(Export).validate_json(json.dumps(run.about.get("choice")))
         except ValueError:
             pass  # of another version: it is followed all the same
         else:
-            self._look_into(self.choice.place)
+            self._look_into(self.place)
             self._count()
         self.follow(run, under_way=True)  # until it is known, and said, how it has ended
         if one.live:
@@ -307,34 +264,26 @@ class ExportModel(Runs[ExportRun]):
     def _count(self) -> None:
         choice, known = self.choice, self._counted
         self.problem = ""
-        if choice.place is None or not choice.maps:
+        if not choice.inputs or not choice.kinds:
             self._runner.cancel()
             self._counted = None
-            self.problem = "" if choice.place is None else "No map is chosen."
+            self.problem = "No map is chosen." if choice.inputs else ""
             self.changed.emit()
             return
-        place = choice.place
 
         def count(emit: Emit) -> _Counted:
             from sd2core.datasets.forecast import Counting
-            from sd2core.datasets.options import DatasetOptions
             from sd2core.datasets.sources import gather
-            from sd2core.options.exporting import SpanOptions
 
-            options = DatasetOptions(
-                kinds=choice.kinds,
-                length=choice.length,
-                overlap=choice.overlap,
-                imu=choice.imu,
-                spans=SpanOptions(margin_s=choice.margin_s) if choice.spans else None,
-            )
-            if known is not None and known.sources == choice.sources:
+            wanted, making = dataset_and_making(choice)
+            asked = choice.inputs, choice.subjects, making
+            if known is not None and known.sources == asked:
                 counting = known.counting
             else:
-                sources = gather([place], choice.making, subjects=choice.subjects or None)
+                sources = gather(choice.inputs, making, subjects=choice.subjects)
                 counting = Counting.of(sources, lambda done, total: emit(None))
-            forecast = counting.forecast(options, VelocityAxis().bins)
-            return _Counted(choice.sources, counting, forecast)
+            forecast = counting.forecast(wanted, making.synthesis.axis.bins)
+            return _Counted(asked, counting, forecast, making.pace_kind)
 
         self._runner.submit(count)
         self.changed.emit()
@@ -344,8 +293,8 @@ class ExportModel(Runs[ExportRun]):
         if not counted.forecast.segments:
             self.problem = (
                 "Nothing is labelled where a person is seen."
-                if self.choice.spans
-                else f"No recording has {self.choice.length} frames on end with a person."
+                if self.choice.segments == "spans"
+                else f"No recording has {self.choice.segment_frames} frames on end with a person."
             )
         self.changed.emit()
 

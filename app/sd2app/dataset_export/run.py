@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -62,9 +61,3 @@ class ExportRun(CommandRun):
     def out(self) -> Path:
         """The data set."""
         return Path(str(self.about.get("out", "data set")))
-
-    @property
-    def choice(self) -> Mapping[str, Any]:
-        """Content that was chosen, as it was noted at the start."""
-        choice = self.about.get("choice")
-        return choice if isinstance(choice, dict) else {}

@@ -75,13 +75,13 @@ def test_counts_follow_and_the_data_set_is_written(
     type_frames(dialog, "Length of a segment (default: 72)", "20", qtbot)
     type_frames(dialog, "Frames that neighbours share (default: 10)", "0", qtbot)
     check(dialog, "denoised", qtbot)
-    assert (model.choice.length, model.choice.overlap) == (20, 0)
-    assert model.choice.maps == {"synthetic", "radar"}
+    assert (model.choice.segment_frames, model.choice.overlap_frames) == (20, 0)
+    assert model.choice.kinds == ("synthetic", "simulated", "real")
     qtbot.waitUntil(lambda: model.ready, timeout=20_000)
     assert any(text.startswith("3 segments of 0.7 s from 1 view") for text in words(dialog))
     formats = next(one for one in dialog.findChildren(QComboBox) if "Format" in one.toolTip())
     qtbot.keyClick(formats, Qt.Key.Key_Down)
-    assert model.choice.ending == ".h5"
+    assert model.choice.out.suffix == ".h5"
     qtbot.mouseClick(button(dialog, "Copy command"), LEFT)
     assert copied_record() == model.command(model.usual_out)
     assert copied_record().segment_frames == 20
@@ -140,7 +140,7 @@ def test_one_segment_of_each_labelled_span(window, dialog, qtbot) -> None:
     model = models_of(window).export
     cut = next(one for one in dialog.findChildren(QComboBox) if "segment is" in one.toolTip())
     qtbot.keyClick(cut, Qt.Key.Key_Down)
-    assert model.choice.spans
+    assert model.choice.segments == "spans"
     type_frames(dialog, "Of spans: time kept before and after each (default: 0)", "0.1", qtbot)
     assert model.choice.margin_s == pytest.approx(0.1)
     shown = {one.toolTip() for one in dialog.findChildren(NumberBox) if one.isVisible()}
