@@ -43,28 +43,28 @@ F = TypeVar("F", bound=RunFolder)
 
 
 class History:
-    """What the lines of a run have told; of a run that tells nothing, that it works.
+    """What the lines of a run have told, at least how far it is.
 
     Damaged lines are left out.
     """
 
-    readers: ClassVar[Mapping[str, Callable[[Any, dict[str, Any]], None]]] = {}
-    """Method that takes a line of progress, by the name of the line's event."""
     begun = True  # the process has said that it works
     paused = False  # the process has said that it pauses
     saving = False  # a result is written that a stop would lose
     error = ""  # reason of a failure as the run reported it
     elapsed_s: float | None = None  # time at work; None while that is not known
+    done = total = 0  # steps; a total of 0 is not known
+    told_left_s: float | None = None
 
     @property
     def share(self) -> float | None:
         """Share of the whole that is done; None while that is not known."""
-        return None
+        return min(self.done / self.total, 1.0) if self.total else None
 
     @property
     def left_s(self) -> float | None:
         """Time left; None while that is not known."""
-        return None
+        return self.told_left_s
 
     def take(self, events: Iterable[dict[str, Any]]) -> bool:
         """Take lines; True if any of them was of use."""
@@ -79,6 +79,20 @@ class History:
                 continue
             taken = True
         return taken
+
+    def _count(self, event: dict[str, Any]) -> None:
+        self.done, self.total = int(event["done"]), int(event.get("total") or 0)
+        left_s = event.get("left_s")
+        self.told_left_s = None if left_s is None else float(left_s)
+
+    def _refuse(self, event: dict[str, Any]) -> None:
+        self.error = str(event["text"])
+
+    readers: ClassVar[Mapping[str, Callable[[Any, dict[str, Any]], None]]] = {
+        "progress": _count,
+        "error": _refuse,
+    }
+    """Method that takes a line of progress, by the name of the line's event."""
 
 
 def reason_in(event: Mapping[str, Any]) -> str:

@@ -41,8 +41,6 @@ def plan_of(folder: Path) -> Path:
 class BatchHistory(History):
     """Counts and failures of a batch's last start."""
 
-    left_s: float | None = None
-
     def __init__(self) -> None:
         self.lines: list[Event] = []  # the first, and the newest with counts
         self.failures: list[Failed] = []
@@ -50,19 +48,20 @@ class BatchHistory(History):
     @property
     def share(self) -> float | None:
         """Share of the time that has passed; None while what is left is not known."""
-        if self.elapsed_s is None or self.left_s is None:
+        elapsed_s, left_s = self.elapsed_s, self.left_s
+        if elapsed_s is None or left_s is None:
             return None
-        return self.elapsed_s / max(self.elapsed_s + self.left_s, 1e-9)
+        return elapsed_s / max(elapsed_s + left_s, 1e-9)
 
     def _start(self, event: Event) -> None:
         self.lines, self.failures = [event], []
-        self.elapsed_s, self.left_s, self.error = None, None, ""
+        self.elapsed_s, self.told_left_s, self.error = None, None, ""
 
     def _count(self, event: Event) -> None:
         self.lines = [*self.lines[:1], event]
         elapsed_s, left_s = event.get("elapsed_s"), event.get("left_s")
         self.elapsed_s = None if elapsed_s is None else float(elapsed_s)
-        self.left_s = None if left_s is None else float(left_s)
+        self.told_left_s = None if left_s is None else float(left_s)
         self.error = reason_in(event)
 
     def _fail(self, event: Event) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
@@ -27,8 +27,9 @@ _MAX_STEPS = 6
 _NO_DATASET = "No data set has been exported here yet."
 _FAILURES, _FAILURES_PAGE = "Failures", 2
 _WORDS = RunWords(
-    headline, lambda run: "", batch_time_text, "batch", "End it now; what is done stays"
-)
+    headline, lambda run: "", batch_time_text, "batch", "End it now; what is done stays",
+    is_deleted=False,
+)  # fmt: skip
 
 
 class BatchRunView(RunView[BatchMonitor]):
@@ -37,17 +38,20 @@ class BatchRunView(RunView[BatchMonitor]):
     def __init__(self, batch: BatchModel, asks: BatchQuestions) -> None:
         buttons = (
             # First, so that no other button comes to where it was.
-            Button("folder", "Open folder", "Show the results as files", asks.open_folder),
-            Button("resume", "Go on", "Do what is missing or new", asks.resume),
-        )
+            Button(
+                "folder", "Open folder", "Show the results as files", asks.open_folder,
+                lambda run: True,
+            ),
+            Button(
+                "resume", "Go on", "Do what is missing or new", asks.resume,
+                lambda run: run.resumable,
+            ),
+        )  # fmt: skip
         super().__init__(batch, asks.shell, _WORDS, buttons)
         self._batch, self._asks = batch, asks
         self._shown_card: str | None = None
         self._where = ElidedLabel(self, "muted")
-        self.column.addLayout(self._bars())
-        self.column.addWidget(self._where)
-        self.column.addWidget(self._pages(), 1)
-        self.refresh()
+        self.add(self._bars(), self._where, (self._pages(), 1))
 
     def _bars(self) -> QGridLayout:
         self._steps: list[tuple[QLabel, ProgressBar, QLabel]] = []
@@ -82,11 +86,6 @@ class BatchRunView(RunView[BatchMonitor]):
             )
         )
         return self._inner
-
-    def shown(self, run: BatchMonitor) -> Collection[str]:
-        """Names of the buttons that are of use now; results are the user's to delete."""
-        useful = {"stop": run.under_way, "resume": run.resumable, "folder": True}
-        return [name for name, is_useful in useful.items() if is_useful]
 
     def show_made(self, run: BatchMonitor) -> None:
         """Follow steps, failures, log and results."""

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from functools import partial
 from pathlib import Path
 
 from PySide6.QtWidgets import QLabel, QWidget
 
-from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.classify.run import CheckPoint, ClassHistory, ClassRun
 from sd2app.classify.setup import MAPS, DataSource
 from sd2app.classify.text import FEATURE_WORDS, MODEL_WORDS, note, run_headline
@@ -161,24 +159,15 @@ class ClassRunView(RunView[ClassRun]):
         buttons = (
             Button(
                 "use", "Use this model", "Say with it which gesture each frame shows",
-                partial(shell.attempt, training.use_model), primary=True,
+                partial(shell.attempt, training.use_model),
+                lambda run: not run.under_way and run.result and not training.in_use, primary=True,
             ),
         )  # fmt: skip
         super().__init__(training, shell, RunWords(run_headline, note), buttons)
-        self._training = training
         self._curve = ChartView(display, "Recall over the steps", class_chart(ClassHistory()))
         self._facts = FactRows(1, at_the_edge=False, parent=self)
         self._about = sentence("")
-        for part in (self._curve, self._facts, self._about):
-            self.column.addWidget(part)
-        self.refresh()
-
-    def shown(self, run: ClassRun) -> Collection[str]:
-        """Names of the buttons that are of use now."""
-        if run.phase in UNDER_WAY:
-            return ("stop", "delete")
-        usable = run.result is not None and not self._training.in_use
-        return ("use", "delete") if usable else ("delete",)
+        self.add(self._curve, self._facts, self._about)
 
     def show_made(self, run: ClassRun) -> None:
         """Follow recall and loss."""

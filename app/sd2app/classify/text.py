@@ -75,7 +75,7 @@ def run_headline(run: ClassRun) -> str:
     history = run.history
     if run.phase != "running":
         return PHASES[run.phase]
-    return f"Training: step {history.steps_done} of {history.total}"
+    return f"Training: step {history.done} of {history.total}"
 
 
 def note(run: ClassRun) -> str:

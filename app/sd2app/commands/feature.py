@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 from PySide6.QtCore import QObject
 from PySide6.QtGui import QFontDatabase
 from PySide6.QtWidgets import QPlainTextEdit, QWidget
 
-from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.commands.form import CommandForm
 from sd2app.commands.model import AnyCommandRun, CommandForms
 from sd2app.commands.refining import MeshRefining
@@ -25,7 +24,6 @@ class CommandRunView(RunView[AnyCommandRun]):
     """Progress of a command, and what it printed."""
 
     def __init__(self, forms: CommandForms, refining: MeshRefining, shell: Shell) -> None:
-        self._refining = refining
         words = RunWords(
             lambda run: f"sd2 {run.about.get('what', '')} · {PHASES[run.phase]}",
             lambda run: "",
@@ -33,21 +31,17 @@ class CommandRunView(RunView[AnyCommandRun]):
             stop_tip="End it now",
         )
         tip = "Put the smooth mesh in the place of the one that is open; undo takes it back"
-        take = Button("take", "Take the mesh", tip, lambda: forms.run and refining.take(forms.run))
+        take = Button(
+            "take", "Take the mesh", tip, lambda: forms.run and refining.take(forms.run),
+            refining.can_take,
+        )  # fmt: skip
         super().__init__(forms, shell, words, (take,))
         self._printed = QPlainTextEdit()
         self._printed.setReadOnly(True)
         self._printed.setAccessibleName("What the command printed")
         self._printed.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
-        self.column.addWidget(self._printed, 1)
+        self.add((self._printed, 1))
         refining.document.changed.connect(self.refresh)
-        self.refresh()
-
-    def shown(self, run: AnyCommandRun) -> Collection[str]:
-        """Names of the buttons that are of use now."""
-        if run.phase in UNDER_WAY:
-            return ("stop", "delete")
-        return ("take", "delete") if self._refining.can_take(run) else ("delete",)
 
     def show_made(self, run: AnyCommandRun) -> None:
         """Show what it printed."""

@@ -9,12 +9,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import MISSING
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.quoting import quoted
-from sd2app.background.run_monitor import CommandRun, History
+from sd2app.background.run_monitor import CommandRun
 from sd2app.background.runs import Runs, free_folder
 from sd2app.settings import Settings
 from sd2core.cli import build_parser
@@ -30,25 +30,9 @@ _OPENED = ("recording", "recordings", "mesh", "path", "paths")
 """Names of arguments that the open recording is for."""
 
 
-class ProgressHistory(History):
-    """Share that is done, where the command tells it."""
-
-    def _progress(self, event: dict[str, Any]) -> None:
-        self.share_done = event["done"] / event["total"] if event.get("total") else None
-
-    readers: ClassVar = {"progress": _progress}
-    share_done: float | None = None
-
-    @property
-    def share(self) -> float | None:
-        """Share of the work that is done."""
-        return self.share_done
-
-
 class AnyCommandRun(CommandRun):
     """A command under way, or one that has ended."""
 
-    histories = ProgressHistory
     facts = ""  # what it printed
 
     def inspect(self) -> str:

@@ -22,18 +22,9 @@ class Exported:
 
 
 class ExportHistory(History):
-    """Steps of an export, and the data set at its end."""
+    """Steps of an export, none while the preview sheet is drawn, and the data set at its end."""
 
-    left_s: float | None = None
-
-    def __init__(self) -> None:
-        self.done = self.total = 0  # steps; 0 of 0 while the preview sheet is drawn
-        self.written: Exported | None = None
-
-    def _progress(self, event: dict[str, Any]) -> None:
-        self.done, self.total = int(event["done"]), int(event["total"])
-        left_s = event.get("left_s")
-        self.left_s = None if left_s is None else float(left_s)
+    written: Exported | None = None
 
     def _done(self, event: dict[str, Any]) -> None:
         self.written = Exported(
@@ -45,10 +36,7 @@ class ExportHistory(History):
             tuple(map(str, event["failed"])),
         )
 
-    def _refuse(self, event: dict[str, Any]) -> None:
-        self.error = str(event["text"])
-
-    readers: ClassVar = {"progress": _progress, "done": _done, "error": _refuse}
+    readers: ClassVar = {**History.readers, "done": _done}
 
 
 class ExportRun(CommandRun):

@@ -38,6 +38,8 @@ _PATIENCE_S = 3.0
 class FitProgress(History):
     """What the lines of one fit tell: its stages, its landmarks, and notes for the user.
 
+    What is done counts in the stage under way.
+
     Landmarks stand by their frame, each of shape (33, 3): x and y in pixels of the upright
     picture, NaN where there is no person, and visibility from 0 to 1.
     """
@@ -50,7 +52,6 @@ class FitProgress(History):
         self.size: tuple[int, int] | None = None  # of the upright picture, once the video is open
         self.resumed = False
         self.stage = self.unit = ""
-        self.done = self.total = 0  # in this stage; a total of 0 is not known
         self.newest: int | None = None  # frame of the landmarks that came last
         self.notes: list[str] = []
 
@@ -81,9 +82,6 @@ class FitProgress(History):
     def _note(self, event: dict[str, Any]) -> None:
         if (text := str(event["text"])) not in self.notes:
             self.notes.append(text)
-
-    def _refuse(self, event: dict[str, Any]) -> None:
-        self.error = str(event["text"])
 
     @property
     def share(self) -> float | None:
@@ -129,11 +127,11 @@ class FitProgress(History):
         return f"{words}, {unit}{self.done} of {self.total}"
 
     readers: ClassVar = {
+        **History.readers,
         "start": _start,
         "progress": _report,
         "landmarks": _find,
         "note": _note,
-        "error": _refuse,
     }
 
 

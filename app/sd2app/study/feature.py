@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -10,7 +10,6 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from sd2app.background.quoting import quoted
-from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.classify.setup import ClassSetup
 from sd2app.feature import Action, Feature, Shell, report
 from sd2app.session.session import Session
@@ -102,23 +101,17 @@ class StudyRunView(RunView[StudyRun]):
     def __init__(self, runs: StudyRuns, shell: Shell, show_result: Callable[[], object]) -> None:
         tip = "Gains, learning curve and confusion matrices"
         buttons = (
-            Button("show", "Show result", tip, show_result, primary=True),
-            Button("again", "Resume", "Train what is missing", partial(shell.attempt, runs.again)),
-        )
+            Button("show", "Show result", tip, show_result, lambda run: run.result, primary=True),
+            Button(
+                "again", "Resume", "Train what is missing", partial(shell.attempt, runs.again),
+                lambda run: not run.under_way and run.phase != "finished",
+            ),
+        )  # fmt: skip
         stop_tip = "End it now; what it has trained is kept"
         words = RunWords(_headline, _note, what="study", stop_tip=stop_tip)
         super().__init__(runs, shell, words, buttons)
         self._conclusion, self._about = sentence("", "plain"), sentence("")
-        for part in (self._conclusion, self._about):
-            self.column.addWidget(part)
-        self.refresh()
-
-    def shown(self, run: StudyRun) -> Collection[str]:
-        """Names of the buttons that are of use now."""
-        if run.phase in UNDER_WAY:
-            return ("stop", "delete")
-        useful = {"show": run.result is not None, "again": run.phase != "finished", "delete": True}
-        return [name for name, is_useful in useful.items() if is_useful]
+        self.add(self._conclusion, self._about)
 
     def show_made(self, run: StudyRun) -> None:
         """Show the conclusion."""
@@ -130,7 +123,7 @@ def _headline(run: StudyRun) -> str:
     if run.phase != "running":
         return PHASES[run.phase]
     total = run.history.total
-    return f"Studying: training {min(run.history.steps_done + 1, total)} of {total}"
+    return f"Studying: training {min(run.history.done + 1, total)} of {total}"
 
 
 def _note(run: StudyRun) -> str:

@@ -8,7 +8,6 @@ from functools import partial
 
 from PySide6.QtWidgets import QWidget
 
-from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.feature import Shell
 from sd2app.session.display import DisplayModel
 from sd2app.session.document import DocumentModel
@@ -65,11 +64,18 @@ class TrainingRunView(RunView[TrainingMonitor]):
         buttons = (
             Button(
                 "use", "Use this model", "Denoise with it, and compare with what was there before",
-                adoption.use, primary=True,
+                adoption.use,
+                lambda run: not run.under_way and run.has_model and adoption.run != run.path,
+                primary=True,
             ),
-            Button("pause", "Pause", "Rest, and give the processor back", pause),
-            Button("go_on", "Continue", "Go on training", go_on),
-            Button("resume", "Resume", "Go on where it ended", resume),
+            Button("pause", "Pause", "Rest, and give the processor back", pause, _can_pause),
+            Button(
+                "go_on", "Continue", "Go on training", go_on,
+                lambda run: run.phase in ("pausing", "paused"),
+            ),
+            Button(
+                "resume", "Resume", "Go on where it ended", resume, lambda run: run.resumable
+            ),
         )  # fmt: skip
         super().__init__(training, shell, RunWords(headline, remedy_text), buttons)
         self._training, self._adoption = training, adoption
@@ -78,35 +84,11 @@ class TrainingRunView(RunView[TrainingMonitor]):
         self._curves = ChartView(display, "Errors over the epochs", empty)
         self._metrics = FactRows(3, at_the_edge=False, parent=self)
         self._about = sentence("")
-        for part in (self._gain, self._curves, self._metrics, self._about):
-            self.column.addWidget(part)
-        self.column.addWidget(self._closing_part())
-        adoption.changed.connect(self.refresh)
-        self.refresh()
-
-    def _closing_part(self) -> QWidget:
-        self._choice = Choice(
-            "What happens to the training when the window is closed",
-            self,
-            _CLOSING_TEXT,
-            self._training.set_closing,
-        )
+        tip = "What happens to the training when the window is closed"
+        self._choice = Choice(tip, self, _CLOSING_TEXT, training.set_closing)
         self._closing = pane(row_of(sentence("When closing:"), (self._choice, 1), spacing_px=8))
-        return self._closing
-
-    def shown(self, run: TrainingMonitor) -> Collection[str]:
-        """Names of the buttons that are of use now."""
-        if run.phase == "starting":
-            return ("delete",)
-        if run.phase in UNDER_WAY:
-            paused = run.phase in ("pausing", "paused")
-            return ("go_on" if paused else "pause", "stop", "delete")
-        useful = {
-            "use": run.has_model and self._adoption.run != run.path,
-            "resume": run.resumable,
-            "delete": True,
-        }
-        return [name for name, is_useful in useful.items() if is_useful]
+        adoption.changed.connect(self.refresh)
+        self.add(self._gain, self._curves, self._metrics, self._about, self._closing)
 
     def show_made(self, run: TrainingMonitor) -> None:
         """Follow curves and figures."""
@@ -116,8 +98,12 @@ class TrainingRunView(RunView[TrainingMonitor]):
         self._curves.setVisible(bool(history.epoch_points or history.step_points))
         self._metrics.show_facts(metric_rows(history))
         self._about.setText(about_text(run))
-        self._closing.setVisible(run.phase in UNDER_WAY)
+        self._closing.setVisible(run.under_way)
         self._choice.show_value(self._training.closing)
+
+
+def _can_pause(run: TrainingMonitor) -> bool:
+    return run.under_way and run.phase not in ("starting", "pausing", "paused")
 
 
 class TrainingGainView(QWidget):

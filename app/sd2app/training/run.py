@@ -26,22 +26,16 @@ class StepHistory(History):
 
     def __init__(self) -> None:
         self.begun = False
-        self.steps_done = self.total = 0  # a total of 0 is not known
         self._pace = Throughput()
         self._stride, self._skipped = 1, 0
 
     @property
-    def share(self) -> float | None:
-        """Share of the whole that is done; None while that is not known."""
-        return min(self.steps_done / self.total, 1.0) if self.total else None
-
-    @property
     def left_s(self) -> float | None:
         """Time left at the pace so far; None until that can be told."""
-        return None if self.saving else self._pace.left_s(self.total - self.steps_done)
+        return None if self.saving else self._pace.left_s(self.total - self.done)
 
     def _advance(self, steps: int, elapsed_s: float) -> None:
-        self.steps_done = steps
+        self.done = steps
         if 0 <= elapsed_s < math.inf:
             self.elapsed_s = elapsed_s
             self._pace.take(steps, elapsed_s)
@@ -118,8 +112,8 @@ class TrainingHistory(StepHistory):
         self.parameters, self.segments = parameters, segments
         self.simulated = event.get("kind") == "simulated"
         # What was done after the checkpoint is done again.
-        self.steps_done = done if event.get("resumed") else 0
-        at = self.steps_done / self.steps_per_epoch if self.steps_per_epoch else 0.0
+        self.done = done if event.get("resumed") else 0
+        at = self.done / self.steps_per_epoch if self.steps_per_epoch else 0.0
         self.step_points = [point for point in self.step_points if point.at <= at]
         self.epoch_points = [point for point in self.epoch_points if point.epoch <= at]
         self.epoch = math.ceil(at)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Generic, NamedTuple
 
 from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtWidgets import QLayout, QSizePolicy, QWidget
 
 from sd2app.background.run_monitor import UNDER_WAY
 from sd2app.background.runs import Run, Runs
@@ -84,12 +84,13 @@ class RunPanel(QWidget):
 
 
 class Button(NamedTuple):
-    """Action on a run: its name for :meth:`RunView.shown`, and what the button says."""
+    """Action on a run, which is shown while it is ``useful`` to the run in view."""
 
     name: str
     text: str
     tip: str
     run: Callable[[], object]
+    useful: Callable[[Any], object]
     primary: bool = False
 
 
@@ -101,6 +102,7 @@ class RunWords(NamedTuple):
     time: Callable[[Any], str] = time_text
     what: str = "training"
     stop_tip: str = "End it now and keep the best so far"
+    is_deleted: bool = True  # results that are the user's to delete are not
 
 
 class RunView(QWidget, Generic[Run]):
@@ -114,16 +116,22 @@ class RunView(QWidget, Generic[Run]):
         stop = partial(runs.tell, "stop")
         buttons = (
             *buttons,
-            Button("stop", "Stop", words.stop_tip, stop),
-            Button("delete", "Delete…", "Delete this run with what it made", self._delete),
-        )
+            Button("stop", "Stop", words.stop_tip, stop, lambda run: run.under_way),
+            Button(
+                "delete", "Delete…", "Delete this run with what it made", self._delete,
+                lambda run: words.is_deleted,
+            ),
+        )  # fmt: skip
         self._headline = title("", f"How the {words.what} stands")
         self._bar = ProgressBar(f"Progress of the {words.what}")
         self._time, self._reason = sentence(""), sentence("", "warning")
         self._note = sentence("")
+        self._useful = {one.name: one.useful for one in buttons}
         self._buttons = {
-            name: outlined(text, tip, run, self, look="primary" if primary else "outlined")
-            for name, text, tip, run, primary in buttons
+            one.name: outlined(
+                one.text, one.tip, one.run, self, look="primary" if one.primary else "outlined"
+            )
+            for one in buttons
         }
         *harmless, delete = self._buttons.values()
         # At the top, where no text above moves them; the one that deletes stands below, so that it
@@ -136,9 +144,14 @@ class RunView(QWidget, Generic[Run]):
         self.setLayout(self.column)
         runs.changed.connect(self.refresh)
 
-    def shown(self, run: Run) -> Collection[str]:
-        """Names of the buttons that are of use now."""
-        raise NotImplementedError
+    def add(self, *parts: QWidget | QLayout | tuple[QWidget, int]) -> None:
+        """Put what shows what the run has told and made below."""
+        for part in parts:
+            if isinstance(part, QLayout):
+                self.column.addLayout(part)
+            else:
+                self.column.addWidget(*part if isinstance(part, tuple) else (part,))
+        self.refresh()
 
     def show_made(self, run: Run) -> None:
         """Follow what the run has told and made."""
@@ -179,9 +192,9 @@ class RunView(QWidget, Generic[Run]):
         show_words(self._note, self._words.note(run))
         self._bar.setVisible(run.phase in UNDER_WAY)
         self._bar.show_share(run.history.share)
-        shown, ending = self.shown(run), run.phase in ("stopping", "cancelling")
+        ending = run.phase in ("stopping", "cancelling")
         for name, button in self._buttons.items():
-            button.setVisible(name in shown)
+            button.setVisible(bool(self._useful[name](run)))
             if name == "delete":
                 button.setEnabled(run.phase != "cancelling")
             elif name in ("pause", "go_on", "stop"):

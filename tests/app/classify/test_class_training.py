@@ -258,12 +258,12 @@ def test_time_left_is_told_from_what_it_took(set_up, qtbot):
     model = set_up.training("--step-s", "0.5")
     set_up.ready(model)
     model.train()
-    qtbot.waitUntil(lambda: model.run.history.steps_done >= 3, timeout=20_000)
+    qtbot.waitUntil(lambda: model.run.history.done >= 3, timeout=20_000)
     history = model.run.history
     # Two seconds a step, as it says.
-    assert history.left_s == pytest.approx(2.0 * (fake_class_command.STEPS - history.steps_done))
-    assert model.mark == f"{100 * history.steps_done / fake_class_command.STEPS:.0f} %"
-    assert run_headline(model.run) == f"Training: step {history.steps_done} of 6"
+    assert history.left_s == pytest.approx(2.0 * (fake_class_command.STEPS - history.done))
+    assert model.mark == f"{100 * history.done / fake_class_command.STEPS:.0f} %"
+    assert run_headline(model.run) == f"Training: step {history.done} of 6"
 
 
 @pytest.mark.slow
@@ -271,12 +271,12 @@ def test_stop_keeps_the_best(set_up, qtbot):
     model = set_up.training("--step-s", "0.5")
     set_up.ready(model)
     model.train()
-    qtbot.waitUntil(lambda: model.run.history.steps_done >= 1, timeout=20_000)
+    qtbot.waitUntil(lambda: model.run.history.done >= 1, timeout=20_000)
     model.run.stop()
     assert model.run.phase == "stopping"
     set_up.ended(model)
     assert model.run.phase == "stopped"
-    assert model.run.history.steps_done < fake_class_command.STEPS
+    assert model.run.history.done < fake_class_command.STEPS
     assert note(model.run) == "The best so far is kept."
     assert model.run.result.is_file()
 

@@ -108,7 +108,7 @@ def test_a_study_that_was_stopped_goes_on_in_its_folder(studies, qtbot):
     model = studies.runs("--step-s", "0.5")
     studies.ready()
     model.begin()
-    qtbot.waitUntil(lambda: model.run.history.steps_done >= 1, timeout=20_000)
+    qtbot.waitUntil(lambda: model.run.history.done >= 1, timeout=20_000)
     model.run.stop()
     studies.ended(model)
     assert model.run.result is None

@@ -37,7 +37,7 @@ def told(*events: dict[str, object]) -> TrainingHistory:
 def test_what_is_told_stands_in_it() -> None:
     history = told(START, step(1), step(5), epoch(1), step(6), epoch(2, best=False))
     assert (history.model, history.parameters, history.segments) == ("s4", 7, 300)
-    assert (history.epoch, history.steps_done, history.share) == (2, 10, 0.5)
+    assert (history.epoch, history.done, history.share) == (2, 10, 0.5)
     assert history.best.epoch == 1
     assert [point.at for point in history.step_points] == [0.2, 1.0, 1.2]
     assert metric_rows(history)[0] == ("Best epoch", "1")
@@ -52,7 +52,7 @@ def test_a_run_limited_by_time_knows_its_share_by_the_clock() -> None:
 def test_what_is_done_again_after_a_kill_counts_once() -> None:
     again = {**START, "resumed": True, "steps_done": 5}
     history = told(START, step(1), epoch(1), step(6), epoch(2), step(11), again)
-    assert history.steps_done == 5
+    assert history.done == 5
     assert [point.epoch for point in history.epoch_points] == [1]
     history.take([step(6), epoch(2), epoch(2)])
     assert [point.epoch for point in history.epoch_points] == [1, 2]

@@ -361,7 +361,7 @@ def test_stopped_by_a_click(trainable, qtbot, monkeypatch):
     training, panel = models_of(trainable).class_training, trainable.findChild(ClassPanel)
     monkeypatch.setenv(fake_class_command.STEP_S, "0.5")
     press(panel, "Start training", qtbot)
-    qtbot.waitUntil(lambda: training.run.history.steps_done >= 1, timeout=20_000)
+    qtbot.waitUntil(lambda: training.run.history.done >= 1, timeout=20_000)
     assert trainable.side.button("Train").toolTip().startswith("Train · ")
     press(panel, "Stop", qtbot)
     qtbot.waitUntil(lambda: not training.run.under_way, timeout=20_000)
