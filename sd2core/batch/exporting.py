@@ -66,18 +66,16 @@ def export_dataset(folder: BatchFolder, export: Exporting) -> None:
     Sources that have been there stay. Where one of them has changed, or the settings have,
     the whole data set is written again.
     """
-    from sd2core.datasets.options import dataset_options
     from sd2core.datasets.writing import write_dataset
 
     out = dataset_path(folder, export)
     note = folder.path / _NOTE
-    options = dataset_options(export, export.spans)
     settings = key_of("export", {"settings": _settings_of(export)})
     if _noted(folder).get("settings") != settings or _is_stale(out, folder, export):
         for path in (*folder.path.glob("dataset.*"),):
             remove(path)
     atomic_write_text(note, json.dumps({"settings": settings}) + "\n")
-    written = write_dataset(out, _Counted(folder, export), options)
+    written = write_dataset(out, _Counted(folder, export), export)
     if written.failed:
         first = written.failed[0]
         raise Sd2Error(

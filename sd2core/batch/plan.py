@@ -80,7 +80,7 @@ class BatchPlan(Section):
             if isinstance(section, Synthesis):
                 chosen_options(section)
             elif isinstance(section, Exporting):
-                dataset_options(section, section.spans)
+                dataset_options(section)
         except Sd2Error as error:
             raise ValueError(str(error)) from None
         return section

@@ -28,7 +28,6 @@ from sd2core.options.shared import Axis, Denoising, JsonAndProgress
 from sd2core.options.synthesis import Counting, Synthesis, Tolerance
 
 if TYPE_CHECKING:
-    from sd2core.datasets.options import DatasetOptions
     from sd2core.datasets.recording_sources import Making
     from sd2core.datasets.source import LazySource
     from sd2core.datasets.writing import Written
@@ -129,8 +128,8 @@ def _export(options: Export) -> int:
     from sd2core.datasets.sources import gather
 
     format_of(options.out)
-    provenance = {"command": shlex.join(["sd2", *sys.argv[1:]])}
-    wanted, making = dataset_and_making(options, provenance)
+    made_by = {"command": shlex.join(["sd2", *sys.argv[1:]])}
+    wanted, making = dataset_and_making(options)
     sources = gather(options.inputs, making, subjects=options.subjects, label_files=options.labels)
     for remark in (text for one in sources for text in one.remarks):
         print(f"sd2: {remark}", file=sys.stderr)
@@ -144,11 +143,11 @@ def _export(options: Export) -> int:
     if options.progress_json:
         print_event("start", format="sd2-export-progress", version=1, sources=len(sources))
         steps = progress_events(_LINE_EVERY_S, time_left=True, stage="segments")
-        written = write_dataset(options.out, sources, wanted, steps)
+        written = write_dataset(options.out, sources, wanted, steps, provenance=made_by)
         print_event("progress", done=0, total=0, stage="sheet", left_s=None)
     else:
         with progress_bar("Exporting", unit="") as progress:
-            written = write_dataset(options.out, sources, wanted, progress)
+            written = write_dataset(options.out, sources, wanted, progress, provenance=made_by)
     if written.added == written.sources:
         keep_pace(making.pace_kind, time.monotonic() - begun_s, written.segments)
     sheet = write_preview(options.out)
@@ -161,9 +160,7 @@ def _export(options: Export) -> int:
     return 1 if written.failed else 0
 
 
-def dataset_and_making(
-    options: Export, provenance: dict[str, Any] | None = None
-) -> tuple[DatasetOptions, Making]:
+def dataset_and_making(options: Export) -> tuple[Exporting, Making]:
     """What a data set holds and how its maps are made; Sd2Error where that cannot be."""
     from sd2core.datasets.options import dataset_options
     from sd2core.datasets.recording_sources import Making
@@ -175,7 +172,7 @@ def dataset_and_making(
     spans = None
     if options.segments == "spans":
         spans = SpanOptions(**picked(options, "margin_s", "shortest_s", "length"))
-    wanted = dataset_options(options, spans, provenance)
+    wanted = dataset_options(options, spans)
     placements: Any = options.placements
     if placements not in (None, "planned"):
         placements = read_placements(Path(placements))
@@ -191,9 +188,7 @@ def dataset_and_making(
     return wanted, making
 
 
-def _dry_run(
-    options: Export, sources: list[LazySource], wanted: DatasetOptions, making: Making
-) -> int:
+def _dry_run(options: Export, sources: list[LazySource], wanted: Exporting, making: Making) -> int:
     from sd2core.datasets.forecast import Counting
     from sd2core.runs.pace import known_pace_s
 

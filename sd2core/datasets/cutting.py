@@ -16,11 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import KINDS, LabelledSpan, Outline, Source
 from sd2core.denoise.resample_to_model import clips, interpolated, is_regular
 from sd2core.errors import Sd2Error
-from sd2core.options.exporting import SpanOptions
+from sd2core.options.exporting import Exporting, SpanOptions
 from sd2core.pairs.segments import cut, segment_starts
 
 _BLOCK = 256
@@ -141,17 +140,21 @@ def count_spans(
     return {"segments": len(pieces), **left_out}
 
 
-def count_segments(outline: Outline, frame_rate_hz: float, options: DatasetOptions) -> Counter[str]:
+def count_segments(outline: Outline, frame_rate_hz: float, options: Exporting) -> Counter[str]:
     """Count the segments of a source by their labels."""
     counts: Counter[str] = Counter()
     if options.spans is not None:
-        pieces, _ = _clips_of_spans(outline, frame_rate_hz, options.length, options.spans)
+        pieces, _ = _clips_of_spans(outline, frame_rate_hz, options.segment_frames, options.spans)
         return Counter(outline.labels[clip.span.label] for clip in pieces if clip.span)
     for clip in clips_of(
-        outline.times_s, outline.present, frame_rate_hz, options.length, options.overlap
+        outline.times_s,
+        outline.present,
+        frame_rate_hz,
+        options.segment_frames,
+        options.overlap_frames,
     ):
         label = _label(outline.times_s, outline.label, clip)
-        windows = label[clip.starts[:, None] + np.arange(options.length)]
+        windows = label[clip.starts[:, None] + np.arange(options.segment_frames)]
         named, purity = label_of_segments(windows, len(outline.labels), options)
         named = named[purity >= options.min_purity - _ROUNDING]
         counts.update(outline.labels[number] for number in np.sort(named).tolist())
@@ -163,7 +166,7 @@ def cut_source(
     frame_rate_hz: float,
     null_bins: Sequence[int],
     label_numbers: NDArray[np.int16],
-    options: DatasetOptions,
+    options: Exporting,
 ) -> Iterator[Arrays]:
     """Yield the rows of a data set in blocks of bounded size.
 
@@ -182,14 +185,16 @@ def cut_source(
         Bins that are set to zero.
     label_numbers : int16 ndarray, (labels of the source,)
         The data set's number of each of them.
-    options : DatasetOptions
+    options : Exporting
         What is wanted; frame rate and null bins, which it may leave open, are given apart.
     """
     known = source.known
     kinds = [kind for kind in options.kinds if kind in source.maps]
-    length = options.length
+    length = options.segment_frames
     if options.spans is None:
-        pieces = clips_of(source.times_s, source.present, frame_rate_hz, length, options.overlap)
+        pieces = clips_of(
+            source.times_s, source.present, frame_rate_hz, length, options.overlap_frames
+        )
     else:
         pieces, _ = _clips_of_spans(source.outline(), frame_rate_hz, length, options.spans)
     for clip in pieces:
@@ -247,7 +252,7 @@ def cut_source(
 
 
 def label_of_segments(
-    windows: NDArray[np.integer], labels: int, options: DatasetOptions
+    windows: NDArray[np.integer], labels: int, options: Exporting
 ) -> tuple[NDArray[np.int16], NDArray[np.float32]]:
     """Return the label of every segment and the share of its frames that have it.
 

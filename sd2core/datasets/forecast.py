@@ -9,11 +9,12 @@ from dataclasses import dataclass, field, replace
 from sd2core.datasets.cutting import count_segments
 from sd2core.datasets.index import empty_header
 from sd2core.datasets.layout import bytes_per_segment
-from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.options import dataset_options
 from sd2core.datasets.source import KINDS, LazySource, Outline, Source, SourceKey, each_once
 from sd2core.datasets.splitting import named_splits, split_people
 from sd2core.errors import Sd2Error
 from sd2core.maps import MapKind
+from sd2core.options.exporting import Exporting
 from sd2core.progress import Progress, silent
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
@@ -67,12 +68,13 @@ class Counting:
         progress(len(sources), len(sources))
         return counting
 
-    def forecast(self, options: DatasetOptions, bins: int) -> Forecast:
+    def forecast(self, options: Exporting, bins: int) -> Forecast:
         """Count the segments that these options give on a velocity axis of ``bins``."""
         if not self.outlines:
             raise Sd2Error(
                 self.failed[0] if self.failed else "There are no sources", "one at least"
             )
+        options = dataset_options(options)
         first = Timebase(self.outlines[0][1].times_s)
         header = empty_header(options, VelocityAxis(bins), first)
         of_subject: Counter[str] = Counter()
@@ -88,7 +90,9 @@ class Counting:
         segments = of_label.total()
         split = Split((), (), ())
         if segments:
-            split = split_people(list(of_subject), options.validation, options.test)
+            split = split_people(
+                list(of_subject), options.validation_subjects, options.test_subjects
+            )
         kinds = tuple(kind for kind in KINDS if kind in of_kind)
         return Forecast(
             sources=len(self.outlines),

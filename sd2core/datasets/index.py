@@ -8,14 +8,14 @@ from typing import Any
 
 from sd2core.datasets.cutting import count_spans
 from sd2core.datasets.layout import Header
-from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import Source
 from sd2core.denoise.resample_to_model import MAX_RESAMPLED, can_resample
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import first_difference
 from sd2core.labels.per_frame import BACKGROUND
 from sd2core.maps import DopplerMap, joints_of
-from sd2core.mesh.vertex_parts import KINEMATICS
+from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, PARTS
+from sd2core.options.exporting import Exporting
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 from sd2core.version import __version__
@@ -53,7 +53,7 @@ class Names:
                 )
 
 
-def header_of(source: Source, options: DatasetOptions) -> Header:
+def header_of(source: Source, options: Exporting) -> Header:
     """Return the header of a new data set; its first source fills in open options."""
     first: DopplerMap = next(iter(source.maps.values()))
     nulled = sorted({number for one in source.maps.values() for number in one.null_bins})
@@ -65,13 +65,13 @@ def header_of(source: Source, options: DatasetOptions) -> Header:
 
 
 def empty_header(
-    options: DatasetOptions, axis: VelocityAxis, timebase: Timebase, nulled: tuple[int, ...] = ()
+    options: Exporting, axis: VelocityAxis, timebase: Timebase, nulled: tuple[int, ...] = ()
 ) -> Header:
     """Return the header of a data set without segments; what the options leave open is given.
 
     Parameters
     ----------
-    options : DatasetOptions
+    options : Exporting
         Take precedence where they name null bins or a frame rate.
     axis : VelocityAxis
         Of all maps.
@@ -81,8 +81,8 @@ def empty_header(
         Bins that are empty in the maps.
     """
     return Header(
-        length=options.length,
-        overlap=options.overlap,
+        length=options.segment_frames,
+        overlap=options.overlap_frames,
         axis=axis,
         null_bins=nulled if options.null_bins is None else tuple(options.null_bins),
         frame_rate_hz=options.frame_rate_hz or round(timebase.frames_per_s, 3),
@@ -91,12 +91,11 @@ def empty_header(
         min_purity=options.min_purity,
         spans=options.spans,
         kinds_wanted=options.kinds,
-        parts=options.parts,
-        joints=options.joints,
+        parts=PARTS if options.limbs else (),
+        joints=JOINTS if options.limbs else (),
         imu=options.imu,
         title=options.title,
         made_by=f"SD² Studio {__version__}",
-        provenance=options.provenance,
     )
 
 
@@ -172,11 +171,11 @@ def entry_of(source: Source, header: Header, fingerprint: str) -> dict[str, Any]
     }
 
 
-def refuse_other_settings(out: Path, header: Header, options: DatasetOptions) -> None:
+def refuse_other_settings(out: Path, header: Header, options: Exporting) -> None:
     """Refuse to go on with a data set that was begun with other options."""
     for what, before, now in (
-        ("segments of", header.length, options.length),
-        ("an overlap of", header.overlap, options.overlap),
+        ("segments of", header.length, options.segment_frames),
+        ("an overlap of", header.overlap, options.overlap_frames),
         ("kinds", list(header.kinds_wanted), list(options.kinds)),
         ("limb maps", bool(header.parts), options.limbs),
         ("kinematics", bool(header.joints), options.limbs),

@@ -62,7 +62,7 @@ class Header:
     """Header of a data set: properties of all its segments.
 
     ``label_rule``, ``min_share``, ``min_purity`` and ``spans`` are those of
-    :class:`~sd2core.datasets.options.DatasetOptions`.
+    :class:`~sd2core.options.exporting.Exporting`.
     """
 
     length: Annotated[int, SEGMENT_FRAMES]  # Frames of a segment.

@@ -15,7 +15,7 @@ from sd2core.datasets.cutting import cut_source
 from sd2core.datasets.formats import refuse_large_npz, write_packed
 from sd2core.datasets.index import Names, check_fits, entry_of, header_of, refuse_other_settings
 from sd2core.datasets.layout import SPLITS, FileFormat, Header, format_of
-from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.options import dataset_options
 from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey, each_once
 from sd2core.datasets.splitting import named_splits, split_people
@@ -24,6 +24,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import full_disk_named
 from sd2core.files.lock import FileLock
 from sd2core.io.kinds import is_dataset
+from sd2core.options.exporting import Exporting
 from sd2core.progress import Progress, part_of, silent
 
 
@@ -49,8 +50,10 @@ class Written:
 def write_dataset(
     out: Path,
     sources: Iterable[Source | LazySource],
-    options: DatasetOptions | None = None,
+    options: Exporting | None = None,
     progress: Progress = silent,
+    *,
+    provenance: dict[str, Any] | None = None,
 ) -> Written:
     """Write segments of all sources, or continue a data set that was begun.
 
@@ -66,6 +69,8 @@ def write_dataset(
         Its ending gives the format: ``.zarr``, ``.h5``, ``.hdf5`` or ``.npz``.
     progress : Progress
         Of all sources where their number is known; it may raise ``Cancelled``.
+    provenance : dict, optional
+        Origin of a new data set; kept as JSON.
 
     Returns
     -------
@@ -79,7 +84,7 @@ def write_dataset(
         same key was made of something else, no source can be made, or there is no segment.
     """
     out = Path(out)
-    options = options or DatasetOptions()
+    options = dataset_options(options or Exporting())
     form = format_of(out)
     work = out if form == "zarr" else out.with_name(f"{out.name}.partial")
     if not out.absolute().parent.is_dir():
@@ -92,7 +97,7 @@ def write_dataset(
     writer: _Writer | None = None
     try:
         with full_disk_named(out):
-            writer = _Writer(out, work, form, options)
+            writer = _Writer(out, work, form, options, provenance or {})
             written = writer.write(sources, progress)
     finally:
         lock.release()
@@ -106,8 +111,16 @@ def write_dataset(
 
 
 class _Writer:
-    def __init__(self, out: Path, work: Path, form: FileFormat, options: DatasetOptions) -> None:
+    def __init__(
+        self,
+        out: Path,
+        work: Path,
+        form: FileFormat,
+        options: Exporting,
+        provenance: dict[str, Any],
+    ) -> None:
         self._out, self._work, self._form, self._options = out, work, form, options
+        self._provenance = provenance
         self._names = Names()
         self._fingerprints: dict[SourceKey, str] = {}
         self._before: dict[str, SourceKey] = {}  # what was there, by its fingerprint
@@ -134,7 +147,7 @@ class _Writer:
 
     @property
     def _kept_out(self) -> tuple[Sequence[str] | None, Sequence[str] | None]:
-        return self._options.validation, self._options.test
+        return self._options.validation_subjects, self._options.test_subjects
 
     @property
     def empty(self) -> bool:
@@ -215,7 +228,8 @@ class _Writer:
                 with open_dataset(self._out) as dataset:
                     self._store = self._unpacked(dataset)
             else:
-                self._store = SegmentStore.begin(self._work, header_of(source, self._options))
+                header = replace(header_of(source, self._options), provenance=self._provenance)
+                self._store = SegmentStore.begin(self._work, header)
         store = self._store
         header = store.header
         check_fits(source, header)
@@ -266,7 +280,7 @@ class _Writer:
                 store = self._unpacked(dataset)
         if store.rows == 0:
             raise Sd2Error(
-                f"No source has {self._options.length} frames on end with a person",
+                f"No source has {self._options.segment_frames} frames on end with a person",
                 "one segment at least",
                 "Choose shorter segments",
             )

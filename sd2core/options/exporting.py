@@ -21,7 +21,12 @@ from sd2core.options.shared import KeptOut, Limbs, SegmentFrames
 
 KINDS: tuple[MapKind, ...] = ("synthetic", "denoised", "simulated", "real")
 LabelRule = Literal["foreground", "majority"]
-"""Rule for a segment's label from those of its frames; see `DatasetOptions`."""
+"""Rule for a segment's label from those of its frames.
+
+``foreground``: the label other than background that most frames have, where they are at least
+``min_share`` of the segment, otherwise background: a gesture that is shorter than half a segment
+still names it. ``majority``: the label that most frames have, background included. Of equal counts
+the lower label wins."""
 
 SEGMENTS, PEOPLE, MAPS = Group("segments"), Group("people"), Group("maps")
 

@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 
 from sd2core.datasets import store
-from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.source import Source
 from sd2core.datasets.torch_dataset import SegmentDataset
 from sd2core.datasets.writing import write_dataset
 from sd2core.maps import DopplerMap, MapKind
+from sd2core.options.exporting import Exporting
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
@@ -57,7 +57,7 @@ def test_writing(
 
     def write() -> None:
         before_s = time.process_time()
-        write_dataset(tmp_path / f"{next(names)}.zarr", sources(), DatasetOptions())
+        write_dataset(tmp_path / f"{next(names)}.zarr", sources(), Exporting())
         worked_s.append(time.process_time() - before_s)
 
     benchmark.pedantic(write, rounds=3, warmup_rounds=1)
@@ -70,7 +70,7 @@ def test_reading(
     benchmark: Any, capsys: pytest.CaptureFixture[str], tmp_path: Path, order: str
 ) -> None:
     path = tmp_path / "set.zarr"
-    segments = write_dataset(path, sources(), DatasetOptions()).segments
+    segments = write_dataset(path, sources(), Exporting()).segments
     data = SegmentDataset(path, "synthetic", "simulated")
     rows = np.arange(segments)
     if order == "shuffled":

@@ -22,7 +22,6 @@ from sd2core.datasets.card import card_text, describe_dataset
 from sd2core.datasets.clips import clips_of_dataset
 from sd2core.datasets.labelled import labelled_facts
 from sd2core.datasets.labelled_source import LabelledSource
-from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.sources import pair_sources
@@ -40,6 +39,7 @@ from sd2core.io.radar.growing import GrowingHead
 from sd2core.live.recording import GrowingRecording
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.options.exporting import Exporting
 from sd2core.pairs.store import read_pairs
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.sensor import VelocityAxis
@@ -184,7 +184,7 @@ def _write_dataset(path: Path) -> None:
     pairs = path.with_name(f"pairs of {path.name}.zarr")
     _write_pairs(pairs)
     sources = pair_sources([pairs], Making(kinds=("synthetic", "simulated")))
-    write_dataset(path, sources, DatasetOptions(length=30, overlap=10))
+    write_dataset(path, sources, Exporting(segment_frames=30, overlap_frames=10))
 
 
 def _read_dataset(path: Path) -> None:

@@ -17,13 +17,13 @@ from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan_file import plan_from_text
 from sd2core.batch.run import BatchEnd, run_batch
 from sd2core.datasets.card import describe_dataset
-from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.sources import gather
 from sd2core.datasets.writing import write_dataset
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.maps import DopplerMap
+from sd2core.options.exporting import Exporting
 
 PLAN = """
 out = "made"
@@ -64,7 +64,7 @@ def test_the_data_set_is_that_of_the_command(tmp_path: Path, scenes: Path) -> No
     assert pool.submitted == {"inspect": 1, "synthesise": 1, "denoise": 2, "export": 1}
     assert end.facts["total"] == {"inspect": 1, "synthesise": 1, "denoise": 2, "export": 1}
     alone = tmp_path / "alone.zarr"
-    options = DatasetOptions(length=15, overlap=0)
+    options = Exporting(segment_frames=15, overlap_frames=0)
     write_dataset(alone, gather([one.folder], Making(model="denoiser")), options)
     with open_dataset(Path(end.facts["dataset"])) as made, open_dataset(alone) as expected:
         assert made.header.subjects == expected.header.subjects == ("anna", "bert", "carl")

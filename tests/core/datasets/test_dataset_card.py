@@ -8,8 +8,8 @@ import pytest
 from made_sources import source
 
 from sd2core.datasets.card import card_paths, write_card
-from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.writing import write_dataset
+from sd2core.options.exporting import Exporting
 
 
 @pytest.mark.parametrize("first", [0, 1])
@@ -21,7 +21,7 @@ def test_movements_count_once_from_whichever_places(tmp_path: Path, first: int) 
         for recording, frames in (("r1", 450), ("r2", 150))
         for placement in range(first, first + 3)
     ]
-    write_dataset(out, sources, DatasetOptions())
+    write_dataset(out, sources, Exporting())
     card = write_card(out)
     assert card["recordings"] == 2
     assert card["placements"] == 3
@@ -32,6 +32,6 @@ def test_movements_count_once_from_whichever_places(tmp_path: Path, first: int) 
 
 def test_long_ones_are_told_in_minutes(tmp_path: Path) -> None:
     out = tmp_path / "set.zarr"
-    write_dataset(out, [source(frames=30 * 150)], DatasetOptions())
+    write_dataset(out, [source(frames=30 * 150)], Exporting())
     write_card(out)
     assert "2.5 minutes" in card_paths(out)[0].read_text("utf-8")

@@ -13,10 +13,10 @@ from made_sources import AXIS, source
 from sd2core.cli.classify.data import clips_of, split_of
 from sd2core.datasets.clips import clips_of_dataset
 from sd2core.datasets.labelled_source import LabelledSource
-from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
+from sd2core.options.exporting import Exporting
 
 ENDINGS = (".zarr", ".h5", ".npz")
 CLASSES = ("background", "horizontal", "vertical")
@@ -34,7 +34,7 @@ def test_segments_are_put_together_again(
         source("r1", "anna", frames=frames, placement=1),
         source("r1", "ben", frames=100),
     ]
-    write_dataset(out, sources, DatasetOptions(length=24, overlap=overlap))
+    write_dataset(out, sources, Exporting(segment_frames=24, overlap_frames=overlap))
     with open_dataset(out) as dataset:
         known = clips_of_dataset(dataset, "denoised")
     assert (known.axis, known.frame_rate_hz, known.classes) == (AXIS, 30.0, CLASSES)
@@ -53,7 +53,9 @@ def test_a_camera_that_is_not_quite_on_time_gives_whole_clips(
     times_s = np.arange(150) / rate_hz + np.random.default_rng(1).uniform(-5e-3, 5e-3, 150)
     one = source(frames=150, times_s=times_s)
     write_dataset(
-        tmp_path / "set.zarr", [one], DatasetOptions(length=24, overlap=4, frame_rate_hz=30.0)
+        tmp_path / "set.zarr",
+        [one],
+        Exporting(segment_frames=24, overlap_frames=4, frame_rate_hz=30.0),
     )
     with open_dataset(tmp_path / "set.zarr") as dataset:
         assert not dataset["resampled"][:].any()
@@ -64,7 +66,7 @@ def test_a_camera_that_is_not_quite_on_time_gives_whole_clips(
 def test_what_was_resampled_is_put_together_by_its_times(tmp_path: Path) -> None:
     one = source(frames=120, rate_hz=30.7)
     out = tmp_path / "set.zarr"
-    write_dataset(out, [one], DatasetOptions(length=24, overlap=4, frame_rate_hz=30.0))
+    write_dataset(out, [one], Exporting(segment_frames=24, overlap_frames=4, frame_rate_hz=30.0))
     with open_dataset(out) as dataset:
         assert dataset["resampled"][:].all()
         (clip,) = clips_of_dataset(dataset, "synthetic").clips
@@ -80,7 +82,7 @@ def test_who_leaves_the_picture_parts_a_clip(tmp_path: Path) -> None:
     present[50:60] = False
     out = tmp_path / "set.zarr"
     one = source(frames=120, present=present)
-    write_dataset(out, [one], DatasetOptions(length=24, overlap=4))
+    write_dataset(out, [one], Exporting(segment_frames=24, overlap_frames=4))
     with open_dataset(out) as dataset:
         first, second = clips_of_dataset(dataset, "synthetic").clips
     np.testing.assert_array_equal(first.energies, one.maps["synthetic"].values.T[:50])
@@ -90,7 +92,7 @@ def test_who_leaves_the_picture_parts_a_clip(tmp_path: Path) -> None:
 def test_only_sources_that_have_the_map_count(tmp_path: Path) -> None:
     out = tmp_path / "set.zarr"
     sources = [source("r1"), source("r2", kinds=("synthetic", "real")), source("r3")]
-    write_dataset(out, sources, DatasetOptions(length=24, overlap=4))
+    write_dataset(out, sources, Exporting(segment_frames=24, overlap_frames=4))
     with open_dataset(out) as dataset:
         assert [clip.movement for clip in clips_of_dataset(dataset, "real").clips] == ["r2"]
         with pytest.raises(Sd2Error, match="holds no simulated maps"):
@@ -99,7 +101,7 @@ def test_only_sources_that_have_the_map_count(tmp_path: Path) -> None:
 
 def test_a_data_set_without_a_segment_of_a_kind_says_so(tmp_path: Path) -> None:
     out = tmp_path / "set.npz"
-    write_dataset(out, [source()], DatasetOptions(length=24, overlap=4))
+    write_dataset(out, [source()], Exporting(segment_frames=24, overlap_frames=4))
     with np.load(out) as file:
         arrays = dict(file)
     arrays["available"][:] = False
@@ -111,7 +113,9 @@ def test_a_data_set_without_a_segment_of_a_kind_says_so(tmp_path: Path) -> None:
 def test_classifiers_take_the_split_of_data_sets(tmp_path: Path) -> None:
     out = tmp_path / "set.zarr"
     people = [source(subject=name, kinds=("synthetic", "simulated")) for name in "abcd"]
-    options = DatasetOptions(length=24, overlap=4, validation=("b",), test=("a",))
+    options = Exporting(
+        segment_frames=24, overlap_frames=4, validation_subjects=("b",), test_subjects=("a",)
+    )
     write_dataset(out, people, options)
     given = [LabelledSource(out, "")]
     assert (split_of(given, "validation"), split_of(given, "test")) == (["b"], ["a"])

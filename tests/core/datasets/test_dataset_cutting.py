@@ -11,18 +11,19 @@ from hypothesis import strategies as st
 from made_sources import AXIS, LABELS, source
 
 from sd2core.datasets.cutting import clips_of, count_segments, cut_source, label_of_segments
-from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.options import dataset_options
 from sd2core.datasets.source import KINDS, Source
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import runs
+from sd2core.options.exporting import Exporting
 from sd2core.pairs.segments import join
 from sd2core.timebase import Timebase
 
 NUMBERS = np.arange(3, dtype=np.int16)
 
 
-def cut_whole(one: Source, options: DatasetOptions, rate_hz: float = 30.0) -> dict:
+def cut_whole(one: Source, options: Exporting, rate_hz: float = 30.0) -> dict:
     blocks = list(cut_source(one, rate_hz, (), NUMBERS, options))
     return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
@@ -39,7 +40,7 @@ def test_segments_put_together_are_the_maps(
     present = np.array(there)
     long_enough = [run for run in runs(present) if run[1] - run[0] >= length]
     one = source(frames=len(there), present=present)
-    options = DatasetOptions(length=length, overlap=overlap)
+    options = Exporting(segment_frames=length, overlap_frames=overlap)
     if not long_enough:
         assert not list(cut_source(one, 30.0, (), NUMBERS, options))
         return
@@ -63,7 +64,9 @@ def test_segments_put_together_are_the_maps(
 def test_no_segment_reaches_over_a_frame_without_a_person() -> None:
     present = np.ones(100, bool)
     present[40] = False
-    cut = cut_whole(source(frames=100, present=present), DatasetOptions(length=30, overlap=5))
+    cut = cut_whole(
+        source(frames=100, present=present), Exporting(segment_frames=30, overlap_frames=5)
+    )
     frames = cut["start_frame"][:, None] + np.arange(30)
     assert not (frames == 40).any()
     assert cut["available"][:, :2].all()
@@ -74,7 +77,7 @@ def test_a_radar_that_missed_a_frame_says_nothing_of_a_segment() -> None:
     recorded = np.ones(90, bool)
     recorded[:35] = False
     maps = one.maps | {"real": replace(one.maps["real"], present=recorded)}
-    cut = cut_whole(replace(one, maps=maps), DatasetOptions(length=30, overlap=0))
+    cut = cut_whole(replace(one, maps=maps), Exporting(segment_frames=30, overlap_frames=0))
     assert cut["available"][:, KINDS.index("synthetic")].tolist() == [True] * 3
     assert cut["available"][:, KINDS.index("real")].tolist() == [False, False, True]
     assert not cut["real"][:2].any()
@@ -94,7 +97,7 @@ def ramp(times_s: np.ndarray) -> Source:
 @pytest.mark.parametrize("rate_hz", [15.0, 60.0, 31.0])
 def test_another_frame_rate_is_brought_to_that_of_the_data_set(rate_hz: float) -> None:
     one = ramp(np.arange(int(3 * rate_hz)) / rate_hz)
-    cut = cut_whole(one, DatasetOptions(length=30, overlap=0))
+    cut = cut_whole(one, Exporting(segment_frames=30, overlap_frames=0))
     frames_s = cut["start_s"][:, None] + np.arange(30) / 30.0
     np.testing.assert_allclose(cut["synthetic"][..., 3], 4.0 * frames_s, atol=1e-5)
     near = np.abs(frames_s - 1.0) > 1.0 / rate_hz
@@ -106,7 +109,7 @@ def test_another_frame_rate_is_brought_to_that_of_the_data_set(rate_hz: float) -
 def test_uneven_frames_are_evened_and_lost_time_parts_clips() -> None:
     rng = np.random.default_rng(3)
     uneven_s = np.cumsum(rng.uniform(0.3, 1.7, 120)) / 30.0
-    cut = cut_whole(ramp(uneven_s), DatasetOptions(length=20, overlap=0))
+    cut = cut_whole(ramp(uneven_s), Exporting(segment_frames=20, overlap_frames=0))
     frames_s = cut["start_s"][:, None] + np.arange(20) / 30.0
     np.testing.assert_allclose(cut["synthetic"][..., 0], frames_s, atol=1e-5)
 
@@ -123,7 +126,7 @@ def test_limb_maps_are_cut_as_maps_of_their_parts() -> None:
     """At another rate, around a gap, with a nulled bin: each like a map of its own."""
     present = np.arange(100) != 40
     one = source(limbs=True, rate_hz=25.0, present=present, kinds=("synthetic",))
-    options = DatasetOptions(length=20, overlap=5)
+    options = Exporting(segment_frames=20, overlap_frames=5)
 
     def cut_at_30_hz(of: Source, limbs: bool, name: str) -> np.ndarray:
         blocks = cut_source(of, 30.0, (2,), NUMBERS, replace(options, limbs=limbs))
@@ -144,18 +147,18 @@ def test_limb_maps_are_cut_as_maps_of_their_parts() -> None:
 
 def test_how_a_segment_is_named() -> None:
     windows = np.array([[0] * 8 + [1] * 2, [0] * 9 + [1], [1] * 4 + [2] * 6, [0] * 5 + [2] * 5])
-    named, purity = label_of_segments(windows, 3, DatasetOptions(min_share=0.2))
+    named, purity = label_of_segments(windows, 3, Exporting(min_share=0.2))
     assert named.tolist() == [1, 0, 2, 2]
     np.testing.assert_allclose(purity, [0.2, 0.9, 0.6, 0.5])
-    named, purity = label_of_segments(windows, 3, DatasetOptions(label_rule="majority"))
+    named, purity = label_of_segments(windows, 3, Exporting(label_rule="majority"))
     assert named.tolist() == [0, 0, 2, 0]
     np.testing.assert_allclose(purity, [0.8, 0.9, 0.6, 0.5])
 
 
-@given(frames=st.integers(1, 200), length=st.integers(1, 40))
+@given(frames=st.integers(1, 200), length=st.integers(2, 40))
 def test_what_is_counted_beforehand_is_cut(frames: int, length: int) -> None:
     one = source(frames=frames)
-    options = DatasetOptions(length=length, overlap=length // 3)
+    options = Exporting(segment_frames=length, overlap_frames=length // 3)
     labels = count_segments(one.outline(), 30.0, options)
     blocks = list(cut_source(one, 30.0, (), NUMBERS, options))
     assert labels.total() == sum(len(block["start_s"]) for block in blocks)
@@ -184,11 +187,11 @@ def test_a_source_that_does_not_fit_together_is_refused(change: dict, message: s
 def test_options_that_cannot_be_are_refused() -> None:
     for change, message in (
         ({"kinds": ()}, "some of synthetic"),
-        ({"length": 0}, "1 or more"),
-        ({"length": 10, "overlap": 10}, "overlap by 10"),
+        ({"segment_frames": 0}, "2 to"),
+        ({"segment_frames": 10, "overlap_frames": 10}, "less than segment_frames"),
         ({"label_rule": "any"}, "foreground"),
         ({"min_share": 1.5}, "0 to 1"),
-        ({"frame_rate_hz": 0.0}, "positive"),
+        ({"frame_rate_hz": 0.0}, "above 0"),
     ):
         with pytest.raises(Sd2Error, match=message):
-            DatasetOptions(**change)  # type: ignore[arg-type]
+            dataset_options(Exporting(**change))  # type: ignore[arg-type]

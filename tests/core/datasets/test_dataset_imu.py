@@ -13,7 +13,7 @@ from made_sources import source
 
 from sd2core.datasets.forecast import Counting
 from sd2core.datasets.layout import Header, row_shapes
-from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.options import dataset_options
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.source import Source
@@ -21,10 +21,11 @@ from sd2core.datasets.sources import gather
 from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
 from sd2core.imu.signals import InertialSignals
+from sd2core.options.exporting import Exporting
 from tests.small_pairs import write_pairs
 
 PLACES = ("left-wrist", "right-foot")
-OPTIONS = DatasetOptions(length=24, overlap=4, imu=PLACES)
+OPTIONS = Exporting(segment_frames=24, overlap_frames=4, imu=PLACES)
 
 
 def felt_by(one: Source, places: tuple[str, ...] = PLACES) -> Source:
@@ -128,8 +129,8 @@ def test_the_forecast_counts_them() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "words"), [({"imu": ("knee",)}, "some of head"), ({"length": 5}, "6 or more")]
+    ("wrong", "words"), [({"imu": ("knee",)}, "some of head"), ({"segment_frames": 5}, "6 or more")]
 )
 def test_options_that_cannot_be_are_refused(wrong: dict, words: str) -> None:
     with pytest.raises(Sd2Error, match=words):
-        replace(OPTIONS, overlap=1, **wrong)
+        dataset_options(replace(OPTIONS, overlap_frames=1, **wrong))

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from made_sources import LABELS, source
 
-from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.preview import draw_preview, examples_of
 from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS
 from sd2core.datasets.writing import write_dataset
+from sd2core.options.exporting import Exporting
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def dataset(tmp_path: Path) -> Dataset:
         for number, name in enumerate(("anna", "ben", "carla"))
         for place in (0, 1)
     ]  # fmt: skip
-    write_dataset(tmp_path / "set.npz", sources, DatasetOptions(length=24, overlap=4))
+    write_dataset(tmp_path / "set.npz", sources, Exporting(segment_frames=24, overlap_frames=4))
     return open_dataset(tmp_path / "set.npz")
 
 

@@ -19,7 +19,6 @@ from sd2core.accuracy.trial import synthesizer_for
 from sd2core.body.parts import synthetic_map
 from sd2core.datasets.card import describe_dataset, limits
 from sd2core.datasets.forecast import Counting
-from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.source import Source
@@ -35,6 +34,7 @@ from sd2core.labels.files import write_labels
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.mocap.recording_pairs import make_recording_pairs
+from sd2core.options.exporting import Exporting
 from sd2core.pairs.store import read_pairs
 from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import PlacementGrid
@@ -174,7 +174,7 @@ def test_limb_maps_of_pairs_are_those_of_their_store(tmp_path: Path) -> None:
     making = Making(kinds=("synthetic", "simulated"), limbs=True)
     path = write_pairs(tmp_path / "p.zarr", ("s1", "s2"), takes=1, limbs=True)
     out = tmp_path / "set.zarr"
-    options = DatasetOptions(kinds=making.kinds, length=30, overlap=0, limbs=True)
+    options = Exporting(kinds=making.kinds, segment_frames=30, overlap_frames=0, limbs=True)
     forecast = Counting.of(gather([path], making)).forecast(options, 8)
     write_dataset(out, gather([path], making), options)
     with open_dataset(out) as dataset:
@@ -198,7 +198,7 @@ def test_recordings_whose_limbs_are_not_known_are_left_out(tmp_path: Path) -> No
     body = Recording.create(tmp_path / "ben.sd2", mesh=tmp_path / "mesh.npz")
     making = Making(kinds=("synthetic",), limbs=True)
     sources = gather([octahedron.folder, body.folder], making)
-    options = DatasetOptions(kinds=("synthetic",), length=10, overlap=0, limbs=True)
+    options = Exporting(kinds=("synthetic",), segment_frames=10, overlap_frames=0, limbs=True)
     forecast = Counting.of(sources).forecast(options, 32)
     written = write_dataset(tmp_path / "set.zarr", sources, options)
     assert forecast.segments == written.segments == 2
@@ -252,7 +252,7 @@ def test_what_was_counted_is_what_is_written(tmp_path: Path) -> None:
     for name in ("anna", "ben"):
         recording(tmp_path / "all" / f"{name}.sd2", offset_s=0.0)
     making = Making(kinds=("synthetic", "simulated"), placements=PlacementGrid((1.0,)))
-    options = DatasetOptions(kinds=making.kinds, length=30, overlap=5)
+    options = Exporting(kinds=making.kinds, segment_frames=30, overlap_frames=5)
     sources = gather([tmp_path / "all"], making)
     forecast = Counting.of(sources).forecast(options, 32)
     out = tmp_path / "set.zarr"
@@ -273,7 +273,7 @@ def test_what_was_counted_is_what_is_written(tmp_path: Path) -> None:
 
 def test_a_changed_recording_is_noticed(tmp_path: Path) -> None:
     one = recording(tmp_path / "anna.sd2", radar=False)
-    options = DatasetOptions(kinds=("synthetic",), length=30, overlap=5)
+    options = Exporting(kinds=("synthetic",), segment_frames=30, overlap_frames=5)
     making = Making(kinds=("synthetic",))
     out = tmp_path / "set.zarr"
     write_dataset(out, gather([one.folder], making), options)
@@ -351,7 +351,7 @@ def damaged_recording(folder: Path) -> Recording:
 def test_frames_of_damaged_chunks_are_in_no_segment_and_told(tmp_path: Path) -> None:
     one = damaged_recording(tmp_path / "anna.sd2")
     out = tmp_path / "set.zarr"
-    options = DatasetOptions(length=20, overlap=0)
+    options = Exporting(segment_frames=20, overlap_frames=0)
     write_dataset(out, gather([one.folder], Making(kinds=("synthetic",))), options)
     with open_dataset(out) as opened:
         card = describe_dataset(opened)
@@ -368,7 +368,7 @@ def test_frames_of_damaged_chunks_are_in_no_segment_and_told(tmp_path: Path) -> 
 
 
 BOTH = Making(kinds=("synthetic", "simulated"))
-FIFTIES = DatasetOptions(kinds=BOTH.kinds, length=50, overlap=0)
+FIFTIES = Exporting(kinds=BOTH.kinds, segment_frames=50, overlap_frames=0)
 
 
 @pytest.fixture(scope="module")

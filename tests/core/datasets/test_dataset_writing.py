@@ -21,7 +21,7 @@ from sd2core.datasets import card, formats, store
 from sd2core.datasets.card import card_paths
 from sd2core.datasets.forecast import Counting
 from sd2core.datasets.layout import SPLITS, row_shapes
-from sd2core.datasets.options import DatasetOptions
+from sd2core.datasets.options import dataset_options
 from sd2core.datasets.preview import write_preview
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey
@@ -30,9 +30,10 @@ from sd2core.errors import Sd2Error
 from sd2core.io.kinds import kind_of
 from sd2core.maps import LimbMaps
 from sd2core.mesh.vertex_parts import PARTS
+from sd2core.options.exporting import Exporting
 from sd2core.progress import Cancelled, Progress
 
-OPTIONS = DatasetOptions(length=24, overlap=4)
+OPTIONS = Exporting(segment_frames=24, overlap_frames=4)
 ENDINGS = (".zarr", ".h5", ".npz")
 ONE_OF_ENDINGS = [
     ".zarr",
@@ -245,13 +246,13 @@ def test_no_subject_is_in_two_splits(tmp_path: Path) -> None:
         assert all(whose)
         named = dataset.header.splits
         assert [{people.index(name) for name in named[split]} for split in SPLITS] == whose
-    chosen = replace(OPTIONS, validation=("s2",), test=("s0", "s5"))
+    chosen = replace(OPTIONS, validation_subjects=("s2",), test_subjects=("s0", "s5"))
     assert write_dataset(out, sources, chosen).added == 0
     with open_dataset(out) as dataset:
         assert {*dataset["subject"][:][dataset.of_split("test")].tolist()} == {0, 5}
         assert {*dataset["subject"][:][dataset.of_split("validation")].tolist()} == {2}
     with pytest.raises(Sd2Error, match="'nobody' is to be a test subject"):
-        write_dataset(out, sources, replace(OPTIONS, test=("nobody",)))
+        write_dataset(out, sources, replace(OPTIONS, test_subjects=("nobody",)))
 
 
 def test_one_bad_source_does_not_stop_the_others(tmp_path: Path) -> None:
@@ -385,7 +386,7 @@ def test_what_is_not_split_is_left_out_of_limb_maps(tmp_path: Path) -> None:
     assert "r3 of ben is not split. Expected: limb maps of trunk" in written.failed[0].reason
     assert "carla is split into left, right" in written.failed[1].reason
     with pytest.raises(Sd2Error, match="Limb maps of denoised, real maps"):
-        DatasetOptions(kinds=("real", "denoised"), limbs=True)
+        dataset_options(Exporting(kinds=("real", "denoised"), limbs=True))
 
 
 def without_parts(path: Path) -> None:
@@ -440,7 +441,7 @@ def test_no_card_is_written_over_another_ones(tmp_path: Path) -> None:
 
 
 def test_a_wrong_name_of_a_person_is_refused_before_the_work(tmp_path: Path) -> None:
-    options = replace(OPTIONS, validation=("bob",))
+    options = replace(OPTIONS, validation_subjects=("bob",))
     for name in ("set.zarr", "set.h5"):
         with pytest.raises(Sd2Error, match="'bob' is to be a validation subject"):
             write_dataset(tmp_path / name, several(), options)
@@ -465,8 +466,8 @@ def test_what_cannot_be_is_refused_in_words(
     out = tmp_path / "set.zarr"
     write_dataset(out, several()[:1], OPTIONS)
     for change, message in (
-        ({"length": 30}, "begun with segments of 24"),
-        ({"overlap": 3}, "an overlap of 4"),
+        ({"segment_frames": 30}, "begun with segments of 24"),
+        ({"overlap_frames": 3}, "an overlap of 4"),
         ({"kinds": ("real",)}, "begun with kinds"),
         ({"label_rule": "majority"}, "label rule foreground"),
     ):
@@ -490,7 +491,7 @@ def test_what_cannot_be_is_refused_in_words(
     for ending in (".zarr", ".h5"):
         with pytest.raises(Sd2Error, match="No source has 24 frames"):
             write_dataset(tmp_path / f"tiny{ending}", [source(frames=20)], OPTIONS)
-        shorter = replace(OPTIONS, length=20)
+        shorter = replace(OPTIONS, segment_frames=20)
         assert write_dataset(tmp_path / f"tiny{ending}", [source(frames=20)], shorter).segments == 1
     with pytest.raises(Sd2Error, match=r"ending in \.zarr, \.h5"):
         write_dataset(tmp_path / "set.csv", several(), OPTIONS)

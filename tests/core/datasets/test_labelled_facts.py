@@ -17,10 +17,10 @@ from sd2core.datasets.labelled import (
     unfolded,
 )
 from sd2core.datasets.labelled_source import LabelledSource
-from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
+from sd2core.options.exporting import Exporting
 from sd2core.pairs.store import PairWriter, Take
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VelocityAxis
@@ -34,7 +34,7 @@ def a_set(path: Path, *people: str, placements: int = 1) -> Path:
         for person in people
         for placement in range(placements)
     ]
-    write_dataset(path, sources, DatasetOptions(length=30, overlap=0))
+    write_dataset(path, sources, Exporting(segment_frames=30, overlap_frames=0))
     return path
 
 

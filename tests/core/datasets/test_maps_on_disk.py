@@ -16,13 +16,13 @@ from sd2core.batch.inputs import MeshInput, Origin, inspect
 from sd2core.batch.synthesis import synthesise
 from sd2core.cli.recording_maps import MapName, maps_of
 from sd2core.datasets import kept_maps
-from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import Making, recording_sources
 from sd2core.datasets.writing import write_dataset
 from sd2core.doppler import Synthesizer
 from sd2core.maps import DopplerMap
 from sd2core.mesh.walls import Wall
+from sd2core.options.exporting import Exporting
 from sd2core.options.synthesis import Synthesis
 from sd2core.progress import silent
 from sd2core.recording.recording import MeshReading, Recording, open_recording
@@ -65,7 +65,7 @@ def test_a_second_export_counts_nothing_and_holds_the_same(
     written = []
     for name, length in (("first.zarr", 40), ("again.zarr", 40), ("longer.zarr", FRAMES)):
         sources = recording_sources([swinging.folder], ["anna"], Making(kinds=("synthetic",)))
-        options = DatasetOptions(kinds=("synthetic",), length=length, overlap=0)
+        options = Exporting(kinds=("synthetic",), segment_frames=length, overlap_frames=0)
         write_dataset(tmp_path / name, sources, options)
         with open_dataset(tmp_path / name) as dataset:
             written.append(np.concatenate(dataset["synthetic"][:]))

@@ -13,7 +13,6 @@ from sd2core.cli.classify.data import clips_of
 from sd2core.datasets.card import describe_dataset, limits
 from sd2core.datasets.labelled import labelled_facts
 from sd2core.datasets.labelled_source import LabelledSource
-from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.people import told_apart
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import Making
@@ -24,6 +23,7 @@ from sd2core.denoise.files import load_model
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.mesh.walls import Wall
+from sd2core.options.exporting import Exporting
 from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import PlacementGrid
 from sd2core.progress import silent
@@ -158,7 +158,7 @@ def test_who_is_not_named_is_another_person_in_each_file(said, files, names) -> 
 
 def test_another_scene_is_no_continuation(tmp_path: Path) -> None:
     one, out = scene(tmp_path / "duo.sd2"), tmp_path / "set.zarr"
-    making, options = Making(kinds=("synthetic",)), DatasetOptions(length=20)
+    making, options = Making(kinds=("synthetic",)), Exporting(segment_frames=20)
     write_dataset(out, gather([one.folder], making), options)
     assert write_dataset(out, gather([one.folder], making), options).added == 0
     for changed in (
@@ -178,7 +178,7 @@ def test_another_scene_is_no_continuation(tmp_path: Path) -> None:
 
 def test_people_are_kept_apart_and_the_card_says_what_shows_everybody(tmp_path: Path) -> None:
     one, out = scene(tmp_path / "duo.sd2"), tmp_path / "set.zarr"
-    making, options = Making(kinds=("synthetic", "simulated")), DatasetOptions(length=20)
+    making, options = Making(kinds=("synthetic", "simulated")), Exporting(segment_frames=20)
     write_dataset(out, gather([one.folder], making), options)
     with open_dataset(out) as dataset:
         assert dataset.header.subjects == ("anna", "bert")

@@ -15,7 +15,6 @@ from made_sources import LABELS, source
 
 from sd2core.datasets.clips import clips_of_dataset
 from sd2core.datasets.cutting import count_segments, cut_source
-from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.source import LabelledSpan, Source
@@ -25,7 +24,7 @@ from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.labels.statistics import label_statistics
-from sd2core.options.exporting import SpanOptions
+from sd2core.options.exporting import Exporting, SpanOptions
 from sd2core.recording.recording import open_recording
 
 NUMBERS = np.arange(3, dtype=np.int16)
@@ -41,7 +40,7 @@ def spanned(*spans: tuple[float, float, int], **others: object) -> Source:
 
 
 def cut(one: Source, options: SpanOptions, length: int = 120, rate_hz: float = 30.0) -> dict:
-    wanted = DatasetOptions(length=length, spans=options)
+    wanted = Exporting(segment_frames=length, spans=options)
     blocks = list(cut_source(one, rate_hz, (), NUMBERS, wanted))
     counted = count_segments(one.outline(), rate_hz, wanted)
     assert counted.total() == len(blocks)
@@ -118,7 +117,7 @@ def test_the_sample_has_as_many_segments_as_labels_are_counted() -> None:
     recording = open_recording(sample)
     (one,) = gather([sample], Making(kinds=("simulated",)))
     assert one.outline is not None
-    counts = count_segments(one.outline(), 30.0, DatasetOptions(spans=SpanOptions()))
+    counts = count_segments(one.outline(), 30.0, Exporting(spans=SpanOptions()))
     counted = {each.label: each.count for each in label_statistics(recording.labelled)}
     assert counts == Counter(counted)
     assert counts.total() == 8
@@ -129,7 +128,7 @@ def test_the_sample_has_as_many_segments_as_labels_are_counted() -> None:
 def test_what_is_written_tells_frames_of_spans_from_empty_ones(tmp_path: Path, ending: str) -> None:
     out = tmp_path / f"set{ending}"
     one = spanned((0.5, 1.0, 1), (1.0, 2.0, 2), (3.5, 5.0, 1))
-    options = DatasetOptions(length=40, spans=SpanOptions(margin_s=0.1, shortest_s=0.6))
+    options = Exporting(segment_frames=40, spans=SpanOptions(margin_s=0.1, shortest_s=0.6))
     written = write_dataset(out, [one], options)
     assert written.segments == 1
     with open_dataset(out) as dataset:
@@ -141,14 +140,14 @@ def test_what_is_written_tells_frames_of_spans_from_empty_ones(tmp_path: Path, e
     card = (tmp_path / "set.card.md").read_text(encoding="utf-8")
     assert "2 labelled spans are shorter than asked for" in card
     with pytest.raises(Sd2Error, match="spans as"):
-        write_dataset(out, [one], DatasetOptions(length=40))
+        write_dataset(out, [one], Exporting(segment_frames=40))
     learnt = SegmentDataset(out, "synthetic", "frame label")
     (_, labels) = learnt[0]
     assert torch.equal(labels == NOT_LEARNT, torch.from_numpy(~mask[0]))
 
 
 def test_stretched_spans_are_no_clips_for_classifiers_of_frames(tmp_path: Path) -> None:
-    options = DatasetOptions(length=20, spans=SpanOptions(length="resampled"))
+    options = Exporting(segment_frames=20, spans=SpanOptions(length="resampled"))
     write_dataset(tmp_path / "set.zarr", [spanned((0.5, 1.0, 1))], options)
     with open_dataset(tmp_path / "set.zarr") as dataset, pytest.raises(Sd2Error, match="stretched"):
         clips_of_dataset(dataset, "synthetic")
@@ -156,7 +155,7 @@ def test_stretched_spans_are_no_clips_for_classifiers_of_frames(tmp_path: Path) 
 
 def test_windows_that_are_not_pure_are_left_out() -> None:
     one = spanned((0.0, 0.5, 1), (1.0, 2.0, 2))
-    options = DatasetOptions(length=30, overlap=0, min_purity=0.6)
+    options = Exporting(segment_frames=30, overlap_frames=0, min_purity=0.6)
     blocks = list(cut_source(one, 30.0, (), NUMBERS, options))
     named = np.concatenate([block["segment_label"] for block in blocks])
     assert named.tolist() == [2, 0, 0]

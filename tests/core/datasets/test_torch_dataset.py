@@ -12,11 +12,11 @@ import torch
 from made_sources import LABELS, source
 from torch.utils.data import DataLoader
 
-from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.torch_dataset import NOT_LEARNT, SegmentDataset
 from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
+from sd2core.options.exporting import Exporting
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def stores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
                kinds=("synthetic", "real") if number % 2 else ("synthetic", "denoised"))
         for number in range(6)
     ]  # fmt: skip
-    options = DatasetOptions(length=24, overlap=4)
+    options = Exporting(segment_frames=24, overlap_frames=4)
     for ending in (".zarr", ".h5", ".npz"):
         write_dataset(folder / f"set{ending}", sources, options)
     return {ending: folder / f"set{ending}" for ending in (".zarr", ".h5", ".npz")}
@@ -106,7 +106,7 @@ def test_limb_maps_are_items_where_there_is_a_synthetic_map(tmp_path: Path) -> N
         source("r1", "s1", kinds=("synthetic", "real"), limbs=True),
         source("r2", "s1", kinds=("real",)),
     ]
-    options = DatasetOptions(length=24, overlap=4, limbs=True)
+    options = Exporting(segment_frames=24, overlap_frames=4, limbs=True)
     write_dataset(tmp_path / "set.zarr", sources, options)
     data = SegmentDataset(tmp_path / "set.zarr", "limbs", "synthetic", gain_db=3)
     assert 0 < len(data) == len(SegmentDataset(tmp_path / "set.zarr", "synthetic", "limbs"))

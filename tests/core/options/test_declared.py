@@ -14,7 +14,6 @@ import zarr
 
 from sd2core.datasets.card import describe_dataset
 from sd2core.datasets.clips import clips_of_dataset
-from sd2core.datasets.options import DatasetOptions
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
@@ -22,6 +21,7 @@ from sd2core.files.stores import array_in, open_group
 from sd2core.maps import DopplerMap
 from sd2core.options.bounds import Bounds
 from sd2core.options.declared import DeclaredColumn, column_bounds
+from sd2core.options.exporting import Exporting
 from sd2core.sensor import MAX_BINS, VelocityAxis
 from sd2core.timebase import Timebase
 from tests.core.datasets.made_sources import source
@@ -31,7 +31,7 @@ from tests.core.datasets.made_sources import source
 def written() -> dict[str, bytes]:
     with TemporaryDirectory() as folder:
         sources = [source("r1", "anna"), source("r1", "ben")]
-        write_dataset(Path(folder) / "set.npz", sources, DatasetOptions(length=20))
+        write_dataset(Path(folder) / "set.npz", sources, Exporting(segment_frames=20))
         return {file.name: file.read_bytes() for file in Path(folder).iterdir()}
 
 
