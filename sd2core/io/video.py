@@ -30,19 +30,11 @@ _SLANTED = 0.01
 
 @dataclass(frozen=True)
 class Upright:
-    """Quarter turns and mirroring of stored pictures: along which axes they are shown.
+    """Quarter turns and mirroring of stored pictures: along which axes they are shown."""
 
-    Parameters
-    ----------
-    swaps : bool
-        Rows become columns, before the picture is reversed.
-    down, right : int
-        -1 where the shown picture is reversed from top to bottom, or from left to right.
-    """
-
-    swaps: bool = False
-    down: int = 1
-    right: int = 1
+    swaps: bool = False  # rows become columns, before the picture is reversed
+    down: int = 1  # -1 where the shown picture is reversed from top to bottom
+    right: int = 1  # -1 where it is from left to right
     notes: tuple[str, ...] = ()
 
     @classmethod
