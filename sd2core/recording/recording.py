@@ -60,6 +60,7 @@ from sd2core.recording.relinking import (
     faces_role,
     find_again,
     is_many,
+    is_thing,
     role_words,
     thing_role,
 )
@@ -84,8 +85,8 @@ _AS_THEY_ARE = (
 )
 """Settings that ``recording.json`` holds as a recording does."""
 
-_AIDS: set[Role] = {"faces", "denoiser", "imu"}
-"""Files that are nothing to look at by themselves."""
+_SHOWN: set[Role] = {"video", "mesh", "radar"}
+"""Files that are something to look at by themselves."""
 
 
 class GoneError(Sd2Error):
@@ -248,12 +249,12 @@ class Recording:
         files: dict[Role, Path] = {}
         for role, path in self._files().items():
             # What went with the folder that it was in can be found again.
-            if not exists(role, Path(path)) and (copy or not self._is_gone):
-                if role == "denoiser":  # everything else can be shown without it
+            if not exists(role, path) and (copy or not self._is_gone):
+                if role == "denoiser" or is_thing(role):  # what else there is is shown without it
                     continue
                 raise Sd2Error(f"The {role_words(role)} {path} does not exist", "a file or folder")
-            files[role] = plain_path(Path(path))
-        if not files.keys() - _AIDS:
+            files[role] = plain_path(path)
+        if not files.keys() & _SHOWN:
             raise Sd2Error(
                 f"{folder} would hold nothing", "a video, a mesh or a radar capture, or several"
             )
@@ -261,15 +262,13 @@ class Recording:
         folder.mkdir(exist_ok=True)
         copied: list[Path] = []
         try:
-            things = self.things
             if copy:
                 files = _copied(files, folder, copied, progress)
-                things = _copied_things(things, folder, copied)
             made = replace(
                 self,
                 folder=folder,
                 **{role: path for role, path in files.items() if role in ROLES},  # type: ignore[arg-type]
-                things=things,
+                things=_with_files(self.things, files.get),
                 bodies=_with_paths(self.bodies, files.get),
                 title=self.title or folder.stem,
                 labels_elsewhere=False,
@@ -331,13 +330,7 @@ class Recording:
 
     def missing(self) -> dict[str, Path]:
         """Files that are not where the recording says, by their roles; those of things last."""
-        things = [
-            (thing_role(number), Path(thing.shape))
-            for number, thing in enumerate(self.things, start=1)
-            if thing.is_file
-        ]
-        files = [*self._files().items(), *things]
-        return {role: path for role, path in files if not exists(role, path)}
+        return {role: path for role, path in self._files().items() if not exists(role, path)}
 
     @property
     def things_there(self) -> tuple[Thing, ...]:
@@ -356,13 +349,11 @@ class Recording:
 
         See :func:`~sd2core.recording.relinking.find_again`.
         """
-        missing = self.missing()
-        relinked = find_again(missing, Path(folder), progress)
-        moved = {str(missing[role]): path for role, path in relinked.paths.items()}
+        relinked = find_again(self.missing(), Path(folder), progress)
         for role in relinked.paths.keys() & set(ROLES):
             setattr(self, role, relinked.paths[role])
         self.bodies = _with_paths(self.bodies, relinked.paths.get)
-        self.things = _with_files(self.things, lambda path: moved.get(path, path))
+        self.things = _with_files(self.things, relinked.paths.get)
         return relinked
 
     def save(self, timebase: Timebase | None = None) -> None:
@@ -410,7 +401,9 @@ class Recording:
         document.placements = None if self.placements is None else self.placements.as_dict()
         document.things = tuple(
             ThingEntry.model_validate(asdict(one))
-            for one in _with_files(self.things, lambda path: stored_path(Path(path), self.folder))
+            for one in _with_files(
+                self.things, lambda _, path: stored_path(Path(path), self.folder)
+            )
         )
         document.bodies = tuple(
             BodyEntry.model_validate(asdict(one))
@@ -614,9 +607,10 @@ class Recording:
     def _files(self) -> dict[Role, Path]:
         paths = {role: getattr(self, role) for role in ROLES}
         for index, one in enumerate(self.bodies):
-            paths |= {body_role(index): Path(one.path)}
-            paths |= {faces_role(index): None if one.faces is None else Path(one.faces)}
-        return {role: path for role, path in paths.items() if path is not None}
+            paths |= {body_role(index): one.path, faces_role(index): one.faces}
+        for number, thing in enumerate(self.things, start=1):
+            paths[thing_role(number)] = thing.shape if thing.is_file else None
+        return {role: Path(path) for role, path in paths.items() if path is not None}
 
     def _present(self, role: Role) -> Path:
         path: Path | None = getattr(self, role)
@@ -688,7 +682,7 @@ def settings_of(document: Document, folder: Path) -> dict[str, Any]:
         "placements": None if planned is None else placements_from_dict(planned),
         "things": _with_files(
             (Thing(**entry.model_dump()) for entry in document.things),
-            lambda path: located_path(path, folder),
+            lambda _, path: located_path(path, folder),
         ),
         "bodies": _with_paths(
             (
@@ -713,10 +707,13 @@ def _with_paths(bodies: Iterable[Body], path_of: Callable[[Role, str], object]) 
     )
 
 
-def _with_files(things: Iterable[Thing], path_of: Callable[[str], object]) -> tuple[Thing, ...]:
+def _with_files(
+    things: Iterable[Thing], path_of: Callable[[Role, str], object]
+) -> tuple[Thing, ...]:
     """The same things with other paths of their mesh files."""
     return tuple(
-        replace(one, shape=str(path_of(one.shape))) if one.is_file else one for one in things
+        replace(one, shape=str(path_of(thing_role(number), one.shape))) if one.is_file else one
+        for number, one in enumerate(things, start=1)
     )
 
 
@@ -755,18 +752,19 @@ def new_folder(folder: Path) -> Path:
 def _copied(
     files: dict[Role, Path], folder: Path, made: list[Path], progress: Progress
 ) -> dict[Role, Path]:
-    """Copy what lies outside ``folder`` into it; ``made`` lists the copies, for undoing."""
+    """Copy what lies outside ``folder`` into it, each once; ``made`` lists copies, for undoing."""
     from sd2core.io.radar import companions
 
     inside: dict[Role, Path] = {}
+    copies: dict[Path, Path] = {}
     for done, (role, source) in enumerate(files.items()):
         progress(done, len(files))
         if is_many(role, source):
             raise Sd2Error(
                 f"{source} stands for several files", "a folder, for copying", "Give their folder"
             )
-        if source.is_relative_to(folder):
-            inside[role] = source
+        if source.is_relative_to(folder) or source in copies:
+            inside[role] = copies.get(source, source)
             continue
         beside = companions(source) if role == "radar" else []
         # Files that belong together keep their names, in a folder of their own.
@@ -786,23 +784,6 @@ def _copied(
         (temporary / target.name).rename(target)
         made.append(target)
         temporary.rmdir()
-        inside[role] = target / source.name if beside else target
+        inside[role] = copies[source] = target / source.name if beside else target
     progress(len(files), len(files))
     return inside
-
-
-def _copied_things(things: tuple[Thing, ...], folder: Path, made: list[Path]) -> tuple[Thing, ...]:
-    """Copy mesh files of things into ``folder`` as :func:`_copied` does, each once."""
-    inside: dict[str, str] = {}
-    for thing in things:
-        path = Path(thing.shape)
-        if not thing.is_file or path.is_relative_to(folder) or thing.shape in inside:
-            continue
-        if not path.exists():  # it can be found again later
-            continue
-        target = free_path(folder, path.name, "thing", reserved=FILE_NAME)
-        made.append(target)
-        with full_disk_named(target):
-            shutil.copy2(path, target)
-        inside[thing.shape] = str(target)
-    return _with_files(things, lambda path: inside.get(path, path))

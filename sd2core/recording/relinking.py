@@ -39,6 +39,11 @@ def thing_role(number: int) -> Role:
     return f"{_THING}{number}"
 
 
+def is_thing(role: Role) -> bool:
+    """True for the role of the mesh file of a thing."""
+    return role.startswith(_THING)
+
+
 def role_words(role: Role) -> str:
     """Role of a file in a sentence, such as ``video`` or ``mesh of thing 2``."""
     if role.startswith((_BODY, _THING)):
