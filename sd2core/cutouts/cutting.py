@@ -158,11 +158,13 @@ def _write_all(
                 progress(start + frames, total)
 
             made = folder / f"{_UNFINISHED}{one.span.id}"
+            aside = made.with_name(f"{made.name}-before")  # for a folder that is in the way
             made.mkdir()
             try:
                 with full_disk_named(one.path):
                     _write_one(source, one.span, video, made, within)
-                    _put(made, one.path)
+                    replace_folder(made, one.path, aside)
+                shutil.rmtree(aside, ignore_errors=True)
             except BaseException:
                 shutil.rmtree(made, ignore_errors=True)
                 raise
@@ -210,13 +212,6 @@ def _write_clip(
     size = video.width + odd_x, video.height + odd_y
     rate = max(round(video.timebase.frames_per_s), 1)
     write_video(path, pictures(), rate, size, times_s=times_s, crf=_CRF, preset=_PRESET)
-
-
-def _put(made: Path, path: Path) -> None:
-    """Give a complete folder its name; one that is in the way goes aside first."""
-    aside = made.with_name(f"{made.name}-before")
-    replace_folder(made, path, aside)
-    shutil.rmtree(aside, ignore_errors=True)
 
 
 def _state(path: Path, described: dict[str, Any]) -> State:

@@ -20,6 +20,7 @@ from sd2core.datasets.layout import (
     check_arrays,
     chunk_of,
     row_shapes,
+    whole_names,
 )
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_file, atomic_write
@@ -121,12 +122,11 @@ def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], Any]:
     with ExitStack() as stack, refusing_damage(path, _EXPECTED):
         stack.push(file)
         meta = member_of(file, path, META)
-        if meta is None:
-            raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
-        header = Header.from_dict(_json(meta[()].decode("utf-8"), path), path)
+        text = "null" if meta is None else meta[()].decode("utf-8")
+        header = Header.from_dict(_json(text, path), path)
         arrays = {
             name: Hdf5Rows(member_of(file, path, name), path, name)
-            for name in _whole(header, file.keys(), path)
+            for name in whole_names(header, file.keys(), path)
         }
         check_arrays(header, arrays, path)
         stack.pop_all()
@@ -137,11 +137,9 @@ def open_npz(path: Path) -> tuple[Header, dict[str, Any], list[dict[str, Any]]]:
     """Read an NPZ data set: header, arrays and sources."""
     with open_npz_file(path, "a data set", _EXPECTED) as data:
         members = dict(data)
-    if META not in members:
-        raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
-    header = Header.from_dict(_json(str(members[META]), path), path)
+    header = Header.from_dict(_json(str(members.get(META, "null")), path), path)
     lines = [_json(str(line), path) for line in members.get(SOURCES, ())]
-    arrays = {name: members[name] for name in _whole(header, members.keys(), path)}
+    arrays = {name: members[name] for name in whole_names(header, members.keys(), path)}
     check_arrays(header, arrays, path)
     return header, arrays, lines
 
@@ -213,11 +211,3 @@ def _json(text: str, path: Path) -> Any:
         return json.loads(text)
     except ValueError as error:
         raise Sd2Error(f"{path}: its description is damaged ({error})", "JSON") from error
-
-
-def _whole(header: Header, existing: Iterable[str], path: Path) -> list[str]:
-    names = list(row_shapes(header))
-    missing = sorted({*names} - {*existing})
-    if missing:
-        raise Sd2Error(f"{path} lacks {', '.join(missing)}", "a data set that is whole")
-    return names

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -106,9 +106,11 @@ class Header:
         return {"format": FORMAT, "version": VERSION, **axis, "all_kinds": list(KINDS), **content}
 
     @classmethod
-    def from_dict(cls, entry: dict[str, Any], path: Path) -> Header:
-        """Parse :meth:`as_dict`; ``path`` is for messages."""
-        check_format(entry, path)
+    def from_dict(cls, entry: Any, path: Path) -> Header:
+        """Parse :meth:`as_dict`; ``path`` is for messages, as where it is no data set."""
+        if not isinstance(entry, dict) or entry.get("format") != FORMAT:
+            raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
+        check_version(entry, path, FORMAT, VERSION)
         with damage_in(path, f"{FORMAT} {VERSION}"):
             axis = VelocityAxis(int(entry["bins"]), float(entry["v_max_mps"]))
             names = (one.name for one in fields(cls) if one.name != "axis")
@@ -133,13 +135,6 @@ _ADDED: dict[str, Any] = {"imu": (), "spans": None, "min_purity": 0.0}
 _HEADER = TypeAdapter(Header)
 
 
-def check_format(entry: Any, path: Path) -> None:
-    """Refuse a file that is no data set, or of a later version."""
-    if not isinstance(entry, dict) or entry.get("format") != FORMAT:
-        raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
-    check_version(entry, path, FORMAT, VERSION)
-
-
 def format_of(path: Path) -> FileFormat:
     """Return the format of a data set by the ending of its name."""
     file_format = SUFFIXES.get(path.suffix.lower())
@@ -162,6 +157,15 @@ def row_shapes(header: Header) -> dict[str, tuple[str, tuple[int, ...]]]:
     if header.spans is not None:
         maps |= {"mask": ("bool", (header.length,)), "end_s": ("float64", ())}
     return maps | {"label": ("int16", (header.length,))} | COLUMNS
+
+
+def whole_names(header: Header, existing: Iterable[str], path: Path) -> list[str]:
+    """Return the names of all arrays that the header implies, and refuse where one is missing."""
+    names = list(row_shapes(header))
+    missing = sorted({*names} - {*existing})
+    if missing:
+        raise Sd2Error(f"{path} lacks {', '.join(missing)}", "a data set that is whole")
+    return names
 
 
 def check_arrays(header: Header, arrays: Mapping[str, Any], path: Path) -> None:

@@ -23,9 +23,9 @@ from sd2core.datasets.layout import (
     FORMAT,
     Header,
     check_arrays,
-    check_format,
     chunk_of,
     row_shapes,
+    whole_names,
 )
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
@@ -217,18 +217,16 @@ def open_arrays(path: Path) -> tuple[Header, dict[str, StoredArray]]:
         raise Sd2Error(f"{path} holds no data set", "one that `sd2 export` made")
     group = open_group(path)
     attributes = dict(group.attrs)
-    check_format(attributes, path)
+    header = Header.from_dict(attributes, path)
     if not attributes.get("complete"):
         raise Sd2Error(
             f"{path} was not written to its end",
             "a finished data set",
             "Run the command that made it once more: it goes on where it was",
         )
-    header = Header.from_dict(attributes, path)
-    missing = [name for name in row_shapes(header) if not (path / name / _DESCRIPTION).exists()]
-    if missing:
-        raise Sd2Error(f"{path} lacks {', '.join(missing)}", "a data set that is whole")
-    arrays = {name: array_in(group, path, name, "segments") for name in row_shapes(header)}
+    existing = (one.parent.name for one in path.glob(f"*/{_DESCRIPTION}"))
+    names = whole_names(header, existing, path)
+    arrays = {name: array_in(group, path, name, "segments") for name in names}
     check_arrays(header, arrays, path)
     return header, arrays
 

@@ -89,7 +89,8 @@ def cached_digest(path: Path) -> str:
     path = path.absolute()
     if sum(entry[1] for entry in deep_signature([path])) < _WORTH_KEEPING_BYTES:
         return file_digest(path)
-    place = _place(path)
+    name = hashlib.sha256(str(path).encode()).hexdigest()[:32]
+    place = user_cache("contents") / f"{name}.json"
     digests = Digests(*_kept(place))
     digest = digests.of(path)
     content = {"files": digests.files, "digests": digests.digests}
@@ -102,11 +103,6 @@ def _tree(path: Path) -> Iterable[Path]:
     yield path
     if path.is_dir():
         yield from sorted(path.rglob("*"))
-
-
-def _place(path: Path) -> Path:
-    folder = user_cache("contents")
-    return folder / f"{hashlib.sha256(str(path).encode()).hexdigest()[:32]}.json"
 
 
 def _kept(place: Path) -> tuple[Signature, dict[str, str]]:

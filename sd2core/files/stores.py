@@ -267,7 +267,9 @@ def open_group(path: Path, mode: Literal["r", "r+"] = "r") -> Any:
             for name in _DESCRIPTIONS:
                 for description in (*path.glob(name), *path.glob(f"*/{name}")):
                     check_size(description, _PARSED * description.stat().st_size)
-                    check_fetched(next(filter(_is_chunk, description.parent.rglob("*")), None))
+                    files_within = filter(Path.is_file, description.parent.rglob("*"))
+                    chunks = (one for one in files_within if one.name not in _DESCRIPTIONS)
+                    check_fetched(next(chunks, None))
         group = zarr.open_group(ZipStore(path, mode="r") if packed else str(path), mode=mode)
         _check_declared(group, path, files)
     except Sd2Error:
@@ -275,10 +277,6 @@ def open_group(path: Path, mode: Literal["r", "r+"] = "r") -> Any:
     except Exception as error:  # damaged descriptions fail in many ways
         raise _no_group(path, error) from error
     return group
-
-
-def _is_chunk(path: Path) -> bool:
-    return path.is_file() and path.name not in _DESCRIPTIONS
 
 
 def _check_declared(group: Any, path: Path, files: int) -> None:

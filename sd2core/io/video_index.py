@@ -82,7 +82,7 @@ def open_stream(path: Path) -> tuple[Any, Any]:
         container = av.open(f"file:{path}", options={"protocol_whitelist": "file"})
     except (FFmpegError, OSError, ValueError) as error:
         raise Sd2Error(
-            f"{path} cannot be read as a video ({_reason(error)})",
+            f"{path} cannot be read as a video ({getattr(error, 'strerror', None) or error})",
             "a complete video file such as .mp4, .mkv, .mov, .avi or .webm",
             "When it came from a copy or an aborted recording, copy or record it again",
         ) from error
@@ -346,8 +346,3 @@ def _nothing_decodes(path: Path) -> Sd2Error:
         "a video with at least one complete frame",
         "The file is damaged or cut short: copy or record it again",
     )
-
-
-def _reason(error: BaseException) -> str:
-    text = getattr(error, "strerror", None) or str(error)
-    return str(text)

@@ -186,12 +186,6 @@ def _refuse_map(path: Path) -> RadarCapture:
     )
 
 
-def _load_infineon(path: Path) -> RadarCapture:
-    folder = find_recording(path)
-    assert folder is not None
-    return load_infineon(folder)
-
-
 def _holds_dca1000(path: Path) -> bool:
     return path.is_dir() and any(one.suffix.lower() == dca1000.SUFFIX for one in path.iterdir())
 
@@ -223,7 +217,7 @@ _READERS: tuple[FileReader[RadarCapture], ...] = (
     FileReader(refuse_a111, recognises=lambda path: _maker_of(path) == "a111"),
     FileReader(_refuse_map, recognises=holds_map),
     FileReader(dca1000.load_dca1000, (dca1000.SUFFIX,)),
-    FileReader(_load_infineon, recognises=lambda path: find_recording(path) is not None),
+    FileReader(load_infineon, recognises=lambda path: find_recording(path) is not None),
     FileReader(dca1000.load_dca1000, recognises=_holds_dca1000),
     FileReader(_ask_description, recognises=lambda path: path.is_file() and is_describable(path)),
     FileReader(_ask_columns, TEXT_SUFFIXES),

@@ -58,11 +58,6 @@ class _Subsweep(BaseModel):
     step_length: int = Field(ge=1, le=10**5)
     profile: str = Field(pattern=r"^PROFILE_[1-5]$")
 
-    @property
-    def pulse_m(self) -> float:
-        """Width of the pulse."""
-        return PULSE_WIDTHS_M[int(self.profile[-1])]
-
 
 class _Sensor(BaseModel):
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
@@ -231,7 +226,7 @@ def _read(file: h5py.File, path: Path) -> RadarCapture:
         sweep_s, frame_s = frame_s, joined * frame_s
         shape = (len(frames) // joined, 1, joined, len(ranges_m))
         timebase = Timebase(timebase.times_s[::joined][: shape[0]])
-    width_m = max(one.pulse_m for one in sensor.subsweeps)
+    width_m = max(PULSE_WIDTHS_M[int(one.profile[-1])] for one in sensor.subsweeps)
     with errors_in(path):
         config = a121_radar(tuple(ranges_m.tolist()), width_m, shape[2], sweep_s, frame_s)
     place = f"{entry}/result/frame"

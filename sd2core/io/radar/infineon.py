@@ -93,11 +93,12 @@ def find_recording(path: Path) -> Path | None:
     return path if (path / _CONFIG).is_file() and (path / _TIMES).is_file() else None
 
 
-def load_infineon(folder: Path) -> RadarCapture:
-    """Read one recording folder; the samples are mapped, not loaded.
+def load_infineon(path: Path) -> RadarCapture:
+    """Read the recording that :func:`find_recording` finds; the samples are mapped, not loaded.
 
     Raises Sd2Error if a file is missing or damaged, or the files contradict each other.
     """
+    folder = find_recording(path) or path
     meta = _read_meta(folder / _META)
     config = _read_config(folder / _CONFIG, meta)
     _check_exists(folder / _DATA)

@@ -52,7 +52,10 @@ def open_stored(path: Path, dataset: str | None) -> StoredArray:
         raise Sd2Error(
             f"{path} is given with the dataset {dataset!r}", "datasets of HDF5 and MATLAB files"
         )
-    return _sigmf(path) if suffix in (META, DATA) else _numpy(path)
+    if suffix in (META, DATA):
+        return _sigmf(path)
+    array = open_npy_file(path, "a whole .npy of numbers", "It may be cut off: copy it again")
+    return StoredArray(array.shape, array.dtype, array.__getitem__)
 
 
 def array_names(path: Path) -> list[str]:
@@ -66,11 +69,6 @@ def array_names(path: Path) -> list[str]:
     except Sd2Error:
         pass
     return []
-
-
-def _numpy(path: Path) -> StoredArray:
-    array = open_npy_file(path, "a whole .npy of numbers", "It may be cut off: copy it again")
-    return StoredArray(array.shape, array.dtype, array.__getitem__)
 
 
 def _hdf5_names(path: Path) -> list[str]:

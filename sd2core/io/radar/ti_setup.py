@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import (
     AliasGenerator,
@@ -70,6 +71,9 @@ def is_studio_json(path: Path) -> bool:
 
 class _Part(BaseModel):
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+
+Part = TypeVar("Part", bound=_Part)
 
 
 def _inside(name: str) -> ConfigDict:
@@ -199,48 +203,30 @@ def _of_cfg(path: Path) -> TiSetup:
             f" {'are' if interleaved == 0 else 'are not'} interleaved. A line '% Platform:xWR14xx',"
             " or xWR14xx in the file's name, says otherwise."
         )
-    profiles = [
-        _Profile.model_construct(
-            profileId=_whole(one[0]),
-            startFreqConst_GHz=one[1],
-            idleTimeConst_usec=one[2],
-            adcStartTimeConst_usec=one[3],
-            rampEndTime_usec=one[4],
-            freqSlopeConst_MHz_usec=one[7],
-            numAdcSamples=_whole(one[9]),
-            digOutSampleRate=one[10],
-        )
-        for one in _all_numbers(commands, "profileCfg", 11)
-    ]
-    chirps = [
-        _Chirp.model_construct(
-            chirpStartIdx=_whole(one[0]),
-            chirpEndIdx=_whole(one[1]),
-            profileId=_whole(one[2]),
-            idleTimeVar_usec=one[5],
-            txEnable=_whole(one[7]),
-        )
-        for one in _all_numbers(commands, "chirpCfg", 8)
-    ]
+    profiles = _all_numbers(commands, "profileCfg", 11)
+    chirps = _all_numbers(commands, "chirpCfg", 8)
     device = _Device.model_construct(
         rxChannelEn=_whole(channels[0]),
         bits=_whole(adc[0]),
         output=_whole(adc[1]),
-        profiles=profiles,
-        chirps=chirps,
-        frame=_Frame.model_construct(
-            chirpStartIdx=_whole(frame[0]),
-            chirpEndIdx=_whole(frame[1]),
-            numLoops=_whole(frame[2]),
-            numFrames=_whole(frame[3]),
-            framePeriodicity_msec=frame[4],
-        ),
+        profiles=[_sent(_Profile, one, (0, 1, 2, 3, 4, 7, 9, 10)) for one in profiles],
+        chirps=[_sent(_Chirp, one, (0, 1, 2, 5, 7)) for one in chirps],
+        frame=_sent(_Frame, frame, range(5)),
         swapped=swapped,
         interleaved=interleaved,
         signs=[],
         shifts=[],
     )
     return _setup(device, lanes, notes)
+
+
+def _sent(part: type[Part], numbers: Sequence[float], places: Sequence[int]) -> Part:
+    """Part of a configuration whose fields, in their order, a command has at some places."""
+    values: dict[str, Any] = {
+        name: _whole(numbers[place]) if field.annotation is int else numbers[place]
+        for (name, field), place in zip(part.model_fields.items(), places, strict=True)
+    }
+    return part.model_construct(**values)
 
 
 def _commands_of_pymmw(text: str, path: Path) -> dict[str, list[list[str]]]:
