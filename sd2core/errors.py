@@ -28,6 +28,8 @@ class Sd2Error(Exception):
         What was expected instead.
     remedy : str
         What to do about it.
+    cure : Cure, optional
+        What puts it right: an option of a command line, or a button.
 
     Examples
     --------
@@ -39,22 +41,20 @@ class Sd2Error(Exception):
     times that increase from frame to frame
     """
 
-    cure: Cure | None = None
-    """What is to be done, for a button."""
-
-    def __init__(self, found: str, expected: str = "", remedy: str = "") -> None:
+    def __init__(
+        self, found: str, expected: str = "", remedy: str = "", cure: Cure | None = None
+    ) -> None:
         self.found = found
         self.expected = expected
         self.remedy = remedy
+        self.cure = cure
         super().__init__(found, expected, remedy)
 
     def within(self, place: object) -> Sd2Error:
         """Return the same error, said of a file; itself if it names that already."""
         if str(place) in self.found:
             return self
-        error = Sd2Error(f"{place}: {self.found}", self.expected, self.remedy)
-        error.cure = self.cure
-        return error
+        return Sd2Error(f"{place}: {self.found}", self.expected, self.remedy, self.cure)
 
     @property
     def arguments(self) -> dict[str, str]:

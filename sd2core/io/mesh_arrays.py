@@ -31,7 +31,6 @@ from sd2core.files.stores import (
 from sd2core.io.mesh_clock import clock_of, is_of_clock
 from sd2core.io.stored_vertices import StoredVertices
 from sd2core.mesh.sequence import MeshSequence, VertexArray, refuse_missing
-from sd2core.plausibility.findings import Finding
 from sd2core.progress import Progress, silent
 
 VERTEX_NAMES = ("vertices", "verts")
@@ -58,7 +57,7 @@ class RawMesh:
     times_s: NDArray[np.float64] | None = None
     frames_per_s: float | None = None
     notes: list[str] = field(default_factory=list)
-    findings: list[Finding] = field(default_factory=list)
+    findings: list[Sd2Error] = field(default_factory=list)
     vertex_counts: NDArray[np.int64] | None = None  # (V,), how many each stands for
     present: NDArray[np.bool_] | None = None  # (T,), False without a person
     limbs: tuple[str, ...] = ()  # names, in the order in which arrays number them

@@ -169,7 +169,7 @@ def _check_size(raw: RawMesh, sample: list[NDArray[np.float64]], source: str) ->
     extent_m = float(np.median([np.ptp(frame, axis=0).max() for frame in sample]))
     finding = judge_size(extent_m)
     if finding is not None and extent_m > LARGEST_BODY_M:
-        raise finding.error().within(source)
+        raise finding.within(source)
     if finding is not None:
         raw.findings.append(finding)
 

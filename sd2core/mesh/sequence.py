@@ -15,7 +15,6 @@ from sd2core.mesh.presence import Presence, checked
 from sd2core.mesh.things import Surroundings
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.plausibility.clock import gaps_between
-from sd2core.plausibility.findings import Finding
 from sd2core.timebase import Timebase
 
 
@@ -58,7 +57,7 @@ class MeshSequence:
         nothing may be concluded from. None: there is one in every frame.
     uncertainty : VelocityUncertainty, optional
         Standard deviations of the velocities; None: not stated.
-    findings : tuple of Finding
+    findings : tuple of Sd2Error
         What the reader found unlikely; in words it is among the notes.
     surroundings : Surroundings, optional
         Things that stand still around it; see :func:`sd2core.io.things.with_things`.
@@ -96,7 +95,7 @@ class MeshSequence:
     vertex_counts: NDArray[np.int64] | None = None
     present: NDArray[np.bool_] | None = None
     uncertainty: VelocityUncertainty | None = None
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Sd2Error, ...] = ()
     surroundings: Surroundings | None = None
     others: tuple[MeshSequence, ...] = ()
     person: str = ""

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.errors import Cure
-from sd2core.plausibility.findings import Finding
+from sd2core.errors import Cure, Sd2Error
 
 USUAL_FRAMES_PER_S = (5.0, 1000.0)
 """Rates outside are of no camera or radar that sees a body move."""
@@ -51,7 +50,7 @@ def probable_unit(step: float) -> tuple[str, float] | None:
     return None
 
 
-def judge_rate(step_s: float, *, of_a_mesh: bool = False) -> list[Finding]:
+def judge_rate(step_s: float, *, of_a_mesh: bool = False) -> list[Sd2Error]:
     """Findings on the typical time between frames; cures are options of a mesh."""
     slowest, fastest = USUAL_FRAMES_PER_S
     rate = 1.0 / step_s
@@ -76,7 +75,7 @@ def judge_rate(step_s: float, *, of_a_mesh: bool = False) -> list[Finding]:
         else:
             cause += ": pass --fps with the right rate"
     expected = f"{slowest:g} to {fastest:,g} frames/s"
-    return [Finding(f"The frames are {step_s:.4g} s apart, {rate:.3g} frames/s", expected, cause,
+    return [Sd2Error(f"The frames are {step_s:.4g} s apart, {rate:.3g} frames/s", expected, cause,
                     cure)]  # fmt: skip
 
 
@@ -92,7 +91,7 @@ def judge_clock(
     present: NDArray[np.bool_] | None = None,
     *,
     of_a_mesh: bool = False,
-) -> list[Finding]:
+) -> list[Sd2Error]:
     """Findings on the rate of frames and on gaps between them.
 
     Parameters
@@ -116,7 +115,7 @@ def judge_clock(
     if count and not findings:
         worst = int(np.argmax(np.where(gaps, steps_s, 0.0)))
         findings.append(
-            Finding(
+            Sd2Error(
                 f"{count:,} {'gap' if count == 1 else 'gaps'} in the times, the longest of"
                 f" {steps_s[worst]:.3g} s after frame {worst:,}",
                 f"about {usual_s:.3g} s from frame to frame",

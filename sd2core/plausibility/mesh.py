@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.errors import Cure
-from sd2core.plausibility.findings import Finding
+from sd2core.errors import Cure, Sd2Error
 
 LARGEST_BODY_M = 10.0
 _SMALLEST_BODY_M = 0.02
@@ -64,10 +63,10 @@ class BodyPoints:
         return np.flatnonzero(windows.all(axis=1))
 
 
-def judge_size(extent_m: float) -> Finding | None:
+def judge_size(extent_m: float) -> Sd2Error | None:
     """Finding on the largest measure of a body; one beyond ``LARGEST_BODY_M`` is to be refused."""
     if extent_m < _SMALLEST_BODY_M:
-        return Finding(
+        return Sd2Error(
             f"The mesh measures {extent_m * 1000:.3g} mm",
             remedy="When that is not its size in metres, pass --scale with the factor",
         )
@@ -80,7 +79,7 @@ def judge_size(extent_m: float) -> Finding | None:
             guess, option = f"These are probably {unit}", f"--scale {factor:g} {keeping}"
             cure = Cure("scale", factor, f"Read it as {unit}", option)
             break
-    return Finding(
+    return Sd2Error(
         f"The body measures {extent_m:,.0f} m",
         f"metres, a body below {LARGEST_BODY_M:g} m",
         guess,
@@ -88,7 +87,7 @@ def judge_size(extent_m: float) -> Finding | None:
     )
 
 
-def judge_place(body: BodyPoints) -> list[Finding]:
+def judge_place(body: BodyPoints) -> list[Sd2Error]:
     """Findings on where a body is in the camera's frame, and which way up."""
     present = body.present if body.present.any() else np.ones_like(body.present)
     points_m = body.points_m[present]
@@ -100,7 +99,7 @@ def judge_place(body: BodyPoints) -> list[Finding]:
         return [_behind(depth_m, bool((points_m[..., 2] < 0).all()), far_m < AT_ROOT_M)]
     if low <= extent_m[2] <= high and extent_m[2] > _LYING_SHARE * extent_m[:2].max():
         return [
-            Finding(
+            Sd2Error(
                 f"The body is {extent_m[2]:.2f} m long along the line of sight and"
                 f" {extent_m[1]:.2f} m high",
                 "y down and z forward",
@@ -110,7 +109,7 @@ def judge_place(body: BodyPoints) -> list[Finding]:
         ]
     if depth_m > _FARTHEST_M:
         return [
-            Finding(
+            Sd2Error(
                 f"The body is {depth_m:.0f} m away on average",
                 f"below {_FARTHEST_M:g} m",
                 "The focal length was probably guessed by the tool that made it: depth, and"
@@ -121,7 +120,7 @@ def judge_place(body: BodyPoints) -> list[Finding]:
     return []
 
 
-def _behind(depth_m: float, wholly: bool, at_root: bool) -> Finding:
+def _behind(depth_m: float, wholly: bool, at_root: bool) -> Sd2Error:
     cure = None
     remedy = (
         "A mesh with y up and z backward needs a half turn about x (--turn x180); one centred on"
@@ -132,7 +131,7 @@ def _behind(depth_m: float, wholly: bool, at_root: bool) -> Finding:
     elif wholly:
         remedy = "y probably points up and z backward"
         cure = Cure("turn", "x180", "Turn it to the front", "--turn x180")
-    return Finding(
+    return Sd2Error(
         f"The mesh is at a mean depth of {depth_m:.2f} m, at or behind the camera",
         "the camera's frame: x right, y down, z forward",
         remedy,
@@ -140,7 +139,7 @@ def _behind(depth_m: float, wholly: bool, at_root: bool) -> Finding:
     )
 
 
-def judge_motion(body: BodyPoints) -> list[Finding]:
+def judge_motion(body: BodyPoints) -> list[Sd2Error]:
     """Findings on the speed of a body, the change of its velocity, and the speed of its parts."""
     spacing_s = np.diff(body.times_s)[np.diff(body.frames) == 1]
     if not spacing_s.size:
@@ -173,7 +172,7 @@ def _too_fast(
     at: NDArray[np.int64],
     step: int,
     speed_mps: NDArray[np.float64],
-) -> Finding:
+) -> Sd2Error:
     """Finding on a body that is too fast, with what its pattern tells of the cause."""
     fast = speed_mps > _FASTEST_BODY_MPS
     often = float(fast.mean()) > _OFTEN
@@ -196,7 +195,7 @@ def _too_fast(
             " there are no motion"
         )
     worst = int(np.argmax(speed_mps))
-    return Finding(
+    return Sd2Error(
         f"The body moves at up to {speed_mps[worst]:,.0f} m/s, after frame"
         f" {body.frames[at[worst]]:,}; too fast in {int(fast.sum()):,} of {len(fast):,} steps",
         f"below {_FASTEST_BODY_MPS:g} m/s",
@@ -206,10 +205,10 @@ def _too_fast(
 
 def _jump(
     body: BodyPoints, at: int, step: int, change_mps: float, changes_mps: NDArray[np.float64]
-) -> Finding:
+) -> Sd2Error:
     duration_s = float(body.times_s[at + step] - body.times_s[at])
     count = int((changes_mps > _LARGEST_CHANGE_MPS).sum())
-    return Finding(
+    return Sd2Error(
         f"The body's velocity changes by {change_mps:.0f} m/s within {duration_s:.3g} s"
         f" ({change_mps / duration_s:,.0f} m/s²) at frame {body.frames[at + step]:,}, and too fast"
         f" {count:,} {'time' if count == 1 else 'times'} in all",
@@ -219,7 +218,7 @@ def _jump(
     )
 
 
-def _parts(body: BodyPoints, at: NDArray[np.int64], step: int) -> list[Finding]:
+def _parts(body: BodyPoints, at: NDArray[np.int64], step: int) -> list[Sd2Error]:
     """Finding on how a body's points move about its middle, which is itself not too fast."""
     about_m = body.points_m - body.points_m.mean(axis=1, keepdims=True)
     moved_m = np.linalg.norm(about_m[at + step] - about_m[at], axis=2)  # (n, N)
@@ -229,7 +228,7 @@ def _parts(body: BodyPoints, at: NDArray[np.int64], step: int) -> list[Finding]:
     if speed_mps[worst] <= _FASTEST_PARTS_MPS:
         return []
     return [
-        Finding(
+        Sd2Error(
             f"The parts of the body move at {speed_mps[worst]:,.0f} m/s on average after frame"
             f" {body.frames[at[worst]]:,}",
             f"below {_FASTEST_PARTS_MPS:g} m/s",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.errors import Sd2Error
 from sd2core.plausibility.clock import judge_clock
-from sd2core.plausibility.findings import Finding
 
 _LOST_SHARE = 0.01
 
@@ -17,7 +17,7 @@ def judge_map(
     present: NDArray[np.bool_] | None = None,
     *,
     measured: bool = True,
-) -> list[Finding]:
+) -> list[Sd2Error]:
     """Findings on a Doppler map.
 
     Parameters
@@ -36,7 +36,7 @@ def judge_map(
     count = int(empty.sum())
     if count == values.shape[1]:
         findings.append(
-            Finding(
+            Sd2Error(
                 "The map holds nothing but zeros",
                 "something that moves",
                 "The recording holds no signal, or its processing went wrong"
@@ -48,7 +48,7 @@ def judge_map(
         )
     elif measured and count > _LOST_SHARE * values.shape[1]:
         findings.append(
-            Finding(
+            Sd2Error(
                 f"{count:,} of {values.shape[1]:,} frames ({count / values.shape[1]:.0%}) hold"
                 " nothing but zeros",
                 "noise at least, in every frame",

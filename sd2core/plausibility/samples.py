@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.plausibility.findings import Finding
+from sd2core.errors import Sd2Error
 
 _USUAL_HZ = (10.0, 10_000.0)
 _GRAVITY_MPS2 = 9.81
@@ -19,7 +19,7 @@ def judge_inertial(
     times_s: NDArray[np.float64],
     acceleration_mps2: NDArray[np.float64],
     turn_rate_radps: NDArray[np.float64],
-) -> list[Finding]:
+) -> list[Sd2Error]:
     """Findings on the rate of samples, gravity and turn rates.
 
     Parameters
@@ -34,7 +34,7 @@ def judge_inertial(
         rate_hz = 1.0 / float(np.median(np.diff(times_s)))
         if not slowest <= rate_hz <= fastest:
             findings.append(
-                Finding(
+                Sd2Error(
                     f"The sensor gives {rate_hz:.3g} samples per second",
                     f"{slowest:g} to {fastest:,g}",
                     "Look at the unit of its times",
@@ -48,7 +48,7 @@ def judge_inertial(
     fastest_turn = float(np.max(turns, where=np.isfinite(turns), initial=0.0))
     if fastest_turn > _FASTEST_TURN_RADPS:
         findings.append(
-            Finding(
+            Sd2Error(
                 f"The sensor turns at up to {fastest_turn:,.0f} rad/s",
                 f"below {_FASTEST_TURN_RADPS:g} rad/s",
                 "These are probably degrees per second: state the unit in the heading",
@@ -57,7 +57,7 @@ def judge_inertial(
     return findings
 
 
-def _judge_gravity(usual_mps2: float) -> list[Finding]:
+def _judge_gravity(usual_mps2: float) -> list[Sd2Error]:
     low, high = _USUAL_MPS2
     if low <= usual_mps2 <= high:
         return []
@@ -68,7 +68,7 @@ def _judge_gravity(usual_mps2: float) -> list[Finding]:
         if low * factor <= usual_mps2 <= high * factor:
             cause = f"These are probably in {unit}: state the unit in the heading"
     return [
-        Finding(
+        Sd2Error(
             f"Accelerations are of {usual_mps2:.3g} m/s² typically",
             f"about {_GRAVITY_MPS2:g} m/s², which is gravity",
             cause,

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.plausibility.findings import Finding
+from sd2core.errors import Sd2Error
 
 _SLACK_S = 0.5
 """What programs put after the last frame, or round."""
@@ -37,7 +37,7 @@ def are_beyond(
 
 def judge_spans(
     spans_s: Sequence[tuple[float, float]], start_s: float, end_s: float
-) -> list[Finding]:
+) -> list[Sd2Error]:
     """Findings on spans beyond a recording.
 
     Parameters
@@ -63,7 +63,7 @@ def judge_spans(
     if end_s > 0 and float(np.median(spans[:, 1])) > 100 * end_s:
         cause = "Their times are probably milliseconds"
     return [
-        Finding(
+        Sd2Error(
             f"{count:,} of {len(spans):,} labels {'reaches' if count == 1 else 'reach'} beyond the"
             f" recording ({start_s:.4g} to {end_s:.4g} s), as far as {far_s:.6g} s",
             "labels within it",

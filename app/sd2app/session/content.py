@@ -16,7 +16,6 @@ from sd2core.io.kinds import Kind, kind_of
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.plausibility.findings import Finding
 from sd2core.plausibility.spans import judge_spans
 from sd2core.progress import Progress
 from sd2core.recording.recording import Recording, open_recording
@@ -212,9 +211,9 @@ def load_content(recording: Recording, progress: Progress) -> Content:
     )
 
 
-def offers_of(unlikely: Iterable[Exception | Finding]) -> tuple[OfferedCure, ...]:
+def offers_of(unlikely: Iterable[Exception]) -> tuple[OfferedCure, ...]:
     """What can be read another way, of errors and findings."""
-    known = [one for one in unlikely if isinstance(one, (Sd2Error, Finding))]
+    known = [one for one in unlikely if isinstance(one, Sd2Error)]
     return tuple(OfferedCure(one.words, one.cure) for one in known if one.cure is not None)
 
 
