@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 Value = TypeVar("Value")
 _LONGEST = 60
@@ -57,7 +57,7 @@ class Sd2Error(Exception):
         return Sd2Error(f"{place}: {self.found}", self.expected, self.remedy, self.cure)
 
     @property
-    def arguments(self) -> dict[str, str]:
+    def arguments(self) -> dict[str, Any]:
         """Arguments to make it anew in another process."""
         return {"found": self.found, "expected": self.expected, "remedy": self.remedy}
 

@@ -49,7 +49,7 @@ class Failure:
     """Failed task with its error (``found``, ``expected``, ``remedy``)."""
 
     task: Task
-    error: dict[str, str]
+    error: dict[str, Any]
     worker_died: bool = False
 
 
@@ -235,7 +235,7 @@ class Driver:
             return False
         return True
 
-    def _fail(self, task: Task, error: dict[str, str], worker_died: bool = False) -> None:
+    def _fail(self, task: Task, error: dict[str, Any], worker_died: bool = False) -> None:
         self.counts.failed[task.step] += 1
         self.counts.waiting += Counter(self._graph.lost_with(task))
         self._on_failure(Failure(task, error, worker_died))

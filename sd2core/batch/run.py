@@ -316,9 +316,9 @@ def _if_there(out: Sequence[str | Path], root: Path) -> str | None:
     return next(existing, None)
 
 
-def remove_old_leftovers(folder: Path, old_s: float = _OLD_S) -> None:
+def remove_old_leftovers(folder: Path) -> None:
     """Delete temporary files and folders of a batch that are no longer written to."""
-    before_s = time.time() - old_s
+    before_s = time.time() - _OLD_S
     for kind in _KINDS:
         for path in (folder / kind).glob("*/.*.tmp"):
             with suppress(OSError):  # of another user, or gone meanwhile

@@ -50,7 +50,7 @@ class Outcome:
     """Result of one task, as the worker sends it back."""
 
     seconds: float = 0.0
-    error: dict[str, str] | None = None  # "found", "expected" and "remedy" of a failed task
+    error: dict[str, Any] | None = None  # "found", "expected" and "remedy" of a failed task
     fatal: bool = False  # True if no other task can be done either
     deaths: int = 0  # workers that died during earlier attempts
     worker_died: bool = False  # True if the task is given up because of that

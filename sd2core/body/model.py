@@ -6,7 +6,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -120,22 +119,22 @@ class Body:
     skeleton: Skeleton
 
     @classmethod
-    def load(cls, resolution: Resolution = "high", path: Path | None = None) -> Body:
-        """Read one surface of the bundled body (or of another export).
+    def load(cls, resolution: Resolution = "high") -> Body:
+        """Read one surface of the bundled body.
 
         The resolutions have 13,348, 5,000 and 1,229 vertices, each one closed component; those
         of ``medium`` are vertices of ``high``. Raises Sd2Error if the file is missing, damaged or
         of a later version.
         """
         surface = [f"{resolution}_{part}" for part in ("vertices", "faces", "bones", "weights")]
-        vertices, faces, bones, weights = read_body_arrays(surface, path)
+        vertices, faces, bones, weights = read_body_arrays(surface)
         weights = weights.astype(np.float64)
         return cls(
             vertices_m=vertices.astype(np.float64),
             faces=faces.astype(np.int32),
             bones=bones.astype(np.intp),
             weights=weights / weights.sum(axis=1, keepdims=True),
-            skeleton=load_skeleton(path),
+            skeleton=load_skeleton(),
         )
 
     @property
@@ -144,9 +143,9 @@ class Body:
         return float(np.ptp(self.vertices_m[:, 1]))
 
 
-def load_skeleton(path: Path | None = None) -> Skeleton:
-    """Read the bones of the bundled body (or of another export)."""
-    names, parents, heads, tails = read_body_arrays(_SKELETON, path)
+def load_skeleton() -> Skeleton:
+    """Read the bones of the bundled body."""
+    names, parents, heads, tails = read_body_arrays(_SKELETON)
     return Skeleton(
         names=tuple(str(name) for name in names),
         parents=tuple(int(parent) for parent in parents),
@@ -155,14 +154,16 @@ def load_skeleton(path: Path | None = None) -> Skeleton:
     )
 
 
-def read_body_arrays(names: Sequence[str], path: Path | None = None) -> list[NDArray[Any]]:
-    """Arrays of the bundled body's file (or of another export), as they are stored.
+def read_body_arrays(names: Sequence[str]) -> list[NDArray[Any]]:
+    """Arrays of the bundled body's file, as they are stored.
 
     Raises Sd2Error if the file is missing, damaged, of a later version, or lacks one of them.
     """
-    path = resource_path("body.npz") if path is None else Path(path)
     command = "python -m tools.build_body export"
-    with open_bundled_arrays(path, FORMAT, VERSION, "a body", command) as (_, data):
+    with open_bundled_arrays(resource_path("body.npz"), FORMAT, VERSION, "a body", command) as (
+        _,
+        data,
+    ):
         return [data[name] for name in names]
 
 

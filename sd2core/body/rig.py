@@ -70,8 +70,7 @@ class KeypointSpace:
     def __init__(self, space: ShapeSpace) -> None:
         skeleton = space.base_skeleton
         vertices, directions = (
-            array.astype(np.float64)
-            for array in read_body_arrays(("high_vertices", "high_shape"), space.path)
+            array.astype(np.float64) for array in read_body_arrays(("high_vertices", "high_shape"))
         )
         self._space = space
         self.bones = np.empty(len(LANDMARKS), np.intp)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +39,7 @@ def check_stature(stature_m: float) -> None:
 
 
 class ShapeSpace:
-    """Directions of shape of the bundled body (or of the export at ``path``).
+    """Directions of shape of the bundled body.
 
     Attributes
     ----------
@@ -52,14 +51,13 @@ class ShapeSpace:
         Of the body whose coefficients are 0.
     """
 
-    def __init__(self, path: Path | None = None) -> None:
-        self.path = path
+    def __init__(self) -> None:
         names = ("shape_heads", "shape_mean", "shape_sd", "shape_polynomial", "high_vertices")
         self.heads_m, self.mean, self.sd, self._polynomial, vertices = (
-            array.astype(np.float64) for array in read_body_arrays(names, path)
+            array.astype(np.float64) for array in read_body_arrays(names)
         )
         self.base_stature_m = float(-vertices[:, 1].min())
-        self.base_skeleton = load_skeleton(path)
+        self.base_skeleton = load_skeleton()
 
     def __len__(self) -> int:
         return len(self.mean)
@@ -86,11 +84,11 @@ class ShapeSpace:
             raise Sd2Error(
                 f"a shape of {shape.coefficients.shape} coefficients", f"{self.mean.shape} of them"
             )
-        return self.shaped(Body.load(resolution, self.path), self.directions_m(resolution), shape)
+        return self.shaped(Body.load(resolution), self.directions_m(resolution), shape)
 
     def directions_m(self, resolution: Resolution) -> Floats:
         """Shift of the vertices per unit of each coefficient, (K, V, 3)."""
-        (directions,) = read_body_arrays((f"{resolution}_shape",), self.path)
+        (directions,) = read_body_arrays((f"{resolution}_shape",))
         return np.asarray(directions.astype(np.float64))
 
     def skeleton(self, shape: BodyShape) -> Skeleton:

@@ -118,7 +118,7 @@ def shape_of_outlines(
 
     sizes, directions = np.linalg.eigh(spread)
     basis = directions * np.sqrt(sizes)  # columns of one standard deviation each
-    surface = Body.load("low", space.path)
+    surface = Body.load("low")
     moves = space.directions_m("low")
 
     def shaped(steps: Floats) -> BodyShape:

@@ -44,7 +44,6 @@ def predicted_spans(
     options: SpanOptions | None = None,
     *,
     present: NDArray[np.bool_] | None = None,
-    first_id: int = 1,
 ) -> tuple[Span, ...]:
     """Find the runs of frames whose most probable class is a gesture.
 
@@ -57,8 +56,6 @@ def predicted_spans(
     present : bool array, shape (frames,), optional
         False in frames without a person: no span reaches across them, nor across a
         pause of the recording.
-    first_id : int
-        Of the first span; the others count on.
 
     Returns
     -------
@@ -99,7 +96,7 @@ def predicted_spans(
             continue
         spans.append(
             Span(
-                id=first_id + len(spans),
+                id=1 + len(spans),
                 track=TRACK,
                 start_s=start_s,
                 end_s=end_s,

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from sd2core.denoise.scaling import Compression
 from sd2core.errors import Sd2Error
 from sd2core.maps import mean_velocity_mps, peak_velocity_mps
+from sd2core.numerics.map_accuracy import relative_l1
 from sd2core.sensor import VelocityAxis
 
 
@@ -159,14 +160,9 @@ def map_error(
         for values in (estimate, target)
     )
     total, energy = float(wanted.sum()), float(answer.sum())
-
-    def relative_l1(estimated: NDArray[np.float64]) -> float:
-        difference = float(np.abs(estimated - wanted).sum())
-        without_target = float("inf") if difference > 0 else 0.0
-        return difference / total if total > 0 else without_target
-
-    relative = relative_l1(answer)
-    shape = relative_l1(answer * (total / energy)) if energy > 0 and total > 0 else relative
+    relative = shape = relative_l1(answer, wanted)
+    if energy > 0 and total > 0:
+        shape = relative_l1(answer * (total / energy), wanted)
     answer, wanted = compression.compress(answer), compression.compress(wanted)
     rmse = float(np.sqrt(((answer - wanted) ** 2).mean())) if answer.size else float("nan")
     return MapError(relative, shape, rmse, _correlation(answer.ravel(), wanted.ravel()))

@@ -395,7 +395,7 @@ class PreparedMesh:
     def _normals(self, block: Block) -> NDArray[np.int8]:
         points, faces = self._at_frames(block), self._faces()
         normals = np.empty(points.shape, np.int8)
-        visibility.vertex_normals_kernel(points, faces, 0, len(points), normals)
+        visibility.vertex_normals_kernel(points, faces, normals)
         return normals
 
     def _steadiness(self, block: Block) -> NDArray[np.float32]:
@@ -408,7 +408,7 @@ class PreparedMesh:
     def _area_vectors(self, block: Block) -> NDArray[np.float32]:
         points, faces = self._at_frames(block), self._faces()
         vectors = np.empty(points.shape, np.float32)
-        amplitude.vertex_area_vectors_kernel(points, faces, 0, len(points), vectors)
+        amplitude.vertex_area_vectors_kernel(points, faces, vectors)
         return vectors
 
     def _middles(self, block: Block) -> NDArray[np.float64]:
@@ -430,7 +430,7 @@ class PreparedMesh:
     def _areas(self, block: Block) -> NDArray[np.float32]:
         points, faces = self._at_frames(block), self._faces()
         areas = np.empty((len(points), points.shape[2]), np.float32)
-        amplitude.vertex_areas_kernel(points, faces, 0, len(points), areas)
+        amplitude.vertex_areas_kernel(points, faces, areas)
         return areas
 
     def _faces(self) -> NDArray[np.int32]:

@@ -16,27 +16,15 @@ NEAREST_RANGE_M = 0.1
 
 @compiled
 def vertex_areas_kernel(
-    positions: NDArray[np.float32],
-    faces: NDArray[np.int32],
-    first: int,
-    last: int,
-    areas: NDArray[np.float32],
+    positions: NDArray[np.float32], faces: NDArray[np.int32], areas: NDArray[np.float32]
 ) -> None:
     """Find the area that each vertex stands for: a third of its adjacent triangles.
 
     In double precision: the area of a sliver is the small difference of large products.
-
-    Parameters
-    ----------
-    positions : float array, shape (n, 3, V)
-        Metres.
-    faces : int32 array, shape (F, 3)
-    first, last : int
-        Half-open range of frames.
-    areas : float32 array, shape (n, V)
-        Written; square metres, whose sum over a frame is the area of the surface.
+    Positions (n, 3, V) are in metres, ``areas`` (n, V) are written in square metres; their sum
+    over a frame is the area of the surface.
     """
-    for t in range(first, last):
+    for t in range(positions.shape[0]):
         x, y, z = positions[t, 0], positions[t, 1], positions[t, 2]
         area = areas[t]
         area[:] = 0
@@ -54,31 +42,19 @@ def vertex_areas_kernel(
 
 @compiled
 def vertex_area_vectors_kernel(
-    positions: NDArray[np.float32],
-    faces: NDArray[np.int32],
-    first: int,
-    last: int,
-    vectors: NDArray[np.float32],
+    positions: NDArray[np.float32], faces: NDArray[np.int32], vectors: NDArray[np.float32]
 ) -> None:
     """Find the area vector of each vertex: a third of the sum of its adjacent triangles'.
 
     A triangle's area vector is its area times its outward unit normal. Its part
     along a direction is the area seen from there; a closed surface's sum to zero.
 
-    Parameters
-    ----------
-    positions : float array, shape (n, 3, V)
-        Metres.
-    faces : int32 array, shape (F, 3)
-        Counter-clockwise seen from outside.
-    first, last : int
-        Half-open range of frames.
-    vectors : float32 array, shape (n, 3, V)
-        Written; square metres.
+    Positions (n, 3, V) are in metres, faces (F, 3) counter-clockwise seen from outside; ``vectors``
+    (n, 3, V) are written in square metres.
     """
     vertices = positions.shape[2]
     total = np.empty((vertices, 3), np.float64)
-    for t in range(first, last):
+    for t in range(positions.shape[0]):
         sum_cross_products(positions[t], faces, total)
         for axis in range(3):
             for v in range(vertices):
@@ -124,5 +100,5 @@ def compile_kernels() -> None:
     """Call every kernel of this module once."""
     positions = np.zeros((1, 3, 3), np.float32)
     faces = np.array([[0, 1, 2]], np.int32)
-    vertex_areas_kernel(positions, faces, 0, 1, np.empty((1, 3), np.float32))
-    vertex_area_vectors_kernel(positions, faces, 0, 1, np.empty((1, 3, 3), np.float32))
+    vertex_areas_kernel(positions, faces, np.empty((1, 3), np.float32))
+    vertex_area_vectors_kernel(positions, faces, np.empty((1, 3, 3), np.float32))

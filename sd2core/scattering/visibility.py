@@ -96,27 +96,17 @@ def sum_cross_products(
 
 @compiled
 def vertex_normals_kernel(
-    positions: NDArray[np.float32],
-    faces: NDArray[np.int32],
-    first: int,
-    last: int,
-    normals: NDArray[np.int8],
+    positions: NDArray[np.float32], faces: NDArray[np.int32], normals: NDArray[np.int8]
 ) -> None:
     """Find area-weighted vertex normals as signed bytes.
 
-    Parameters
-    ----------
-    positions : float array, shape (n, 3, V)
-    faces : int32 array, shape (F, 3)
-        Counter-clockwise seen from outside.
-    first, last : int
-        Half-open range of frames.
-    normals : int8 array, shape (n, 3, V)
-        Written: :data:`NORMAL_SCALE` times the outward unit normal, zero where there is no surface.
+    Positions are (n, 3, V), faces (F, 3) counter-clockwise seen from outside; ``normals``
+    (n, 3, V) are written: :data:`NORMAL_SCALE` times the outward unit normal, zero where there is
+    no surface.
     """
     vertices = positions.shape[2]
     total = np.empty((vertices, 3), np.float64)
-    for t in range(first, last):
+    for t in range(positions.shape[0]):
         sum_cross_products(positions[t], faces, total)
         for v in range(vertices):
             set_normal(total, v, normals[t], v)
@@ -176,7 +166,7 @@ def compile_kernels() -> None:
     positions = np.zeros((1, 3, 3), np.float32)
     faces = np.array([[0, 1, 2]], np.int32)
     normals = np.empty((1, 3, 3), np.int8)
-    vertex_normals_kernel(positions, faces, 0, 1, normals)
+    vertex_normals_kernel(positions, faces, normals)
     zero = np.float32(0)
     x, nx = positions[0, 0], normals[0, 0]
     facing_kernel(x, x, x, nx, nx, nx, zero, zero, zero, np.empty(3, np.uint8))

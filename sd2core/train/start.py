@@ -84,7 +84,7 @@ def begin(
         lock.release()
 
 
-def go_on(out: Path, *, command: str = "", watch: Watch | None = None) -> Ending:
+def go_on(out: Path, *, watch: Watch | None = None) -> Ending:
     """Resume a run that was stopped, killed, or failed for a reason that is mended.
 
     On a CPU, with the same version of torch and the same number of threads, it ends with
@@ -103,7 +103,7 @@ def go_on(out: Path, *, command: str = "", watch: Watch | None = None) -> Ending
     lock = folder.lock()
     try:
         write_control(folder.control, "run")
-        return _trained(folder, config, command, watch, resume=resume, lock=lock)
+        return _trained(folder, config, "", watch, resume=resume, lock=lock)
     finally:
         lock.release()
 

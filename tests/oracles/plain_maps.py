@@ -71,8 +71,8 @@ def _facing(*arguments: Any) -> None:
 
 
 def _whole(function: Any) -> Any:
-    def kernel(points: Any, faces: Any, first: int, last: int, into: Any) -> None:
-        into[first:last] = function(points[first:last], faces)
+    def kernel(points: Any, faces: Any, into: Any) -> None:
+        into[:] = function(points, faces)
 
     return kernel
 

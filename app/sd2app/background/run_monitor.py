@@ -100,7 +100,8 @@ def reason_in(event: Mapping[str, Any]) -> str:
     error = event.get("error")
     if not isinstance(error, dict):
         return ""
-    return str(Sd2Error(*(str(error.get(part) or "") for part in ("found", "expected", "remedy"))))
+    found, *more = (str(error.get(part) or "") for part in ("found", "expected", "remedy"))
+    return str(Sd2Error(found, more[0], more[1]))
 
 
 class _Status(NamedTuple):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from sd2core.body import model
 from sd2core.body.model import Body, Resolution, vertex_normals
 from sd2core.body.rotations import about
 from sd2core.errors import Sd2Error
@@ -123,15 +124,16 @@ def test_normals_point_outwards(body: Body) -> None:
     assert outside.mean() < 0.02
 
 
-def test_a_damaged_file_is_named(tmp_path: Path) -> None:
+def test_a_damaged_file_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     broken = tmp_path / "body.npz"
     broken.write_bytes(resource_path("body.npz").read_bytes()[:5000])
+    monkeypatch.setattr(model, "resource_path", tmp_path.joinpath)
     with pytest.raises(Sd2Error, match=r"body\.npz cannot be read as a body"):
-        Body.load("low", broken)
+        Body.load("low")
 
 
-def test_a_later_version_is_refused(tmp_path: Path) -> None:
-    later = tmp_path / "body.npz"
-    np.savez(later, meta='{"format": "sd2-body", "version": 99}')
+def test_a_later_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model, "resource_path", tmp_path.joinpath)
+    np.savez(tmp_path / "body.npz", meta='{"format": "sd2-body", "version": 99}')
     with pytest.raises(Sd2Error, match="version 99"):
-        Body.load("low", later)
+        Body.load("low")

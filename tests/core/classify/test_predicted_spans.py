@@ -38,10 +38,10 @@ def found(labels: list[int], options: SpanOptions | None = None, **more) -> list
 def test_runs_of_frames_are_spans_with_their_mean_probability() -> None:
     values = sure([0, 1, 1, 1, 0, 2, 2, 0])
     values[1:4, 1] = [0.5, 0.7, 0.9]
-    spans = predicted_spans(values, Timebase.regular(8, 10.0), CLASSES, EXACT, first_id=7)
+    spans = predicted_spans(values, Timebase.regular(8, 10.0), CLASSES, EXACT)
     assert [(one.id, one.label, one.start_s, one.end_s) for one in spans] == [
-        (7, "horizontal", pytest.approx(0.1), pytest.approx(0.4)),
-        (8, "vertical", pytest.approx(0.5), pytest.approx(0.7)),
+        (1, "horizontal", pytest.approx(0.1), pytest.approx(0.4)),
+        (2, "vertical", pytest.approx(0.5), pytest.approx(0.7)),
     ]
     assert spans[0].confidence == pytest.approx(0.7)
     assert all(one.origin == "suggestion" and one.track == TRACK for one in spans)

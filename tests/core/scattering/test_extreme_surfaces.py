@@ -77,7 +77,7 @@ def facing(
     points: NDArray[np.float32], faces: NDArray[np.int32], sensor: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     normals = np.empty(points.shape, np.int8)
-    vertex_normals_kernel(points, faces, 0, 1, normals)
+    vertex_normals_kernel(points, faces, normals)
     visible = np.full(points.shape[2], 7, np.uint8)
     facing_kernel(*points[0], *normals[0], *sensor.astype(np.float32), visible)
     return visible == 1
@@ -233,7 +233,7 @@ def test_areas(name: str, size_m: float) -> None:
     truth = np.zeros(points.shape[2], np.longdouble)
     np.add.at(truth, faces.ravel(), np.repeat(third, 3))
     compiled = np.empty((1, points.shape[2]), np.float32)
-    vertex_areas_kernel(points, faces, 0, 1, compiled)
+    vertex_areas_kernel(points, faces, compiled)
     most = np.bincount(faces.ravel()).max()
     # Every triangle's third and every sum is rounded to single precision. The cross product
     # of two edges is good to 4 double roundings of the product of their lengths.
@@ -260,7 +260,7 @@ def test_areas_of_a_tower_of_slivers() -> None:
     cross = np.cross(corner[:, :, 1] - corner[:, :, 0], corner[:, :, 2] - corner[:, :, 0], axis=0)
     truth = 0.5 * np.linalg.norm(cross, axis=0).sum()
     compiled = np.empty((1, points.shape[2]), np.float32)
-    vertex_areas_kernel(points, faces, 0, 1, compiled)
+    vertex_areas_kernel(points, faces, compiled)
     # As above; the reference's own double products are wrong by 1e-16 of 1 m x 1 m each.
     assert abs(compiled.sum(dtype=np.float64) - truth) <= 8 * SINGLE * truth
 

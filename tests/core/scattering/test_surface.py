@@ -31,10 +31,10 @@ def test_compiled_normals_and_areas_are_the_plain_ones() -> None:
     vertices, faces = together(sphere(0.5), plate(1.0))
     points = np.concatenate([columns(vertices), columns(vertices * [1.0, 0.7, 1.3])])
     normals = np.empty(points.shape, np.int8)
-    vertex_normals_kernel(points, faces, 0, 2, normals)
+    vertex_normals_kernel(points, faces, normals)
     np.testing.assert_array_equal(normals, vertex_normals(points, faces))
     areas = np.empty((2, points.shape[2]), np.float32)
-    vertex_areas_kernel(points, faces, 0, 2, areas)
+    vertex_areas_kernel(points, faces, areas)
     np.testing.assert_allclose(areas, vertex_areas(points, faces), rtol=1e-5)
 
 
@@ -74,7 +74,7 @@ def test_compiled_area_vectors_are_the_plain_ones() -> None:
     vertices, faces = together(sphere(0.5), plate(1.0))
     points = np.concatenate([columns(vertices), columns(vertices * [1.0, 0.7, 1.3])])
     vectors = np.empty(points.shape, np.float32)
-    vertex_area_vectors_kernel(points, faces, 0, 2, vectors)
+    vertex_area_vectors_kernel(points, faces, vectors)
     # Both sum in double precision; what is compared has been rounded to single.
     plain = vertex_area_vectors(points, faces)
     np.testing.assert_allclose(vectors, plain, rtol=1e-6, atol=1e-6 * np.abs(plain).max())
