@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,34 +12,17 @@ from sd2core.labels.per_frame import BACKGROUND
 from sd2core.labels.spans import Span
 from sd2core.labels.suggest import TRACK, frame_ends_s, stretches
 from sd2core.mesh.presence import checked
+from sd2core.options.suggesting import PredictedSpans
 from sd2core.timebase import Timebase
 
 _ROUNDING_S = 1e-6
-
-
-@dataclass(frozen=True)
-class SpanOptions:
-    """Conditions for frames of a class to be a span."""
-
-    min_duration_s: float = 0.2  # shorter ones are left out
-    merge_gap_s: float = 0.1
-    """Frames of other classes up to this long do not end a span, nor begin one."""
-    min_confidence: float = 0.0  # spans whose class is less probable on average are left out
-
-    def __post_init__(self) -> None:
-        for name in ("min_duration_s", "merge_gap_s"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise Sd2Error(f"{name} is {value}", "a finite number from 0 on")
-        if not 0.0 <= self.min_confidence <= 1.0:
-            raise Sd2Error(f"min_confidence is {self.min_confidence}", "0 to 1")
 
 
 def predicted_spans(
     probabilities: NDArray[np.floating],
     timebase: Timebase,
     classes: Sequence[str],
-    options: SpanOptions | None = None,
+    options: PredictedSpans | None = None,
     *,
     present: NDArray[np.bool_] | None = None,
 ) -> tuple[Span, ...]:
@@ -63,7 +44,8 @@ def predicted_spans(
         Of origin ``"suggestion"``; they do not overlap. The confidence is the mean
         probability of the span's class over its frames.
     """
-    options = options or SpanOptions()
+    options = options or PredictedSpans()
+    least = options.min_confidence or 0.0
     values = _checked(probabilities, len(timebase), len(classes))
     mask = np.ones(len(timebase), bool) if present is None else checked(present, len(timebase))
     first, last = stretches(timebase, mask)
@@ -92,7 +74,7 @@ def predicted_spans(
     for start, stop, number in joined:
         start_s, end_s = float(starts_s[start]), float(ends_s[stop - 1])
         sure = min(float(values[start:stop, number].mean()), 1.0)
-        if end_s - start_s < options.min_duration_s - _ROUNDING_S or sure < options.min_confidence:
+        if end_s - start_s < options.min_duration_s - _ROUNDING_S or sure < least:
             continue
         spans.append(
             Span(

@@ -1,9 +1,27 @@
-"""Options of suggesting spans in which something moves."""
+"""Options of suggesting spans: in which something moves, or a gesture is predicted."""
 
 from __future__ import annotations
 
-from sd2core.options.kinds import NotNegative
+from sd2core.options.kinds import NotNegative, Share
 from sd2core.options.records import OptionError, OptionRecord
+
+
+class PredictedSpans(OptionRecord):
+    """Conditions for frames of a predicted class to be a span.
+
+    Parameters
+    ----------
+    min_duration_s : S
+        shorter spans are left out
+    merge_gap_s : S
+        merge spans of a class with a shorter gap between them
+    min_confidence : SHARE
+        spans whose class is less probable on average are left out, as 50% or 0.5 (default: none)
+    """
+
+    min_duration_s: NotNegative = 0.2
+    merge_gap_s: NotNegative = 0.1
+    min_confidence: Share | None = None
 
 
 class SuggestOptions(OptionRecord):

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sd2core.classify.data import ClipSet
 from sd2core.classify.live import TrainedClassifier, judge
 from sd2core.classify.metrics import Score, mean_recall
-from sd2core.classify.spans import SpanOptions, predicted_spans
+from sd2core.classify.spans import predicted_spans
 from sd2core.classify.splitting import dealt
 from sd2core.classify.training import TrainOptions, train
 from sd2core.cli.classify.data import clips_of
@@ -28,7 +28,7 @@ from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.io.radar.kkt import RecordedMap, load_kkt
 from sd2core.labels.matching import match_spans
 from sd2core.labels.suggest import suggest_spans
-from sd2core.options.suggesting import SuggestOptions
+from sd2core.options.suggesting import PredictedSpans, SuggestOptions
 from sd2core.study.plan import Learner
 from tools.documentation.pages import spread_of, table, write_filled
 from tools.documentation.places import BUILD, SHARED
@@ -39,7 +39,7 @@ DATA = [SHARED / "radar" / f"kkt_gestures{more}" for more in ("", "_more", "_stu
 SPLITS = 3
 KERNEL = TrainOptions(model="kernel", delay_s=0.9)
 KERNEL_NAME = "kernel, columns, after 0.9 s"
-SPANS = SpanOptions(min_duration_s=0.5, merge_gap_s=0.2)
+SPANS = PredictedSpans(min_duration_s=0.5, merge_gap_s=0.2)
 IOUS = (0.3, 0.4, 0.5, 0.6, 0.7)
 """Options are chosen by the mean F1 over these: with few files F1 at one of them has steps."""
 AT = IOUS.index(0.5)

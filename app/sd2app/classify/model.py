@@ -19,9 +19,10 @@ from sd2app.session.session import Session
 from sd2app.suggestions.finders import SearchResult, Threshold
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.files import GESTURES
-from sd2core.classify.spans import SpanOptions, predicted_spans
+from sd2core.classify.spans import predicted_spans
 from sd2core.cli.classify.trained import Apply
 from sd2core.options.records import words_of
+from sd2core.options.suggesting import PredictedSpans
 
 _PATIENCE_MS = 1500
 """Delay after the first map before the last session's classifier is loaded."""
@@ -182,7 +183,7 @@ class ClassifyModel(ReportingModel):
         assert card is not None
         doppler, shares = source.map, self.track.shares.copy()
         timebase = doppler.timebase.shifted(source.offset_s)
-        options = SpanOptions(min_confidence=threshold / 100.0)
+        options = PredictedSpans(min_confidence=threshold / 100.0 or None)
         names = {name: self.label_of(name) for name in card.classes}
 
         def look() -> SearchResult:

@@ -19,9 +19,9 @@ from sd2core.cli.labels.suggest import (
 from sd2core.cli.output import counted, print_json, print_rows, progress_bar
 from sd2core.cli.recording_maps import MapName, parsed_maps
 from sd2core.errors import Sd2Error
-from sd2core.options.kinds import NotNegative, Share
 from sd2core.options.records import OptionRecord, Place
 from sd2core.options.shared import Json
+from sd2core.options.suggesting import PredictedSpans
 
 if TYPE_CHECKING:
     from sd2core.classify.card import ClassifierCard
@@ -61,7 +61,7 @@ class Evaluate(SourcesAndMaps, TrainedModel, Judging):
     """
 
 
-class Apply(SearchedMap, TrainedModel, Json):
+class Apply(PredictedSpans, SearchedMap, TrainedModel, Json):
     """Options of ``sd2 classify apply``.
 
     Parameters
@@ -70,19 +70,10 @@ class Apply(SearchedMap, TrainedModel, Json):
         which map of a recording (default: of a kind that was learnt from; synthetic, or radar)
     probabilities : FILE.npz
         write `probabilities` (frames, classes), `times_s` and `classes`
-    min_duration_s : S
-        shorter spans are left out
-    merge_gap_s : S
-        merge spans of a class with a shorter gap between them
-    min_confidence : SHARE
-        spans whose class is less probable on average are left out, as 50% or 0.5 (default: none)
     """
 
     of: MapName | None = None
     probabilities: Annotated[Path | None, Place(endings=(".npz",))] = None
-    min_duration_s: NotNegative = 0.2
-    merge_gap_s: NotNegative = 0.1
-    min_confidence: Share | None = None
 
 
 @command("eval", Evaluate, DATA_HELP)
@@ -184,14 +175,13 @@ def _apply(options: Apply) -> None:
     import numpy as np
 
     from sd2core.classify.files import describe_classifier, load_classifier
-    from sd2core.classify.spans import SpanOptions, predicted_spans
+    from sd2core.classify.spans import predicted_spans
     from sd2core.denoise.resample_to_model import check_bins
     from sd2core.files.atomic import atomic_write
     from sd2core.files.texts import errors_in
 
     if options.out is not None:
         check_label_output(options.out)
-    chosen = SpanOptions(options.min_duration_s, options.merge_gap_s, options.min_confidence or 0.0)
     card = describe_classifier(options.classifier)
     doppler, clock = map_and_clock(options, card.axis, card.trained_on)
     # Before torch is loaded, which takes seconds.
@@ -200,7 +190,7 @@ def _apply(options: Apply) -> None:
     with progress_bar("Classifying") as progress:
         probabilities = load_classifier(options.classifier).probabilities(doppler, progress)
     spans = predicted_spans(
-        probabilities, doppler.timebase, card.classes, chosen, present=doppler.present
+        probabilities, doppler.timebase, card.classes, options, present=doppler.present
     )
     lost = write_spans(options, spans, clock)
     if options.probabilities is not None:

@@ -9,16 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2core.classify.spans import SpanOptions, predicted_spans
+from sd2core.classify.spans import predicted_spans
 from sd2core.errors import Sd2Error
 from sd2core.labels.field_edits import offer
 from sd2core.labels.free_time import LabelledFrames
 from sd2core.labels.spans import Labels
 from sd2core.labels.suggest import TRACK
+from sd2core.options.suggesting import PredictedSpans
 from sd2core.timebase import Timebase
 
 CLASSES = ("background", "horizontal", "vertical")
-EXACT = SpanOptions(min_duration_s=0.0, merge_gap_s=0.0)
+EXACT = PredictedSpans(min_duration_s=0.0, merge_gap_s=0.0)
 
 
 def sure(labels: list[int], share: float = 0.8) -> np.ndarray:
@@ -28,7 +29,7 @@ def sure(labels: list[int], share: float = 0.8) -> np.ndarray:
     return values
 
 
-def found(labels: list[int], options: SpanOptions | None = None, **more) -> list[tuple]:
+def found(labels: list[int], options: PredictedSpans | None = None, **more) -> list[tuple]:
     spans = predicted_spans(
         sure(labels), Timebase.regular(len(labels), 10.0), CLASSES, options, **more
     )
@@ -55,7 +56,9 @@ def test_short_ones_are_left_out_and_short_gaps_do_not_part() -> None:
 
 def test_a_blip_of_another_class_is_part_of_the_span() -> None:
     assert found([1, 1, 1, 2, 1, 1, 1]) == [("horizontal", 0.0, 0.7)]
-    assert found([1, 1, 1, 2, 0, 1, 1, 1], SpanOptions(0.0, 0.2)) == [("horizontal", 0.0, 0.8)]
+    assert found([1, 1, 1, 2, 0, 1, 1, 1], PredictedSpans(min_duration_s=0.0, merge_gap_s=0.2)) == [
+        ("horizontal", 0.0, 0.8)
+    ]
     assert found([1, 1, 1, 2, 2, 1, 1]) == [
         ("horizontal", 0.0, 0.3),
         ("vertical", 0.3, 0.5),
@@ -73,8 +76,8 @@ def test_no_span_reaches_across_absence_or_a_pause() -> None:
 
 
 def test_unsure_spans_can_be_left_out() -> None:
-    assert found([1] * 5, SpanOptions(min_confidence=0.9)) == []
-    assert len(found([1] * 5, SpanOptions(min_confidence=0.8))) == 1
+    assert found([1] * 5, PredictedSpans(min_confidence=0.9)) == []
+    assert len(found([1] * 5, PredictedSpans(min_confidence=0.8))) == 1
 
 
 @given(
@@ -86,7 +89,9 @@ def test_spans_never_overlap_and_begin_and_end_with_their_class(
     labels: list[int], gap_s: float, least_s: float
 ) -> None:
     clock = Timebase.regular(len(labels), 10.0)
-    spans = predicted_spans(sure(labels), clock, CLASSES, SpanOptions(least_s, gap_s))
+    spans = predicted_spans(
+        sure(labels), clock, CLASSES, PredictedSpans(min_duration_s=least_s, merge_gap_s=gap_s)
+    )
     for one, after in pairwise(spans):
         assert one.end_s <= after.start_s
     for one in spans:
@@ -106,8 +111,8 @@ def test_they_are_offered_like_other_suggestions() -> None:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: found([1], SpanOptions(min_duration_s=-1.0)), "min_duration_s is -1"),
-        (lambda: found([1], SpanOptions(min_confidence=2.0)), "min_confidence is 2"),
+        (lambda: found([1], PredictedSpans(min_duration_s=-1.0)), "min_duration_s is -1"),
+        (lambda: found([1], PredictedSpans(min_confidence=2.0)), "min_confidence is 2"),
         (
             lambda: predicted_spans(sure([0, 1]), Timebase.regular(3, 10.0), CLASSES),
             r"\(3 frames, 3 classes\)",
