@@ -21,7 +21,7 @@ VERSION = 2
 INFLUENCES = 8
 """Bones per vertex, at most."""
 
-_SKELETON = ("bone_names", "bone_parents", "bone_heads", "bone_tails")
+_SKELETON = ("bone_names", "bone_parents", "bone_heads")
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,6 @@ class Skeleton:
     names: tuple[str, ...]
     parents: tuple[int, ...]  # -1 for the root
     heads_m: Floats  # (B, 3) points about which the bones turn
-    tails_m: Floats  # (B, 3)
 
     @cached_property
     def index(self) -> Mapping[str, int]:
@@ -61,7 +60,6 @@ class Skeleton:
             tuple(self.names[bone] for bone in numbers),
             tuple(place[self.parents[bone]] for bone in numbers),
             self.heads_m[rows],
-            self.tails_m[rows],
         )
         return pruned, rows
 
@@ -145,12 +143,11 @@ class Body:
 
 def load_skeleton() -> Skeleton:
     """Read the bones of the bundled body."""
-    names, parents, heads, tails = read_body_arrays(_SKELETON)
+    names, parents, heads = read_body_arrays(_SKELETON)
     return Skeleton(
         names=tuple(str(name) for name in names),
         parents=tuple(int(parent) for parent in parents),
         heads_m=heads.astype(np.float64),
-        tails_m=tails.astype(np.float64),
     )
 
 

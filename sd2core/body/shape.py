@@ -96,10 +96,7 @@ class ShapeSpace:
         scale = shape.stature_m / self.base_stature_m
         heads = np.tensordot(shape.coefficients, self.heads_m, 1)
         base = self.base_skeleton
-        # Tails, which pose nothing, go with their own bone's head.
-        return replace(
-            base, heads_m=scale * (base.heads_m + heads), tails_m=scale * (base.tails_m + heads)
-        )
+        return replace(base, heads_m=scale * (base.heads_m + heads))
 
     def shaped(self, body: Body, directions_m: Floats, shape: BodyShape) -> Body:
         """A body moved along directions (K, V, 3) and scaled to its stature."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +102,7 @@ def swap_odds(track: RawTrack) -> Floats:
     breaks = np.flatnonzero(np.diff(track.times_s[rows]) > _LONGEST_GAP_S) + 1
     for stretch in np.split(rows, breaks):
         if len(stretch) > 1:
-            odds[stretch] = _odds(_bundled(), track, stretch)
+            odds[stretch] = _odds(load_sides(), track, stretch)
     return odds
 
 
@@ -152,13 +151,9 @@ def likely_swaps(network: Network, seen: Seen) -> NDArray[np.float32]:
 
 
 @lru_cache(maxsize=1)
-def _bundled() -> Network:
-    return load_sides()
-
-
-def load_sides(path: Path | None = None) -> Network:
-    """Read the bundled network, or another one; Sd2Error if it is missing, damaged or newer."""
-    path = resource_path("sides.npz") if path is None else Path(path)
+def load_sides() -> Network:
+    """Read the bundled network; Sd2Error if it is missing, damaged or newer."""
+    path = resource_path("sides.npz")
     command = "python -m tools.train_lifter sides"
     with open_bundled_arrays(path, FORMAT, VERSION, "what tells sides", command) as (meta, data):
         return network_of(meta, data)

@@ -151,15 +151,9 @@ def synthesize_alike(
     return tuple(maps)
 
 
-def map_l1(
-    values: DopplerMap, reference: DopplerMap, frames: NDArray[np.bool_] | None = None
-) -> float:
-    """Sum of absolute differences over the sum of the reference, both smoothed.
+def map_l1(values: DopplerMap, reference: DopplerMap) -> float:
+    """Sum of absolute differences of two maps of one shape over the sum of the reference.
 
-    Both maps are of one shape; ``frames`` restricts the sums. 0 when both are empty,
-    infinite when only the reference is.
+    0 when both are empty, infinite when only the reference is.
     """
-    a, b = (one.values.astype(np.float64) for one in (values, reference))
-    if frames is not None:
-        a, b = a[:, frames], b[:, frames]
-    return relative_l1(a, b)
+    return relative_l1(values.values.astype(np.float64), reference.values.astype(np.float64))

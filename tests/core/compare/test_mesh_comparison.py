@@ -82,8 +82,6 @@ def test_the_maps_of_half_the_motion_differ(mesh: MeshSequence) -> None:
     assert one.velocity_rms_mps[hand] == pytest.approx(0.5 * truth, rel=0.05)
     assert 0.2 < one.map_l1 < 2.0
     assert map_l1(found.maps[1], found.maps[0]) == one.map_l1
-    none = np.zeros(len(TIMES), bool)
-    assert map_l1(found.maps[1], found.maps[0], none) == 0.0
 
 
 def test_jitter_belongs_to_the_mesh_that_has_it(mesh: MeshSequence) -> None:

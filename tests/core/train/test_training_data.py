@@ -147,17 +147,17 @@ class TestSegments:
 
     def test_inputs_and_targets_are_of_the_same_frames(self, tmp_path: Path) -> None:
         pairs = read_pairs(write_pairs(tmp_path / "p.zarr", ("s1",), takes=1))
-        segments = segments_of(pairs.takes, 40, 10)
+        segments = segments_of(pairs.takes, 40)
         take = pairs.takes[0]
-        assert [len(segments), *segments.inputs.shape[1:]] == [5, 40, 8]
-        for number, start in enumerate((0, 30, 60, 90, 110)):
+        assert [len(segments), *segments.inputs.shape[1:]] == [4, 40, 8]
+        for number, start in enumerate((0, 40, 80, 110)):
             assert np.array_equal(segments.inputs[number], take.synthetic[start : start + 40])
             assert np.array_equal(segments.targets[number], take.radar[start : start + 40])
 
     def test_takes_that_are_too_short(self, tmp_path: Path) -> None:
         pairs = read_pairs(write_pairs(tmp_path / "p.zarr", ("s1",), frames=50))
         with pytest.raises(Sd2Error, match="72 frames long, and the longest of 2 takes has 50"):
-            segments_of(pairs.takes, 72, 10)
+            segments_of(pairs.takes, 72)
 
     def test_other_pairs_have_another_digest(self, tmp_path: Path) -> None:
         one = write_pairs(tmp_path / "a.zarr")
