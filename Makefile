@@ -13,7 +13,7 @@ TESTS = system-packages-for-tests .venv/.with-test $(COMPILED) landmark-models
 # Among them every module in KERNEL_MODULES of sd2core/numerics/compiled.py.
 KERNELS := $(wildcard sd2core/numerics/*.py sd2core/body/*.py sd2core/scattering/*.py sd2core/doppler/*.py sd2core/fmcw/*.py)
 
-.PHONY: help setup demo test test-slow lint pins fresh-machine docs format bench fuzz wheel bundle contact-sheet screenshots moving-picture accuracy fitting denoiser range-synthesis scale classifier real-gestures paper soak clean
+.PHONY: help setup demo test test-slow lint pins fresh-machine docs format bench fuzz wheel bundle screenshots moving-picture accuracy fitting denoiser range-synthesis scale classifier real-gestures paper soak clean
 
 help:
 	@echo "make demo         set up, and open the sample recording in the window"
@@ -115,9 +115,6 @@ wheel:
 
 bundle: .venv/.with-dev $(COMPILED)
 	$(BIN)/python -m PyInstaller --noconfirm --workpath build/bundle app/packaging/sd2-studio.spec
-
-contact-sheet: $(TESTS)
-	QT_QPA_PLATFORM=offscreen $(BIN)/python -m tools.documentation.contact_sheet
 
 screenshots: $(TESTS)
 	scripts/on_display.sh $(BIN)/python -m tools.documentation.screenshots
