@@ -1,8 +1,7 @@
 """Clips of simulated people with known motion, to measure a fit from video against.
 
 Every clip is a folder with the picture (``video.mp4``), the surface that was drawn
-(``mesh.zarr``), the 33 landmarks and all joints in metres (``keypoints.npz``) and what
-is known besides (``truth.json``).
+(``mesh.zarr``) and what is known besides (``truth.json``).
 """
 
 from __future__ import annotations
@@ -17,10 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.model import Body, Resolution, Skeleton
-from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
-from sd2core.body.track import LANDMARKS
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder
 from sd2core.io.video_writing import write_video
@@ -29,7 +26,6 @@ from sd2core.mocap.body_motion import Role
 from sd2core.progress import Progress, silent
 from sd2core.simulate.limbs import arm_length_m
 from sd2core.timebase import Timebase
-from sd2core.version import __version__
 from tools.build_sample.clothing import Clothes
 from tools.build_sample.render import Camera, Renderer
 from tools.build_sample.sample import write_compact_mesh
@@ -230,16 +226,6 @@ class Scene:
         vertices = pose_vertices(body, self.transforms)
         return MeshSequence(vertices, body.faces, Timebase(self.times_s), source="simulated body")
 
-    def keypoints_m(self, space: ShapeSpace) -> NDArray[np.float64]:
-        """The 33 landmarks, (T, 33, 3)."""
-        return KeypointSpace(space).of(self.shape).positions(self.transforms)
-
-    def joints_m(self) -> NDArray[np.float64]:
-        """Joints of all bones, (T, B, 3)."""
-        heads = self.skeleton.heads_m[..., None]
-        turned: NDArray[np.float64] = (self.transforms[..., :3] @ heads)[..., 0]
-        return turned + self.transforms[..., 3]
-
 
 def scene(clip: Clip, space: ShapeSpace, motions: Path | None = None) -> Scene:
     """Everything about a clip but its picture; ``motions`` as :func:`make_fit_truth` takes it."""
@@ -284,7 +270,7 @@ def _frame_count(clip: Clip) -> int:
 def _is_made(folder: Path, clip: Clip) -> bool:
     if not folder.exists():
         return False
-    if read_truth(folder).meta["clip"] != _description(clip):
+    if read_truth(folder).description != _description(clip):
         raise Sd2Error(
             f"{folder} is another clip of this name",
             "the clip that this version makes, or nothing",
@@ -302,53 +288,16 @@ def _fill(folder: Path, clip: Clip, motions: Path | None, progress: Progress) ->
     )
     write_video(folder / "video.mp4", pictures, FRAMES_PER_S, (camera.width, camera.height))
     write_compact_mesh(known.mesh(space, RESOLUTION), folder / "mesh.zarr")
-    keypoints = known.keypoints_m(space)
-    np.savez_compressed(
-        folder / "keypoints.npz",
-        keypoints_m=keypoints.astype(np.float32),
-        names=np.array(LANDMARKS),
-        joints_m=known.joints_m().astype(np.float32),
-        joint_names=np.array(known.skeleton.names),
-        times_s=known.times_s,
-    )
-    text = json.dumps(_truth(clip, known, keypoints), indent=1)
-    (folder / "truth.json").write_text(text + "\n", "utf-8")
-
-
-def _truth(clip: Clip, known: Scene, keypoints: NDArray[np.float64]) -> dict[str, Any]:
-    hand = keypoints[:, LANDMARKS.index(f"index.{clip.action.hand}")]
-    speed = np.linalg.norm(np.gradient(hand, known.times_s, axis=0), axis=1)
-    person = PEOPLE[clip.person]
-    return {
+    truth = {
         "format": FORMAT,
         "version": VERSION,
         "simulated": True,
-        "made_by": f"SD² Studio {__version__}",
         "clip": _description(clip),
-        "frames_per_s": FRAMES_PER_S,
-        "frames": len(known.times_s),
-        "camera": asdict(known.camera),
+        "camera": asdict(camera),
         "stature_m": known.shape.stature_m,
-        "shape": {
-            "coefficients": [float(value) for value in known.shape.coefficients],
-            **{k: v for k, v in asdict(person).items() if k not in ("outfit", "stature_m")},
-        },
         "spans": [span._asdict() for span in known.spans],
-        "peak_hand_speed_mps": float(speed.max()),
-        "resolution": RESOLUTION,
-        "notes": _notes(clip),
     }
-
-
-def _notes(clip: Clip) -> list[str]:
-    if clip.action.kind == "captured":
-        return ["A real person's recorded motion on another body; fingers and face do not move."]
-    notes = ["Hand and arm follow minimum-jerk moves; a person's are less even."]
-    if clip.action.kind == "still":
-        notes = ["The body does not move at all: it does not breathe. The camera has noise."]
-    elif clip.action.kind in ("walk", "turn"):
-        notes = ["A gait by construction: planned footholds, closed-form legs, swinging arms."]
-    return notes
+    (folder / "truth.json").write_text(json.dumps(truth, indent=1) + "\n", "utf-8")
 
 
 def _description(clip: Clip) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,43 +25,14 @@ class Truth:
     """One clip."""
 
     folder: Path
-    meta: dict[str, Any]  # what ``truth.json`` holds; see tools/README.md
-
-    @property
-    def name(self) -> str:
-        """Name of the clip."""
-        return str(self.meta["clip"]["name"])
-
-    @property
-    def kind(self) -> str:
-        """``swipes``, ``still``, ``walk`` or ``turn``."""
-        return str(self.meta["clip"]["action"]["kind"])
-
-    @property
-    def speed(self) -> str:
-        """Speed of the swipes: ``slow``, ``normal`` or ``fast``."""
-        return str(self.meta["clip"]["action"]["speed"])
-
-    @property
-    def hand(self) -> str:
-        """``L`` or ``R``: the one that swipes."""
-        return str(self.meta["clip"]["action"]["hand"])
-
-    @property
-    def strokes(self) -> tuple[GestureSpan, ...]:
-        """The gestures."""
-        return tuple(GestureSpan(**span) for span in self.meta["spans"])
-
-    @property
-    def stature_m(self) -> float:
-        """Stature of the person, without shoes."""
-        return float(self.meta["stature_m"])
-
-    @property
-    def camera(self) -> PinholeCamera:
-        """That took the video."""
-        camera = self.meta["camera"]
-        return PinholeCamera(camera["width"], camera["height"], camera["focal_px"])
+    description: Mapping[str, Any]  # as the program that made it describes the clip
+    name: str
+    kind: str  # ``swipes``, ``still``, ``walk``, ``turn`` or ``captured``
+    speed: str  # of the swipes: ``slow``, ``normal`` or ``fast``
+    hand: str  # ``L`` or ``R``: the one that swipes
+    strokes: tuple[GestureSpan, ...]
+    stature_m: float  # of the person, without shoes
+    camera: PinholeCamera
 
     @property
     def video(self) -> Path:
@@ -78,13 +50,22 @@ def read_truth(folder: Path) -> Truth:
     try:
         meta = json.loads(path.read_text("utf-8"))
         kind, version = meta["format"], meta["version"]
+        if kind != FORMAT or version > VERSION:
+            raise Sd2Error(
+                f"{path} is of format {kind!r} version {version}", f"{FORMAT!r} up to {VERSION}"
+            )
+        clip, camera = meta["clip"], meta["camera"]
+        return Truth(
+            Path(folder),
+            clip,
+            clip["name"],
+            **{name: clip["action"][name] for name in ("kind", "speed", "hand")},
+            strokes=tuple(GestureSpan(**span) for span in meta["spans"]),
+            stature_m=meta["stature_m"],
+            camera=PinholeCamera(camera["width"], camera["height"], camera["focal_px"]),
+        )
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise Sd2Error(f"{path} cannot be read ({error})", _EXPECTED) from error
-    if kind != FORMAT or version > VERSION:
-        raise Sd2Error(
-            f"{path} is of format {kind!r} version {version}", f"{FORMAT!r} up to {VERSION}"
-        )
-    return Truth(Path(folder), meta)
 
 
 def truth_folders(folder: Path) -> list[Path]:

@@ -137,8 +137,7 @@ def test_sigma_covers_what_it_is_larger_than(truth: Truth, factor: float, covere
 
 def test_limbs_out_of_the_picture_are_measured_against_what_they_hang_on(truth: Truth) -> None:
     """The elbow stays; a hand that is held there, too, has all of the true motion for an error."""
-    camera = {**truth.meta["camera"], "width": 240, "height": 2000}
-    narrow = replace(truth, meta={**truth.meta, "camera": camera})
+    narrow = replace(truth, camera=replace(truth.camera, width=240, height=2000))
     mesh = truth.mesh()
     joints = own_patches("low").positions(mesh.read(0, mesh.frame_count))
     off_px = np.abs(narrow.camera.project(joints)[..., 0] - 120.0) > 120.0

@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from sd2core.body.model import Body
+from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.track import LANDMARKS
 from sd2core.errors import Sd2Error
@@ -49,9 +50,7 @@ def test_a_clip_is_complete_and_on_one_clock(made: Path) -> None:
     with open_video(truth.video) as video:
         assert (video.width, video.height) == (640, 480)
         np.testing.assert_allclose(video.timebase.times_s, mesh.times_s, atol=1e-6)
-    with np.load(made / "keypoints.npz") as data:
-        assert data["keypoints_m"].shape == (FRAMES, 33, 3)
-    assert truth.meta["simulated"] is True
+    assert json.loads((made / "truth.json").read_text("utf-8"))["simulated"] is True
     assert (truth.kind, truth.strokes, truth.camera.focal_px) == ("still", (), 600.0)
     assert truth_folders(made) == truth_folders(made.parent) == [made]
 
@@ -76,7 +75,7 @@ def test_keypoints_lie_on_and_in_the_surface(space: ShapeSpace) -> None:
     known = scene(clip_named("vertical-fast"), space)
     frame = 40
     vertices = known.mesh(space, "high").frame(frame)
-    keypoints = known.keypoints_m(space)[frame]
+    keypoints = KeypointSpace(space).of(known.shape).positions(known.transforms)[frame]
     away, _ = cKDTree(vertices).query(keypoints)
     for name in ("nose", "mouth.L", "ear.R", "heel.R", "foot_index.L"):
         assert away[LANDMARKS.index(name)] < 0.002
@@ -84,16 +83,6 @@ def test_keypoints_lie_on_and_in_the_surface(space: ShapeSpace) -> None:
     assert away.max() < 0.13
     assert (keypoints >= vertices.min(axis=0)).all()
     assert (keypoints <= vertices.max(axis=0)).all()
-
-
-def test_joints_are_where_the_bones_are(space: ShapeSpace) -> None:
-    known = scene(clip_named("all-fast"), space)
-    wrist = known.skeleton.index["wrist.R"]
-    np.testing.assert_allclose(
-        known.joints_m()[:, wrist],
-        known.keypoints_m(space)[:, LANDMARKS.index("wrist.R")],
-        atol=1e-9,
-    )
 
 
 def test_what_is_there_is_kept(made: Path, short: None) -> None:
@@ -114,8 +103,7 @@ def test_another_clip_of_the_same_name_is_not_touched(made: Path) -> None:
 @pytest.mark.slow
 def test_a_clip_is_the_same_every_time(made: Path, tmp_path: Path, short: None) -> None:
     (again,) = make_fit_truth(tmp_path / "again", [clip_named("still-hand-up")])
-    for name in ("truth.json", "keypoints.npz"):
-        assert (again / name).read_bytes() == (made / name).read_bytes()
+    assert (again / "truth.json").read_bytes() == (made / "truth.json").read_bytes()
     np.testing.assert_array_equal(
         read_truth(again).mesh().read(0, FRAMES), read_truth(made).mesh().read(0, FRAMES)
     )

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import json
 import re
 import shutil
 import subprocess
@@ -12,13 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from known_clip import standing, write_clip
 
 from sd2core.body.model import Body
 from sd2core.io.mesh import save_mesh
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 from tools.fitting.__main__ import main
-from tools.fitting.truth import FORMAT, VERSION
 
 
 @dataclass(frozen=True)
@@ -47,22 +46,11 @@ def fitting(capsys: pytest.CaptureFixture[str]) -> Tool:
 @pytest.fixture
 def truth(tmp_path: Path) -> Path:
     """One clip, in which the coarse body stands still."""
-    folder = tmp_path / "truth" / "still"
-    folder.mkdir(parents=True)
     body = Body.load("low")
     vertices = np.repeat((body.vertices_m + np.array([0.0, 1.0, 2.5]))[None], 14, axis=0)
     times = Timebase(np.arange(14) / 30.0)
-    save_mesh(MeshSequence(vertices.astype(np.float32), body.faces, times), folder / "mesh.zarr")
-    meta = {
-        "format": FORMAT,
-        "version": VERSION,
-        "clip": {"name": "still", "action": {"kind": "still", "speed": "normal", "hand": "R"}},
-        "camera": {"width": 640, "height": 480, "focal_px": 600.0},
-        "stature_m": 1.76,
-        "spans": [],
-    }
-    (folder / "truth.json").write_text(json.dumps(meta))
-    return folder.parent
+    mesh = MeshSequence(vertices.astype(np.float32), body.faces, times)
+    return write_clip(tmp_path / "truth" / "still", mesh, "still").parent
 
 
 def test_fitted_meshes_are_measured(fitting: Tool, truth: Path, tmp_path: Path) -> None:
@@ -187,10 +175,8 @@ def test_a_clip_that_is_not_there_is_named_with_those_that_are(
 
 
 def test_fits_that_are_missing_are_named(fitting: Tool, tmp_path: Path) -> None:
-    for folder in (tmp_path / "truth" / "walk", tmp_path / "fits"):
-        folder.mkdir(parents=True)
-    meta = {"format": FORMAT, "version": VERSION, "clip": {"name": "walk"}}
-    (tmp_path / "truth" / "walk" / "truth.json").write_text(json.dumps(meta))
+    write_clip(tmp_path / "truth" / "walk", standing(), "walk")
+    (tmp_path / "fits").mkdir()
     folders = tmp_path / "truth", tmp_path / "fits"
     outcome = fitting("errors", *folders, "--out", tmp_path / "e.json")
     assert outcome.code == 1
