@@ -156,11 +156,8 @@ def read_body_arrays(names: Sequence[str]) -> list[NDArray[Any]]:
 
     Raises Sd2Error if the file is missing, damaged, of a later version, or lacks one of them.
     """
-    command = "python -m tools.build_body export"
-    with open_bundled_arrays(resource_path("body.npz"), FORMAT, VERSION, "a body", command) as (
-        _,
-        data,
-    ):
+    path, command = resource_path("body.npz"), "python -m tools.bundled body"
+    with open_bundled_arrays(path, FORMAT, VERSION, "a body", command) as (_, data):
         return [data[name] for name in names]
 
 

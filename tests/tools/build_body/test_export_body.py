@@ -13,8 +13,8 @@ from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.progress import Progress
 from tools.build_body import export_body as exporting
-from tools.build_body.__main__ import main
 from tools.build_sample.posing import posed
+from tools.bundled import main
 
 needs_anny = pytest.mark.skipif(
     importlib.util.find_spec("anny") is None,
@@ -112,7 +112,7 @@ def test_the_command_hands_over_its_file(
         progress(0, 2)
         asked.append(out)
 
-    monkeypatch.setattr("tools.build_body.__main__.export_body", export)
-    assert main(["export", str(tmp_path / "body.npz")]) == 0
+    monkeypatch.setattr("tools.bundled.export_body", export)
+    assert main(["body", str(tmp_path / "body.npz")]) == 0
     assert asked == [tmp_path / "body.npz"]
     assert str(tmp_path / "body.npz") in capsys.readouterr().out

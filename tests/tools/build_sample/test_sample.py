@@ -19,7 +19,6 @@ from sd2core.progress import Cancelled, Progress
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.sensor import VirtualSensor
-from tools.build_sample.__main__ import main
 from tools.build_sample.render import Camera
 from tools.build_sample.sample import (
     FRAMES_PER_S,
@@ -28,6 +27,7 @@ from tools.build_sample.sample import (
     make_sample,
 )
 from tools.build_sample.swipes import DURATION_S, SPANS
+from tools.bundled import main
 
 SHORT_S = 0.2
 
@@ -113,8 +113,8 @@ def test_the_command_hands_the_folder_over(
         asked.append(out)
         return out
 
-    monkeypatch.setattr("tools.build_sample.__main__.make_sample", make)
-    assert main(["make", str(tmp_path / "mine.sd2")]) == 0
+    monkeypatch.setattr("tools.bundled.make_sample", make)
+    assert main(["sample", str(tmp_path / "mine.sd2")]) == 0
     assert asked == [tmp_path / "mine.sd2"]
     assert str(tmp_path / "mine.sd2") in capsys.readouterr().out
 
@@ -122,7 +122,7 @@ def test_the_command_hands_the_folder_over(
 def test_the_command_does_not_replace_a_sample(tmp_path: Path) -> None:
     (tmp_path / "a.sd2").mkdir()
     (tmp_path / "a.sd2" / "precious").touch()
-    assert main(["make", str(tmp_path / "a.sd2")]) == 1
+    assert main(["sample", str(tmp_path / "a.sd2")]) == 1
     assert [path.name for path in (tmp_path / "a.sd2").iterdir()] == ["precious"]
 
 
