@@ -36,59 +36,23 @@ MARKERS = tuple(
 )
 """The points as markers of a body."""
 
-# Name of each point in a kind of skeleton; {s} is l or r, {S} L or R, {Side} Left or Right.
-CMU_ASF = {
-    "shoulder": "{s}clavicle",
-    "elbow": "{s}humerus",
-    "wrist": "{s}radius",
-    "index": "{s}hand",
-    "thumb": "{s}thumb",
-    "hip": "{s}hipjoint",
-    "knee": "{s}femur",
-    "ankle": "{s}tibia",
-    "foot_index": "{s}toes",
-    "head": "head",
-    "neck": "upperneck",
+# Name of each point in the kinds of skeletons; {s} is l or r, {S} L or R, {Side} Left or Right.
+_NAMES = {
+    "shoulder": ("{s}clavicle", "{Side}Arm", "{Side}Shoulder", "{s}Shldr"),
+    "elbow": ("{s}humerus", "{Side}ForeArm", "{Side}Elbow", "{s}ForeArm"),
+    "wrist": ("{s}radius", "{Side}Hand", "{Side}Wrist", "{s}Hand"),
+    "index": ("{s}hand", "{Side}HandIndex1", "{s}hand", "{s}Index1"),
+    "thumb": ("{s}thumb", "{S}Thumb_end", "{S}Thumb_end", "{s}Thumb2"),
+    "hip": ("{s}hipjoint", "{Side}UpLeg", "{Side}Hip", "{s}Thigh"),
+    "knee": ("{s}femur", "{Side}Leg", "{Side}Knee", "{s}Shin"),
+    "ankle": ("{s}tibia", "{Side}Foot", "{Side}Ankle", "{s}Foot"),
+    "foot_index": ("{s}toes", "{Side}ToeBase_end", "{Side}Toe_end", "{s}Foot_end"),
+    "head": ("head", "Head_end", "Head_end", "head"),
+    "neck": ("upperneck", "Head", "Head", "neck"),
 }
-HAHNE_BVH = {
-    "shoulder": "{Side}Arm",
-    "elbow": "{Side}ForeArm",
-    "wrist": "{Side}Hand",
-    "index": "{Side}HandIndex1",
-    "thumb": "{S}Thumb_end",
-    "hip": "{Side}UpLeg",
-    "knee": "{Side}Leg",
-    "ankle": "{Side}Foot",
-    "foot_index": "{Side}ToeBase_end",
-    "head": "Head_end",
-    "neck": "Head",
-}
-KOYAMA_BVH = {
-    "shoulder": "{Side}Shoulder",
-    "elbow": "{Side}Elbow",
-    "wrist": "{Side}Wrist",
-    "index": "{s}hand",
-    "thumb": "{S}Thumb_end",
-    "hip": "{Side}Hip",
-    "knee": "{Side}Knee",
-    "ankle": "{Side}Ankle",
-    "foot_index": "{Side}Toe_end",
-    "head": "Head_end",
-    "neck": "Head",
-}
-POSER_BVH = {
-    "shoulder": "{s}Shldr",
-    "elbow": "{s}ForeArm",
-    "wrist": "{s}Hand",
-    "index": "{s}Index1",
-    "thumb": "{s}Thumb2",
-    "hip": "{s}Thigh",
-    "knee": "{s}Shin",
-    "ankle": "{s}Foot",
-    "foot_index": "{s}Foot_end",
-    "head": "head",
-    "neck": "neck",
-}
+CMU_ASF, HAHNE_BVH, KOYAMA_BVH, POSER_BVH = (
+    dict(zip(_NAMES, names, strict=True)) for names in zip(*_NAMES.values(), strict=True)
+)
 
 _EAR_M, _NOSE_M = 0.075, 0.12
 """Of the middle of the head: to each ear, and forwards to the nose."""
