@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +16,10 @@ from sd2core.body.rotations import applied, product, to_vector
 from sd2core.errors import Sd2Error
 from sd2core.mocap.body_motion import BodyMotion
 from sd2core.mocap.driving import SkeletonClip, puppet_of, resample_pose
+from sd2core.processes import end_with_parent
 from sd2core.progress import Progress, silent
 from tools.motion_capture.catalogue import RATE_HZ, Trial, trials
 from tools.motion_capture.points import MARKERS
-from tools.processes import finished
 
 Floats = NDArray[np.float64]
 
@@ -44,10 +46,11 @@ def drive_bodies(
     total, done = sum(len(one) for one in jobs), 0
     notes: list[str] = []
     progress(0, total)
-    for own, left_out in finished(partial(_drive, out), jobs, processes):
-        notes += left_out
-        done += len(own)
-        progress(done, total)
+    with ProcessPoolExecutor(processes, get_context("spawn"), end_with_parent) as pool:
+        for own, left_out in zip(jobs, pool.map(partial(_drive, out), jobs), strict=True):
+            notes += left_out
+            done += len(own)
+            progress(done, total)
     return sorted(notes)
 
 

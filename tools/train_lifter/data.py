@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +14,6 @@ from sd2core.options.kinds import Count
 from sd2core.options.records import ARGUMENT
 from sd2core.processes import end_with_parent
 from sd2core.progress import Progress, silent
-from tools.processes import finished
 from tools.train_lifter.takes import Motion, Take, TakeMaker
 
 
@@ -50,10 +51,9 @@ def make_lifter_data(options: Data, progress: Progress = silent) -> int:
     missing = [n for n in range(options.takes) if not take_path(options.out, n).exists()]
     done = options.takes - len(missing)
     progress(done, options.takes)
-    work = partial(_make, options.out)
-    for _ in finished(work, missing, options.processes, _start, (options,)):
-        done += 1
-        progress(done, options.takes)
+    with ProcessPoolExecutor(options.processes, get_context("spawn"), _start, (options,)) as pool:
+        for made, _ in enumerate(pool.map(partial(_make, options.out), missing), start=1):
+            progress(done + made, options.takes)
     return len(missing)
 
 
