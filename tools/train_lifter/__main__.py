@@ -17,7 +17,6 @@ from tools.command_line import tool
 from tools.train_lifter.data import Data, load_takes, make_lifter_data
 from tools.train_lifter.fits import fit_law, repaired
 from tools.train_lifter.pairs import Pairs, make_pairs
-from tools.train_lifter.score import score
 from tools.train_lifter.swaps import score_sides
 
 
@@ -68,12 +67,9 @@ class Score(OptionRecord):
     ----------
     data : DATA
         folder of the takes
-    lifter : FILE
-        (default: the bundled one)
     """
 
     data: Annotated[Path, ARGUMENT]
-    lifter: Path | None = None
 
 
 def _data(options: Data) -> None:
@@ -131,19 +127,11 @@ def _sides(options: Learning) -> None:
 
 
 def _score(options: Score) -> None:
-    """Measure the lifter, and what tells left from right, on such takes.
-
-    Errors of the velocity along the line of sight, joint by joint, and frames in which left is
-    taken for right.
-    """
-    takes = load_takes(options.data)
-    joints, likeness, still_mps = score(Lifter.load(options.lifter), takes)
+    """Measure what tells left from right on such takes: frames in which left is taken for right."""
     sides = [["mirrored", "found", "undone", "put in", "undone"]]
-    for part, shares in score_sides(takes).items():
+    for part, shares in score_sides(load_takes(options.data)).items():
         sides.append([part, *(f"{100.0 * share:.1f} %" for share in shares)])
-    for rows in (joints, likeness, sides):
-        print("\n".join(numbers_table(rows)))
-    print(f"Nothing moves: {still_mps:.3f} m/s over all landmarks")
+    print("\n".join(numbers_table(sides)))
 
 
 main = tool(
