@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -29,12 +28,6 @@ def write_filled(name: str, **values: object) -> None:
 def table(rows: Iterable[Sequence[str]], names: int = 1) -> str:
     """Rows in Markdown; the first is the heading, the first ``names`` columns are of words."""
     return "\n".join(markdown_table(list(rows), names))
-
-
-def sections(page: str) -> dict[str, str]:
-    """Text below every heading of the second level, up to the next."""
-    _, *parts = re.split(r"^## (.+)\n", page, flags=re.MULTILINE)
-    return dict(zip(parts[::2], parts[1::2], strict=True))
 
 
 def spread(values: Mapping[str, Any], digits: int = 3) -> str:

@@ -1,18 +1,16 @@
 """Makes ``paper.md`` and its pictures: ``make paper``, half an hour after ``make classifier``.
 
-The SD² paper's figures and tables, and its sentences in ``texts/paper-lines.md`` with their places
-in the program. Runs and campaigns stay in ``build/paper``, the study of classifiers where
-``make classifier`` keeps it; what is there is not made again. ``--only`` renews some sections, and
-leaves the others as the page has them.
+The SD² paper's figures and tables, and its sentences with their places in the program. Runs and
+campaigns stay in ``build/paper``, the study of classifiers where ``make classifier`` keeps it; what
+is there is not made again.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,14 +30,12 @@ from sd2core.simulate.campaign.protocol import PAPER, Protocol
 from sd2core.simulate.campaign.takes import Campaign
 from sd2core.timebase import Timebase
 from tools.documentation.measured import write_page
-from tools.documentation.pages import TEXTS, filled, sections, spread, spread_of, table
+from tools.documentation.pages import filled, spread, spread_of, table
 from tools.documentation.paper_bodies import draw_bodies
 from tools.documentation.places import BUILD, DOCS, IMAGES, REPOSITORY
 from tools.documentation.runs import Job, epochs_in, evaluated, settings, train
 
-PAGE = DOCS / "paper.md"
 FOLDER, STUDY = BUILD / "paper", BUILD / "classifier" / "to-and-fro"
-LINES = TEXTS / "paper-lines.md"
 DROPOUT = 0.1
 SEEDS, MINUTES, CAMPAIGN_MINUTES = 3, 2.0, 18.0
 """Trainings of each denoiser, minutes of each, and minutes of all people."""
@@ -63,27 +59,10 @@ SHOWN_MINUTES = 3.0
 """Of a campaign, for two takes of everybody; a longer one begins with the same ones."""
 
 
-@dataclass(frozen=True)
-class Section:
-    """Part of the page that is measured."""
-
-    heading: str
-    make: Callable[[], str]
-
-
 def main() -> None:
-    """Measure what is asked for and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", nargs="+", choices=SECTIONS, default=tuple(SECTIONS))
-    options = parser.parse_args()
-    page = filled("paper-head.md", machine=this_machine())
-    kept = sections(PAGE.read_text("utf-8")) if PAGE.exists() else {}
-    for name, section in SECTIONS.items():
-        missing = f"\nNot measured yet: `python -m tools.documentation.paper --only {name}`.\n\n"
-        made = name in options.only
-        text = section.make() if made else kept.get(section.heading, missing)
-        page += f"## {section.heading}\n{text}"
-    write_page(PAGE.name, page + linked(LINES.read_text("utf-8")))
+    """Measure and write the page."""
+    values = {**_pictures(), **_denoisers(), **_classifiers()}
+    write_page("paper.md", linked(filled("paper.md", machine=this_machine(), **values)))
 
 
 def linked(text: str) -> str:
@@ -108,7 +87,7 @@ def _link(match: re.Match[str]) -> str:
     return f"[`{name or path}`](../sd2core/{path})"
 
 
-def _pictures() -> str:
+def _pictures() -> dict[str, float]:
     """Figures 2, 4 and 7."""
     bodies = draw_bodies(IMAGES / "paper-mesh.png", IMAGES / "paper-range.png")
     pairs = read_pairs(protocol_campaign(PAPER, SHOWN_MINUTES))
@@ -125,7 +104,7 @@ def _pictures() -> str:
         )
     ]
     _save_maps("paper-swipes.png", rows, "Figure 7 on simulated people before a simulated radar")
-    return filled("paper-pictures.md", **bodies)
+    return bodies
 
 
 def protocol_campaign(protocol: Protocol, minutes: float) -> Path:
@@ -155,7 +134,7 @@ def _save_maps(name: str, rows: Sequence[MapRow], heading: str) -> None:
     save_figure(figure, IMAGES / name, pixels_per_inch=PIXELS_PER_INCH)
 
 
-def _denoisers() -> str:
+def _denoisers() -> dict[str, Any]:
     """Figure 6 and Table 1."""
     campaign = protocol_campaign(RANDOM, CAMPAIGN_MINUTES)
     how = settings({"dropout": DROPOUT})
@@ -167,20 +146,18 @@ def _denoisers() -> str:
     evaluation = evaluated(train(FOLDER, runs), campaign)
     judged = read_pairs(campaign).of(evaluation["subjects"])
     _compare(judged, {name: FOLDER / f"{name}-0" for name in PRINTED})
-    bin_mps = judged.axis.bin_width_mps
-    return filled(
-        "paper-denoisers.md",
-        seed=SEED,
-        campaign_minutes=CAMPAIGN_MINUTES,
-        seeds=SEEDS,
-        minutes=MINUTES,
-        dropout=DROPOUT,
-        epochs=", ".join(f"{title} {count} epochs" for title, count in epochs.items()),
-        frames=evaluation["frames"],
-        moving=evaluation["moving_frames"],
-        table=table_1(evaluation, _nothing_moves(judged)),
-        findings=findings(evaluation, bin_mps),
-    )
+    return {
+        "seed": SEED,
+        "campaign_minutes": CAMPAIGN_MINUTES,
+        "seeds": SEEDS,
+        "minutes": MINUTES,
+        "dropout": DROPOUT,
+        "epochs": ", ".join(f"{title} {count} epochs" for title, count in epochs.items()),
+        "frames": evaluation["frames"],
+        "moving": evaluation["moving_frames"],
+        "table_1": table_1(evaluation, _nothing_moves(judged)),
+        "findings": findings(evaluation, judged.axis.bin_width_mps),
+    }
 
 
 def _compare(judged: PairSet, runs: Mapping[str, Path]) -> None:
@@ -247,15 +224,12 @@ def _change(value: float, reference: float) -> str:
     return "" if value == reference else f"{100 * (value / reference - 1):+.0f} %".replace("-", "−")
 
 
-def _classifiers() -> str:
+def _classifiers() -> dict[str, Any]:
     """Tables 2 and 3."""
     study = json.loads((STUDY / "study.json").read_text("utf-8"))
     totals = {one["title"]: one["seeds"] for one in study["totals"]}
-    return filled(
-        "paper-classifiers.md",
-        seeds=study["plan"]["seeds"],
-        table=tables_2_and_3(study["classes"], totals),
-    )
+    tables = tables_2_and_3(study["classes"], totals)
+    return {"classifier_seeds": study["plan"]["seeds"], "tables_2_and_3": tables}
 
 
 def tables_2_and_3(classes: Sequence[str], totals: Mapping[str, Any]) -> str:
@@ -277,13 +251,6 @@ def tables_2_and_3(classes: Sequence[str], totals: Mapping[str, Any]) -> str:
         rows[-2] += [f"{np.diagonal(GIVEN[words]).mean():.1f}", mean(title)]
         rows[-1] += ["", mean(PAPER_NETWORK) if title == "radar alone" else ""]
     return table(rows)
-
-
-SECTIONS = {
-    "pictures": Section("Mesh, range and Doppler: Figures 2, 4 and 7", _pictures),
-    "denoisers": Section("Denoisers: Figure 6 and Table 1", _denoisers),
-    "classifiers": Section("Classifiers: Tables 2 and 3", _classifiers),
-}
 
 
 if __name__ == "__main__":

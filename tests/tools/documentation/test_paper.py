@@ -5,8 +5,10 @@ import re
 import pytest
 
 from sd2core.denoise.metrics import VelocityError
-from tools.documentation.pages import sections
-from tools.documentation.paper import LINES, findings, linked, table_1
+from tools.documentation.pages import TEXTS
+from tools.documentation.paper import findings, linked, table_1
+
+LINES = TEXTS / "paper.md"
 
 
 def evaluation(**mae_mps: float) -> dict:
@@ -71,8 +73,3 @@ def test_every_equation_has_a_line(what: str) -> None:
 )
 def test_every_figure_table_and_section_has_a_line(what: str) -> None:
     assert re.search(rf"^\|[^|]*{what}\b", LINES.read_text("utf-8"), re.MULTILINE)
-
-
-def test_sections_can_be_put_together_again() -> None:
-    page = "# Head\n\n## One\nfirst\n\n### Below\n\n## Two\nlast\n"
-    assert sections(page) == {"One": "first\n\n### Below\n\n", "Two": "last\n"}
