@@ -17,7 +17,7 @@ from tools.command_line import tool
 from tools.fitting.clips import CLIPS, REAL_MOTION, TUNING, clip_named, make_fit_truth
 from tools.fitting.error_measurement import measure_errors
 from tools.fitting.people import OTHERS, as_table, measure_people, meetings
-from tools.fitting.report import as_csv, as_markdown, as_text
+from tools.fitting.report import as_csv, as_markdown
 from tools.fitting.scoring import Fits
 from tools.fitting.truth import read_truth, truth_folders
 
@@ -147,10 +147,11 @@ def _score(options: Score) -> None:
         fits = Fits(Path(folder))
         scores = [fits.score(truth) for truth in truths]
         real = [fits.score_real(video) for video in options.real]
+    tables = as_markdown(scores, real)
     if options.markdown is not None:
-        atomic_write_text(options.markdown, as_markdown(scores, real))
+        atomic_write_text(options.markdown, tables)
         atomic_write_text(options.markdown.with_suffix(".csv"), as_csv(scores))
-    print(as_text(scores, real))
+    print(tables, end="")
 
 
 def _errors(options: Errors) -> None:

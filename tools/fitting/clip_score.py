@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.model import own_resolution
-from sd2core.body.shaping import overlap, silhouette
 from sd2core.body.track import LandmarkTrack
 from sd2core.compare.joints import JOINTS, JointPatches, own_patches
 from sd2core.compare.measures import (
@@ -30,28 +29,16 @@ from sd2core.scattering.resampling import resample_mesh
 from sd2core.sensor import VirtualSensor
 from tools.build_sample.swipes import GestureSpan
 from tools.fitting.measures import EDGE_FRAMES, medium_in_high, peak_kept, speed_mps
-from tools.fitting.real_score import reprojection
+from tools.fitting.real_score import reprojection_m
 from tools.fitting.truth import Truth
 
 Floats = NDArray[np.float64]
 
-LIMBS = ("hand", "wrist", "elbow")
+LIMBS = ("hand", "elbow")
 """Parts of the moving arm that are measured during strokes."""
-
-_PARENTS = {
-    "elbow": "shoulder",
-    "wrist": "elbow",
-    "hand": "elbow",
-    "knee": "pelvis",
-    "ankle": "knee",
-}
-"""Joints of limbs, and those that they hang on."""
 
 _MOVING_MPS = 0.1
 """Root mean square of the true velocity of a joint from which on it moves."""
-
-_MASK = (160, 120)
-_MASK_STEP = 5
 
 
 class Pair(NamedTuple):
@@ -90,7 +77,7 @@ class StrokeScore:
     stroke: GestureSpan
     speed: str
     velocity: dict[str, Pair]  # of each of LIMBS, along the line of sight
-    tempo: dict[str, Pair]  # the same limbs' speed in space
+    tempo: Pair  # the hand's speed in space
     # Sums over the gesture's frames of the absolute difference of the smoothed Doppler maps, and of
     # the true one.
     map_difference: float
@@ -105,7 +92,6 @@ class ClipScore:
     kind: str
     strokes: tuple[StrokeScore, ...]
     distance_m: Floats  # (J,), mean distance of each joint
-    aligned_m: Floats  # (J,), the same from the pelvis
     quiet: bool  # true if no joint moves along the line of sight; then all joints count as moving
     velocity: Pair  # of all frames and the joints that move, along the line of sight, each (n,)
     # Of these joints' velocities within a frame, fitted over true (root mean square over frames);
@@ -122,17 +108,10 @@ class ClipScore:
     # sight (m/s), then place (m), of all joints.
     edge: Floats
     middle: Floats
-    overlap: float  # mean intersection over union of the fitted and the true silhouette
-    # Of the joints of limbs while they are out of the picture, (n,): velocity along the line of
-    # sight against the joint that they hang on.
-    unseen: Pair
     # ``fitted`` holds standard deviations that the fit gave for the velocities of joints, ``truth``
     # their actual errors, each (n, J); NaN where a joint does not move.
     sigma: Pair | None = None
-    unseen_sigma: Pair | None = None  # of the same joints, as ``sigma``
-    # That the fit took by the clock, and on all cores together.
-    seconds_per_frame: float | None = None
-    processor_s_per_frame: float | None = None
+    seconds_per_frame: float | None = None  # that the fit took
     # Mean distance of joints from the landmarks that were found, in the picture at the joint's
     # depth.
     residual_m: float | None = None
@@ -142,7 +121,7 @@ def score_clip(
     truth: Truth,
     fitted: MeshSequence,
     *,
-    seconds: tuple[float, float] | None = None,
+    seconds: float | None = None,
     track: LandmarkTrack | None = None,
     progress: Progress = silent,
 ) -> ClipScore:
@@ -153,8 +132,8 @@ def score_clip(
     fitted : MeshSequence
         Of this clip's video, in the camera frame. Where it says how well its velocities are known,
         that is measured too.
-    seconds : (float, float), optional
-        That the whole fit took: by the clock, and of processor time.
+    seconds : float, optional
+        That the whole fit took.
     track : LandmarkTrack, optional
         The landmarks that were fitted to.
     progress : Progress
@@ -180,34 +159,29 @@ def score_clip(
     plain = synthesize_alike(pair, VirtualSensor())
     measured = presence.measured
     apart = np.linalg.norm(joints[1] - joints[0], axis=-1)
-    root = JOINTS.index("pelvis")
-    aligned = [one - one[:, root : root + 1] for one in joints]
     strokes = []
     for stroke in truth.strokes:
         during = (times_s >= stroke.start_s) & (times_s < stroke.end_s) & measured
         if not during.any():
             continue
         rows = {limb: JOINTS.index(f"{limb}.{truth.hand}") for limb in LIMBS}
+        hand = rows["hand"]
         difference = np.abs(maps[1].values - maps[0].values)[:, during].sum(dtype=np.float64)
         strokes.append(
             StrokeScore(
                 stroke,
                 truth.speed,
                 {k: Pair(velocity[1][during, j], velocity[0][during, j]) for k, j in rows.items()},
-                {k: Pair(tempo[1][during, j], tempo[0][during, j]) for k, j in rows.items()},
+                Pair(tempo[1][during, hand], tempo[0][during, hand]),
                 float(difference),
                 float(maps[0].values[:, during].sum(dtype=np.float64)),
             )
         )
     errors = np.stack([velocity[1] - velocity[0], apart])  # (2, T, J)
-    everywhere = np.broadcast_to(measured[:, None], apart.shape)
     moving = np.sqrt((velocity[0][measured] ** 2).mean(axis=0)) >= _MOVING_MPS
     quiet = not moving.any()
     moving |= quiet
     within = [one[measured][:, moving].var(axis=1).mean() for one in velocity]
-    pixels = truth.camera.project(joints[0])
-    size = truth.camera.width, truth.camera.height
-    out = ((pixels < 0) | (pixels > size)).any(axis=-1) & everywhere
     edge = np.zeros(len(times_s), bool)
     edge[:EDGE_FRAMES] = edge[-EDGE_FRAMES:] = True
     return ClipScore(
@@ -215,7 +189,6 @@ def score_clip(
         kind=truth.kind,
         strokes=tuple(strokes),
         distance_m=apart[measured].mean(axis=0),
-        aligned_m=np.linalg.norm(aligned[1] - aligned[0], axis=-1)[measured].mean(axis=0),
         quiet=quiet,
         velocity=Pair(*(one[measured][:, moving].ravel() for one in velocity[::-1])),
         spread=np.nan if quiet else float(np.sqrt(within[1] / within[0])),
@@ -225,15 +198,11 @@ def score_clip(
         stated_l1=body_error(Synthesizer(pair[1]), VirtualSensor()),
         edge=np.array([rms(one[edge & measured]) for one in errors]),
         middle=np.array([rms(one[~edge & measured]) for one in errors]),
-        overlap=_overlap(pair[0], pair[1], truth),
-        unseen=Pair(*(_against_parents(one, out) for one in velocity[::-1])),
-        sigma=_sigma(pair[1], patches[1], errors[0], everywhere & moving),
-        unseen_sigma=_sigma(pair[1], patches[1], errors[0], out),
-        seconds_per_frame=None if seconds is None else seconds[0] / len(fitted.timebase),
-        processor_s_per_frame=None if seconds is None else seconds[1] / len(fitted.timebase),
+        sigma=_sigma(pair[1], patches[1], errors[0], measured[:, None] & moving),
+        seconds_per_frame=None if seconds is None else seconds / len(fitted.timebase),
         residual_m=None
         if track is None
-        else float(reprojection(fitted, track, truth.camera)[1].mean()),
+        else float(reprojection_m(fitted, track, truth.camera).mean()),
     )
 
 
@@ -260,31 +229,6 @@ def _with_vertices_of(mesh: MeshSequence, other: MeshSequence) -> MeshSequence:
 def _vertex_velocity(mesh: MeshSequence, presence: Presence) -> float:
     velocity = line_of_sight_velocity(np.asarray(mesh.vertices), mesh.times_s, presence=presence)
     return rms(velocity[presence.measured])
-
-
-def _overlap(true: MeshSequence, fitted: MeshSequence, truth: Truth) -> float:
-    assert true.faces is not None
-    assert fitted.faces is not None
-    overlaps = [
-        overlap(
-            silhouette(true.frame(frame), true.faces, truth.camera, _MASK),
-            silhouette(fitted.frame(frame), fitted.faces, truth.camera, _MASK),
-        )
-        for frame in np.flatnonzero(fitted.presence.present)[::_MASK_STEP]
-    ]
-    return float(np.nanmean(overlaps))
-
-
-def _against_parents(velocity_mps: Floats, chosen: NDArray[np.bool_]) -> Floats:
-    """Velocities (n,) of the chosen joints of limbs, less those of the joints they hang on."""
-    relative_mps = []
-    for child, parent in _PARENTS.items():
-        for side in ".L", ".R":
-            row = JOINTS.index(child + side)
-            rows = chosen[:, row]
-            above = JOINTS.index(parent if parent in JOINTS else parent + side)
-            relative_mps.append(velocity_mps[rows, row] - velocity_mps[rows, above])
-    return np.concatenate(relative_mps)
 
 
 def _sigma(

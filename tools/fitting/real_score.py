@@ -30,9 +30,8 @@ class RealScore:
     # Mean over frames of the intersection over union of the mesh's silhouette and the landmark
     # model's mask, within the picture.
     overlap: float
-    # Mean distance of joints from their landmarks in the picture, and the same at the joint's
-    # depth. Landmarks that are hidden or outside the picture are left out.
-    reprojection_px: float
+    # Mean distance of joints from their landmarks in the picture, at the joint's depth. Landmarks
+    # that are hidden or outside the picture are left out.
     reprojection_m: float
 
 
@@ -62,19 +61,18 @@ def score_real(
         height, width = seen.shape
         drawn = silhouette(mesh.frame(frame), mesh.faces, camera, (width, height))
         overlaps.append(overlap(drawn, seen))
-    away_px, away_m = reprojection(mesh, track, camera)
+    away_m = reprojection_m(mesh, track, camera)
     return RealScore(
         name,
         float(np.nanmean(overlaps)) if overlaps else float("nan"),
-        float(away_px.mean()) if away_px.size else float("nan"),
         float(away_m.mean()) if away_m.size else float("nan"),
     )
 
 
-def reprojection(
+def reprojection_m(
     mesh: MeshSequence, track: LandmarkTrack, camera: PinholeCamera
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Distances (n,) of joints from their landmarks in the picture: pixels, metres at their depth.
+) -> NDArray[np.float64]:
+    """Distances (n,) of joints from their landmarks in the picture, in metres at their depth.
 
     Of shoulders, elbows, wrists, hips, knees and ankles in all frames in which they are seen; the
     mesh has a surface of ours, frame by frame of the track.
@@ -89,4 +87,4 @@ def reprojection(
     inside = ((pixels >= 0) & (pixels <= (track.width, track.height))).all(axis=-1)
     seen = track.present[:, None] & (track.visibility[:, rows] >= _SEEN) & inside
     away_px = np.linalg.norm(camera.project(joints[seen]) - pixels[seen], axis=-1)
-    return away_px, away_px * joints[seen][:, 2] / camera.focal_px
+    return np.asarray(away_px * joints[seen][:, 2] / camera.focal_px)

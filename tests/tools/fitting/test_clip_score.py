@@ -18,7 +18,7 @@ from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from tools.fitting.clip_score import LIMBS as MEASURED
 from tools.fitting.clip_score import ClipScore, score_clip
 from tools.fitting.measures import coverage
-from tools.fitting.report import Row, as_csv, as_markdown, as_text, reach_rows
+from tools.fitting.report import Row, as_csv, as_markdown, reach_rows
 from tools.fitting.truth import Truth, read_truth
 
 
@@ -42,19 +42,17 @@ def row(scores: list[ClipScore], what: str) -> Row:
 
 
 def test_the_truth_itself_is_perfect(truth: Truth) -> None:
-    score = score_clip(truth, truth.mesh(), seconds=(7.2, 10.8))
+    score = score_clip(truth, truth.mesh(), seconds=7.2)
     assert [one.stroke.label for one in score.strokes] == [one["label"] for one in STROKES]
     for stroke in score.strokes:
         for limb in MEASURED:
             pair = stroke.velocity[limb]
             assert (pair.error, pair.correlation, pair.peak_kept) == (0.0, 1.0, 1.0)
-            assert stroke.tempo[limb].peak_kept == 1.0
+        assert stroke.tempo.peak_kept == 1.0
         assert stroke.map_difference == 0.0
         assert stroke.map_total > 0.0
-    assert score.distance_m.max() == score.aligned_m.max() == score.map_l1 == 0.0
-    assert score.overlap == 1.0
+    assert score.distance_m.max() == score.map_l1 == 0.0
     assert score.seconds_per_frame == pytest.approx(0.2)
-    assert score.processor_s_per_frame == pytest.approx(0.3)
     assert score.sigma is None
     unmet = [one.what for one in reach_rows([score]) if one.met is False]
     assert unmet == ["time for a fit"]
@@ -80,7 +78,6 @@ def test_a_drift_is_an_error_of_velocity(truth: Truth) -> None:
         during = (stroke.stroke.start_s <= TIMES) & (stroke.stroke.end_s > TIMES)
         assert stroke.velocity["hand"].error == pytest.approx(0.1 * rms(cosine[during]), rel=0.06)
         assert stroke.velocity["hand"].correlation > 0.99
-    assert score.aligned_m.max() < 1e-6
     assert score.distance_m == pytest.approx((0.1 * TIMES).mean(), rel=1e-3)
 
 
@@ -135,25 +132,6 @@ def test_sigma_covers_what_it_is_larger_than(truth: Truth, factor: float, covere
     assert row([score], "1σ of the velocity covers").met is False
 
 
-def test_limbs_out_of_the_picture_are_measured_against_what_they_hang_on(truth: Truth) -> None:
-    """The elbow stays; a hand that is held there, too, has all of the true motion for an error."""
-    narrow = replace(truth, camera=replace(truth.camera, width=240, height=2000))
-    mesh = truth.mesh()
-    joints = own_patches("low").positions(mesh.read(0, mesh.frame_count))
-    off_px = np.abs(narrow.camera.project(joints)[..., 0] - 120.0) > 120.0
-    assert off_px[:, JOINTS.index("hand.R")].sum() > 0
-    assert not off_px[:, JOINTS.index("elbow.R")].any()
-    same, held = (
-        score_clip(narrow, one)
-        for one in (mesh, replace(mesh, vertices=np.repeat(mesh.read(0, 1), len(TIMES), axis=0)))
-    )
-    np.testing.assert_array_equal(same.unseen.fitted, same.unseen.truth)
-    assert len(same.unseen.truth) == off_px.sum()
-    assert row([same], "limbs out of the picture").value == rms(same.unseen.truth) > 0.1
-    assert row([held], "limbs out of the picture").value == 0.0
-    assert len(score_clip(truth, mesh).unseen.truth) == 0
-
-
 def test_frames_without_a_person_are_left_out(truth: Truth) -> None:
     there = np.ones(len(TIMES), bool)
     there[20:] = False
@@ -175,25 +153,18 @@ def test_a_range_is_met_inside_only() -> None:
     for value, met in ((0.59, False), (0.6, True), (0.75, True), (0.76, False), (math.nan, None)):
         assert Row("", value, least=0.6, most=0.75).met is met
     assert Row("", 0.25, most=0.25).met is True
-    assert Row("", 1.0).met is None
 
 
 def test_the_tables_say_the_same_in_every_form(truth: Truth, still: Truth) -> None:
     scores = [score_clip(one, one.mesh()) for one in (truth, still)]
-    text, markdown = as_text(scores), as_markdown(scores)
-    assert sum("  " + one.what in text for one in reach_rows(scores)) > 10
-    lines = [tuple(line.split()) for line in text.splitlines()]
+    markdown = as_markdown(scores)
+    assert sum(f"| {one.what} | " in markdown for one in reach_rows(scores)) > 10
     for stroke in STROKES:
-        for speed in ("fast", "all"):
-            assert any(line[:2] == (stroke["label"], speed) for line in lines)
-    for what in ("who stands still", "up-to-down"):
-        assert what in text
-        assert what in markdown
+        assert f"| {stroke['label']} | all | 1 |" in markdown
     rows = [line for line in markdown.splitlines() if line.startswith("|")]
     assert len({line.count("|") for line in rows}) == 3
     clips = list(csv.DictReader(as_csv(scores).splitlines()))
     assert [one["clip"] for one in clips] == ["wave", "still"]
-    assert any(line[:2] == ("wave", f"{float(clips[0]['joints (m)']):.3f}") for line in lines)
     medians = next(line for line in rows if line.startswith("| gestures"))
     assert medians.split(" | ")[1:3] == ["1", f"{float(clips[0]['joints (m)']):.2g}"]
 

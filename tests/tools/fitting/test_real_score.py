@@ -15,7 +15,7 @@ from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 from tools.fitting.clip_score import score_clip
-from tools.fitting.real_score import reprojection, score_real
+from tools.fitting.real_score import reprojection_m, score_real
 from tools.fitting.truth import read_truth
 
 CAMERA = PinholeCamera()
@@ -55,14 +55,13 @@ def track(mesh: MeshSequence) -> LandmarkTrack:
 def test_a_mesh_on_the_person_is_perfect(mesh: MeshSequence, track: LandmarkTrack) -> None:
     score = score_real("wave", mesh, track, CAMERA)
     assert score.overlap == 1.0
-    assert score.reprojection_px < 1e-4
-    assert len(reprojection(mesh, track, CAMERA)[0]) == 12 * len(TIMES)
+    assert score.reprojection_m < 1e-6
+    assert len(reprojection_m(mesh, track, CAMERA)) == 12 * len(TIMES)
 
 
 def test_a_shift_in_the_picture_is_measured(mesh: MeshSequence, track: LandmarkTrack) -> None:
     shifted = replace(track, image_px=track.image_px + np.array([3.0, 4.0], np.float32))
     score = score_real("wave", mesh, shifted, CAMERA)
-    assert score.reprojection_px == pytest.approx(5.0, abs=0.01)
     # 600 px are one metre at one metre; the joints are some 2.5 m off.
     assert score.reprojection_m == pytest.approx(5.0 * 2.5 / 600, rel=0.05)
 
@@ -75,9 +74,9 @@ def test_hidden_landmarks_and_those_outside_are_left_out(
     image = track.image_px.copy()
     image[:, LANDMARKS.index("elbow.R"), 1] = 700.0
     partly = replace(track, visibility=visibility, image_px=image)
-    away_px, _ = reprojection(mesh, partly, CAMERA)
-    assert len(away_px) == 10 * len(TIMES)
-    assert away_px.max() < 1e-4
+    away_m = reprojection_m(mesh, partly, CAMERA)
+    assert len(away_m) == 10 * len(TIMES)
+    assert away_m.max() < 1e-6
 
 
 def test_the_residual_of_a_known_clip(
