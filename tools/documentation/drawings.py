@@ -31,7 +31,7 @@ from sd2core.files.resources import resource_path
 from sd2core.fmcw.options import SignalOptions
 from sd2core.fmcw.simulation import simulate_radar
 from tools.documentation.places import IMAGES, REPOSITORY
-from tools.fitting.measures import speed_mps
+from tools.fitting.clip_score import speed_mps
 
 CONCEPTS = IMAGES / "concepts"
 SAMPLE = resource_path("swipes.sd2")

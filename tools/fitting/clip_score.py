@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from sd2core.body.model import own_resolution
+from sd2core.body.model import Body, own_resolution
 from sd2core.body.track import LandmarkTrack
 from sd2core.compare.joints import JOINTS, JointPatches, own_patches
 from sd2core.compare.measures import (
@@ -26,19 +28,44 @@ from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.scattering.resampling import resample_mesh
+from sd2core.scattering.velocity import moments
 from sd2core.sensor import VirtualSensor
 from tools.build_sample.swipes import GestureSpan
-from tools.fitting.measures import EDGE_FRAMES, medium_in_high, peak_kept, speed_mps
 from tools.fitting.real_score import reprojection_m
 from tools.fitting.truth import Truth
 
 Floats = NDArray[np.float64]
+
+EDGE_FRAMES = 5
+"""Frames at each end of a clip that count as its edge."""
+
 
 LIMBS = ("hand", "elbow")
 """Parts of the moving arm that are measured during strokes."""
 
 _MOVING_MPS = 0.1
 """Root mean square of the true velocity of a joint from which on it moves."""
+
+
+def peak_kept(values: NDArray[Any], truth: NDArray[Any]) -> float:
+    """Largest magnitude of one over that of the other; NaN when the truth has none."""
+    peak = float(np.abs(truth).max(initial=0.0))
+    return float(np.abs(values).max(initial=0.0)) / peak if peak > 0 else float("nan")
+
+
+def speed_mps(positions_m: NDArray[Any], times_s: Floats) -> Floats:
+    """Magnitude of the velocity, (T, N) for positions (T, N, 3)."""
+    stencil = moments(times_s, np.arange(len(times_s)), 1)
+    step = positions_m[stencil.after[:, 0]] - positions_m[stencil.before[:, 0]]
+    return np.asarray(np.linalg.norm(step, axis=-1) / stencil.duration_s)
+
+
+def coverage(errors: NDArray[Any], sigma: NDArray[Any]) -> float:
+    """Share of errors no larger than their standard deviation (0.683 when it is right)."""
+    known = np.isfinite(errors) & np.isfinite(sigma)
+    if not known.any():
+        return float("nan")
+    return float((np.abs(errors[known]) <= sigma[known]).mean())
 
 
 class Pair(NamedTuple):
@@ -224,6 +251,13 @@ def _with_vertices_of(mesh: MeshSequence, other: MeshSequence) -> MeshSequence:
     rows = medium_in_high()
     known = None if mesh.uncertainty is None else mesh.uncertainty.of_vertices(rows)
     return replace(mesh, vertices=mesh.vertices[:, rows], faces=other.faces, uncertainty=known)
+
+
+@lru_cache(maxsize=1)
+def medium_in_high() -> NDArray[np.intp]:
+    """Vertices of the finest surface that are those of the medium one, (5000,)."""
+    _, rows = cKDTree(Body.load("high").vertices_m).query(Body.load("medium").vertices_m)
+    return np.asarray(rows, np.intp)
 
 
 def _vertex_velocity(mesh: MeshSequence, presence: Presence) -> float:

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from sd2core.body.fitted import fitted_vertices
 from sd2core.body.initial import Pose
 from sd2core.body.mesh_refining import refined
 from sd2core.body.model import vertex_normals
+from sd2core.body.parts import body_parts
 from sd2core.body.rig import KeypointSpace
 from sd2core.body.rotations import from_vector
 from sd2core.body.shape import ShapeSpace
+from sd2core.compare.measures import line_of_sight_velocity, rms
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.body_motion import RATE_HZ, BodyMotion
 from sd2core.progress import Progress, silent
 from sd2core.timebase import Timebase
-from tools.motion_capture.jitter import Floats, approaching_mps, facing, jittering
+
+Floats = NDArray[np.float64]
+
 
 TUNED_ON = frozenset({"cmu01", "cmu02", "cmu05", "cmu08", "cmu49", "cmu127"})
 """Persons by whose motion something of the smoothing was chosen.
@@ -33,6 +40,32 @@ _WHITE_M, _LASTING_M = 0.006, 0.010
 _MIN_FRAMES, _MAX_FRAMES = 36, 300
 _ABOVE_FLOOR_M = 1.0  # of the camera
 _NEAREST_M = 4.0
+
+
+def wandering(generator: np.random.Generator, frames: int, count: int) -> Floats:
+    """Noise (T, count, 3) of standard deviation 1 that is forgotten within half a second."""
+    share = np.exp(-1.0 / 15.0)
+    noise = generator.normal(size=(frames, count, 3))
+    noise[1:] *= np.sqrt(1.0 - share**2)
+    return np.asarray(lfilter([1.0], [1.0, -share], noise, axis=0))
+
+
+def jittering(mesh: MeshSequence, white_m: float, lasting_m: float, seed: int) -> MeshSequence:
+    """The mesh with jitter, half of its variance common to all limbs, depth twice as uncertain."""
+    generator = np.random.default_rng(seed)
+    parts = body_parts(mesh)
+    assert parts is not None
+    frames, limbs = mesh.frame_count, len(parts.names)
+    white = generator.normal(size=(frames, limbs + 1, 3))
+    lasting = wandering(generator, frames, limbs + 1)
+    jitter = (white_m * white + lasting_m * lasting) / np.sqrt(2.0) * [1.0, 1.0, 2.0]
+    moved = mesh.read(0, frames) + jitter[:, parts.numbers] + jitter[:, -1:]
+    return replace(mesh, vertices=moved)
+
+
+def facing(vertices: NDArray[np.floating], normals: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Vertices that look towards the camera."""
+    return np.asarray((vertices * normals).sum(axis=-1) < 0)
 
 
 def measure_refining(folder: Path, progress: Progress = silent) -> dict[str, tuple[float, float]]:
@@ -75,10 +108,10 @@ def _errors(true: MeshSequence) -> tuple[float, float]:
     assert faces is not None
     vertices = true.read(0, true.frame_count)
     seen = np.stack([facing(one, vertex_normals(one, faces)) for one in vertices[1:-1]])
-    known = approaching_mps(vertices, true.times_s)
+    known = line_of_sight_velocity(vertices, true.times_s)[1:-1]
 
     def error(mesh: MeshSequence) -> float:
-        moved: Floats = approaching_mps(mesh.read(0, mesh.frame_count), mesh.times_s)
-        return float(np.sqrt(np.mean((moved - known)[seen] ** 2)))
+        moved = line_of_sight_velocity(mesh.read(0, mesh.frame_count), mesh.times_s)[1:-1]
+        return rms((moved - known)[seen])
 
     return error(noisy), error(refined(noisy))

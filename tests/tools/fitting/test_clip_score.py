@@ -16,8 +16,7 @@ from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from tools.fitting.clip_score import LIMBS as MEASURED
-from tools.fitting.clip_score import ClipScore, score_clip
-from tools.fitting.measures import coverage
+from tools.fitting.clip_score import ClipScore, coverage, score_clip
 from tools.fitting.report import Row, as_csv, as_markdown, reach_rows
 from tools.fitting.truth import Truth, read_truth
 

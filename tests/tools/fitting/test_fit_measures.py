@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sd2core.body.model import Body
-from tools.fitting.measures import coverage, medium_in_high, peak_kept, speed_mps
+from tools.fitting.clip_score import coverage, medium_in_high, peak_kept, speed_mps
 
 
 def test_the_speed_along_a_circle_is_that_of_its_chords() -> None:
