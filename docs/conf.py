@@ -14,8 +14,9 @@ REPOSITORY = Path(__file__).resolve().parent.parent
 for _folder in (REPOSITORY / "app", REPOSITORY):
     sys.path.insert(0, str(_folder))
 
+from sd2app.command_line import full_parser  # noqa: E402
+from sd2app.manual.pages import command_text, commands_of  # noqa: E402
 from sd2core.version import __version__  # noqa: E402
-from tools.documentation.command_pages import write_command_pages  # noqa: E402
 
 # What the notebook's kernel keeps for itself stays out of the user's folders.
 _KERNEL = REPOSITORY / "build" / "notebook"
@@ -50,7 +51,6 @@ MEASURED = "how-good-is-it"
 
 # Markdown. Links to files outside docs/ become downloads, so that they work without a network;
 # one that leads nowhere is a warning, and warnings are errors.
-myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 4
 
 # The notebook is stored without outputs, and runs whenever its page is built.
@@ -97,10 +97,24 @@ def setup(app: Sphinx) -> None:
     """Write the pages of the commands before pages are looked for, and follow the reading."""
     for variable in ("IPYTHONDIR", "JUPYTER_RUNTIME_DIR"):
         Path(os.environ[variable]).mkdir(parents=True, exist_ok=True)
-    write_command_pages(Path(app.srcdir) / "commands")
+    _write_command_pages(Path(app.srcdir) / "commands")
     app.connect("source-read", _unlink_what_is_left_out)
     app.connect("env-updated", _leave_measured_out_of_the_search)
     app.connect("autodoc-process-signature", _with_readable_defaults)
+
+
+def _write_command_pages(folder: Path) -> None:
+    """Write the pages of commands that the program's own manual has."""
+    parser = full_parser()
+    pages = {f"{name}.md": command_text(parser, name) for name in ("index", *commands_of(parser))}
+    folder.mkdir(exist_ok=True)
+    for path in set(folder.glob("*.md")) - {folder / name for name in pages}:
+        path.unlink()
+    for name, text in pages.items():
+        path = folder / name
+        # Pages that are as they were are not built again.
+        if not path.is_file() or path.read_text("utf-8") != text:
+            path.write_text(text, "utf-8")
 
 
 def _unlink_what_is_left_out(app: Sphinx, name: str, source: list[str]) -> None:

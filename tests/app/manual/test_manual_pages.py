@@ -14,8 +14,7 @@ from parsers import arguments_of
 from sd2app.command_line import full_parser
 from sd2app.manual.help import HELP
 from sd2app.manual.library import described
-from sd2app.manual.pages import MEASURED, Manual, manual_folder, plain_words
-from tools.documentation.command_pages import commands_of
+from sd2app.manual.pages import MEASURED, Manual, commands_of, manual_folder, plain_words
 
 MANUAL = Manual(manual_folder(), full_parser)
 LINK = re.compile(r"!?\[(?:(?!\n\n)[^\]])*\]\(([^)\s]+)\)")
