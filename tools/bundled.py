@@ -104,15 +104,7 @@ def _colours(options: Bundled) -> None:
     np.savez_compressed(options.out, **tables)
 
 
-main = tool(
-    "bundled",
-    {
-        "body": (Bundled, _body),
-        "sample": (Bundled, _sample),
-        "gestures": (Gestures, _gestures),
-        "colours": (Bundled, _colours),
-    },
-)
+main = tool("bundled", _body, _sample, _gestures, _colours)
 
 
 if __name__ == "__main__":

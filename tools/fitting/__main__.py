@@ -167,15 +167,7 @@ def _errors(options: Errors) -> None:
     print(f"Wrote {options.out}: {len(truths)} clips, {errors.provenance['frames']} frames")
 
 
-main = tool(
-    "fitting",
-    {
-        "clips": (Clips, _clips),
-        "score": (Score, _score),
-        "errors": (Errors, _errors),
-        "people": (People, _people),
-    },
-)
+main = tool("fitting", _clips, _score, _errors, _people)
 
 
 if __name__ == "__main__":

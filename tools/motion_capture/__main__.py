@@ -71,7 +71,7 @@ def _refining(options: Refining) -> None:
     )
 
 
-main = tool("motion_capture", {"drive": (Drive, _drive), "refining": (Refining, _refining)})
+main = tool("motion_capture", _drive, _refining)
 
 
 if __name__ == "__main__":

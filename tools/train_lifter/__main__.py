@@ -134,16 +134,7 @@ def _score(options: Score) -> None:
     print("\n".join(numbers_table(sides)))
 
 
-main = tool(
-    "train_lifter",
-    {
-        "data": (Data, _data),
-        "pairs": (Pairs, _pairs),
-        "train": (Train, _train),
-        "sides": (Learning, _sides),
-        "score": (Score, _score),
-    },
-)
+main = tool("train_lifter", _data, _pairs, _train, _sides, _score)
 
 
 if __name__ == "__main__":
