@@ -29,7 +29,7 @@ from sd2core.io.video_writing import write_video
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.radar_config import PAPER_RADAR
-from sd2core.recording.recording import SUFFIX, Recording, Span
+from sd2core.recording.recording import SUFFIX, Recording
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 from tools.build_sample.posing import posed
@@ -121,11 +121,7 @@ def _fill(folder: Path, times_s: NDArray[np.float64], progress: Progress) -> Non
         mesh=folder / "fit.zarr",
         radar=folder / "radar",
         sensor=_SENSOR,
-        spans=tuple(
-            Span(start_s=span.start_s, end_s=span.end_s, label=span.label)
-            for span in SPANS
-            if span.end_s <= end_s
-        ),
+        spans=tuple(span for span in SPANS if span.end_s <= end_s),
         title=TITLE,
         simulated=True,
     )

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats
+from sd2core.files.recording_json import Span
 from sd2core.simulate.limbs import (
     HANGING,
     ArmPose,
@@ -31,14 +32,6 @@ from sd2core.simulate.limbs import (
 )
 
 DURATION_S = 15.0
-
-
-class GestureSpan(NamedTuple):
-    """Time span of one gesture: half-open ``[start_s, end_s)``."""
-
-    start_s: float
-    end_s: float
-    label: str
 
 
 class Move(NamedTuple):
@@ -74,10 +67,17 @@ _MOVES = (
     Move(14.0, 14.95, HANGING),
 )
 
-SPANS = tuple(
-    GestureSpan(move.start_s, move.end_s, move.label) for move in _MOVES if move.label is not None
-)
-"""The strokes themselves; raising, holding and lowering the hand belong to no gesture."""
+
+def strokes(moves: Sequence[Move]) -> tuple[Span, ...]:
+    """The gestures; raising, holding and lowering the hand belong to none."""
+    return tuple(
+        Span(start_s=move.start_s, end_s=move.end_s, label=move.label)
+        for move in moves
+        if move.label
+    )
+
+
+SPANS = strokes(_MOVES)
 
 
 def swipes(skeleton: Skeleton, times_s: ArrayLike) -> Motion:

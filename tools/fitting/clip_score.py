@@ -24,13 +24,13 @@ from sd2core.compare.measures import (
 from sd2core.doppler.body_error import body_error
 from sd2core.doppler.synthesizer import Synthesizer
 from sd2core.errors import Sd2Error
+from sd2core.files.recording_json import Span
 from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.scattering.resampling import resample_mesh
 from sd2core.scattering.velocity import moments
 from sd2core.sensor import VirtualSensor
-from tools.build_sample.swipes import GestureSpan
 from tools.fitting.real_score import reprojection_m
 from tools.fitting.truth import Truth
 
@@ -101,7 +101,7 @@ def pooled(pairs: list[Pair]) -> Pair:
 class StrokeScore:
     """One gesture."""
 
-    stroke: GestureSpan
+    stroke: Span
     speed: str
     velocity: dict[str, Pair]  # of each of LIMBS, along the line of sight
     tempo: Pair  # the hand's speed in space

@@ -22,6 +22,7 @@ from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder
+from sd2core.files.recording_json import Span
 from sd2core.io.video_writing import write_video
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.body_motion import RATE_HZ, BodyMotion, Role
@@ -31,7 +32,6 @@ from sd2core.timebase import Timebase
 from tools.build_sample.clothing import Clothes
 from tools.build_sample.render import Camera, Renderer
 from tools.build_sample.sample import write_compact_mesh
-from tools.build_sample.swipes import GestureSpan
 from tools.fitting.cast import PEOPLE, ROOMS
 from tools.fitting.motions import Action, duration_s, perform
 from tools.fitting.truth import FORMAT, VERSION, read_truth
@@ -222,7 +222,7 @@ class Scene:
     # (T, B, 3, 4), of the bones, in the camera frame.
     transforms: NDArray[np.float64]
     skeleton: Skeleton
-    spans: tuple[GestureSpan, ...]
+    spans: tuple[Span, ...]
     camera: Camera
 
     def mesh(self, space: ShapeSpace, resolution: Resolution) -> MeshSequence:
@@ -346,7 +346,7 @@ def _fill(folder: Path, clip: Clip, motions: Path | None, progress: Progress) ->
         "clip": _description(clip),
         "camera": asdict(camera),
         "stature_m": known.shape.stature_m,
-        "spans": [span._asdict() for span in known.spans],
+        "spans": [span.model_dump() for span in known.spans],
     }
     (folder / "truth.json").write_text(json.dumps(truth, indent=1) + "\n", "utf-8")
 

@@ -14,6 +14,7 @@ import numpy as np
 from sd2core.body.model import Skeleton
 from sd2core.body.rotations import Floats, about
 from sd2core.errors import Sd2Error
+from sd2core.files.recording_json import Span
 from sd2core.simulate.gait import Path, gait
 from sd2core.simulate.limbs import (
     HANGING,
@@ -23,7 +24,7 @@ from sd2core.simulate.limbs import (
     reach,
     relax_fingers,
 )
-from tools.build_sample.swipes import GestureSpan, Move, arm_poses, with_one_arm
+from tools.build_sample.swipes import Move, arm_poses, strokes, with_one_arm
 
 Kind = Literal["swipes", "still", "walk", "turn", "captured"]
 Speed = Literal["slow", "normal", "fast"]
@@ -75,7 +76,7 @@ class Performance(NamedTuple):
     """A motion and when its gestures are made."""
 
     motion: Motion
-    spans: tuple[GestureSpan, ...]
+    spans: tuple[Span, ...]
 
 
 def duration_s(action: Action, seed: int) -> float:
@@ -117,9 +118,9 @@ def perform(
     if action.kind == "still":
         return Performance(_still(skeleton, action, len(times), arm_scale), ())
     moves = _moves(action, rng)
-    spans = tuple(GestureSpan(move.start_s, move.end_s, move.label) for move in moves if move.label)
     arm, sway_s = arm_poses(moves, times), float(rng.uniform(0, 30))
-    return Performance(with_one_arm(skeleton, times, arm, action.hand, arm_scale, sway_s), spans)
+    motion = with_one_arm(skeleton, times, arm, action.hand, arm_scale, sway_s)
+    return Performance(motion, strokes(moves))
 
 
 def _straight(start_s: float, distance_m: float, speed_mps: float) -> Path:

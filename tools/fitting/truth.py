@@ -10,9 +10,9 @@ from typing import Any
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.errors import Sd2Error
+from sd2core.files.recording_json import Span
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.sequence import MeshSequence
-from tools.build_sample.swipes import GestureSpan
 
 FORMAT = "sd2-fit-truth"
 VERSION = 1
@@ -30,7 +30,7 @@ class Truth:
     kind: str  # ``swipes``, ``still``, ``walk``, ``turn`` or ``captured``
     speed: str  # of the swipes: ``slow``, ``normal`` or ``fast``
     hand: str  # ``L`` or ``R``: the one that swipes
-    strokes: tuple[GestureSpan, ...]
+    strokes: tuple[Span, ...]
     stature_m: float  # of the person, without shoes
     camera: PinholeCamera
 
@@ -60,7 +60,7 @@ def read_truth(folder: Path) -> Truth:
             clip,
             clip["name"],
             **{name: clip["action"][name] for name in ("kind", "speed", "hand")},
-            strokes=tuple(GestureSpan(**span) for span in meta["spans"]),
+            strokes=tuple(Span(**span) for span in meta["spans"]),
             stature_m=meta["stature_m"],
             camera=PinholeCamera(camera["width"], camera["height"], camera["focal_px"]),
         )

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from sd2core.body.model import Body
+from sd2core.files.recording_json import Span
 from tools.build_sample.posing import posed
-from tools.build_sample.swipes import DURATION_S, SPANS, GestureSpan, swipes
+from tools.build_sample.swipes import DURATION_S, SPANS, swipes
 
 PLACE = np.array([0.05, 1.1, 2.2])
 RATE = 100.0
@@ -42,7 +43,7 @@ def radial_velocity(hand: np.ndarray) -> np.ndarray:
     return -np.gradient(np.linalg.norm(hand, axis=1), 1.0 / RATE)
 
 
-def during(span: GestureSpan, times_s: np.ndarray) -> np.ndarray:
+def during(span: Span, times_s: np.ndarray) -> np.ndarray:
     return (times_s >= span.start_s) & (times_s < span.end_s)
 
 
@@ -59,7 +60,7 @@ def test_two_of_each_gesture_apart_and_in_order() -> None:
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize("span", SPANS)
 def test_the_hand_goes_where_the_label_says(
-    span: GestureSpan, hand: np.ndarray, times_s: np.ndarray
+    span: Span, hand: np.ndarray, times_s: np.ndarray
 ) -> None:
     path = hand[during(span, times_s)]
     right, down, _ = path[-1] - path[0]
@@ -75,7 +76,7 @@ def test_the_hand_goes_where_the_label_says(
 
 @pytest.mark.parametrize("span", SPANS)
 def test_each_direction_has_its_own_doppler(
-    span: GestureSpan, hand: np.ndarray, times_s: np.ndarray
+    span: Span, hand: np.ndarray, times_s: np.ndarray
 ) -> None:
     velocity = radial_velocity(hand)[during(span, times_s)]
     approach, recede = velocity.max(), -velocity.min()
