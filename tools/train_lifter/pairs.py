@@ -27,9 +27,8 @@ from sd2core.simulate.campaign.radar import TargetOptions, radar_target
 from sd2core.simulate.campaign.scene import RANGES_M
 from sd2core.simulate.campaign.takes import FITTED, OPTIONS, TRUE
 from tools.fitting.whole_fit import fit_body, mesh_of
-from tools.train_lifter.data import load_takes
 from tools.train_lifter.fits import track_of
-from tools.train_lifter.takes import Motion, Stage
+from tools.train_lifter.takes import Motion, Stage, load_takes
 
 _BESIDE_M = 0.25
 _TRUNK = [LANDMARKS.index(f"{place}.{side}") for place in ("shoulder", "hip") for side in "LR"]

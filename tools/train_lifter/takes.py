@@ -1,13 +1,19 @@
-"""Takes of random people, with what the landmark network says about them and the truth."""
+"""Takes of random people, with what the landmark network says about them and the truth.
+
+Several processes make a folder of them: ``python -m tools.train_lifter data``.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
+from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +21,7 @@ from numpy.typing import NDArray
 from sd2core.body.blazepose import CLOSE_UP, Pose, PoseLandmarker, Roi
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.initial import Pose as BodyPose
+from sd2core.body.landmark_models import DEFAULT_MODEL, LandmarkModel, landmark_models
 from sd2core.body.landmark_repair import on_cubics
 from sd2core.body.refining import fast_looks
 from sd2core.body.rig import JOINT, Keypoints, KeypointSpace, Rig
@@ -22,10 +29,14 @@ from sd2core.body.rotations import Floats, from_vector
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
 from sd2core.body.track import LANDMARKS
+from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.mocap.body_motion import RATE_HZ, BodyMotion, Role, load_motions
 from sd2core.mocap.driving import resample_pose
-from sd2core.options.records import OptionRecord
+from sd2core.options.kinds import Count
+from sd2core.options.records import ARGUMENT, OptionRecord
+from sd2core.processes import end_with_parent
+from sd2core.progress import Progress, silent
 from sd2core.simulate.people.motion import random_motion
 from tools.train_lifter.crops import (
     CropPainter,
@@ -33,10 +44,10 @@ from tools.train_lifter.crops import (
     random_background,
     random_furniture,
     random_look,
+    random_wardrobe,
 )
 from tools.train_lifter.deeds import Manner, random_deed
 from tools.train_lifter.view import View, random_view, random_view_around
-from tools.train_lifter.wardrobe import random_wardrobe
 
 FRAMES = 96
 
@@ -369,3 +380,71 @@ def _towards(old: Roi, new: Roi) -> Roi:
         old.size_px * float((new.size_px / old.size_px) ** share),
         old.angle_rad + share * float(turn),
     )
+
+
+class Data(Motion):
+    """Options of ``data``.
+
+    Parameters
+    ----------
+    out : OUT
+        folder of the takes
+    takes : N
+        how many
+    processes : P
+        at work at once
+    models : FOLDER
+        the landmark models
+    landmark_model
+        which of them looks
+    """
+
+    out: Annotated[Path, ARGUMENT]
+    takes: Count = 400
+    processes: Count = 2
+    models: Path | None = None
+    landmark_model: LandmarkModel = DEFAULT_MODEL
+
+
+_maker: TakeMaker | None = None
+
+
+def make_lifter_data(options: Data, progress: Progress = silent) -> int:
+    """Make the takes of a folder that are not there yet, each whole or not at all; their number."""
+    landmark_models(options.models, model=options.landmark_model)
+    options.out.mkdir(parents=True, exist_ok=True)
+    missing = [n for n in range(options.takes) if not take_path(options.out, n).exists()]
+    done = options.takes - len(missing)
+    progress(done, options.takes)
+    with ProcessPoolExecutor(options.processes, get_context("spawn"), _start, (options,)) as pool:
+        for made, _ in enumerate(pool.map(partial(_make, options.out), missing), start=1):
+            progress(done + made, options.takes)
+    return len(missing)
+
+
+def take_path(folder: Path, number: int) -> Path:
+    """Path of one take."""
+    return folder / f"take-{number:05d}.npz"
+
+
+def load_takes(folder: Path) -> list[Take]:
+    """All takes of a folder, in the order of their numbers; Sd2Error if there are none."""
+    takes = [Take.load(path) for path in sorted(folder.glob("take-*.npz"))]
+    if not takes:
+        raise Sd2Error(
+            f"There are no takes in {folder}",
+            "a folder made by `python -m tools.train_lifter data`",
+        )
+    return takes
+
+
+def _start(options: Data) -> None:
+    end_with_parent()
+    global _maker
+    models = landmark_models(options.models, model=options.landmark_model)
+    _maker = TakeMaker(PoseLandmarker(models.landmarker), options)
+
+
+def _make(folder: Path, number: int) -> None:
+    assert _maker is not None
+    _maker.make(number).save(take_path(folder, number))
