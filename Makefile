@@ -135,7 +135,7 @@ range-synthesis: setup
 	$(BIN)/python -m tools.documentation.range_synthesis
 
 classifier: setup
-	$(BIN)/python -m tools.documentation.classifier
+	$(BIN)/python -m tools.documentation.studies classifier
 
 real-gestures: setup
 	$(BIN)/python -m tools.documentation.real_gestures

@@ -1,6 +1,8 @@
 """Makes ``studies.md`` and its pictures: ``python -m tools.documentation.studies``, an hour.
 
-Pairs and runs stay in ``build/studies``; what is there is not made again.
+``python -m tools.documentation.studies classifier`` makes ``classifier.md`` of simulated campaigns,
+an hour, too. Pairs and runs stay in ``build/studies`` and ``build/classifier``; what is there is
+not made again.
 """
 
 from __future__ import annotations
@@ -8,6 +10,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -24,18 +27,24 @@ from tools.studies.hand_gestures import make_pairs
 
 FOLDER = BUILD / "studies"
 PLANS = REPOSITORY / "tools" / "studies"
+CAMPAIGNS = {
+    "varied": ("--minutes", 18, "--seed", 2),
+    "to-and-fro": ("--minutes", 18, "--protocol", "paper", "--seed", 5),
+}
+"""Options of ``sd2 simulate campaign`` for the data of a plan of ``classifier.md``."""
 _SHARE = 0.1
 _VARIANTS = ("places", "shapes", "mirrored")
 
 
 def study_section(folder: Path, name: str) -> str:
-    """Return a study's page as a section of another, its pictures among those of the guide.
+    """Make a study; its page as a section of another, its pictures among those of the guide.
 
     What its columns mean the other page says once.
     """
-    text = (folder / "study.md").read_text(encoding="utf-8")
+    sd2("study", PLANS / f"{name}.toml")
+    text = (folder / name / "study.md").read_text(encoding="utf-8")
     for picture in ("curve", "confusion"):
-        shutil.copy(folder / f"{picture}.png", IMAGES / f"study-{name}-{picture}.png")
+        shutil.copy(folder / name / f"{picture}.png", IMAGES / f"study-{name}-{picture}.png")
         text = text.replace(f"({picture}.png)", f"(images/study-{name}-{picture}.png)")
     text = re.sub(r"^(Points of frames over|Mean recall over) .*\n\n", "", text, flags=re.MULTILINE)
     return re.sub(r"^#", "##", text, flags=re.MULTILINE).strip()
@@ -77,15 +86,12 @@ def _gain(gain: Gain) -> str:
     return f"{100 * gain.mean:+.1f} ({low:+.1f} to {high:+.1f})"
 
 
-def main() -> None:
-    """Make the pairs and the studies, and write the page."""
+def studies() -> None:
+    """Make the pairs and the studies on recordings, and write the page."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     sd2("pairs", "mars", *MARS, "--limbs", "--out", FOLDER / "mars.zarr")
     make_pairs(FOLDER / "hand-gestures.zarr")
-    sections = []
-    for name in ("mars", "k60168a"):
-        sd2("study", PLANS / f"{name}.toml")
-        sections.append(study_section(FOLDER / name, name))
+    sections = [study_section(FOLDER, name) for name in ("mars", "k60168a")]
     for variant in _VARIANTS:
         out = FOLDER / f"mars-{variant}.zarr"
         sd2("pairs", "vary", *MARS, "--by", variant, "--limbs", "--out", out)
@@ -98,5 +104,17 @@ def main() -> None:
     )
 
 
+def classifier() -> None:
+    """Make the campaigns and the studies on them, and write the page."""
+    folder = BUILD / "classifier"
+    folder.mkdir(parents=True, exist_ok=True)
+    sections = []
+    for name, options in CAMPAIGNS.items():
+        campaign = folder / f"{name}.zarr"
+        sd2("simulate", "campaign", *options, "--workers", 2, "--out", campaign)
+        sections.append(study_section(folder, name))
+    write_filled("classifier.md", studies="\n\n".join(sections))
+
+
 if __name__ == "__main__":
-    main()
+    classifier() if sys.argv[1:] == ["classifier"] else studies()
