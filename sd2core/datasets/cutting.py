@@ -77,7 +77,11 @@ def clips_of(
 def _clips_of_spans(
     outline: Outline, frame_rate_hz: float, length: int, options: SpanOptions
 ) -> tuple[list[Clip], Counter[str]]:
-    """Find each span's clip, its longest part with the person, and why others have none."""
+    """Find the clip of one segment that each labelled span is, and why others are none.
+
+    Of a span that the person leaves, its longest part counts. Raises Sd2Error for a span of more
+    than ``length`` frames, unless spans are resampled.
+    """
     times_s = outline.times_s
     whole = clips_of(times_s, outline.present, frame_rate_hz, 1, 0)
     ends_s = np.array([clip.times_s[-1] for clip in whole])
@@ -274,7 +278,10 @@ def _values(
     null_bins: Sequence[int],
     least: int,
 ) -> NDArray[np.float32]:
-    """Return a clip at its own times, ``least`` frames: (…, bins, frames) → (frames, …, bins)."""
+    """Return energies of a clip at its own times: (…, bins, frames) → (frames, …, bins).
+
+    Empty frames make them ``least`` frames.
+    """
     own = np.moveaxis(values, -1, 0)[clip.start : clip.stop].copy()
     if clip.resampled:
         rows = own.reshape(len(own), -1)

@@ -54,26 +54,46 @@ _COUNTED_SHARE = 0.05
 
 @dataclass(frozen=True)
 class Making:
-    """Options for the maps of recordings."""
+    """Options for the maps of recordings.
 
-    kinds: tuple[MapKind, ...] = KINDS  # wanted, where a recording has what they are made of
-    synthesis: SynthesisOptions = PRESETS["paper"]  # its axis is that of the radar's map, too
+    Parameters
+    ----------
+    kinds : tuple of str
+        Wanted, where a recording has what they are made of.
+    synthesis : SynthesisOptions
+        Its axis is that of the radar's map, too.
+    tolerance : float, optional
+        Error of a synthetic map that is allowed, as a share; the cheapest plan within it is
+        chosen once per recording, see :mod:`sd2core.accuracy.places`. None: as ``synthesis``
+        says.
+    placements : Placements or "planned", optional
+        Where else sensors stand around the body, besides the recording's own; each gives
+        synthetic and denoised maps. ``"planned"``: where each recording itself plans them.
+    simulation : Simulation, optional
+        Gives every place a simulated map, also where the recording's own radar is simulated,
+        so that all are of one radar. It takes far longer than everything else. None: there
+        are simulated maps only where a recording's radar file holds one.
+    model : str, optional
+        Denoiser, by file or name; None: that of the recording, or the bundled one where
+        none is chosen. A recording that is set to have no denoiser has no denoised map.
+    texture : int, optional
+        Seed with which denoised maps are drawn as the radar would show them; None: the mean.
+    limbs : bool
+        Split the synthetic map by the parts of the body; a recording where they are not known
+        fails.
+    imu : tuple of str
+        Places of inertial sensors on the body; a recording without the bundled body's mesh fails.
+    """
+
+    kinds: tuple[MapKind, ...] = KINDS
+    synthesis: SynthesisOptions = PRESETS["paper"]
     tolerance: float | None = None
-    """Error of a synthetic map that is allowed, as a share; the cheapest plan within it is chosen
-    once per recording, see :mod:`sd2core.accuracy.places`. None: as ``synthesis`` says."""
     placements: Placements | Literal["planned"] | None = None
-    """Where else sensors stand around the body, besides the recording's own; each gives synthetic
-    and denoised maps. ``"planned"``: where each recording itself plans them."""
     simulation: Simulation | None = None
-    """Gives every place a simulated map, also where the recording's own radar is simulated, so that
-    all are of one radar. It takes far longer than everything else. None: there are simulated maps
-    only where a recording's radar file holds one."""
     model: str | None = None
-    """Denoiser, by file or name; None: that of the recording, or the bundled one where none is
-    chosen. A recording that is set to have no denoiser has no denoised map."""
-    texture: int | None = None  # seed of maps drawn as the radar would show them; None: the mean
-    limbs: bool = False  # split the synthetic map by parts; a recording that knows none fails
-    imu: tuple[str, ...] = ()  # places on the body; a recording without the bundled body's fails
+    texture: int | None = None
+    limbs: bool = False
+    imu: tuple[str, ...] = ()
 
     @property
     def pace_kind(self) -> Kind:

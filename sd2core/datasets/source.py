@@ -68,26 +68,46 @@ class Outline:
 class Source:
     """Maps of one recording as one sensor sees it, with a label per frame.
 
-    Raises Sd2Error when these do not fit together.
+    Parameters
+    ----------
+    recording : str
+        Unique within the subject.
+    placement : int
+        0 for the recording's own sensor; 1 and up are the same movement seen from elsewhere.
+    maps : mapping of kind to DopplerMap
+        On one axis and one clock. A map's ``present`` is False in frames of which it says
+        nothing: in a synthetic or denoised map those without a person, in a radar's map
+        those that the radar did not record.
+    label : int array, shape (frames,)
+        Index into ``labels``, the first of which is :data:`BACKGROUND`.
+    classes : mapping of str to str
+        Class that a classifier learns for a label; labels that are not learnt from are absent.
+    target_m : tuple of 3 floats, optional
+        Mean place of the body, from which range and angles of the sensor follow.
+    imu : mapping of str to InertialSignals
+        Inertial sensors by their places, sampled at the frames of the maps.
+    spans : tuple of LabelledSpan, optional
+        Labelled stretches, which may overlap; None: the runs of frames with a label.
+    provenance : dict
+        Origin of the maps, as JSON can hold it, besides what the maps say of themselves.
+
+    Raises
+    ------
+    Sd2Error
+        When these do not fit together.
     """
 
     subject: str
-    recording: str  # Unique within the subject.
-    placement: int  # 0: the recording's own sensor; 1 and up: the same movement from elsewhere.
+    recording: str
+    placement: int
     sensor: VirtualSensor
-    # On one axis and one clock. A map's ``present`` is False in frames of which it says nothing: in
-    # a synthetic or denoised map those without a person, in a radar's those that it did not record.
     maps: Mapping[MapKind, DopplerMap]
-    label: NDArray[np.integer]  # (frames,), index into ``labels``
-    labels: tuple[str, ...] = (BACKGROUND,)  # The first is :data:`BACKGROUND`.
-    # Class that a classifier learns for a label; labels that are not learnt from are absent.
+    label: NDArray[np.integer]
+    labels: tuple[str, ...] = (BACKGROUND,)
     classes: Mapping[str, str] = field(default_factory=dict)
-    target_m: Vector | None = None  # Mean place of the body: range and angles follow from it.
-    # Origin of the maps, as JSON can hold it, besides what the maps say of themselves.
+    target_m: Vector | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
-    # Inertial sensors by their places, sampled at the frames of the maps.
     imu: Mapping[str, InertialSignals] = field(default_factory=dict)
-    # Labelled stretches, which may overlap; None: the runs of frames with a label.
     spans: tuple[LabelledSpan, ...] | None = None
 
     def __post_init__(self) -> None:

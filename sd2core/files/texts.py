@@ -286,8 +286,12 @@ def _is_deep(content: Any) -> bool:
 def first_difference(before: Any, now: Any, name: str = "") -> tuple[str, str, str]:
     """Name the first part in which two values differ, and say both there in words.
 
-    Mappings, records or lists are gone into; both values are of one kind, and differ. ``name`` is
-    that of the whole, before that of the part.
+    Parameters
+    ----------
+    before, now : object
+        Mappings, records or lists are gone into; both are of one kind, and differ.
+    name : str
+        Of the whole, before that of the part.
 
     Examples
     --------

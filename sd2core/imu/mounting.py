@@ -138,11 +138,21 @@ class Mounting:
 
 
 def mounted(mesh: MeshSequence, at: str | int, up: Vector = UP) -> Mounting:
-    """Mount a sensor at a named place of the bundled body, or on a vertex of a mesh with faces.
+    """Mount a sensor at a named place of the bundled body, or on a vertex.
 
-    ``at`` is one of :data:`PLACES`, or the number of a vertex, which may be text as well; ``up`` is
-    the direction upwards in the world. Raises Sd2Error when the mesh has no body, no such place or
-    vertex, or no surface around the vertex.
+    Parameters
+    ----------
+    mesh : MeshSequence
+        With faces.
+    at : str or int
+        One of :data:`PLACES`, or the number of a vertex, which may be text as well.
+    up : tuple of 3 floats
+        Direction upwards in the world.
+
+    Raises
+    ------
+    Sd2Error
+        When the mesh has no body, no such place or vertex, or no surface around the vertex.
 
     Examples
     --------

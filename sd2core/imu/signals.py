@@ -251,9 +251,12 @@ def _parabola(values: Floats) -> Floats:
 
 
 def _before(values: Floats, count: int, rate_hz: float, cutoff_hz: float) -> Floats:
-    """Values (count, n) before the start of a stretch, mirrored and bent as its first period is."""
+    """Values (count, n) that continue a stretch before its start.
+
+    They are mirrored through its first value, which keeps the slope, and bent as the parabola
+    through its first period of the cut-off: without that the acceleration would end at zero.
+    """
     near = min(max(round(rate_hz / cutoff_hz), _ORDER) + 1, len(values))
-    # Mirroring keeps the slope; without the bend the acceleration would end at zero.
     bend = np.diff(_parabola(values[:near])[:3], n=2, axis=0)  # (1, n)
     steps = np.arange(count, 0, -1.0)[:, None]
     return np.asarray(2.0 * values[0] - values[count:0:-1] + bend * steps**2)

@@ -63,9 +63,19 @@ def frames_among(files: Sequence[Path], notes: list[str]) -> list[Path]:
 def numbered_frames(files: Sequence[Path], person: int | str | None, source: str) -> FrameFiles:
     """Files of one person with the numbers of their frames, by what changes in their names.
 
-    Files come in natural order; ``person`` is the number in the names, None the one in most frames;
-    ``source`` is the folder or pattern, for messages. Raises Sd2Error if there is no such person,
-    or the names are of two kinds.
+    Parameters
+    ----------
+    files : sequence of Path
+        In natural order.
+    person : optional
+        Number in the names; None: the one in most frames.
+    source : str
+        Folder or pattern, for messages.
+
+    Raises
+    ------
+    Sd2Error
+        If there is no such person, or the names are of two kinds.
     """
     numbers = _numbers_in(files, source)
     if numbers is None or len(numbers) < 2:
@@ -100,7 +110,10 @@ def _counted(persons: NDArray[np.int64]) -> dict[int, int]:
 
 
 def _numbers_in(files: Sequence[Path], source: str) -> tuple[NDArray[np.int64], ...] | None:
-    """Numbers (files,) of frames, and of persons, as far as names tell; None: they are unclear."""
+    """Numbers (files,) of frames, and of persons, as far as the names tell; None: they are unclear.
+
+    Raises Sd2Error where the names are of two kinds.
+    """
     names = [re.split("([0-9]+)", file.name.lower()) for file in files]
     kinds = {tuple(name[::2]): [] for name in names}  # type: dict[tuple[str, ...], list[int]]
     for place, name in enumerate(names):

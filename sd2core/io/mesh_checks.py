@@ -219,7 +219,10 @@ def _stretches(vertices: VertexArray) -> list[tuple[int, int]]:
 def _looked_at(
     vertices: NDArray[Any], first: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Numbers of frames, some vertices (n, N, 3), and their extent (n, 3), 0 of single points."""
+    """Numbers of frames, some of their vertices (n, N, 3), and the extent of these (n, 3).
+
+    It is 0 for none but frames with all vertices in one point.
+    """
     some = np.unique(np.linspace(0, vertices.shape[1] - 1, _POINTS).astype(int))
     points_m = vertices[:, some].astype(np.float64)
     extent_m = np.ptp(points_m, axis=1)

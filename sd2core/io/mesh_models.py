@@ -203,7 +203,10 @@ def _stacked(vertices: Any, path: Path) -> NDArray[Any]:
 def _numbers(
     path: Path, entry: dict[Any, Any], content: dict[Any, Any], names: tuple[str, ...]
 ) -> Any:
-    """Numbers under the first of these names, of the person or of all; None without any."""
+    """Numbers under the first of these names, of the person or of all; None where there are none.
+
+    Raises Sd2Error where a text, or an array of anything else, stands there.
+    """
     for place in (entry, content):
         for name in names:
             value = place.get(name)
@@ -263,7 +266,10 @@ def _shift(entry: dict[Any, Any], frames: int, path: Path) -> NDArray[np.float64
 def _with_focal(
     shift_m: NDArray[np.float64], raw: RawMesh, entry: dict[Any, Any], hints: MeshHints
 ) -> NDArray[np.float64]:
-    """The place by the focal length that is known best, to which the depth is proportional."""
+    """The place by the focal length that is known best.
+
+    A body twice as far off is seen as large by one of twice the length.
+    """
     name = next(name for name in _SHIFTS if entry.get(name) is not None)
     size, taken = _image_size(entry, hints), _SHIFTS[name]
     focal = first_of(entry, FOCAL_NAMES)

@@ -370,8 +370,11 @@ class _TorchUnpickler(_DataUnpickler):
 
 
 def _read_old_torch(source: LimitedFile) -> Any:
-    """Storage alone of a torch file from before it was a zip: five pickles, then its numbers."""
-    # Tensors cannot be made before their numbers are there.
+    """Content of a torch file from before it was a zip: five pickles, then the numbers.
+
+    Tensors cannot be made before their numbers are there, so that only a storage by itself is read:
+    what a tensor in a plain pickle holds.
+    """
     if [_DataUnpickler(source).load() for _ in range(2)] != [_OLD_TORCH, 1001]:
         raise Refused("is no torch file that is known")
     _DataUnpickler(source).load()  # of the machine that wrote it

@@ -30,11 +30,19 @@ _SLANTED = 0.01
 
 @dataclass(frozen=True)
 class Upright:
-    """Quarter turns and mirroring of stored pictures: along which axes they are shown."""
+    """Quarter turns and mirroring of stored pictures: along which axes they are shown.
 
-    swaps: bool = False  # rows become columns, before the picture is reversed
-    down: int = 1  # -1 where the shown picture is reversed from top to bottom
-    right: int = 1  # -1 where it is from left to right
+    Parameters
+    ----------
+    swaps : bool
+        Rows become columns, before the picture is reversed.
+    down, right : int
+        -1 where the shown picture is reversed from top to bottom, or from left to right.
+    """
+
+    swaps: bool = False
+    down: int = 1
+    right: int = 1
     notes: tuple[str, ...] = ()
 
     @classmethod

@@ -51,9 +51,19 @@ def fit_line(
     polynomial regression analysis", 1950), so that frames that were held up do not count; where
     its 95 % interval holds 1, or there are less than 20 s, the clocks are taken to run alike.
 
-    ``times_s`` are by the source's clock, ``arrivals_s`` by the monotonic clock of this computer,
-    both (frames,); ``rate`` is that of the line, where it is known from more frames than these.
-    Raises Sd2Error if there is no frame, or the clocks differ by more than one in a thousand.
+    Parameters
+    ----------
+    times_s : float64 array, shape (frames,)
+        By the source's clock.
+    arrivals_s : float64 array, shape (frames,)
+        By the monotonic clock of this computer.
+    rate : float, optional
+        Of the line, where it is known from more frames than these.
+
+    Raises
+    ------
+    Sd2Error
+        If there is no frame, or the clocks differ by more than one in a thousand.
     """
     if not len(times_s):
         raise Sd2Error("No frame has arrived", "one at least")

@@ -156,10 +156,13 @@ class FrameAssembler:
         return between <= sent <= between * PAYLOAD_BYTES
 
     def _take_elsewhere(self, given: _Packet, received_s: float) -> list[RawFrame]:
-        """Take a packet of a card that began again, or of a stream that went on unheard."""
+        """Take a packet of a card that began again, or of a stream that went on unheard.
+
+        Unless it is the first packet of all, the one after it is waited for: a stray one is none.
+        """
         before, self._alone = self._alone, None
         together = [given]
-        if not given.is_first:  # The one after it is waited for: a stray one is none.
+        if not given.is_first:
             if before is None or not before.is_followed_by(given):
                 self.counts.invalid += before is not None
                 self._alone = given._replace(samples=memoryview(bytes(given.samples)))

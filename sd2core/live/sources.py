@@ -91,7 +91,13 @@ class Source(Protocol):
 
 
 class ReplaySource(Source):
-    """Frames of a capture, or of what ``load_capture`` opens, at the times they were taken at."""
+    """Frames of a capture at the times at which they were taken.
+
+    Parameters
+    ----------
+    capture : path or RadarCapture
+        Anything that :func:`~sd2core.io.radar.load_capture` opens, or what it opened.
+    """
 
     delay_s = 0.0
 

@@ -123,7 +123,10 @@ def _clock(
     path: Path,
     notes: list[str],
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Column of every frame with points, and the times of all columns, from 0 s on."""
+    """Column of every frame with points, and the times of all columns, from 0 s on.
+
+    Frames that are left out had no points, and are empty columns; longer gaps are gaps in time.
+    """
     steps = np.maximum(np.diff(numbers), 1.0)
     frame_s = stated_s
     moments_s = None
@@ -142,7 +145,6 @@ def _clock(
         gaps_s = np.diff(moments_s)
     else:
         gaps_s = steps * frame_s
-    # Frames that are left out had no points; longer gaps are gaps in time.
     filled = np.where(steps <= LONGEST_GAP_FRAMES, steps, 1.0).astype(np.intp)
     columns = np.concatenate([[0], np.cumsum(filled)])
     at_s = np.concatenate([[0.0], np.cumsum(gaps_s)])
