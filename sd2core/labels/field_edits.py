@@ -21,27 +21,18 @@ from sd2core.labels.suggest import LABEL, TRACK
 SpanField = Literal["label", "note", "author", "confidence", "track", "person"]
 
 
-def set_field(labels: Labels, ids: Iterable[int], field: SpanField, value: Any) -> Edit:
-    """Set one field of spans, at the times they have.
+def change_spans(labels: Labels, ids: Iterable[int], **field: Any) -> Edit:
+    """Change a :data:`SpanField` of spans, at the times they have.
 
-    Parameters
-    ----------
-    labels : Labels
-    ids : iterable of int
-    field : {"label", "note", "author", "confidence", "track", "person"}
-    value : str, float or None
-        An empty note or person removes it; a confidence is 0 to 1, or None for unknown.
-
-    Raises
-    ------
-    Sd2Error
-        When the value is none for that field, or spans would overlap on an exclusive track; the
-        message names both.
+    An empty note or person removes it; a confidence is 0 to 1, or None for unknown. Raises Sd2Error
+    when the value is none for that field, or spans would overlap on an exclusive track; the message
+    names both.
     """
-    if field == "track":
-        labels.track(value)
-    changed = [replace(span, **{field: value}) for span in labels.these(ids)]
-    return Edit(f"Change {field}", labels.with_spans(changed), tuple(one.id for one in changed))
+    if "track" in field:
+        labels.track(field["track"])
+    changed = [replace(span, **field) for span in labels.these(ids)]
+    name = f"Change {next(iter(field))}"
+    return Edit(name, labels.with_spans(changed), tuple(one.id for one in changed))
 
 
 def rename_persons(labels: Labels, names: Mapping[str, str]) -> Edit:

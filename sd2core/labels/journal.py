@@ -136,17 +136,9 @@ def head(kept: Kept) -> dict[str, Any]:
     }
 
 
-def change(name: str, time_unix_s: float, before: Labels, after: Labels) -> dict[str, Any]:
-    """Return the content of the record of an edit: what of the labels has changed.
-
-    Parameters
-    ----------
-    name : str
-        Of the edit.
-    time_unix_s : float
-    before, after : Labels
-    """
-    content: dict[str, Any] = {"name": name, "time_unix_s": time_unix_s}
+def change(before: Labels, after: Labels) -> dict[str, Any]:
+    """Return what of the labels an edit has changed, for its record."""
+    content: dict[str, Any] = {}
     if before.spans is not after.spans:
         # Spans that an edit did not touch are the very same; those that equal others do no harm.
         first, stop = same_ends(before.spans, after.spans)
@@ -221,7 +213,7 @@ class Journal:
         labels.
         """
         before, now_s = self.kept, time.time()
-        content = change(name, now_s, before.labels, labels)
+        content = {"name": name, "time_unix_s": now_s} | change(before.labels, labels)
         if others is not None:
             content["others"] = others
         self.kept = Kept(

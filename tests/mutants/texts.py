@@ -132,7 +132,9 @@ def _write_recording(path: Path) -> None:
 def _journal() -> bytes:
     before, after = Labels(), replace(_LABELS, label_set=GESTURES)
     first = head(Kept(Path("/walk.sd2"), before, time_unix_s=1.0))
-    return packed(first) + packed(change("Add", 2.0, before, after) | {"others": {"title": "x"}})
+    return packed(first) + packed(
+        {"name": "Add", "time_unix_s": 2.0, **change(before, after), "others": {"title": "x"}}
+    )
 
 
 def _read_journal(path: Path) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-
 from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
 from PySide6.QtGui import QMouseEvent
 
@@ -57,33 +55,34 @@ class LabelDragging(QObject):
 
     def drag_edge(self, span_id: int, side: Side, time_s: float, within_s: float) -> None:
         """Move an edge of a span to a time; spans within a distance attract it."""
-        place_s = self._snapped(time_s, within_s, {span_id})
-        self._drag(lambda now: now.resize(span_id, side, place_s))
+        self._drag(lambda now: now.resize(span_id, side, now.snap(time_s, within_s, {span_id})))
 
     def drag_span(self, span_id: int, start_s: float, within_s: float) -> None:
         """Move a span to a start; either end snaps.
 
         Where it is one of several selected spans, all of them move.
         """
-        assert self._before is not None
-        length_s = self._before.labels.span(span_id).duration_s
         ids = {span_id}
         if self.labels.is_selected(span_id):
-            ids.update(span.id for span in self.labels.selected)
-        ends = (
-            (self._snapped(start_s, within_s, ids), 0.0),
-            (self._snapped(start_s + length_s, within_s, ids), length_s),
-        )
-        near_s = min((at_s - offset_s for at_s, offset_s in ends), key=lambda t: abs(t - start_s))
-        self._drag(lambda now: now.move(ids, span_id, near_s))
+            ids |= self.labels.selected_ids
+
+        def moved(now: Edits) -> Edit:
+            ends_s = (0.0, now.labels.span(span_id).duration_s)
+            starts_s = (now.snap(start_s + end_s, within_s, ids) - end_s for end_s in ends_s)
+            return now.move(ids, span_id, min(starts_s, key=lambda one: abs(one - start_s)))
+
+        self._drag(moved)
 
     def drag_new(
         self, track: str, from_s: float, to_s: float, within_s: float, *, cutting: bool = False
     ) -> None:
         """Draw a span between two times; ``cutting`` cuts away others there."""
-        one_s, other_s = (self._snapped(time_s, within_s) for time_s in (from_s, to_s))
         label, make = self.labels.label, Edits.overwrite if cutting else Edits.create
-        self._drag(lambda now: make(now, track, one_s, other_s, label))
+        self._drag(
+            lambda now: make(
+                now, track, now.snap(from_s, within_s), now.snap(to_s, within_s), label
+            )
+        )
 
     def end_drag(self) -> None:
         """End the drag, as one step in the history."""
@@ -107,10 +106,6 @@ class LabelDragging(QObject):
         except Sd2Error:
             return
         self.labels.set_labels(self._dragged.labels)
-
-    def _snapped(self, time_s: float, within_s: float, held: Collection[int] = ()) -> float:
-        assert self._before is not None
-        return self._before.snap(time_s, within_s, held)
 
 
 class SpanDragger(QObject):

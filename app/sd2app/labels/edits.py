@@ -88,7 +88,7 @@ class LabelEdits(QObject):
     def give(self, field: Literal["label", "track", "person"], value: str) -> None:
         """Give the selected spans another label or track, or say whose they are (nobody's: "")."""
         ids = self._ids()
-        self.apply(lambda now: field_edits.set_field(now.labels, ids, field, value))
+        self.apply(lambda now: field_edits.change_spans(now.labels, ids, **{field: value}))
 
     def _rename(self, names: dict[str, str]) -> None:
         """Call the persons whose spans are by their new names."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,35 +97,36 @@ class SpanArrays:
         """Return the rows of spans that overlap an interval."""
         return np.flatnonzero((self.starts_s < end_s) & (self.ends_s > start_s))
 
-    def columns(
-        self,
-        start_s: float,
-        end_s: float,
-        columns: int,
-        wide_columns: float,
-        chosen: NDArray[np.int64],
-        *,
-        together: bool = False,
-    ) -> SpanColumns:
-        """Compute the content of a time window in a number of columns.
 
-        Spans at least ``wide_columns`` wide get a box; narrower ones share columns. ``chosen`` are
-        the rows of the selected spans. ``together`` puts all tracks in one lane.
-        """
-        view = self.within(start_s, end_s)
-        per_s = columns / (end_s - start_s)
-        lefts = (self.starts_s[view] - start_s) * per_s
-        rights = (self.ends_s[view] - start_s) * per_s
-        wide = rights - lefts >= wide_columns
-        narrow, lefts, rights = view[~wide], lefts[~wide], rights[~wide]
-        lanes = 1 if together else sum(self.lanes_of_track)
-        rows = np.zeros(len(narrow), np.int64) if together else self.rows[narrow]
-        shape = lanes, len(self.colours), columns
-        by_tone = _held(rows * len(self.colours) + self.tones[narrow], lefts, rights, shape)
-        is_chosen = np.isin(narrow, chosen)
-        marked = _held(rows[is_chosen], lefts[is_chosen], rights[is_chosen], (lanes, 1, columns))
-        share = np.minimum(by_tone.sum(axis=1), 1.0).astype(np.float32)
-        return SpanColumns(view[wide], share, by_tone.argmax(axis=1), marked[:, 0] > 0)
+@lru_cache(maxsize=8)  # maps, timelines and overview use few scales, at every frame
+def span_columns(
+    arrays: SpanArrays,
+    selected: frozenset[int],
+    stretch_s: tuple[float, float],
+    columns: int,
+    wide_columns: float,
+    together: bool = False,
+) -> SpanColumns:
+    """Compute the content of a time window in a number of columns.
+
+    Spans at least ``wide_columns`` wide get a box; narrower ones share columns. ``selected`` are
+    the ids of the selected spans. ``together`` puts all tracks in one lane.
+    """
+    start_s, end_s = stretch_s
+    view = arrays.within(start_s, end_s)
+    per_s = columns / (end_s - start_s)
+    lefts = (arrays.starts_s[view] - start_s) * per_s
+    rights = (arrays.ends_s[view] - start_s) * per_s
+    wide = rights - lefts >= wide_columns
+    narrow, lefts, rights = view[~wide], lefts[~wide], rights[~wide]
+    lanes = 1 if together else sum(arrays.lanes_of_track)
+    rows = np.zeros(len(narrow), np.int64) if together else arrays.rows[narrow]
+    shape = lanes, len(arrays.colours), columns
+    by_tone = _held(rows * len(arrays.colours) + arrays.tones[narrow], lefts, rights, shape)
+    is_chosen = np.isin(narrow, arrays.rows_of(selected))
+    marked = _held(rows[is_chosen], lefts[is_chosen], rights[is_chosen], (lanes, 1, columns))
+    share = np.minimum(by_tone.sum(axis=1), 1.0).astype(np.float32)
+    return SpanColumns(view[wide], share, by_tone.argmax(axis=1), marked[:, 0] > 0)
 
 
 def _held(

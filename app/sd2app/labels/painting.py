@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QLineF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QPen
 
-from sd2app.labels.model import WIDE_PX, LabelsModel, Mark, SpanArrays, SpanColumns
+from sd2app.labels.model import WIDE_PX, LabelsModel, Mark, SpanArrays, SpanColumns, span_columns
 from sd2app.maps.arrangement import BELOW_PX
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import AT_RIGHT, Overlay, clipped, image_of
@@ -313,22 +312,9 @@ def _columns_in(
     """Spans in view, one column per device pixel."""
     ratio = painter.device().devicePixelRatioF()
     count = max(round(plot.width() * ratio), 1)
-    selected, wide = model.selected_ids, wide_px * ratio
-    return _columns(model.arrays, selected, scale.start_s, scale.end_s, count, wide, together)
-
-
-@lru_cache(maxsize=8)  # maps, timelines and overview use few scales, at every frame
-def _columns(
-    arrays: SpanArrays,
-    selected: frozenset[int],
-    start_s: float,
-    end_s: float,
-    count: int,
-    wide: float,
-    together: bool,
-) -> SpanColumns:
-    chosen = arrays.rows_of(selected)
-    return arrays.columns(start_s, end_s, count, wide, chosen, together=together)
+    stretch_s = scale.start_s, scale.end_s
+    arrays, selected = model.arrays, model.selected_ids
+    return span_columns(arrays, selected, stretch_s, count, wide_px * ratio, together)
 
 
 def _tinted(columns: SpanColumns, colours: tuple[str, ...], tints: tuple[int, int]) -> QImage:

@@ -16,7 +16,7 @@ from sd2app.widgets.text import counted
 from sd2core.errors import Sd2Error
 from sd2core.labels.comparison import same_ends
 from sd2core.labels.edits import Change, Side
-from sd2core.labels.field_edits import SpanField, set_field
+from sd2core.labels.field_edits import SpanField, change_spans
 from sd2core.labels.spans import Span
 from sd2core.labels.typed_times import typed_duration_end, typed_end, typed_start
 from sd2core.timebase import Timebase
@@ -79,7 +79,7 @@ def _given(field: SpanField, value: Callable[[str], Any] = str.strip) -> Typed:
 
     def typed(text: str, spans: Sequence[Span]) -> Change:
         ids = [span.id for span in spans]
-        return lambda now: set_field(now.labels, ids, field, value(text))
+        return lambda now: change_spans(now.labels, ids, **{field: value(text)})
 
     return typed
 

@@ -58,23 +58,15 @@ class Row:
 class LabelRows:
     """Content of a label file: rows, tracks, a label set, and what could not be read.
 
-    Parameters
-    ----------
-    rows : list of Row
-    tracks : list of (str, Overlap or None)
-        In their order, also those without spans; further ones of the rows follow. A track is
-        ``"free"`` where spans do overlap, else as it says; where it says None, ``"exclusive"``.
-    label_set : LabelSet
-    odd : list of Sd2Error
-        Why entries are left out.
-    remarks : list of str
-        What else a reader of the file should know, each without a full stop.
+    Tracks are in their order, also those without spans; further ones of the rows follow. A track is
+    ``"free"`` where spans do overlap, else as it says; where it says None, ``"exclusive"``.
     """
 
     rows: list[Row] = field(default_factory=list)
     tracks: list[tuple[str, Overlap | None]] = field(default_factory=list)
     label_set: LabelSet = GESTURES
-    odd: list[Sd2Error] = field(default_factory=list)
+    odd: list[Sd2Error] = field(default_factory=list)  # Why entries are left out.
+    # What else a reader of the file should know, each without a full stop.
     remarks: list[str] = field(default_factory=list)
 
     @contextmanager
@@ -108,21 +100,11 @@ class LabelRows:
 
 @dataclass(frozen=True)
 class LabelClock:
-    """What is known of a recording's time while labels are read for it.
-
-    Parameters
-    ----------
-    timebase : Timebase, optional
-        Of the recording.
-    frames_per_s : float, optional
-        Rate of frames from 0 s on, where there is no timebase.
-    mark_s : float, optional
-        Length of marks without a duration; by default the frame that is shown then.
-    """
+    """What is known of a recording's time while labels are read for it."""
 
     timebase: Timebase | None = None
-    frames_per_s: float | None = None
-    mark_s: float | None = None
+    frames_per_s: float | None = None  # Rate of frames from 0 s on, where there is no timebase.
+    mark_s: float | None = None  # Length of marks without a duration; None: the frame shown then.
 
     def __post_init__(self) -> None:
         for what, value in (
@@ -212,12 +194,8 @@ def assembled(content: LabelRows, clock: LabelClock) -> LabelReading:
     """Make labels of what a reader found.
 
     Ids are kept where they are positive and differ; the other spans are numbered after them, in
-    the order of time.
-
-    Raises
-    ------
-    Sd2Error
-        When frames or marks need a clock that is not known, or when nothing is left to be taken.
+    the order of time. Raises Sd2Error when frames or marks need a clock that is not known, or when
+    nothing is left to be taken.
     """
     _check_clock(content.rows, clock)
     rows: list[Row] = []

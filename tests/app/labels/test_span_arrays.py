@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.labels.model import SpanArrays
+from sd2app.labels.model import SpanArrays, span_columns
 from sd2core.labels.spans import Labels, LabelTrack, Span
 
 TRACKS = (LabelTrack("Left", "free"), LabelTrack("Right", "free"))
@@ -56,7 +56,7 @@ def test_spans_of_a_lane_do_not_overlap(places) -> None:
 def test_columns_hold_what_spans_hold(places, columns, together, wide_columns) -> None:
     arrays = SpanArrays.of(labels_of(places))
     start_s, end_s = 1.0, 8.0
-    found = arrays.columns(start_s, end_s, columns, wide_columns, np.zeros(0, np.int64))
+    found = span_columns(arrays, frozenset(), (start_s, end_s), columns, wide_columns)
     assert not found.selected.any()
     column_s = (end_s - start_s) / columns
     edges_s = start_s + column_s * np.arange(columns + 1)
@@ -73,8 +73,8 @@ def test_columns_hold_what_spans_hold(places, columns, together, wide_columns) -
     assert ((found.share > 0) >= (expected > 1e-9)).all()
     assert found.wide.tolist() == np.flatnonzero(in_view & wide).tolist()
     if together:
-        one_line = arrays.columns(
-            start_s, end_s, columns, wide_columns, np.zeros(0, np.int64), together=True
+        one_line = span_columns(
+            arrays, frozenset(), (start_s, end_s), columns, wide_columns, together=True
         )
         assert one_line.share.shape == (1, columns)
         assert ((one_line.share[0] > 0) == (found.share > 0).any(axis=0)).all()
@@ -84,14 +84,14 @@ def test_the_colour_is_that_of_what_holds_most() -> None:
     arrays = SpanArrays.of(
         labels_of([("Left", 0, 3, NAMES[0]), ("Left", 3, 5, NAMES[1]), ("Left", 10, 5, NAMES[2])])
     )
-    found = arrays.columns(0.0, 2.0, 2, 9.0, np.array([1]))
+    found = span_columns(arrays, frozenset({arrays.spans[1].id}), (0.0, 2.0), 2, 9.0)
     assert [arrays.colours[tone] for tone in found.tone[0]] == ["#d55e00", arrays.colours[-1]]
     assert found.selected[0].tolist() == [True, False]
     assert found.share[0] == pytest.approx([0.8, 0.5])
 
 
 def test_no_spans() -> None:
-    found = SpanArrays.of(Labels()).columns(0.0, 1.0, 10, 4.0, np.zeros(0, np.int64))
+    found = span_columns(SpanArrays.of(Labels()), frozenset(), (0.0, 1.0), 10, 4.0)
     assert found.share.shape == (1, 10)
     assert not found.share.any()
     assert not found.wide.size

@@ -10,11 +10,11 @@ from sd2core.errors import Sd2Error
 from sd2core.labels.field_edits import (
     SpanField,
     add_track,
+    change_spans,
     change_track,
     move_track,
     reject,
     remove_track,
-    set_field,
     take,
 )
 from sd2core.labels.free_time import LabelledFrames
@@ -44,7 +44,7 @@ LABELS = Labels(
     ],
 )
 def test_one_field_changes(field: SpanField, value: object) -> None:
-    edit = set_field(LABELS, [1, 3], field, value)
+    edit = change_spans(LABELS, [1, 3], **{field: value})
     after = edit.labels
     assert (edit.name, edit.ids) == (f"Change {field}", (1, 3))
     for span in LABELS.spans:
@@ -55,13 +55,13 @@ def test_one_field_changes(field: SpanField, value: object) -> None:
 
 def test_bad_values_are_refused() -> None:
     with pytest.raises(Sd2Error, match="name of a person"):
-        set_field(LABELS, [1], "person", "two\nlines")
+        change_spans(LABELS, [1], person="two\nlines")
     with pytest.raises(Sd2Error, match=r"confidence 1\.5.*0 to 1"):
-        set_field(LABELS, [1], "confidence", 1.5)
+        change_spans(LABELS, [1], confidence=1.5)
     with pytest.raises(Sd2Error, match="No track is called 'Feet'"):
-        set_field(LABELS, [1], "track", "Feet")
+        change_spans(LABELS, [1], track="Feet")
     with pytest.raises(Sd2Error, match=r"Span 1 .* and Span 2 .* overlap on 'Gestures'"):
-        set_field(LABELS, [2], "track", "Gestures")
+        change_spans(LABELS, [2], track="Gestures")
 
 
 class TestSuggestions:

@@ -32,7 +32,8 @@ def session(labels: Labels, seed: int, edits: int) -> tuple[list[bytes], list[La
     records, states = [packed(head(Kept(WALK, labels)))], [labels]
     for count in range(edits):
         edit = random_edit(states[-1], FRAMES, rng)
-        records.append(packed(change(edit.name, float(count), states[-1], edit.labels)))
+        written = {"name": edit.name, "time_unix_s": float(count)}
+        records.append(packed(written | change(states[-1], edit.labels)))
         states.append(edit.labels)
     return records, states
 
@@ -78,11 +79,11 @@ def test_a_changed_byte_is_noticed(seed: int, where: int, flip: int) -> None:
 def test_an_edit_writes_what_it_changed_and_no_more() -> None:
     labels = many_spans(2000)
     after = labels.with_spans([Span(1, "Gestures", 0.0, 0.5, "wave")], without=[2])
-    record = change("Move span", 0.0, labels, after)
+    record = change(labels, after)
     assert [entry["id"] for entry in record["put"]] == [1]
     assert record["gone"] == [2]
     assert len(packed(record)) < 300
-    assert change("Nothing", 0.0, labels, labels) == {"name": "Nothing", "time_unix_s": 0.0}
+    assert change(labels, labels) == {}
 
 
 def test_a_journal_of_the_first_version_is_read() -> None:
