@@ -16,7 +16,7 @@ from sd2app.denoise.model import DenoiseModel
 from sd2app.labels.model import LabelsModel
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
-from sd2app.suggestions.finders import SearchResult, Threshold
+from sd2app.suggestions.finders import SearchResult, SpanFinder, Threshold
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.files import GESTURES
 from sd2core.classify.spans import predicted_spans
@@ -35,7 +35,7 @@ class _Loaded(NamedTuple):
     classifier: RemoteClassifier
 
 
-class ClassifyModel(ReportingModel):
+class ClassifyModel(ReportingModel, SpanFinder):
     """The chosen classifier, remembered and used for all recordings, and the map that it reads.
 
     It is a finder of suggestions too: of spans that it recognises as gestures.
@@ -63,7 +63,7 @@ class ClassifyModel(ReportingModel):
         self._real, self._playback, self._settings = maps.real, session.playback, session.settings
         # The denoised one first: it follows the sensor and looks like a radar's.
         self._in_favour = (maps.denoised, maps.real, maps.synthetic)
-        self._maps = (maps.synthetic, maps.denoised, maps.real)
+        self.searched = (maps.synthetic, maps.denoised, maps.real)
         self._labels, self._library = labels, library
         self.track = ClassTrack(denoise.is_current, session.results, self)
         # The classifier that is in use or being loaded, and the card of the one in use.
@@ -78,11 +78,10 @@ class ClassifyModel(ReportingModel):
         self.shown = self._settings.flag(_SHOWN, usual is None)
         # The bundled one is loaded once it is asked for.
         self._asleep = usual is not None and not self.shown
-        self._chosen: MapModel | None = None
         self._runner = LatestRunner("classifier", self, self._set_loaded, self._fail)
         self._patience = delayed(self._load, _PATIENCE_MS, self)
         self.track.changed.connect(self.moved)
-        for track in self._maps:
+        for track in self.searched:
             track.came_or_went.connect(self._follow)
         self._playback.frame_changed.connect(lambda _: self.moved.emit())
         denoise.current_changed.connect(self.counts_changed)
@@ -104,11 +103,6 @@ class ClassifyModel(ReportingModel):
     def problem(self) -> str:
         """Reason why nothing is classified; empty where something is, or nothing was asked for."""
         return self._problem or self.track.problem
-
-    @property
-    def sources(self) -> tuple[MapModel, ...]:
-        """Maps that can be looked at."""
-        return tuple(track for track in self._maps if track.map is not None)
 
     @property
     def source(self) -> MapModel | None:

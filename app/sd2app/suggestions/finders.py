@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from PySide6.QtCore import SignalInstance
@@ -36,46 +36,48 @@ class SearchResult(NamedTuple):
     if_none: str = ""
 
 
-class SpanFinder(Protocol):
-    """Method of finding spans."""
+class SpanFinder:
+    """Method of finding spans in one of several maps; ``searched`` are those that it can search."""
 
     title: str
     threshold: Threshold
-
-    @property
-    def why_not(self) -> str:
-        """Reason why it cannot be used; empty where it can."""
+    searched: tuple[MapModel, ...]
+    why_not: str
+    """Reason why it cannot be used; empty where it can."""
+    signals: tuple[SignalInstance, ...]
+    """Signals after which a search may become possible."""
+    ready: bool
+    """True if everything needed for a search is there."""
+    _chosen: MapModel | None = None
 
     @property
     def sources(self) -> tuple[MapModel, ...]:
-        """Maps to choose from."""
+        """Maps to choose from: those that are there."""
+        return tuple(track for track in self.searched if track.map is not None)
 
     @property
     def source(self) -> MapModel | None:
-        """Map that is searched."""
+        """Map that is searched: the one chosen, else the first."""
+        sources = self.sources
+        return self._chosen if self._chosen in sources else next(iter(sources), None)
 
     def set_source(self, source: MapModel | None) -> None:
         """Search another map; None: the default."""
-
-    @property
-    def signals(self) -> tuple[SignalInstance, ...]:
-        """Signals after which a search may become possible."""
-
-    @property
-    def ready(self) -> bool:
-        """True if everything needed for a search is there."""
+        self._chosen = source
 
     def wake(self) -> None:
-        """Begin to get ready."""
+        """Begin to get ready; a map is made anyway."""
 
     def look(self, threshold: float) -> Callable[[], SearchResult]:
         """Make the search, to be run in the background."""
+        raise NotImplementedError
 
     def words(self, recording: Path, threshold: float) -> list[str]:
         """Words of the command that searches a saved recording likewise."""
+        raise NotImplementedError
 
 
-class MotionFinder:
+class MotionFinder(SpanFinder):
     """Finder of motion, of any kind."""
 
     title = "motion"
@@ -85,8 +87,8 @@ class MotionFinder:
     )  # fmt: skip
 
     def __init__(self, maps: Sequence[MapModel]) -> None:
-        self._maps = tuple(maps)
-        self._source: MapModel | None = None
+        self.searched = tuple(maps)
+        self.signals = tuple(track.changed for track in maps)
 
     @property
     def why_not(self) -> str:
@@ -94,34 +96,9 @@ class MotionFinder:
         return "" if self.sources else "There is no map to look in"
 
     @property
-    def sources(self) -> tuple[MapModel, ...]:
-        """Maps that are there."""
-        return tuple(track for track in self._maps if track.map is not None)
-
-    @property
-    def source(self) -> MapModel | None:
-        """Map that is searched: the one chosen, else the first."""
-        sources = self.sources
-        if self._source in sources:
-            return self._source
-        return sources[0] if sources else None
-
-    def set_source(self, source: MapModel | None) -> None:
-        """Search another map; None: the first."""
-        self._source = source
-
-    @property
-    def signals(self) -> tuple[SignalInstance, ...]:
-        """Signals of the maps."""
-        return tuple(track.changed for track in self._maps)
-
-    @property
     def ready(self) -> bool:
         """True if the map is complete."""
         return self.source is not None and self.source.covered is None
-
-    def wake(self) -> None:
-        """Wait for the map, which is made anyway."""
 
     def look(self, threshold: float) -> Callable[[], SearchResult]:
         """Make the search, to be run in the background."""
