@@ -13,7 +13,6 @@ from sd2core.labels import field_edits
 from sd2core.labels.edits import (
     Edit,
     Edits,
-    delete,
     merge,
 )
 from sd2core.labels.free_time import LabelledFrames
@@ -84,7 +83,7 @@ def random_edit(labels: Labels, timebase: Timebase, rng: random.Random) -> Edit:
         lambda: Edits(labels, timebase).create(track, near_s(), near_s(), label),
         lambda: Edits(labels, timebase).overwrite(track, near_s(), near_s(), label),
         lambda: Edits(labels, timebase).duplicate([span_id], time_s()),
-        lambda: delete(labels, some),
+        lambda: field_edits.delete(labels, some),
         lambda: Edits(labels, timebase).resize(span_id, side, near_s()),
         lambda: Edits(labels, timebase).resize(span_id, side, time_s()),
         lambda: Edits(labels, timebase).move([span_id], span_id, near_s()),

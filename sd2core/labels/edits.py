@@ -22,7 +22,7 @@ is not moved, or an end of the recording.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -252,13 +252,6 @@ class Edits(LabelledFrames):
 
 Change = Callable[[Edits], Edit]
 """Edit that waits for the labels and frames to be applied to."""
-
-
-def delete(labels: Labels, ids: Iterable[int]) -> Edit:
-    """Delete spans."""
-    gone = {span.id for span in labels.these(ids)}
-    name = "Delete span" if len(gone) == 1 else f"Delete {len(gone)} spans"
-    return Edit(name, labels.with_spans(without=gone))
 
 
 def merge(labels: Labels, ids: Sequence[int]) -> Edit:

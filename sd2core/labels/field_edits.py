@@ -127,8 +127,14 @@ def reject(labels: Labels, ids: Iterable[int]) -> Edit:
     gone = labels.these(ids)
     for span in gone:
         _check_suggestion(span)
-    after = labels.with_spans(without={span.id for span in gone})
-    return Edit(_name("Reject", len(gone)), tidied(after))
+    return Edit(_name("Reject", len(gone)), delete(labels, ids).labels)
+
+
+def delete(labels: Labels, ids: Iterable[int]) -> Edit:
+    """Delete spans; the track of suggestions goes with the last of them."""
+    gone = {span.id for span in labels.these(ids)}
+    name = "Delete span" if len(gone) == 1 else f"Delete {len(gone)} spans"
+    return Edit(name, tidied(labels.with_spans(without=gone)))
 
 
 def _check_suggestion(span: Span) -> None:

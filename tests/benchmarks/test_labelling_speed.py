@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 from labelled import even, many_spans
 
-from sd2core.labels.edits import Edits, delete
+from sd2core.labels.edits import Edits
+from sd2core.labels.field_edits import delete
 from sd2core.labels.files import read_labels, write_labels
 from sd2core.labels.free_time import LabelledFrames
 from sd2core.labels.journal import Journal, Kept

@@ -15,7 +15,8 @@ from PySide6.QtCore import QItemSelectionModel, Qt
 from PySide6.QtWidgets import QTableView
 
 from sd2app.labels.table_model import COLUMNS, SpanFilter, SpanTableModel
-from sd2core.labels.edits import Edits, delete
+from sd2core.labels.edits import Edits
+from sd2core.labels.field_edits import delete
 from sd2core.labels.spans import Labels
 
 SPANS = 10_000

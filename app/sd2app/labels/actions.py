@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.feature import Action
 from sd2app.labels.edits import LabelEdits
-from sd2app.labels.loop import SpanLoop
-from sd2app.labels.marking import LabelMarking
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.key_text import canonical, native
 from sd2core.labels.label_set import Label, LabelSet
@@ -78,21 +76,3 @@ def _tip(label: Label) -> str:
         "Begin a span with this frame, or end the one that has begun; with a span selected,"
         f" give it this label{keys}"
     )
-
-
-def fill_place_menu(
-    menu: QMenu, time_s: float, edits: LabelEdits, marking: LabelMarking, loop: SpanLoop
-) -> None:
-    """Offer to play the span at a time, and to begin another one there."""
-    labels = edits.labels
-    if (span := labels.at(time_s)) is not None:
-        menu.addAction(f"Play “{span.label}” in a loop", lambda: loop.play(span))
-    begin = menu.addMenu("La&bel from here")
-    begin.setEnabled(not edits.refusal and bool(labels.track))
-
-    def mark(name: str) -> None:
-        edits.playback.seek(time_s)
-        marking.mark(name)
-
-    for label in labels.labels.label_set.labels:
-        begin.addAction(label.name, partial(mark, label.name))

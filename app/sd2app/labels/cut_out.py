@@ -48,12 +48,6 @@ class _Plan(NamedTuple):
     folder: Path
 
 
-class _Done(NamedTuple):
-    folder: Path
-    written: int
-    same: int
-
-
 class CutOutModel(ReportingModel):
     """Cuts spans out into folders; asks first where a folder holds something else."""
 
@@ -113,7 +107,7 @@ class CutOutModel(ReportingModel):
         if plan is None:
             return
 
-        def cut(emit: Emit) -> _Done:
+        def cut(emit: Emit) -> str:
             written = cut_out(
                 plan.source,
                 plan.cuts,
@@ -121,7 +115,9 @@ class CutOutModel(ReportingModel):
                 replace_others=replace_others,
                 progress=lambda done, total: emit((done, total)),
             )
-            return _Done(plan.folder, len(written), len(plan.cuts) - len(written))
+            words = f"{counted(len(written), 'span')} cut out into {plan.folder}."
+            same = len(plan.cuts) - len(written)
+            return words + (f" {same} stayed as they were." if same else "")
 
         self._runner.submit(cut, _title(len(plan.cuts)))
 
@@ -130,18 +126,16 @@ class CutOutModel(ReportingModel):
         self._runner.cancel()
         self._plan = None
 
-    def _receive(self, result: _Plan | _Done) -> None:
-        if isinstance(result, _Plan):
-            self._plan = result
-            others = [cut.path.name for cut in result.cuts if cut.state == "other"]
-            if others:
-                self.asked.emit(len(others), others[0])
-            else:
-                self.go_on(replace_others=False)
+    def _receive(self, result: _Plan | str) -> None:
+        if isinstance(result, str):
+            self.noted.emit(result)
             return
-        words = f"{counted(result.written, 'span')} cut out into {result.folder}."
-        same = f" {result.same} stayed as they were." if result.same else ""
-        self.noted.emit(words + same)
+        self._plan = result
+        others = [cut.path.name for cut in result.cuts if cut.state == "other"]
+        if others:
+            self.asked.emit(len(others), others[0])
+        else:
+            self.go_on(replace_others=False)
 
 
 def _title(count: int) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any, Literal
 
 from PySide6.QtCore import QObject, Signal
@@ -21,12 +20,6 @@ from sd2core.labels.spans import Labels, Span
 from sd2core.recording.divergence import State
 from sd2core.recording.edited import decoded_fields
 from sd2core.recording.recording import Recording
-
-
-def _deleted(labels: Labels, ids: Iterable[int]) -> Edit:
-    """Delete spans; the track of suggestions goes with the last of them."""
-    done = edits.delete(labels, ids)
-    return Edit(done.name, field_edits.tidied(done.labels))
 
 
 class LabelEdits(QObject):
@@ -115,7 +108,7 @@ class LabelEdits(QObject):
     def delete(self) -> None:
         """Delete the selected spans."""
         if ids := self._ids():
-            self.apply(lambda now: _deleted(now.labels, ids))
+            self.apply(lambda now: field_edits.delete(now.labels, ids))
 
     def merge(self) -> None:
         """Merge the selected spans."""

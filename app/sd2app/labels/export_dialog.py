@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
@@ -41,14 +40,9 @@ def export_labels(shell: Shell, session: Session, labels: LabelsModel) -> None:
         session.document.file_name(""),
         shell.dialog_parent,
     )
-    dialog.written.connect(lambda _, text: shell.note(text))
+    dialog.written.connect(shell.note)
     accepted(dialog)
     dialog.finish()
-
-
-class _Written(NamedTuple):
-    path: Path
-    losses: tuple[Loss, ...]
 
 
 class LabelExportDialog(Dialog):
@@ -57,7 +51,7 @@ class LabelExportDialog(Dialog):
     The losses are computed by writing to a temporary folder. ``name`` is proposed for the file.
     """
 
-    written = Signal(Path, str)  # the file, and a sentence on it
+    written = Signal(str)  # a sentence on it
 
     def __init__(
         self,
@@ -110,10 +104,11 @@ class LabelExportDialog(Dialog):
             self._refuse(Sd2Error(f"{target} exists", "another name", remedy))
             return
 
-        def write(emit: Emit) -> _Written:
-            return _Written(
-                target, tuple(write_labels(target, labels, base, chosen.name, media=media))
-            )
+        def write(emit: Emit) -> str:
+            losses = write_labels(target, labels, base, chosen.name, media=media)
+            kept = " ".join(["Not kept:", *(f"{loss}." for loss in losses)])
+            text = f"Wrote {target} with {counted(len(labels.spans), 'span')}."
+            return f"{text} {kept if losses else 'The file holds everything.'}"
 
         self.exporting, self.problem = True, ""
         self._runner.submit(write)
@@ -129,17 +124,14 @@ class LabelExportDialog(Dialog):
         self._runner.submit(lambda emit: tuple(would_lose(labels, base, name, media=media)))
         self._refresh()
 
-    def _receive(self, result: _Written | tuple[Loss, ...]) -> None:
-        if not isinstance(result, _Written):
+    def _receive(self, result: str | tuple[Loss, ...]) -> None:
+        if isinstance(result, str):
+            self.exporting = False
+            self.written.emit(result)
+            self.accept()
+        else:
             self.losses = result
             self._refresh()
-            return
-        self.exporting = False
-        text = f"Wrote {result.path} with {counted(len(self._labels.spans), 'span')}."
-        lost = " ".join(f"{loss}." for loss in result.losses)
-        kept = f"Not kept: {lost}" if lost else "The file holds everything."
-        self.written.emit(result.path, f"{text} {kept}")
-        self.accept()
 
     def _refuse(self, error: Exception) -> None:
         self.exporting, self.problem = False, str(error)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QObject, QPointF
 from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.feature import Action, Drop, Feature, Shell, report
-from sd2app.labels.actions import LabelActions, editing, fill_place_menu
+from sd2app.labels.actions import LabelActions, editing
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.cut_out import CutOutModel, ask_about_others, ask_for_cut_outs
 from sd2app.labels.dragging import LabelDragging, SpanDragger
@@ -365,8 +366,20 @@ class LabelsFeature(Feature):
         self._fill_menu(menu, self._session.playback.time_s)
 
     def _fill_menu(self, menu: QMenu, time_s: float) -> None:
-        if self._session.has_content():
-            fill_place_menu(menu, time_s, self.edits, self.marking, self.loop)
+        """Offer to play the span at a time, and to begin another one there."""
+        if not self._session.has_content():
+            return
+        labels = self.model
+        if (span := labels.at(time_s)) is not None:
+            menu.addAction(f"Play “{span.label}” in a loop", lambda: self.loop.play(span))
+        begin = menu.addMenu("La&bel from here")
+        begin.setEnabled(not self.edits.refusal and bool(labels.track))
+        for label in labels.labels.label_set.labels:
+            begin.addAction(label.name, partial(self._mark_at, time_s, label.name))
+
+    def _mark_at(self, time_s: float, label: str) -> None:
+        self._session.playback.seek(time_s)
+        self.marking.mark(label)
 
     # --- life -----------------------------------------------------------------------------
 

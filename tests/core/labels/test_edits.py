@@ -12,9 +12,9 @@ from sd2core.errors import Sd2Error
 from sd2core.labels.edits import (
     Edit,
     Edits,
-    delete,
     merge,
 )
+from sd2core.labels.field_edits import delete
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
 
