@@ -65,7 +65,7 @@ def test_sorting_by_label(benchmark: Any, shown) -> None:
     _, model, view = shown
     falling, rising = Qt.SortOrder.DescendingOrder, Qt.SortOrder.AscendingOrder
     run(benchmark, view, lambda: model.sort(LABEL, falling), lambda: model.sort(LABEL, rising))
-    assert [span.label for span in model.spans] == sorted(span.label for span in model.spans)
+    assert [span.label for span in model.rows] == sorted(span.label for span in model.rows)
 
 
 @pytest.mark.benchmark(group="span table")
@@ -77,7 +77,7 @@ def test_filtering(benchmark: Any, shown) -> None:
         lambda: model.set_filter(SpanFilter(text="up")),
         lambda: model.set_filter(SpanFilter()),
     )
-    assert model.rowCount() in (SPANS, sum("up" in one.label for one in model.spans))
+    assert model.rowCount() in (SPANS, sum("up" in one.label for one in model.rows))
 
 
 @pytest.mark.benchmark(group="span table")
@@ -97,4 +97,4 @@ def test_following_an_edit_of_one_span(benchmark: Any, shown) -> None:
         lambda: labels.set_labels(gone),
         lambda: labels.set_labels(before),
     )
-    assert len(model.spans) >= SPANS - 1
+    assert len(model.rows) >= SPANS - 1

@@ -64,7 +64,6 @@ class LabelActions:
         action = QAction(swatch_icon(label.colour), label.name, self._window)
         if label.key:
             action.setShortcut(QKeySequence(canonical(label.key)))
-        action.setToolTip(_tip(label))
         action.setAutoRepeat(False)
         action.triggered.connect(lambda _=False: self._use(label.name))
         return action

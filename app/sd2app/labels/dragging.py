@@ -63,7 +63,7 @@ class LabelDragging(QObject):
         Where it is one of several selected spans, all of them move.
         """
         ids = {span_id}
-        if self.labels.is_selected(span_id):
+        if span_id in self.labels.selected_ids:
             ids |= self.labels.selected_ids
 
         def moved(now: Edits) -> Edit:
@@ -178,7 +178,7 @@ class SpanDragger(QObject):
         time_s = self._time_s(place)
         reach_s = _EDGE_PX * self._view.scale.seconds_per_px
         for span in self._labels.within(time_s - reach_s, time_s + reach_s):
-            if self._labels.is_selected(span.id):
+            if span.id in self._labels.selected_ids:
                 if abs(span.start_s - time_s) <= reach_s:
                     return span.id, "start"
                 if abs(span.end_s - time_s) <= reach_s:

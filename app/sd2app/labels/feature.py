@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -203,7 +203,7 @@ class LabelsFeature(Feature):
                 "leave", "Labels", "Cancel", ("Esc",),
                 "Let go of what is dragged; else place no sensor, or align no more; else forget"
                 " what is being marked; else end the loop of a span; else select nothing",
-                self._cancel, self._can_cancel,
+                lambda: next(self._to_cancel())(), lambda: any(self._to_cancel()),
             ),
             Action(
                 "loop_span", "Labels", "Play selected span in a loop", ("O",),
@@ -289,22 +289,17 @@ class LabelsFeature(Feature):
     def _can_put(self) -> bool:
         return self._some_selected() and self._has_tracks()
 
-    def _can_cancel(self) -> bool:
-        mode = any(mode.active for mode in self._modes)
-        at_work = self.dragging.dragging or mode or self.loop.span is not None
-        return at_work or bool(self.model.marks or self.model.selected_ids)
-
-    def _cancel(self) -> None:
+    def _to_cancel(self) -> Iterator[Callable[[], object]]:
+        """What there is to let go of; the first one is."""
         if self.dragging.dragging:
-            self.dragging.cancel_drag()
-        elif active := [mode for mode in self._modes if mode.active]:
-            active[0].end()
-        elif self.model.marks:
-            self.model.set_marks(())
-        elif self.loop.span is not None:
-            self.loop.end()
-        else:
-            self.model.select(())
+            yield self.dragging.cancel_drag
+        yield from (mode.end for mode in self._modes if mode.active)
+        if self.model.marks:
+            yield lambda: self.model.set_marks(())
+        if self.loop.span is not None:
+            yield self.loop.end
+        if self.model.selected_ids:
+            yield lambda: self.model.select(())
 
     def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
         """Labels with their keys, and tracks."""

@@ -196,10 +196,6 @@ class LabelsModel(QObject):
         """Selected spans, in the order of time."""
         return tuple(self.labels.spans[row] for row in self.arrays.rows_of(self.selected_ids))
 
-    def is_selected(self, span_id: int) -> bool:
-        """True if the span is selected."""
-        return span_id in self.selected_ids
-
     def within(self, start_s: float, end_s: float) -> list[Span]:
         """Return the spans that overlap an interval, in order."""
         return [self.labels.spans[row] for row in self.arrays.within(start_s, end_s)]

@@ -235,7 +235,7 @@ def _paint_spans(
             text_on(span, arrays),
             arrays.colours[arrays.tones[number]],
             palette,
-            selected=model.is_selected(span.id),
+            selected=span.id in model.selected_ids,
             suggestion=span.origin == "suggestion",
         )
 

@@ -54,10 +54,6 @@ class StatisticsTableModel(RecordTableModel[tuple[str, ...]]):
         self._labels, self._playback = labels, playback
         labels.changed.connect(self._follow)
 
-    def text(self, separator: str) -> str:
-        """Return the table as CSV, or with a tab to paste into a sheet."""
-        return statistics_text(self.rows, separator)
-
     def _refresh(self) -> None:
         base = self._playback.timebase
         self.beginResetModel()
@@ -96,7 +92,7 @@ class StatisticsPage(QWidget):
         self.setLayout(column_of((table, 1), buttons, spacing_px=6, margins_px=0))
 
     def _copy(self, separator: str) -> None:
-        text = self._model.text(separator)
+        text = statistics_text(self._model.rows, separator)
         clipboard = QGuiApplication.clipboard()
         clipboard.setText(text)
         if separator == ",":

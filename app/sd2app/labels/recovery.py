@@ -61,7 +61,8 @@ class LabelNotice(Notice):
         super().__init__("State of the labels", buttons, self._put_off)
         self._autosave, self._document = autosave, document
         autosave.changed.connect(self._refresh)
-        document.undo_stack.indexChanged.connect(self._compare_again)
+        # What is offered is compared with what is open by now.
+        document.undo_stack.indexChanged.connect(lambda _: autosave.offer and self._refresh())
         self._refresh()
 
     def _put_off(self) -> None:
@@ -71,11 +72,6 @@ class LabelNotice(Notice):
             self._autosave.postpone()
         else:
             self._autosave.dismiss()
-
-    def _compare_again(self) -> None:
-        """Compare what is offered with what is open by now."""
-        if self._autosave.offer is not None:
-            self._refresh()
 
     def _refresh(self) -> None:
         autosave, offer = self._autosave, self._autosave.offer

@@ -162,7 +162,7 @@ class SpanTable(CellTable):
         super().selectionChanged(selected, deselected)
         if not (self._mirroring or self._model.following):
             # By ranges: rows one by one are asked for every cell, which takes seconds.
-            spans = self._model.spans
+            spans = self._model.rows
             ranges = cast(Iterable[QItemSelectionRange], self.selectionModel().selection())
             self._labels.select(
                 span.id for part in ranges for span in spans[part.top() : part.bottom() + 1]
@@ -177,7 +177,7 @@ class SpanTable(CellTable):
     def _go(self, index: QModelIndex) -> None:
         if not index.isValid():
             return
-        span, column = self._model.spans[index.row()], COLUMNS[index.column()]
+        span, column = self._model.rows[index.row()], COLUMNS[index.column()]
         base = self._playback.timebase
         first, stop = base.frames_between(span.start_s, span.end_s)
         at_end = column.edge is not None and column.edge.side == "end"
@@ -220,7 +220,7 @@ class SpanTable(CellTable):
         """Make a row current, which is no wish to go there: the selected one, else the nearest."""
         self._mirroring = True
         try:
-            if self._model.spans and not self.currentIndex().isValid():
+            if self._model.rows and not self.currentIndex().isValid():
                 self._make_nearest_current()
             super().focusInEvent(event)
         finally:
@@ -229,8 +229,8 @@ class SpanTable(CellTable):
     def _make_nearest_current(self) -> None:
         now_s = self._playback.time_s
         nearest = min(
-            range(len(self._model.spans)),
-            key=lambda row: abs(self._model.spans[row].start_s - now_s),
+            range(len(self._model.rows)),
+            key=lambda row: abs(self._model.rows[row].start_s - now_s),
         )
         self.selectionModel().setCurrentIndex(
             self._model.index(nearest, 0), QItemSelectionModel.SelectionFlag.NoUpdate
@@ -241,7 +241,7 @@ class SpanTable(CellTable):
     def paintEvent(self, event: QPaintEvent) -> None:
         """Paint the rows, or why there are none."""
         super().paintEvent(event)
-        if not self._model.spans:
+        if not self._model.rows:
             with QPainter(self.viewport()) as painter:
                 painter.setPen(self.palette().color(self.palette().ColorRole.PlaceholderText))
                 words = (

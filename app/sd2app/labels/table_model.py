@@ -208,11 +208,6 @@ class SpanTableModel(RecordTableModel[Span]):
         return len(self._labels.labels.spans)
 
     @property
-    def spans(self) -> Sequence[Span]:
-        """Spans shown, from top to bottom."""
-        return self.rows
-
-    @property
     def words(self) -> str:
         """Number of spans, and of those shown."""
         whole = counted(self.total, "span")
@@ -326,7 +321,7 @@ class SpanTableModel(RecordTableModel[Span]):
         if column.typed is None or text == self.data(index):
             return False
         spans = [span]
-        if column.listed is not None and self._labels.is_selected(span.id):
+        if column.listed is not None and span.id in self._labels.selected_ids:
             spans += [one for one in self._labels.selected if one.id != span.id]
         done = self._edits.apply(column.typed(text, spans))
         if done and column.edge is not None:

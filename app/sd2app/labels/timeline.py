@@ -151,7 +151,7 @@ class LabelTimeline(ZoomedPlot):
             for one in arrays.within(time_s - reach_s, time_s + reach_s)
             if arrays.spans[one].track == row.name and arrays.lanes[one] == lane
         ]
-        near.sort(key=lambda one: not labels.is_selected(one.id))
+        near.sort(key=lambda one: one.id not in labels.selected_ids)
         for span in near:
             # The middle third of a short span is for moving it.
             edge_s = min(reach_s, span.duration_s / 3)

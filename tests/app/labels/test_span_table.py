@@ -82,10 +82,10 @@ def test_what_the_cells_show(table) -> None:
 )
 def test_sorted_by_any_column_both_ways(table, column: str, ids: list[int]) -> None:
     table.model.sort(AT[column])
-    assert [span.id for span in table.model.spans] == ids
+    assert [span.id for span in table.model.rows] == ids
     table.model.sort(AT[column], FALLING)
     order = COLUMNS[AT[column]].order
-    falling = [order(span) for span in table.model.spans]
+    falling = [order(span) for span in table.model.rows]
     assert falling == sorted(falling, reverse=True)
     assert falling[0] == order(table.labels.labels.span(ids[-1]))
 
@@ -93,7 +93,7 @@ def test_sorted_by_any_column_both_ways(table, column: str, ids: list[int]) -> N
 def test_filtered_by_text_label_and_track(table) -> None:
     def shown(**wanted: str) -> list[int]:
         table.model.set_filter(SpanFilter(**wanted))
-        return [span.id for span in table.model.spans]
+        return [span.id for span in table.model.rows]
 
     assert shown(text="HANDS") == [3]
     assert shown(text="gest") == [1, 2]
@@ -114,7 +114,7 @@ def test_persons_are_offered_where_there_are_several(table) -> None:
     assert table.type(0, "person", "anna")
     assert [span.person for span in table.labels.labels.spans] == ["anna", "", "anna"]
     table.model.set_filter(SpanFilter("ANNA"))
-    assert [span.id for span in table.model.spans] == [1, 2]
+    assert [span.id for span in table.model.rows] == [1, 2]
     # Whom the scene does not have any more is still somebody.
     table.edits._document.mesh = None
     assert table.model.choices("person") == ["", "anna"]
@@ -211,17 +211,17 @@ def test_rows_and_what_points_at_them_follow_any_edits(table, column: str) -> No
     table.labels.open(imported(timebase, 7, 20))
     for _ in range(50):
         held = [(span.id, QPersistentModelIndex(model.index(row, 2)))
-                for row, span in enumerate(model.spans)]  # fmt: skip
+                for row, span in enumerate(model.rows)]  # fmt: skip
         edit = random_edit(table.labels.labels, timebase, rng)
         same = {span.id for span in edit.labels.spans} == {one for one, _ in held}
         table.labels.set_labels(edit.labels)
         expected = sorted(edit.labels.spans, key=COLUMNS[AT[column]].order, reverse=True)
-        assert model.spans == expected
+        assert model.rows == expected
         if same:
-            assert all(model.spans[index.row()].id == one for one, index in held)
+            assert all(model.rows[index.row()].id == one for one, index in held)
         else:
             for one, index in held:
-                assert not index.isValid() or model.spans[index.row()].id == one
+                assert not index.isValid() or model.rows[index.row()].id == one
     tester.deleteLater()
 
 

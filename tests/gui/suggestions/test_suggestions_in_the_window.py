@@ -303,7 +303,7 @@ def boxes_of_others(window) -> list[QRectF]:
             view.scale.x_of(span.end_s),
         )
         for span, lane in zip(arrays.spans, arrays.lanes.tolist(), strict=True)
-        if not c.labels.is_selected(span.id)
+        if span.id not in c.labels.selected_ids
     ]
 
 
