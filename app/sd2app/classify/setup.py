@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from PySide6.QtCore import QObject
 
 from sd2app.background.run_setup import RunSetup
 from sd2app.settings import Settings, StoredChoices
 from sd2app.widgets.text import counted, duration_text
-from sd2core.classify.defaults import CLASSIFIERS, DELAY_S, DELAYS_S, MODELS, WIDTH, pace_kind
+from sd2core.classify.defaults import CLASSIFIERS, DELAYS_S, MODELS, FeatureKind, pace_kind
 from sd2core.cli.classify.comparison import Table
 from sd2core.cli.classify.train import Train
 from sd2core.datasets.labelled_source import LabelledSource
@@ -26,20 +26,11 @@ if TYPE_CHECKING:
     from sd2core.train.data import Split
 
 MAPS = ("radar", "synthetic", "denoised")
-FEATURES = ("columns", "peak")
-_DEFAULTS: dict[str, Any] = {
-    "model": "lstm",
-    "features": "columns",
-    "width": WIDTH,
-    "delay_s": DELAY_S,
-    "maps": "radar",
-    "steps": 300,
-    "seed": 0,
-}
-"""Defaults of ``sd2 classify train``."""
 _NETWORK = ("model", "features", "width", "delay_s")
+_DEFAULTS = {name: getattr(Train, name) for name in (*_NETWORK, "maps", "seed")} | {"steps": 300}
+"""Defaults of ``sd2 classify train``."""
 _DATA, _PEOPLE = "classify/train/data", "classify/train/people"
-_CHOICES = {"features": FEATURES}
+_CHOICES = {"features": get_args(FeatureKind)}
 
 
 @dataclass(frozen=True)
@@ -100,7 +91,7 @@ class ClassSetup(RunSetup[DataSource]):
         if values["model"] not in MODELS and CLASSIFIERS.find(values["model"]) is None:
             values.set("model", _DEFAULTS["model"])
         if values["delay_s"] not in DELAYS_S:
-            values.set("delay_s", DELAY_S)
+            values.set("delay_s", _DEFAULTS["delay_s"])
         people = settings.table(_PEOPLE)
         data = [DataSource(path, str(people.get(str(path), ""))) for path in settings.paths(_DATA)]
         super().__init__(settings, values, _DATA, data, parent)

@@ -173,10 +173,13 @@ class ClassTrack(BackgroundModel):
 
     # --- following the map ----------------------------------------------------------------
 
-    def _restart(self) -> None:
+    def _stop(self) -> None:
         self._runner.cancel()
         self._calm.stop()
         self._forget()
+
+    def _restart(self) -> None:
+        self._stop()
         self.problem = ""
         self._follow()
         self.changed.emit()
@@ -185,9 +188,7 @@ class ClassTrack(BackgroundModel):
         source, card = self.source, self.card
         if source is None or source.map is None or card is None:
             if self._given is not None:
-                self._runner.cancel()
-                self._calm.stop()
-                self._forget()
+                self._stop()
                 self.changed.emit()
             return
         if source.revision == self._revision:
@@ -211,17 +212,21 @@ class ClassTrack(BackgroundModel):
         """Copy values, which may change while they are classified."""
         assert self.card is not None
         before = self._given
-        if before is not None and _is_longer(doppler, before):
-            before = self._lengthen(before, doppler.timebase)
-        if before is None or not np.array_equal(before.times_s, doppler.times_s):
+        count = 0 if before is None else len(before.timebase)
+        if before is None or not np.array_equal(before.times_s, doppler.times_s[:count]):
             self.shares = np.full((len(known), len(self.card.classes)), np.nan, np.float32)
             self.done = np.zeros(len(known), bool)
-            first, values = 0, doppler.values.copy()
+            before, first, values = None, 0, doppler.values.copy()
         else:
+            if count < len(known):
+                before = self._lengthen(before, doppler.timebase)
             # Of a long map little is known while it grows frame by frame: no more is looked at.
             numbers = np.flatnonzero(known | self._known)
             start, stop = (int(numbers[0]), int(numbers[-1]) + 1) if numbers.size else (0, 0)
-            differs = self._differs(before, doppler, known, slice(start, stop))
+            part = slice(start, stop)
+            differs = (before.values[:, part] != doppler.values[:, part]).any(axis=0)
+            differs |= self._known[part] != known[part]
+            differs |= before.present_mask[part] != doppler.present_mask[part]
             first = start + int(differs.argmax()) if differs.any() else len(known)
             values = before.values
         self.problem = ""
@@ -236,7 +241,7 @@ class ClassTrack(BackgroundModel):
             self._going = None
         if self._going is not None and self._going.next > first:
             self._going = None
-        if before is not None and values is before.values:
+        if before is not None:
             # What is read meanwhile is before it, or of no interest any more.
             values[:, first:stop] = doppler.values[:, first:stop]
         self._given, self._known = replace(doppler, values=values), known.copy()
@@ -270,15 +275,6 @@ class ClassTrack(BackgroundModel):
         values = np.pad(before.values, ((0, 0), (0, more)))
         present = np.append(before.present_mask, np.ones(more, bool))
         return replace(before, values=values, timebase=timebase, present=present)
-
-    def _differs(
-        self, before: DopplerMap, doppler: DopplerMap, known: NDArray[np.bool_], part: slice
-    ) -> NDArray[np.bool_]:
-        """Mask of the frames of a part that differ from before."""
-        differs = (before.values[:, part] != doppler.values[:, part]).any(axis=0)
-        differs |= self._known[part] != known[part]
-        differs |= before.present_mask[part] != doppler.present_mask[part]
-        return np.asarray(differs)
 
     # --- classifying ----------------------------------------------------------------------
 
@@ -329,8 +325,7 @@ class ClassTrack(BackgroundModel):
 
     def _fail(self, error: Exception) -> None:
         revision = self._revision
-        self._runner.cancel()
-        self._forget()
+        self._stop()
         self._revision = revision
         self.problem = str(error)
         self.changed.emit()
@@ -356,9 +351,3 @@ def _in_order(
         emit(_Piece(answered, shares, going))
     if going.answered < stop and not grows:
         emit(_Piece(going.answered, going.session.finish(), going))
-
-
-def _is_longer(doppler: DopplerMap, before: DopplerMap) -> bool:
-    """True if frames were added at the end of a map, whatever became of the others."""
-    count = len(before.timebase)
-    return len(doppler.timebase) > count and np.array_equal(doppler.times_s[:count], before.times_s)

@@ -135,21 +135,20 @@ def read(path: Path, _: Timebase | None, observation: str | None) -> LabelRows:
 
 def _start_s(observation: dict[str, Any]) -> float:
     """Time of events at which the video begins: its first player's that has pictures."""
-    media, players = observation.get("media_info"), observation.get("file")
-    media = media if isinstance(media, dict) else {}
-    offsets, pictures = media.get("offset"), media.get("hasVideo")
-    player = next(
-        (
-            number
-            for number, files in (players.items() if isinstance(players, dict) else ())
-            if isinstance(files, list)
-            and any(isinstance(pictures, dict) and pictures.get(one) is True for one in files)
-        ),
-        "1",
+    media, players = _mapping(observation.get("media_info")), _mapping(observation.get("file"))
+    offsets, pictures = _mapping(media.get("offset")), _mapping(media.get("hasVideo"))
+    seen = {name for name, has in pictures.items() if has is True}
+    with_pictures = (
+        number
+        for number, files in players.items()
+        if isinstance(files, list) and any(isinstance(one, str) and one in seen for one in files)
     )
-    return _seconds(observation.get("time offset")) + _seconds(
-        offsets.get(player) if isinstance(offsets, dict) else None
-    )
+    offset = offsets.get(next(with_pictures, "1"))
+    return _seconds(observation.get("time offset")) + _seconds(offset)
+
+
+def _mapping(value: Any) -> dict[str, Any]:
+    return value if isinstance(value, dict) else {}
 
 
 def _seconds(value: Any) -> float:
@@ -166,9 +165,7 @@ def _project(path: Path) -> dict[str, Any]:
 
 
 def _entries(project: dict[str, Any], key: str) -> list[dict[str, Any]]:
-    section = project.get(key)
-    entries = list(section.values()) if isinstance(section, dict) else []
-    return [one for one in entries if isinstance(one, dict)]
+    return [one for one in _mapping(project.get(key)).values() if isinstance(one, dict)]
 
 
 def observations(path: Path) -> tuple[str, ...]:
