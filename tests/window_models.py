@@ -103,7 +103,6 @@ def _named(session: Session, features: Features, **others: object) -> SimpleName
         placements=f.sensor.placements,
         alignment=f.sensor.alignment,
         denoise=f.denoise.model,
-        live=f.denoise.live,
         classify=f.classify.model,
         class_training=f.classify.training,
         labels=f.labels.model,

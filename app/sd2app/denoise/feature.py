@@ -10,7 +10,6 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QMenu
 
 from sd2app.background.model_worker.client import DenoiserLibrary
-from sd2app.denoise.live import LiveDenoiseModel
 from sd2app.denoise.model import DenoiseModel
 from sd2app.denoise.text import denoiser_page, kind_words, origin_words
 from sd2app.feature import Action, Drop, Feature, Shell, report
@@ -47,13 +46,12 @@ class DenoiseFeature(Feature):
         self._session, self._shell = session, shell
         self.model = DenoiseModel(session, synthesis, library, parent)
         report(shell, self.model)
-        self.live = LiveDenoiseModel(session, self.model, parent)
-        self.changing = self.model.changed, self.live.changed, *synthesis.completeness
-        self.closing, self.working = (self.live, self.model), (self.model,)
+        self.changing = self.model.changed, *synthesis.completeness
+        self.closing = self.working = (self.model,)
 
     def actions(self) -> Sequence[Action]:
         """Models and what is done with them."""
-        model, live = self.model, self.live
+        model = self.model
         return (
             Action(
                 "export_denoised", "File", "Export denoised map…", (),
@@ -89,7 +87,7 @@ class DenoiseFeature(Feature):
                 "live", "Model", "Denoise live while playing", ("V",),
                 "Frame by frame as the clock reaches them, knowing the past only, as beside a"
                 " radar",
-                lambda: live.set_wanted(not live.wanted), checked=lambda: live.wanted,
+                lambda: model.set_live(not model.live), checked=lambda: model.live,
             ),
         )  # fmt: skip
 

@@ -36,6 +36,9 @@ _TRIED = 3
 _BETWEEN_MS = 80
 """Shortest interval between denoisings of a short clip while its map is refined."""
 
+_JUMP_S = 1.0
+"""Longest step of the clock whose skipped frames are denoised live; a jump starts again."""
+
 _WAITS = "too slow to be dragged, follows when the sensor rests"
 
 AT_ONCE = 2048
@@ -76,7 +79,7 @@ class DenoisedMap(BackgroundModel):
     map (:meth:`postprocess`), so that both are of the same place and are shown together. At
     rest one piece after another is denoised behind the synthetic map. Pieces of a long clip
     are a preview, where a model remembers more than is around them: when the synthetic map
-    stands, the clip is gone through in order (:meth:`finish`).
+    stands, the clip is gone through in order (:meth:`finish`). Live it grows frame by frame.
     """
 
     failed = Signal(str)
@@ -91,12 +94,17 @@ class DenoisedMap(BackgroundModel):
         self.track, self._synthetic = track, session.maps.synthetic
         self._view, self._partial = view, PartialMap(track)
         self._jobs, self._results = session.jobs, session.results
+        self._playback = session.playback
         self._job: Job | None = None
         self.denoiser: RemoteDenoiser | None = None  # the model in use
         self.words = ""
         self._texture: Texture | None = None
         self._movements: KnownMovements | None = None
-        self._held = False
+        self._held = False  # it follows the clock
+        self._reached: _Order | None = None  # by it; None: begin where it is
+        self._stepper = LatestRunner("live", self, self._take_live)
+        self._stepper.failed.connect(lambda _: self.set_live(False))
+        session.playback.frame_changed.connect(self._step)
         self._runner = LatestRunner("denoise", self, self._receive)
         self._runner.failed.connect(lambda error: self._fail(str(error)))
         self._stumbled.connect(self._fail)
@@ -234,34 +242,72 @@ class DenoisedMap(BackgroundModel):
             self.track.set_status(f"{self.words} · {_WAITS}")
         self._publish()
 
-    def hold(self, held: bool) -> None:
-        """Leave the map to live denoising for a while."""
-        if held == self._held:
+    def set_live(self, live: bool) -> None:
+        """Denoise frame by frame as the clock reaches them, as beside a radar, or the whole map."""
+        if live == self._held:
             return
-        self._held = held
+        self._held = live
         self._stop()
         self._restart()
-        if held:
+        if live:
             self._publish()
+            self._step()
         else:
             self.track.set_status(self.words)
             self._go_on()
-
-    def put(self, start: int, values: NDArray[np.float32], fresh: bool = False) -> None:
-        """Show frames (bins, n) that were denoised elsewhere; ``fresh``: no others."""
-        source = self._synthetic.map
-        if source is None or not self._held:
-            return
-        if fresh:
-            self._partial.quality[:] = 0
-        like = replace(source, kind="denoised", meta={}, uncertainty=None, limbs=None)
-        self._paint(values, (start, start + values.shape[1]), like)
-        self._publish()
 
     def close(self) -> None:
         """Stop computing."""
         self._stop()
         super().close()
+
+    # --- live -----------------------------------------------------------------------------
+
+    def _step(self) -> None:
+        """Ask for the frames up to the one on screen, one after another."""
+        source, denoiser, clock = self._synthetic.map, self.denoiser, self._playback
+        frame = self._synthetic.frame_at(clock.time_s)
+        if not self._held or source is None or denoiser is None or frame is None:
+            return
+        if self._stepper.busy or self._lacks_limbs:
+            return
+        longest = _JUMP_S * source.timebase.frames_per_s * clock.speed
+        if self._reached is None or not -1 <= frame - self._reached.next <= longest:
+            self._reached = _Order(frame)
+        reached, stop = self._reached, frame + 1
+        start = reached.next
+        if stop <= start or not self._synthetic.known[start:stop].all():
+            return
+        energies = input_of(source.between(start, stop), denoiser.card.parts)
+        present = source.present_mask[start:stop]
+        like = replace(source, kind="denoised", meta={}, uncertainty=None, limbs=None)
+
+        def work(emit: object) -> tuple[_Answer, float]:
+            live = reached.session or denoiser.live()
+            began = time.perf_counter()
+            answers = live.advance(energies, present)
+            cost_s = (time.perf_counter() - began) / len(answers)
+            return _Answer((start, stop), answers.T, like, reached, live), cost_s
+
+        self._stepper.submit(work)
+
+    def _take_live(self, result: tuple[_Answer, float]) -> None:
+        answer, cost_s = result
+        assert self.denoiser is not None
+        if self._reached is not None and self._reached.session is None:
+            self._partial.quality[:] = 0  # it began here
+        self._reached = _Order(answer.piece[1], answer.session)
+        self._paint(answer.values, answer.piece, answer.like)
+        self._publish()
+        # A model that looks at a window of frames knows no later ones here.
+        past = "" if self.denoiser.equals_batch else ", from past frames only"
+        source, rate_hz = self._synthetic.map, self.denoiser.card.frame_rate_hz
+        if source is not None and not is_regular(source.times_s, rate_hz):
+            past += f", as if at {rate_hz:g} frames/s"
+        self.track.set_status(
+            f"{self.words} · live, frame by frame{past}: {1e3 * cost_s:.1f} ms a frame"
+        )
+        self._step()
 
     # --- what was made before -------------------------------------------------------------
 
@@ -440,6 +486,8 @@ class DenoisedMap(BackgroundModel):
 
     def _stop(self) -> None:
         self._runner.cancel()
+        self._stepper.cancel()
+        self._reached = None
         self._again.stop()
         self._end_job()
 

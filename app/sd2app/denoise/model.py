@@ -27,7 +27,7 @@ from sd2core.options.records import words_of
 if TYPE_CHECKING:
     from sd2core.denoise.card import ModelCard
 
-_TEXTURED = "textured"
+_TEXTURED, _LIVE = "textured", "denoise_live"
 _PATIENCE_MS = 2000
 """Longest delay of the first model, which waits for the synthetic map."""
 
@@ -55,7 +55,9 @@ class DenoiseModel(ReportingModel):
         self._loaded: RemoteDenoiser | None = None
         self._before: RemoteDenoiser | None = None
         self._comparing = False
-        self.textured = session.settings.flag(_TEXTURED, False)  # by the user
+        self.textured, self.live = (  # by the user
+            session.settings.flag(name, False) for name in (_TEXTURED, _LIVE)
+        )
         self._awake = False
         self._splits = True  # False once it is known that the mesh's parts are not
         self._runner = LatestRunner("denoiser", self, self._set_model, self._fail)
@@ -72,6 +74,9 @@ class DenoiseModel(ReportingModel):
         self._synthetic.changed.connect(self._watch)
         for signal in (self._synthetic.changed, self.changed):
             signal.connect(self._keep_place)
+        playing_changed = session.playback.playing_changed
+        for signal in (self._synthetic.changed, self.changed, playing_changed):
+            signal.connect(self._follow_clock)
         moved = session.sensor.changed, synthesis.moving_changed
         for signal in (*moved, synthesis.completed, synthesis.painted):
             signal.connect(self.current_changed)
@@ -156,6 +161,12 @@ class DenoiseModel(ReportingModel):
         self.textured = textured
         self._session.settings.set_value(_TEXTURED, textured)
         self._set_model(self._loaded)
+
+    def set_live(self, live: bool) -> None:
+        """Denoise frame by frame while playing, or the whole map."""
+        self.live = live
+        self._session.settings.set_value(_LIVE, live)
+        self.changed.emit()
 
     def export(self, path: Path) -> None:
         """Write what the model makes of the synthetic map on screen, with its provenance.
@@ -260,6 +271,10 @@ class DenoiseModel(ReportingModel):
         if self.path is not None and loaded != self.path:
             self._load()
         self.changed.emit()
+
+    def _follow_clock(self) -> None:
+        known = self._synthetic.map is not None and self.map.denoiser is not None
+        self.map.set_live(self.live and known and self._session.playback.playing)
 
     def _keep_place(self) -> None:
         """Have a map that comes later not move those below it."""

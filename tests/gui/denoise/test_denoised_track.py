@@ -193,11 +193,11 @@ def test_playing_live_shows_frames_as_the_clock_reaches_them(denoised, fake_mode
     c = models_of(denoised)
     whole = c.denoised.map.values.copy()
     qtbot.keyClick(denoised, Qt.Key.Key_V)
-    assert c.live.wanted
-    assert not c.live.running
+    assert c.denoise.live
+    assert "live" not in c.denoised.status
     c.playback.seek_frame(10)
     qtbot.keyClick(denoised, Qt.Key.Key_Space)
-    qtbot.waitUntil(lambda: c.live.running and fake_models.steps > 8, timeout=10_000)
+    qtbot.waitUntil(lambda: fake_models.steps > 8, timeout=10_000)
     # What has been denoised is shown a little later.
     qtbot.waitUntil(lambda: bool(c.denoised.covered[10:14].all()), timeout=10_000)
     covered, frame = c.denoised.covered.copy(), c.playback.frame
