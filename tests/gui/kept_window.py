@@ -36,7 +36,7 @@ _PLAIN = (str, int, float, complex, bytes, type(None), enum.Enum, Path)
 _PASSING = (
     *("revision", "renderings", "_origin_s"),  # counted up, or of the clock
     *("_image", "_picture", "_strongest", "_dirty", "_fine"),  # painted when it is next on screen
-    "_prefetcher",  # looked ahead, for the next frame
+    *("_prefetcher", "_masks_of"),  # looked ahead, for the next frame
     *("_lister", "_thread", "_synthesizers._made", "_kept"),  # made in the background, or kept
     # Of a drag that is over, or of typing.
     *("edits._before", "edits._dragged", "_last_px", "_pressed_px", "_drops", "_name._before"),

@@ -16,7 +16,7 @@ import numpy as np
 from PySide6.QtCore import QObject, Signal, SignalInstance
 
 from sd2app.accuracy.model import AccuracyModel
-from sd2app.background.latest import Emit, ReportingModel, delayed
+from sd2app.background.latest import Emit, LatestRunner, ReportingModel, delayed
 from sd2app.background.quoting import quoted
 from sd2app.maps.partial_map import FINAL, PREVIEW, Part, PartialMap, View, empty_map
 from sd2app.maps.quality import (
@@ -24,7 +24,6 @@ from sd2app.maps.quality import (
     AT_ONCE,
     ROUGH_WORDS,
     Compiler,
-    MaskPrefetcher,
     Postprocess,
     QualityLevel,
     SynthesizerCache,
@@ -82,8 +81,8 @@ class SynthesisModel(ReportingModel):
         self._wanting_limbs: set[str] = set()
         self._reader = FrameReader(session)
         self._synthesizers: SynthesizerCache | None = None
-        self._prefetcher = MaskPrefetcher(self)
-        self._prefetcher.failed.connect(super()._fail)
+        # The mesh of the plan for dragging, and its masks from where the sensor rests.
+        self._prefetcher = LatestRunner("ready", self, self._note_masks, super()._fail)
         # Asked for by the window and taken by the thread.
         self._next_sweep: deque[tuple[Callable[..., Part], Postprocess | None]] = deque(maxlen=1)
         self._woken = threading.Event()  # by another sweep, or the end of what is made of one
@@ -225,7 +224,7 @@ class SynthesisModel(ReportingModel):
         self._synthesizers = synthesizers.among(mesh, options, self._files)
         self._partial.mark_stale()
         if options != synthesizers.options:
-            self._prefetcher.forget()
+            self._forget_masks()
             self._accuracy.attach(mesh, options)
         self._set_moving(self.moving or dragging)
         self._follow()
@@ -323,9 +322,17 @@ class SynthesisModel(ReportingModel):
         self._reader.forget()
         self._plan: AccuracyPlan | None = None
         self._dragging_plan: AccuracyPlan | None = None
-        self._prefetcher.forget()
+        self._forget_masks()
         self._next_sweep.clear()
         self._sweeping = False
+
+    def _forget_masks(self) -> None:
+        """Drop the masks: plan or mesh have changed."""
+        self._prefetcher.cancel()
+        self._masks_of: VirtualSensor | None = None
+
+    def _note_masks(self, swept: Part) -> None:
+        self._masks_of = swept.sensor
 
     def _announce(self) -> None:
         self.frame_changed.emit()
@@ -436,9 +443,13 @@ class SynthesisModel(ReportingModel):
             self._accuracy.choose(self._sensor, self._budget_ms())
         elif not self.complete:
             self._settle()
-        elif self._dragging_plan is not None and self._prefetcher.prefetched_for != self._sensor:
-            self._prefetcher.prefetch(
-                self._synthesizers, self._dragging_plan, self._sensor, self._swept()
+        elif self._dragging_plan is not None and self._masks_of != self._sensor:
+            sensor, view = self._sensor, self._swept()
+            prepared = functools.partial(self._synthesizers.of, self._dragging_plan)
+            parts_of = self._synthesizers.parts_of
+            level = QualityLevel(prepared, PREVIEW, "", parts_of=parts_of)
+            self._prefetcher.submit(
+                lambda emit: compute_part(level, sensor, *view, lambda: emit(None))
             )
 
     def _may_choose(self) -> bool:
@@ -454,7 +465,7 @@ class SynthesisModel(ReportingModel):
         )
         if dragging != self._dragging_plan:
             self._dragging_plan = dragging
-            self._prefetcher.forget()
+            self._forget_masks()
         if self._synthesizers is None or plan == self._plan:
             self._say_quality()
             return
@@ -540,7 +551,7 @@ class SynthesisModel(ReportingModel):
             words, reuse_m = f"while dragging: {dragging.accuracy}", dragging.plan.mask_reuse_m
             if reuse_m == 0:
                 return preview(synthesizer, words, None)
-            masks_of, here_m = self._prefetcher.prefetched_for, self._sensor.position_m
+            masks_of, here_m = self._masks_of, self._sensor.position_m
             if masks_of is not None and math.dist(masks_of.position_m, here_m) <= reuse_m:
                 return preview(synthesizer, words, "frozen")
         # The masks of rest serve until one for dragging is known.

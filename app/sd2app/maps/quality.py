@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject
 
 from sd2app.accuracy.text import InUse
-from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.latest import Emit
 from sd2app.maps.partial_map import FINAL, ROUGH, Part, View, pieces
 from sd2app.session.tasks import ListedRunner
 from sd2core.body.parts import body_parts
@@ -233,42 +232,6 @@ def refine(
 
 
 _POLL_S = 0.2
-
-
-class MaskPrefetcher(LatestRunner):
-    """Prepares the mesh of the plan for dragging, and its masks from where the sensor rests."""
-
-    def __init__(self, parent: QObject) -> None:
-        super().__init__("ready", parent)
-        self.prefetched_for: VirtualSensor | None = None  # whose masks are there
-        self.finished.connect(self._note)
-
-    def prefetch(
-        self,
-        synthesizers: SynthesizerCache,
-        plan: AccuracyPlan,
-        sensor: VirtualSensor,
-        frames: View,
-    ) -> None:
-        """Apply a plan once to the frames that will follow a drag."""
-
-        def work(emit: Emit) -> VirtualSensor:
-            synthesizer = synthesizers.of(plan)
-            parts = synthesizers.parts_of(synthesizer)
-            synthesizer.stretch(
-                sensor, *frames, progress=lambda *_: emit(None), parts=parts, shares=False
-            )
-            return sensor
-
-        self.submit(work)
-
-    def forget(self) -> None:
-        """Drop the masks: plan or mesh have changed."""
-        self.cancel()
-        self.prefetched_for = None
-
-    def _note(self, sensor: VirtualSensor) -> None:
-        self.prefetched_for = sensor
 
 
 class Compiler(ListedRunner):

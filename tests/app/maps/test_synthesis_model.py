@@ -383,9 +383,7 @@ def test_a_hand_gets_the_plan_for_dragging(context, fake, qtbot, ball):
     fake.dragging = AccuracyPlan(visibility="depth", depth_resolution=128, mask_stride=5)
     open_ball(context, qtbot, ball)
     wait_until_done(context, qtbot)
-    qtbot.waitUntil(
-        lambda: context.synthesis._prefetcher.prefetched_for is not None, timeout=10_000
-    )
+    qtbot.waitUntil(lambda: context.synthesis._masks_of is not None, timeout=10_000)
     context.edits.begin_sensor_drag()
     assert not context.synthesis.moving  # the hand has hold of it; nothing moves yet
     context.edits.drag_sensor((0.2, 0.0, 0.0))
@@ -405,9 +403,7 @@ def test_masks_are_kept_within_their_reach_and_not_beyond(context, fake, qtbot, 
     fake.dragging = AccuracyPlan(mask_reuse_m=0.1)
     open_ball(context, qtbot, ball)
     wait_until_done(context, qtbot)
-    qtbot.waitUntil(
-        lambda: context.synthesis._prefetcher.prefetched_for is not None, timeout=10_000
-    )
+    qtbot.waitUntil(lambda: context.synthesis._masks_of is not None, timeout=10_000)
     context.edits.begin_sensor_drag()
     for x_m, words in ((0.05, "while dragging: ±13 %"), (0.15, "facing the sensor")):
         context.edits.drag_sensor((x_m, 0.0, 0.0))
