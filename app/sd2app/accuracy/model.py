@@ -234,10 +234,7 @@ class AccuracyModel(ReportingModel):
     def _compute(
         self, mesh: MeshSequence, options: SynthesisOptions, request: _Request, emit: Emit
     ) -> Choice:
-        """In the background: the choices for a wish, that at rest first; a place is surveyed once.
-
-        The last is the result.
-        """
+        """Choose for a wish in the background, at rest first; a place is surveyed once."""
         library = self._library()
 
         def progress(done: int, total: int) -> None:

@@ -67,7 +67,7 @@ class DenoiseModel(ReportingModel):
         self.before_map.failed.connect(lambda _: self.set_comparing(False))
         self._document.opened.connect(self._open)
         self._document.changed.connect(self._follow)
-        synthesis.postprocess_with(self._postprocess)
+        synthesis.postprocess = self._postprocess
         synthesis.painted.connect(self._take)
         synthesis.completed.connect(self._wake)
         synthesis.completed.connect(self._finish)

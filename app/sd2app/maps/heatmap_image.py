@@ -125,10 +125,7 @@ def heatmap_image(
 def _mixed(
     parts: Mapping[str, NDArray[np.float32]], shade: NDArray[np.float32], nothing: int
 ) -> NDArray[np.uint32]:
-    """Colours (bins, columns) of parts of the body, mixed by their shares, as bright as the level.
-
-    ``shade``, 0 to 1, is that of all together, ``nothing`` the colour at 0.
-    """
+    """Colours (bins, columns) of parts, mixed by their shares, as bright as all are together."""
     values = np.stack([*parts.values()])  # (parts, bins, columns)
     share = values / np.maximum(values.sum(axis=0), np.finfo(np.float32).tiny)
     own = np.stack([rgb(colour) for colour in colours_of(parts).values()]).astype(np.float32)

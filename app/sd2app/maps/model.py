@@ -77,7 +77,8 @@ class SynthesisModel(ReportingModel):
         self.moving = False  # then the time budget decides, otherwise the tolerance
         self._track = session.maps.synthetic
         self._partial = PartialMap(self._track)
-        self._postprocess: Callable[[], Postprocess | None] = lambda: None
+        # Asked before each sweep what is to be made of it, and shown with it.
+        self.postprocess: Callable[[], Postprocess | None] = lambda: None
         self._wanting_limbs: set[str] = set()
         self._reader = FrameReader(session)
         self._synthesizers: SynthesizerCache | None = None
@@ -204,10 +205,7 @@ class SynthesisModel(ReportingModel):
         self._follow()
 
     def _recount(self) -> None:
-        """Count another way or among other things and people, at the same 0 dB.
-
-        What was made before stays until it is replaced.
-        """
+        """Count another way or among others, at the same 0 dB; the map stays until then."""
         document, synthesizers = self._session.document, self._synthesizers
         if synthesizers is None or document.mesh is None:
             return
@@ -238,10 +236,6 @@ class SynthesisModel(ReportingModel):
         if synthesizers is None or self.moving or not self.complete:
             return None
         return lambda: synthesizers.of(plan), self._sensor
-
-    def postprocess_with(self, postprocess: Callable[[], Postprocess | None]) -> None:
-        """Ask ``postprocess`` before each sweep what is to be made of it, and shown with it."""
-        self._postprocess = postprocess
 
     def want_limbs(self, who: str, wanted: bool) -> None:
         """Split the map by the parts of the body while somebody wants it."""
@@ -363,24 +357,17 @@ class SynthesisModel(ReportingModel):
             self.moving_changed.emit()
 
     def _sweep(self) -> None:
-        """Ask for a rough pass for the sensor where it is now, after the one under way.
-
-        Passes follow each other in the background, so that none waits for the window, which
-        shows the one before meanwhile.
-        """
+        """Ask for a rough pass for the sensor where it is now, after the one under way."""
         level, (start, stop) = self._preview_quality(), self._swept()
         sweep = functools.partial(compute_part, level, self._sensor, start, stop)
-        self._next_sweep.append((sweep, self._postprocess()))
+        self._next_sweep.append((sweep, self.postprocess()))
         self._woken.set()
         if not (self._sweeping and self._runner.busy):
             self._sweeping = True
             self._runner.submit(self._sweep_on)
 
     def _sweep_on(self, emit: Emit) -> None:
-        """Make passes in the background for as long as another is asked for.
-
-        What is to be made of one is made beside the next, and comes with it.
-        """
+        """Make pass after pass; what is to be made of one is made beside the next."""
 
         def more_of(part: Part, postprocess: Postprocess | None) -> None:
             emit(part if postprocess is None else replace(part, more=postprocess(part)))

@@ -134,10 +134,7 @@ class ImageBackend(QWidget):
 
 
 def _off_screen_window() -> vtkRenderWindow:
-    """Make a render window that needs no screen.
-
-    Raises NoOpenGL if no driver answers: rendering would end the program.
-    """
+    """Make a window that needs no screen; NoOpenGL where no driver would draw in it."""
     uses_egl = sys.platform.startswith("linux") and hasattr(opengl, "vtkEGLRenderWindow")
     # Left to itself VTK tries the X server first and complains when there is none.
     kind = opengl.vtkEGLRenderWindow if uses_egl else vtkRenderWindow

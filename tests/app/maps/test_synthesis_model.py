@@ -129,7 +129,7 @@ def test_a_sweep_need_not_wait_for_what_is_made_of_the_one_before(
         return _stretch(self, sensor, *args, **options)
 
     monkeypatch.setattr(Synthesizer, "stretch", counted)
-    context.synthesis.postprocess_with(lambda: slowly)
+    context.synthesis.postprocess = lambda: slowly
     context.synthesis._rest.setInterval(60_000)  # the hand does not rest, however slow the machine
     context.synthesis.painted.connect(lambda part: shown.append((part.sensor.position_m[0], part)))
     context.edits.begin_sensor_drag()
