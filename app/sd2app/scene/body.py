@@ -54,19 +54,13 @@ class Extent:
 def is_closed_outward(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> bool:
     """True if the surface is closed and its faces point outwards.
 
-    Then the back of no face can be seen from outside, and drawing them is
-    wasted. Every edge of such a surface is walked once in either direction.
+    Then the back of no face can be seen from outside, and drawing them is wasted.
     """
-    begin = faces.astype(np.int64)
-    end = np.roll(begin, -1, axis=1)
-    count = len(vertices)
-    forward = np.sort((begin * count + end).ravel())
-    back = np.sort((end * count + begin).ravel())
-    if not np.array_equal(forward, back):
-        return False
+    from sd2core.scattering.visibility import encloses  # with kernels
+
     corners = np.asarray(vertices, np.float64)[faces] - np.mean(vertices, axis=0)  # (F, 3, 3)
     volume = np.einsum("fi,fi->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
-    return bool(volume > 0)
+    return bool(volume > 0) and encloses(faces)
 
 
 def coarse_faces(
