@@ -51,7 +51,7 @@ class Extent:
         return 0.5 * (self.low_m + self.high_m)
 
 
-def is_closed_outward(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> bool:
+def is_closed_outward(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> bool:
     """True if the surface is closed and its faces point outwards.
 
     Then the back of no face can be seen from outside, and drawing them is wasted.

@@ -114,6 +114,14 @@ class EyePose:
         """Offset of a pixel from the middle of the picture, at one metre of depth."""
         return (np.array([x_px, y_px]) - np.array(self.size_px) / 2) / self.pixels_per_tangent
 
+    def nearest(
+        self, points: NDArray[np.floating], x_px: float, y_px: float, within_px: float
+    ) -> int | None:
+        """Number of the point (n, 3) that is nearest to a pixel, if it is within reach."""
+        x, y, depth = self.project(points).T
+        away = np.where(depth > _IN_FRONT_M, np.hypot(x - x_px, y - y_px), np.inf)
+        return int(away.argmin()) if away.min(initial=np.inf) <= within_px else None
+
     def metres_per_pixel(self, point: ArrayLike) -> float:
         """Size of a pixel at a point's depth; infinite behind the eye."""
         depth = float((np.asarray(point, np.float64) - self.position) @ self.axes[2])

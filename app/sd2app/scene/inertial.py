@@ -26,8 +26,6 @@ PLACING_HINT = "A click on the body places an inertial sensor  ·  Esc cancels"
 _REACH_PX = 9.0
 _THIN_M = 0.05
 """Depth behind the surface at which a marker counts as hidden."""
-_NEAREST_M = 0.01
-"""Depth from which something is in front of the eye."""
 
 
 class InertialHand:
@@ -54,15 +52,16 @@ class InertialHand:
         points, places = self._scene.inertial.points_m, list(self._model.vertices)
         if not self._scene.mesh_shown or not len(points) or len(points) != len(places):
             return None
-        x, y, depth = self._scene.pose.project(points).T
-        away = np.where(depth > _NEAREST_M, np.hypot(x - x_px, y - y_px), np.inf)
-        nearest = int(away.argmin())
-        if away[nearest] > _REACH_PX:
+        pose = self._scene.pose
+        nearest = pose.nearest(points, x_px, y_px, _REACH_PX)
+        if nearest is None:
             return None
         front = self.vertex_at(x_px, y_px)
         if front is not None:  # it may be on the far side
-            front_m = self._scene.pose.project(self._scene.body.points[front])[0, 2]
-            if depth[nearest] > front_m + _THIN_M:
+            front_m, marker_m = pose.project([self._scene.body.points[front], points[nearest]])[
+                :, 2
+            ]
+            if marker_m > front_m + _THIN_M:
                 return None
         return places[nearest]
 
@@ -114,14 +113,14 @@ class LimbHand:
 
     def part_at(self, x_px: float, y_px: float) -> str | None:
         """Part of a body under the pointer; None beside it, and where that is not known."""
-        hit = self._navigator.thing_at(x_px, y_px)
-        if hit is None:
+        target = self._navigator.target
+        if target is None:
             vertex = self._surface.vertex_at(x_px, y_px)
             return None if vertex is None else self._model.part_of(vertex)
-        other = self._scene.movables.person_of(hit.number)
-        if other is None:
+        other = self._scene.movables.person_of(target.number)
+        if target.kind != "movable" or other is None:
             return None
-        return self._model.part_of(hit.vertex, other + 1)
+        return self._model.part_of(target.vertex, other + 1)
 
     def click(self, x_px: float, y_px: float, keys: Qt.KeyboardModifier) -> None:
         """Choose the part under the pointer, or with nothing there everybody."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -15,7 +15,6 @@ from PySide6.QtCore import Qt
 
 from sd2app.scene.camera import Vector, drag_along, drag_in_view, drag_level, triple
 from sd2app.scene.scene import Scene
-from sd2app.scene.things import Met
 from sd2app.session.undo import Edits
 
 _BUTTONS = (Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton, Qt.MouseButton.RightButton)
@@ -27,6 +26,16 @@ _BODY_PX = 6.0
 _CLICK_PX = 4.0
 """Movement below which a press counts as a click."""
 _ZOOM_PER_NOTCH = 0.88
+
+
+@dataclass(frozen=True)
+class Target:
+    """What the pointer is on: the sensor, a planned place, or a thing or other body."""
+
+    kind: Literal["sensor", "marker", "movable"]
+    number: int = 0  # of the place, or of what can be moved: bodies after things
+    vertex: int = field(default=0, compare=False)
+    place_m: Vector | None = field(default=None, compare=False)
 
 
 @dataclass
@@ -59,10 +68,8 @@ class Navigator:
     ) -> None:
         self._scene, self._edits = scene, edits
         self._pick, self._changed = pick, changed
-        self.hovers_sensor = False  # the pointer is over the sensor
-        self.marker: int | None = None  # number of the planned place under the pointer
+        self.target: Target | None = None  # under the pointer
         self._button: Qt.MouseButton | None = None
-        self.thing: int | None = None  # number of the thing or body under the pointer
         self._held: _Held | None = None
         self._held_thing: _HeldThing | None = None
         self._moving: Literal["orbit", "pan"] | None = None
@@ -96,27 +103,20 @@ class Navigator:
             return None
         return held.number, triple(held.at_m + held.moved_m), triple(held.moved_m)
 
-    def thing_at(self, x_px: float, y_px: float) -> Met | None:
-        """The thing or other body under the pointer; not if the first is before it."""
+    def target_at(self, x_px: float, y_px: float) -> Target | None:
+        """What a pointer is on; nothing that is behind the first body."""
         scene, pose = self._scene, self._scene.pose
         if self.sensor_at(x_px, y_px):
-            return None
+            return Target("sensor")
+        marker = pose.nearest(scene.markers.positions_m, x_px, y_px, _MARKER_PX)
+        if marker is not None:
+            return Target("marker", marker)
         hit = scene.movables.under(pose, x_px, y_px)
-        if hit is None or not scene.mesh_shown:
-            return hit
-        x, y, depth = pose.project(scene.body.points).T
-        beneath = depth[np.hypot(x - x_px, y - y_px) <= _BODY_PX]
-        return None if (beneath < pose.project(hit.place_m)[0, 2]).any() else hit
-
-    def marker_at(self, x_px: float, y_px: float) -> int | None:
-        """Number of the planned place within reach of a pointer, the nearest to it."""
-        places = self._scene.markers.positions_m
-        if not len(places) or self.sensor_at(x_px, y_px):
-            return None
-        x, y, depth = self._scene.pose.project(places).T
-        away = np.where(depth > 0.01, np.hypot(x - x_px, y - y_px), np.inf)
-        nearest = int(away.argmin())
-        return nearest if away[nearest] <= _MARKER_PX else None
+        if hit is not None and scene.mesh_shown:
+            x, y, depth = pose.project(scene.body.points).T
+            beneath = depth[np.hypot(x - x_px, y - y_px) <= _BODY_PX]
+            hit = None if (beneath < pose.project(hit[2])[0, 2]).any() else hit
+        return None if hit is None else Target("movable", *hit)
 
     def press(
         self, x_px: float, y_px: float, button: Qt.MouseButton, keys: Qt.KeyboardModifier
@@ -125,19 +125,22 @@ class Navigator:
         if self._button is not None or button not in _BUTTONS:
             return
         left = button == Qt.MouseButton.LeftButton
+        target = self.target_at(x_px, y_px) if left else None
         self._button = button
         self._last_px = (x_px, y_px)
-        if left and self.sensor_at(x_px, y_px):
+        if target is not None and target.kind == "sensor":
             start = np.asarray(self._scene.sensor.position_m)
             x, y, _ = self._scene.pose.project(start)[0]
             self._held = _Held(start, (x - x_px, y - y_px), _constraint(keys))
             self._edits.begin_sensor_drag()
             self._show_hot()
-        elif left and self._take_thing(x_px, y_px):
+        elif target is not None and target.place_m is not None:
+            at_m, start_px = target.place_m, (x_px, y_px)
+            self._held_thing = _HeldThing(target.number, at_m, np.zeros(3), start_px)
+            self._edits.begin_scene_drag(target.number)
             self._show_hot()
         elif left and not keys & Qt.KeyboardModifier.ShiftModifier:
-            marker = self.marker_at(x_px, y_px)
-            self._clicking = None if marker is None else (marker, x_px, y_px)
+            self._clicking = None if target is None else (target.number, x_px, y_px)
             self._moving = "orbit"
         else:
             self._moving = "pan"
@@ -162,7 +165,7 @@ class Navigator:
             self._scene.pose = turn(dx, dy)
             self._changed()
         else:
-            self._look(x_px, y_px)
+            self._hover(self.target_at(x_px, y_px))
 
     def release(self, x_px: float, y_px: float, button: Qt.MouseButton) -> None:
         """Handle a released button."""
@@ -171,7 +174,7 @@ class Navigator:
             self.let_go()
             if clicked is not None:
                 self._pick(clicked[0])
-            self._look(x_px, y_px)
+            self._hover(self.target_at(x_px, y_px))
 
     def let_go(self) -> None:
         """End whatever is going on, e.g. because the view is hidden."""
@@ -187,13 +190,12 @@ class Navigator:
 
     def look_again(self) -> None:
         """Test again what is under a resting pointer."""
-        hovers = self.hovers_sensor or self.marker is not None or self.thing is not None
-        if hovers and self._button is None:
-            self._look(*self._last_px)
+        if self.target is not None and self._button is None:
+            self._hover(self.target_at(*self._last_px))
 
     def leave(self) -> None:
         """Handle the pointer's leaving the view."""
-        self._hover(False, None, None)
+        self._hover(None)
 
     def wheel(self, x_px: float, y_px: float, notches: float) -> None:
         """Zoom with the wheel; positive comes nearer."""
@@ -217,13 +219,6 @@ class Navigator:
         if position is not None:
             self._edits.drag_sensor(triple(position))
 
-    def _take_thing(self, x_px: float, y_px: float) -> bool:
-        hit = None if self.marker_at(x_px, y_px) is not None else self.thing_at(x_px, y_px)
-        if hit is not None:
-            self._held_thing = _HeldThing(hit.number, hit.place_m, np.zeros(3), (x_px, y_px))
-            self._edits.begin_scene_drag(hit.number)
-        return hit is not None
-
     def _drag_thing(
         self, held: _HeldThing, x_px: float, y_px: float, constraint: Constraint
     ) -> None:
@@ -240,20 +235,17 @@ class Navigator:
             self._edits.drag_in_scene(triple(held.moved_m))
             self._changed()
 
-    def _look(self, x_px: float, y_px: float) -> None:
-        marker, hit = self.marker_at(x_px, y_px), self.thing_at(x_px, y_px)
-        thing = None if hit is None or marker is not None else hit.number
-        self._hover(self.sensor_at(x_px, y_px), marker, thing)
-
-    def _hover(self, sensor: bool, marker: int | None, thing: int | None) -> None:
-        if (sensor, marker, thing) != (self.hovers_sensor, self.marker, self.thing):
-            self.hovers_sensor, self.marker, self.thing = sensor, marker, thing
+    def _hover(self, target: Target | None) -> None:
+        before, self.target = self.target, target
+        if target != before:
             self._show_hot()
 
     def _show_hot(self) -> None:
-        self._scene.set_hot(self.hovers_sensor or self._held is not None)
+        kind, number = (self.target.kind, self.target.number) if self.target else ("", 0)
+        self._scene.set_hot(kind == "sensor" or self._held is not None)
+        movable = number if kind == "movable" else None
         held = self._held_thing
-        self._scene.movables.set_hot(self.thing if held is None else held.number)
+        self._scene.movables.set_hot(movable if held is None else held.number)
         self._changed()
 
 

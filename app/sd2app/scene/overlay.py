@@ -98,8 +98,7 @@ class Overlay(Canvas):
         )
         rest = (
             (self.message, self.hint, scene.pose, scene.sensor, scene.metre_labels),
-            (navigator.hovers_sensor, navigator.holds_sensor, navigator.marker, navigator.thing),
-            navigator.held_thing,
+            (navigator.target, navigator.holds_sensor, navigator.held_thing),
         )
         if legend != self._states[0]:
             self._kept.clear()
@@ -133,23 +132,24 @@ class Overlay(Canvas):
         self._paint_axes(painter)
         if not (self._scene.sensor_in_sight or self._navigator.holds_sensor):
             self._paint_where_sensor_is(painter)
-        position_m, marker = self._scene.sensor.position_m, self._navigator.marker
+        position_m, target = self._scene.sensor.position_m, self._navigator.target
+        kind, number = (target.kind, target.number) if target is not None else ("", 0)
         if self._navigator.holds_sensor:
             self._paint_beside(painter, _place_words(position_m), position_m)
         elif (held := self._navigator.held_thing) is not None:
-            number, at_m, moved_m = held
-            self._paint_beside(painter, self._words_of_held(number, moved_m), at_m)
-        elif self._navigator.hovers_sensor:
+            held_number, at_m, moved_m = held
+            self._paint_beside(painter, self._words_of_held(held_number, moved_m), at_m)
+        elif kind == "sensor":
             self._paint_hint(painter, HINT)
-        elif (thing := self._navigator.thing) is not None and thing < len(self.thing_names):
-            words = THING_HINT.format(self.thing_names[thing])
+        elif kind == "movable" and number < len(self.thing_names):
+            words = THING_HINT.format(self.thing_names[number])
             if not (self.hint and self._paint_hint(painter, f"{words}  ·  {self.hint}")):
                 self._paint_hint(painter, words)
         elif self.hint:
             self._paint_hint(painter, self.hint)
-        elif marker is not None:
-            place_m = self._scene.markers.positions_m[marker]
-            self._paint_beside(painter, self.marker_words[marker], place_m)
+        elif kind == "marker":
+            place_m = self._scene.markers.positions_m[number]
+            self._paint_beside(painter, self.marker_words[number], place_m)
             self._paint_hint(painter, MARKER_HINT)
 
     def _words_of_held(self, number: int, moved_m: Sequence[float]) -> str:

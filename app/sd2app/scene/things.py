@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,14 +43,6 @@ class ThingShapes:
         self._face.set_colour(mixed(colours.plain, colours.sensor, 0.35 if hot else 0.0))
         faint = mixed(colours.muted, colours.background, 0.2)
         self._edge.set_colour(colours.sensor if hot else faint)
-
-
-class Met(NamedTuple):
-    """What is at a pixel: number of a thing or person, its nearest vertex, and the place."""
-
-    number: int
-    vertex: int
-    place_m: NDArray[np.float64]
 
 
 class Movables:
@@ -103,8 +94,10 @@ class Movables:
         """Number of a person among the people, from 0; None of a thing."""
         return number - len(self.things) if number >= len(self.things) else None
 
-    def under(self, pose: EyePose, x_px: float, y_px: float) -> Met | None:
-        """The one that is foremost at a pixel, and its vertex and place there; None beside all."""
+    def under(
+        self, pose: EyePose, x_px: float, y_px: float
+    ) -> tuple[int, int, NDArray[np.float64]] | None:
+        """Number of the foremost at a pixel, its vertex and the place there; None beside all."""
         met = [
             (*hit, number)
             for number, one in enumerate(self._all)
@@ -113,7 +106,7 @@ class Movables:
         if not met:
             return None
         depth, vertex, number = min(met)
-        return Met(number, vertex, pose.position + depth * pose.ray(x_px, y_px))
+        return number, vertex, pose.position + depth * pose.ray(x_px, y_px)
 
     def shift(self, number: int, offset_m: ArrayLike) -> None:
         """Draw one elsewhere than it is."""

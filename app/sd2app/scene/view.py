@@ -180,7 +180,7 @@ class SceneView(QWidget):
         kind, place = event.type(), _place(event)
         if kind == QEvent.Type.MouseMove:
             self.navigator.move(*place, event.modifiers())
-            at_body = not event.buttons() and not self._at_something(place)
+            at_body = not event.buttons() and not self._at_something
             part = self.limb_hand.part_at(*place) if at_body else None
             self.overlay.show_reading(place, self._words_at(place, part) if at_body else "")
             if not self.inertial_hand.placing:
@@ -192,16 +192,12 @@ class SceneView(QWidget):
             if event.button() == Qt.MouseButton.LeftButton:
                 if self.inertial_hand.placing:
                     self.inertial_hand.click(*place)
-                elif not self._at_something(place):
+                elif not self._at_something:
                     self.limb_hand.click(*place, event.modifiers())
             elif event.button() == Qt.MouseButton.RightButton:
                 menu = picture_menu(self, self.menu_parts, QPointF(*place))
                 menu.popup(event.globalPosition().toPoint())
-        elif (
-            kind == QEvent.Type.MouseButtonDblClick
-            and not self._at_something(place)
-            and self.navigator.thing is None
-        ):
+        elif kind == QEvent.Type.MouseButtonDblClick and self.navigator.target is None:
             self._pressed_px = (math.inf, math.inf)  # its release is no click
             self.set_view("overview")
         else:
@@ -214,7 +210,7 @@ class SceneView(QWidget):
         words = self.inertial_hand.words_at(*place)
         if words or self.inertial_hand.placing:
             return words
-        reading = "" if self.navigator.thing is not None else self.reading_at(*place)
+        reading = "" if self.navigator.target is not None else self.reading_at(*place)
         return "  ·  ".join(filter(None, [part and part_words(part), reading]))
 
     def reading_at(self, x_px: float, y_px: float) -> str:
@@ -240,11 +236,13 @@ class SceneView(QWidget):
         copy = menu.addAction("Copy &value", lambda: QGuiApplication.clipboard().setText(words))
         copy.setEnabled(bool(words))
 
-    def _at_something(self, place: tuple[float, float]) -> bool:
+    @property
+    def _at_something(self) -> bool:
         """True at what is no body."""
-        at_marker, thing = self.navigator.marker_at(*place) is not None, self.navigator.thing
-        at_thing = thing is not None and self.scene.movables.person_of(thing) is None
-        return at_marker or at_thing or self.navigator.sensor_at(*place)
+        target = self.navigator.target
+        if target is None:
+            return False
+        return target.kind != "movable" or self.scene.movables.person_of(target.number) is None
 
     # What changed
 
@@ -390,13 +388,12 @@ class SceneView(QWidget):
     def _choose_cursor(self) -> None:
         if self._backend is None:
             return
-        navigator = self.navigator
+        navigator, target = self.navigator, self.navigator.target
         if navigator.holds_sensor or navigator.held_thing:
             shape = Qt.CursorShape.ClosedHandCursor
-        elif navigator.hovers_sensor or navigator.thing is not None:
-            shape = Qt.CursorShape.OpenHandCursor
-        elif navigator.marker is not None:
-            shape = Qt.CursorShape.PointingHandCursor
+        elif target is not None:
+            at_marker, shapes = target.kind == "marker", Qt.CursorShape
+            shape = shapes.PointingHandCursor if at_marker else shapes.OpenHandCursor
         elif self.inertial_hand.placing:
             shape = Qt.CursorShape.CrossCursor
         else:

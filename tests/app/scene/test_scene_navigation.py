@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from sd2app.scene.camera import EyePose
-from sd2app.scene.navigation import MIN_GRAB_PX, Navigator
+from sd2app.scene.navigation import MIN_GRAB_PX, Navigator, Target
 from sd2app.scene.scene import Scene
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.placements import Place
@@ -212,7 +212,7 @@ def test_a_click_picks_the_nearest_place_and_turns_nothing(planned: Hand) -> Non
     for number in (2, 1, 0):
         x, y = marker_px(planned, number)
         planned.navigator.move(x, y, NONE)
-        assert planned.navigator.marker == number
+        assert planned.navigator.target == Target("marker", number)
         planned.navigator.press(x, y, LEFT, NONE)
         planned.navigator.move(x + 2, y - 1, NONE)
         planned.navigator.release(x + 2, y - 1, LEFT)
@@ -234,7 +234,7 @@ def test_a_drag_that_begins_on_a_place_turns_the_view_and_picks_nothing(planned:
 def test_a_place_under_the_sensor_leaves_the_sensor_to_the_hand(planned: Hand) -> None:
     planned.scene.set_sensor(VirtualSensor(tuple(planned.scene.markers.positions_m[2])))
     x, y = marker_px(planned, 2)
-    assert planned.navigator.marker_at(x, y) is None
+    assert planned.navigator.target_at(x, y) == Target("sensor")
     planned.navigator.press(x, y, LEFT, NONE)
     assert planned.navigator.holds_sensor
 
@@ -243,4 +243,4 @@ def test_places_that_go_away_are_not_under_the_pointer(planned: Hand) -> None:
     planned.navigator.move(*marker_px(planned, 2), NONE)
     planned.scene.set_markers((), np.zeros(0), None)
     planned.navigator.look_again()
-    assert planned.navigator.marker is None
+    assert planned.navigator.target is None

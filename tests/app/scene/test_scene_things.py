@@ -36,8 +36,8 @@ def test_a_ray_meets_the_nearest_thing_before_the_eye() -> None:
     things.set_things([box.placed() for box in boxes], boxes)
     found = things.under(pose, x, y)
     assert found is not None
-    assert found.number == 1
-    np.testing.assert_allclose(found.place_m, [0, 0, 2.75], atol=1e-9)
+    assert found[0] == 1
+    np.testing.assert_allclose(found[2], [0, 0, 2.75], atol=1e-9)
     assert things.under(pose, x + 0.5 * pose.pixels_per_tangent, y) is None
 
 

@@ -21,6 +21,7 @@ from scene_stage import LEFT, RIGHT, Stage, two_plates
 from sd2app.scene import backend as choose
 from sd2app.scene import offscreen_backend as image_backend
 from sd2app.scene.colours import SceneColours
+from sd2app.scene.navigation import Target
 from sd2app.session.maps import LIMB_COLOURS
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import VertexParts
@@ -284,7 +285,7 @@ def test_the_cursor_tells_what_can_be_held(stage: Stage) -> None:
     QTest.mouseMove(widget, QPoint(300, 430))
     assert widget.cursor().shape() == Qt.CursorShape.ArrowCursor
     QGuiApplication.sendEvent(widget, QEvent(QEvent.Type.Leave))
-    assert not stage.view.navigator.hovers_sensor
+    assert stage.view.navigator.target is None
 
 
 def test_the_view_keeps_no_keys_for_itself(stage: Stage) -> None:
@@ -562,7 +563,7 @@ def test_a_click_on_a_place_picks_it_and_its_words_are_shown(stage: Stage) -> No
     QTest.mouseMove(widget, place + QPoint(60, 60))
     before = as_array(stage.view.grab().toImage())
     QTest.mouseMove(widget, place)
-    assert stage.view.navigator.marker == 1
+    assert stage.view.navigator.target == Target("marker", 1)
     assert widget.cursor().shape() == Qt.CursorShape.PointingHandCursor
     assert (as_array(stage.view.grab().toImage()) != before).any()
     QTest.mouseClick(widget, Qt.MouseButton.LeftButton, pos=place)

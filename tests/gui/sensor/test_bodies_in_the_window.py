@@ -14,6 +14,7 @@ from window_models import models_of
 
 from sd2app.maps.feature import LimbMenu
 from sd2app.maps.partial_map import FINAL
+from sd2app.scene.navigation import Target
 from sd2app.scene.view import SceneView
 from sd2app.sensor.bodies_page import BodiesPage
 from sd2app.widgets.inputs import NumberBox
@@ -130,7 +131,7 @@ def pointed_at(window, qtbot) -> tuple[QWidget, QPoint, np.ndarray]:
     start = QPoint(round(x), round(y))
     widget = view.childAt(start)
     hover(widget, start)
-    assert view.navigator.thing == 0
+    assert view.navigator.target == Target("movable", 0)
     return widget, start, middle
 
 

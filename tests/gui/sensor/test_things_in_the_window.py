@@ -9,6 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog, QToolButton
 from window_models import models_of
 
+from sd2app.scene.navigation import Target
 from sd2app.scene.view import SceneView
 from sd2app.sensor.things_page import ThingsPage
 from sd2app.widgets.inputs import Choice, NumberBox
@@ -109,11 +110,11 @@ def test_it_is_dragged_on_its_level_and_with_shift_upwards(window, qtbot):
     start = QPoint(round(x), round(y))
     widget, count = view.childAt(start), stack.count()
     QTest.mouseMove(widget, start)
-    assert view.navigator.thing == 0
+    assert view.navigator.target == Target("movable", 0)
     assert widget.cursor().shape() == Qt.CursorShape.OpenHandCursor
     pose, before = scene.pose, things(window)[0]
     level, moved = (
-        scene.movables.under(pose, start.x(), start.y()).place_m,
+        scene.movables.under(pose, start.x(), start.y())[2],
         QPoint(40, 15),
     )
     QTest.mousePress(widget, LEFT, Qt.KeyboardModifier.NoModifier, start)
@@ -167,7 +168,7 @@ def test_the_map_follows_a_thing_while_it_is_dragged_and_settles(window, qtbot, 
     view.grab()
     pose = scene.pose
     start = pixel_of(pose, scene.movables.points_m.mean(axis=0))
-    held_m = scene.movables.under(pose, start.x(), start.y()).place_m
+    held_m = scene.movables.under(pose, start.x(), start.y())[2]
     there = pixel_of(pose, held_m - [1.5, 0.0, 0.0])
     written = []
     monkeypatch.setattr(
