@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2app.displays import has_display, silent_displays
+from sd2app.displays import explain_missing, has_display, missing_libraries, silent_displays
 from sd2app.plain_imports import plain_imports
-from sd2app.system_libraries import explain_missing, missing_libraries
 from sd2core.cli import build_parser, run
 from sd2core.cli.command_names import COMMANDS
 from sd2core.cli.command_parser import Subcommands, add_command, in_a_list

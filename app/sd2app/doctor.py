@@ -11,8 +11,7 @@ import sys
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-from sd2app.displays import silent_displays
-from sd2app.system_libraries import how_to_install, missing_libraries
+from sd2app.displays import how_to_install, missing_libraries, silent_displays
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_cache, user_data
 from sd2core.files.resources import resource_path

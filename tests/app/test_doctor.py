@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from sd2app import command_line, doctor, system_libraries
-from sd2app.system_libraries import (
+from sd2app import command_line, displays, doctor
+from sd2app.displays import (
     DRAWING,
     UNDER_WAYLAND,
     UNDER_X11,
@@ -28,9 +28,9 @@ def finding(about: str) -> doctor.Finding:
 
 @pytest.fixture
 def without_egl(monkeypatch: pytest.MonkeyPatch) -> None:
-    loads = system_libraries.loads
+    loads = displays.loads
     monkeypatch.setattr(
-        system_libraries, "loads", lambda library: library != "libEGL.so.1" and loads(library)
+        displays, "loads", lambda library: library != "libEGL.so.1" and loads(library)
     )
 
 

@@ -17,7 +17,7 @@ from typing import Literal
 
 from PySide6.QtGui import QGuiApplication, QOffscreenSurface, QOpenGLContext
 
-from sd2app.system_libraries import loads
+from sd2app.displays import loads
 
 BackendName = Literal["gl", "image"]
 

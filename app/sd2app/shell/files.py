@@ -15,9 +15,10 @@ from sd2app.fit.request import read_request
 from sd2app.foreign_mesh.model import is_foreign
 from sd2app.labels.edits import LabelEdits
 from sd2app.session.content import UNTITLED, recording_of
+from sd2app.session.document import DocumentModel
 from sd2app.session.mesh_reading import ReadMesh
 from sd2app.session.session import Session
-from sd2app.shell.mesh_offer import MeshOffer
+from sd2app.session.undo import Edits
 from sd2app.shell.mesh_readings import MeshReadings
 from sd2app.shell.open_dialog import ask_to_open
 from sd2app.widgets.dialogs import Answer, ask_folder, ask_new, confirmed
@@ -338,6 +339,29 @@ class FilesFeature(Feature):
     def may_close(self) -> bool:
         """Ask what becomes of unsaved edits."""
         return self.may_discard()
+
+
+class MeshOffer(Notice):
+    """What is unlikely about the mesh, and a button for what would put it right."""
+
+    def __init__(self, document: DocumentModel, edits: Edits) -> None:
+        tip = "Read the mesh again so; undo takes it back, File → Save keeps it"
+        buttons = (("cure", "Read it so", tip, self._accept),)
+        super().__init__("Mesh that is unlikely", buttons, document.decline_offers)
+        self._document, self._edits = document, edits
+        document.offered.connect(self._refresh)
+
+    def _accept(self) -> None:
+        document = self._document
+        if document.offers:
+            read = self._edits.cure_mesh if document.offers_of_open else document.open_mesh_so
+            read(document.offers[0].cure)
+
+    def _refresh(self) -> None:
+        offers = self._document.offers
+        if offers:
+            self.buttons["cure"].setText(offers[0].cure.words)
+        self.show_words("The mesh is unlikely" if offers else "", offers[0].text if offers else "")
 
 
 def _is_inertial(paths: Sequence[Path]) -> bool:

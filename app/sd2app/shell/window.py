@@ -10,7 +10,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from PySide6.QtCore import QEvent, Qt, QTimer, Signal
+from PySide6.QtCore import QByteArray, QEvent, QRect, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QAction,
     QCloseEvent,
@@ -18,11 +18,13 @@ from PySide6.QtGui import (
     QDragLeaveEvent,
     QDragMoveEvent,
     QDropEvent,
+    QGuiApplication,
     QKeyEvent,
 )
-from PySide6.QtWidgets import QAbstractButton, QApplication, QMainWindow, QMenu, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QMainWindow, QMenu, QTabBar, QWidget
 
 from sd2app.background.latest import LatestRunner, delayed
+from sd2app.session.display import LAYOUTS, Layouts
 from sd2app.settings import Settings
 from sd2app.shell.loading import DropOverlay, LoadingCover
 from sd2app.shell.messages.model import MessagesModel
@@ -30,7 +32,6 @@ from sd2app.shell.messages.views import MessageNotice, MessagesDialog
 from sd2app.shell.parts import Parts
 from sd2app.shell.side_dock import SideDock
 from sd2app.shell.side_panel import SidePanel
-from sd2app.shell.window_size import place_on_screen
 from sd2app.widgets.dialogs import accepted, tab_to
 from sd2app.widgets.inputs import claims
 from sd2app.widgets.layouts import column_of, pane, row_of
@@ -53,6 +54,9 @@ _LABELS_PX = 560
 _PANELS = ("video", "scene", "tracks", "spectrum", "side")
 _SPLITTERS = ("views", "main")  # whose sizes each layout remembers
 _SIDE_PX = 328
+_SHARE = 0.8
+_LEAST_PX = QSize(960, 640)
+_OFF_SCREEN_PX = QSize(1280, 800)
 
 
 class MainWindow(QMainWindow):
@@ -135,7 +139,6 @@ class MainWindow(QMainWindow):
         from sd2app.playback.views import TransportBar
         from sd2app.session.session import Session
         from sd2app.shell.keys.bindings import KeyBindings
-        from sd2app.shell.layout_tabs import LayoutTabs
         from sd2app.shell.menus import Menus, in_order
         from sd2app.shell.status_bar import StatusLine
         from sd2app.shell.wiring import Features
@@ -463,7 +466,56 @@ class MainWindow(QMainWindow):
         event.accept()
 
 
+class LayoutTabs(QTabBar):
+    """A tab for each layout."""
+
+    def __init__(self, layouts: Layouts, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Layout")
+        self.setObjectName("layouts")
+        self.setDrawBase(False)
+        self.setExpanding(False)
+        for place, (name, layout) in enumerate(LAYOUTS.items()):
+            self.addTab(name)
+            self.setTabToolTip(place, layout.tip)
+        self._layouts = layouts
+        layouts.changed.connect(self._follow)
+        self._follow()
+        self.currentChanged.connect(lambda place: layouts.choose(list(LAYOUTS)[place]))
+
+    def _follow(self) -> None:
+        self.setCurrentIndex(list(LAYOUTS).index(self._layouts.name))
+
+
 def _application() -> QApplication:
     application = QApplication.instance()
     assert isinstance(application, QApplication)
     return application
+
+
+def place_on_screen(window: QWidget, remembered: QByteArray | None) -> None:
+    """Put a window where it was left or, at first, in the middle; always within its screen."""
+    if remembered is not None:
+        window.restoreGeometry(remembered)
+    if QGuiApplication.platformName() == "offscreen":  # whose screen says nothing
+        window.setMinimumSize(_LEAST_PX)
+        if remembered is None:
+            window.resize(_OFF_SCREEN_PX)
+        return
+    room = window.screen().availableGeometry()
+    window.setMinimumSize(_LEAST_PX.boundedTo(room.size()))
+    if not window.isMaximized():
+        window.setGeometry(fitting(window.geometry() if remembered is not None else None, room))
+
+
+def fitting(wanted: QRect | None, room: QRect) -> QRect:
+    """A rectangle cut to a screen's room and moved into it; by default 80 % in the middle."""
+    if wanted is None:
+        place = QRect(room.topLeft(), (room.size() * _SHARE).expandedTo(_LEAST_PX))
+        place.setSize(place.size().boundedTo(room.size()))
+        place.moveCenter(room.center())
+        return place
+    place = QRect(wanted.topLeft(), wanted.size().boundedTo(room.size()))
+    place.moveLeft(min(max(place.left(), room.left()), room.right() + 1 - place.width()))
+    place.moveTop(min(max(place.top(), room.top()), room.bottom() + 1 - place.height()))
+    return place

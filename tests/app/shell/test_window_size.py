@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import QRect
 
-from sd2app.shell.window_size import fitting
+from sd2app.shell.window import fitting
 
 LARGE, SMALL = QRect(0, 0, 2560, 1440), QRect(0, 24, 1366, 700)
 

@@ -13,9 +13,8 @@ from window_models import models_of
 from sd2app.maps.level_bar import ColourScale
 from sd2app.session.display import LAYOUTS
 from sd2app.settings import Settings
-from sd2app.shell.layout_tabs import LayoutTabs
 from sd2app.shell.parts import Parts
-from sd2app.shell.window import MainWindow
+from sd2app.shell.window import LayoutTabs, MainWindow
 from sd2app.suggestions.feature import SuggestionBar
 
 LEFT = Qt.MouseButton.LeftButton

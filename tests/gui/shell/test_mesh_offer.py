@@ -9,7 +9,7 @@ from sd2app.session.document import DocumentModel
 from sd2app.session.sensor import SensorModel
 from sd2app.session.tasks import TaskList
 from sd2app.session.undo import Edits
-from sd2app.shell.mesh_offer import MeshOffer
+from sd2app.shell.files import MeshOffer
 
 POSE = np.random.default_rng(0).uniform((-0.3, -0.9, 2.5), (0.3, 0.9, 2.9), (60, 3))
 
