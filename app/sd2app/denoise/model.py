@@ -147,7 +147,8 @@ class DenoiseModel(ReportingModel):
         if choice == self._choice and self._loaded is None:
             self.problem = ""
             self._load()  # once more, after it failed
-        self._session.edits.choose_denoiser(choice)
+        fields = {"denoiser": choice.path, "bundled_denoiser": choice.bundled}
+        self._session.edits.change("Choose denoiser", fields)
 
     def set_comparing(self, comparing: bool) -> None:
         """Show the map of the model before beside that of this one, or not."""

@@ -86,6 +86,6 @@ class ImuFeature(Feature):
                 f"&Remove sensor at {place_words(current)}", lambda: model.remove(current)
             )
         if model.file is not None:
-            menu.addAction(f"Remove {model.file.name}", self._session.edits.remove_inertial_file)
+            menu.addAction(f"Remove {model.file.name}", model.remove_file)
         menu.addSeparator()
         menu.addAction("&Help on this track", lambda: show_help("Inertial sensor"))

@@ -145,12 +145,20 @@ class ImuModel(ReportingModel):
         self._session.placing.end()
         if not self.why_not:
             self._chosen = self.place_at(vertex)
-            self._session.edits.place_inertial(self._chosen)
+            if self._chosen not in self.places:
+                places = (*self.places, self._chosen)
+                self._session.edits.change("Place inertial sensor", {"imu_places": places})
             self._follow()
 
     def remove(self, place: str) -> None:
         """Take a virtual sensor away."""
-        self._session.edits.remove_inertial(place)
+        left = tuple(one for one in self.places if one != place)
+        self._session.edits.change("Remove inertial sensor", {"imu_places": left})
+
+    def remove_file(self) -> None:
+        """Show the samples of no file."""
+        none = {"imu": None, "imu_offset_s": 0.0}
+        self._session.edits.change("Remove inertial sensor's file", none)
 
     def show(self, place: str) -> None:
         """Show another sensor of the recording."""
@@ -259,14 +267,14 @@ class ImuModel(ReportingModel):
         self._take_file((path, signals))
         first_s, last_s = map(float, signals.times_s[[0, -1]])
         clock = self._session.playback.timebase
-        if last_s >= clock.start_s and first_s < clock.end_s:
-            self._session.edits.add_inertial_file(path, first_s)
-            return
-        self._session.edits.add_inertial_file(path, clock.start_s)
-        self.noted.emit(
-            f"{path.name} has a clock of its own: its first sample is put at the start of the"
-            " recording. Drag the title of its track to align it."
-        )
+        same_clock = last_s >= clock.start_s and first_s < clock.end_s
+        shown = {"imu": path, "imu_offset_s": first_s if same_clock else clock.start_s}
+        self._session.edits.change("Add inertial sensor's file", shown)
+        if not same_clock:
+            self.noted.emit(
+                f"{path.name} has a clock of its own: its first sample is put at the start of the"
+                " recording. Drag the title of its track to align it."
+            )
 
 
 def _feel(

@@ -138,10 +138,10 @@ class SensorPanel(QWidget):
         self._receiver = Choice("Receiver whose signal is shown", self)
         self._transmitter = Choice("Transmitter whose signal is shown", self)
         self._receiver.currentIndexChanged.connect(
-            lambda place: edits.choose_channel("receiver", place or None)
+            lambda place: edits.change("Choose receiver", {"radar_receiver": place or None})
         )
         self._transmitter.currentIndexChanged.connect(
-            lambda place: edits.choose_channel("transmitter", place or None)
+            lambda place: edits.change("Choose transmitter", {"radar_transmitter": place or None})
         )
         self._capture_form = form = _form_of(
             ("Offset", offset),

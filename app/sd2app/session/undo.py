@@ -10,7 +10,6 @@ from typing import Any, Literal
 
 from PySide6.QtGui import QUndoCommand
 
-from sd2app.session.content import DenoiserChoice
 from sd2app.session.document import DocumentModel
 from sd2app.session.maps import MapModel
 from sd2app.session.mesh_reading import ReadMesh
@@ -133,7 +132,7 @@ class Edits:
         rest = dict(fields)
         if "sensor" in rest:
             self.place_sensor(rest.pop("sensor"), "Restore sensor")
-        self._change("Restore settings", rest)
+        self.change("Restore settings", rest)
 
     # --- things, bodies and walls -----------------------------------------------------------
 
@@ -219,33 +218,7 @@ class Edits:
         recording = self._document.recording
         if recording is not None:
             name = {Thing: "things", Body: "bodies", Wall: "walls"}[type(one)]
-            self._change(f"{text} {one.name}", {name: change(getattr(recording, name))})
-
-    # --- inertial sensors -----------------------------------------------------------------
-
-    def place_inertial(self, place: str) -> None:
-        """Put a virtual inertial sensor at a place: a name, or the number of a vertex."""
-        places = self._inertial_places
-        if place not in places:
-            self._change("Place inertial sensor", {"imu_places": (*places, place)})
-
-    def remove_inertial(self, place: str) -> None:
-        """Take the virtual inertial sensor of a place away."""
-        left = tuple(one for one in self._inertial_places if one != place)
-        self._change("Remove inertial sensor", {"imu_places": left})
-
-    def add_inertial_file(self, path: Path, offset_s: float) -> None:
-        """Show a real inertial sensor's samples, the first at a time of the recording's clock."""
-        self._change("Add inertial sensor's file", {"imu": path, "imu_offset_s": offset_s})
-
-    def remove_inertial_file(self) -> None:
-        """Show no real inertial sensor's samples."""
-        self._change("Remove inertial sensor's file", {"imu": None, "imu_offset_s": 0.0})
-
-    @property
-    def _inertial_places(self) -> tuple[str, ...]:
-        recording = self._document.recording
-        return () if recording is None else recording.imu_places
+            self.change(f"{text} {one.name}", {name: change(getattr(recording, name))})
 
     # --- files ----------------------------------------------------------------------------
 
@@ -261,7 +234,7 @@ class Edits:
 
     def _take_added(self, fields: Mapping[str, Any]) -> None:
         added = [WORDS[name] for name in ("video", "mesh", "radar", "imu") if fields.get(name)]
-        self._change(f"Add {' and '.join(added)}" if added else "Read files again", fields)
+        self.change(f"Add {' and '.join(added)}" if added else "Read files again", fields)
 
     def relink(self, folder: Path) -> Relinked | None:
         """Look for missing files below a folder; what was found is read again."""
@@ -271,7 +244,7 @@ class Edits:
         found = replace(recording)
         relinked = found.find_missing(folder)
         names = (*ROLES, "bodies", "things")
-        self._change("Find missing files", {name: getattr(found, name) for name in names})
+        self.change("Find missing files", {name: getattr(found, name) for name in names})
         return relinked
 
     # --- the mesh -------------------------------------------------------------------------
@@ -280,12 +253,12 @@ class Edits:
         """Read another mesh, or the same one another way; a step once it was read."""
         recording = self._document.recording
         if recording is not None:
-            self._document.meshes.read(recording, fields, partial(self._change, text))
+            self._document.meshes.read(recording, fields, partial(self.change, text))
 
     def take_mesh(self, text: str, read: ReadMesh) -> None:
         """Show a mesh that was read already, as one step."""
         self._document.meshes.keep(read)
-        self._change(text, read.fields)
+        self.change(text, read.fields)
 
     def cure_mesh(self, cure: Cure) -> None:
         """Read the mesh with a setting that puts it right."""
@@ -297,7 +270,7 @@ class Edits:
 
     def set_radar_offset(self, offset_s: float) -> None:
         """Align the capture."""
-        self._change(_ALIGNED["radar_offset_s"], {"radar_offset_s": offset_s})
+        self.change(_ALIGNED["radar_offset_s"], {"radar_offset_s": offset_s})
 
     def begin_offset_drag(self, name: Offset = "radar_offset_s") -> None:
         """Begin to drag what was measured in time."""
@@ -327,10 +300,6 @@ class Edits:
         document = self._document
         self._push("Choose clutter removal", document.set_clutter, document.clutter, clutter)
 
-    def choose_channel(self, of: Literal["receiver", "transmitter"], number: int | None) -> None:
-        """Show one receiver or transmitter, by its number from 1 on, or all together."""
-        self._change(f"Choose {of}", {f"radar_{of}": number})
-
     # --- levels ---------------------------------------------------------------------------
 
     def set_references(self, references: Mapping[MapModel, float], *, by_hand: bool) -> None:
@@ -339,16 +308,9 @@ class Edits:
         after = {track: (reference, by_hand) for track, reference in references.items()}
         self._push("0 dB", _assign_references, before, after)
 
-    # --- denoising ------------------------------------------------------------------------
-
-    def choose_denoiser(self, choice: DenoiserChoice) -> None:
-        """Denoise the recording with another model, or with none."""
-        fields = {"denoiser": choice.path, "bundled_denoiser": choice.bundled}
-        self._change("Choose denoiser", fields)
-
     # --- the history ----------------------------------------------------------------------
 
-    def _change(self, text: str, fields: Mapping[str, object]) -> None:
+    def change(self, text: str, fields: Mapping[str, object]) -> None:
         """Change fields of the recording as one step."""
         before = self._fields(fields)
         self._document.assign(fields)

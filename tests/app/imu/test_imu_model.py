@@ -256,7 +256,7 @@ def test_a_real_file_on_the_same_clock_lies_where_its_times_say(
     desk.history.redo()
     desk.settle()
     assert model.measured is not None
-    desk.session.edits.remove_inertial_file()
+    model.remove_file()
     assert (model.measured, desk.recording.imu) == (None, None)
 
 

@@ -45,12 +45,12 @@ def test_the_map_follows_and_the_choice_can_be_undone(session, qtbot):
     ).values
     assert not np.array_equal(first, every)
     assert real.title == "Radar (simulated)"
-    session.edits.choose_channel("receiver", 1)
+    session.edits.change("Choose receiver", {"radar_receiver": 1})
     assert document.undo_stack.undoText() == "Choose receiver"
     wait_for(session, first, qtbot)
     assert real.title == "Radar (simulated), receiver 1"
     assert real.reference == reference  # compared at the same 0 dB
-    session.edits.choose_channel("receiver", 2)
+    session.edits.change("Choose receiver", {"radar_receiver": 2})
     wait_for(session, np.zeros_like(every), qtbot)
     document.undo_stack.undo()
     wait_for(session, first, qtbot)
@@ -62,7 +62,7 @@ def test_the_map_follows_and_the_choice_can_be_undone(session, qtbot):
 def test_the_choice_is_stored_and_shown_again(session, qtbot):
     document = session.document
     folder = document.recording.folder
-    session.edits.choose_channel("receiver", 2)
+    session.edits.change("Choose receiver", {"radar_receiver": 2})
     document.save()
     assert open_recording(folder).radar_receiver == 2
     open_here(document, folder, qtbot)
@@ -72,7 +72,7 @@ def test_the_choice_is_stored_and_shown_again(session, qtbot):
 
 def test_another_radar_file_has_no_choice_yet(session, qtbot, tmp_path):
     document = session.document
-    session.edits.choose_channel("receiver", 2)
+    session.edits.change("Choose receiver", {"radar_receiver": 2})
     other = recording(tmp_path / "ben.sd2", silent_receivers=2)
     with qtbot.waitSignal(document.opened, timeout=10_000):
         session.edits.add([other.radar])
@@ -83,10 +83,10 @@ def test_another_radar_file_has_no_choice_yet(session, qtbot, tmp_path):
 def test_a_number_that_is_not_there_is_told_and_can_be_replaced(session, qtbot):
     document = session.document
     with qtbot.waitSignal(document.failed, timeout=10_000) as told:
-        session.edits.choose_channel("receiver", 7)
+        session.edits.change("Choose receiver", {"radar_receiver": 7})
     assert "Receiver 7" in told.args[0]
     assert "1 to 2" in told.args[0]
-    session.edits.choose_channel("receiver", 2)
+    session.edits.change("Choose receiver", {"radar_receiver": 2})
     wait_for(session, np.zeros_like(document.radar_map.values), qtbot)
 
 
