@@ -17,7 +17,7 @@ from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import Dialog, accepting, ask_file
 from sd2app.widgets.inputs import CheckBox, Choice, FrameSlider, NumberBox, option_box
 from sd2app.widgets.layouts import column_of, form_of, row_of
-from sd2app.widgets.mesh_painting import paint_mesh_over
+from sd2app.widgets.mesh_painting import draw_mesh, no_picture, paint_picture
 from sd2app.widgets.panel import ElidedLabel, outlined, say, sentence, side_by_side
 from sd2app.widgets.text import counted
 from sd2core.files.turns import Turn
@@ -64,7 +64,9 @@ class MeshOverPicture(Canvas):
         # Dots cover little: they have to be stronger to be seen at all.
         opacity = 1.0 if mesh is not None and mesh.faces is None else _OPACITY
         camera, time_s = preview.camera, preview.time_s
-        paint_mesh_over(painter, self.rect(), picture, mesh, time_s, camera, colour, opacity)
+        shown = no_picture(camera) if picture is None else picture
+        box = paint_picture(painter, self.rect(), shown)
+        draw_mesh(painter, box, mesh, time_s, camera, colour, opacity)
 
 
 class MeshDialog(Dialog):

@@ -15,7 +15,7 @@ from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
 from sd2app.video.overlay_settings import OverlayModel
 from sd2app.widgets.canvas import AT_RIGHT, Canvas, paint_axes
-from sd2app.widgets.mesh_painting import paint_mesh_over
+from sd2app.widgets.mesh_painting import draw_mesh, no_picture, paint_picture
 from sd2app.widgets.time_axis import paint_title, signed_text, ticks
 from sd2core.mesh.presence import runs
 
@@ -69,7 +69,8 @@ class ComparedPicture(Canvas):
             time_s = reader.timebase.time_of(s.video.shown_frame)
         opacity = max(self._overlay.style.opacity, _MIN_OPACITY)
         mesh = comparison.mesh(self._number)
-        paint_mesh_over(painter, ground, picture, mesh, time_s, camera, colour, opacity)
+        box = paint_picture(painter, ground, no_picture(camera) if picture is None else picture)
+        draw_mesh(painter, box, mesh, time_s, camera, colour, opacity)
 
 
 class JointCurves(SeekingPlot):

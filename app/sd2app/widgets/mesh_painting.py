@@ -35,39 +35,9 @@ def paint_picture(
     return box
 
 
-def paint_mesh_over(
-    painter: QPainter,
-    room: QRect,
-    picture: NDArray[np.uint8] | None,
-    mesh: MeshSequence | None,
-    time_s: float,
-    camera: PinholeCamera,
-    colour: QColor,
-    opacity: float,
-) -> None:
-    """Paint a picture, and the mesh of its moment over it.
-
-    Parameters
-    ----------
-    painter : QPainter
-    room : QRect
-        The picture is as large as fits, in the middle.
-    picture : uint8 array, shape (H, W, 3), or None
-        RGB; a grey ground without one.
-    mesh : MeshSequence or None
-    time_s : float
-        Of the picture.
-    camera : PinholeCamera
-        That took the picture.
-    colour : QColor
-    opacity : float
-        From 0 to 1.
-    """
-    if picture is None:
-        picture = np.full((camera.height, camera.width, 3), _GREY, np.uint8)
-    box = paint_picture(painter, room, picture)
-    painter.setClipRect(box)
-    draw_mesh(painter, box, mesh, time_s, camera, colour, opacity)
+def no_picture(camera: PinholeCamera) -> NDArray[np.uint8]:
+    """A grey ground in place of a camera's picture, RGB (H, W, 3)."""
+    return np.full((camera.height, camera.width, 3), _GREY, np.uint8)
 
 
 def draw_mesh(
