@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 
@@ -16,12 +16,12 @@ from sd2app.denoise.text import origin_words, track_words
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.partial_map import Part
 from sd2app.maps.quality import Postprocess
-from sd2app.session.content import NO_MODEL, UNSAID, DenoiserChoice
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2core.cli.denoise import Denoise
 from sd2core.denoise.files import default_name
 from sd2core.errors import Sd2Error
+from sd2core.files.resources import is_bundled
 from sd2core.options.records import words_of
 
 if TYPE_CHECKING:
@@ -30,6 +30,17 @@ if TYPE_CHECKING:
 _TEXTURED, _LIVE = "textured", "denoise_live"
 _PATIENCE_MS = 2000
 """Longest delay of the first model, which waits for the synthetic map."""
+
+
+class _Choice(NamedTuple):
+    """Fields of a recording: a file, the name of a bundled model (empty: none), or neither."""
+
+    denoiser: Path | None = None
+    bundled_denoiser: str | None = None
+
+
+_UNSAID, _NO_MODEL = _Choice(), _Choice(bundled_denoiser="")
+"""The bundled default, where there is one; and the map as it is."""
 
 
 class DenoiseModel(ReportingModel):
@@ -51,7 +62,7 @@ class DenoiseModel(ReportingModel):
         )
         self.path: Path | None = None  # of the model that is in use or being loaded
         self.problem = ""  # why the chosen model is not in use; empty where it is
-        self._choice = UNSAID
+        self._choice = _UNSAID
         self._loaded: RemoteDenoiser | None = None
         self._before: RemoteDenoiser | None = None
         self._comparing = False
@@ -143,12 +154,13 @@ class DenoiseModel(ReportingModel):
             return
         if path is not None:
             self._library.describe(path)
-        choice = NO_MODEL if path is None else DenoiserChoice.of_file(path)
+        choice = _NO_MODEL if path is None else _Choice(denoiser=path.absolute())
+        if path is not None and is_bundled(path):
+            choice = _Choice(bundled_denoiser=path.stem)
         if choice == self._choice and self._loaded is None:
             self.problem = ""
             self._load()  # once more, after it failed
-        fields = {"denoiser": choice.path, "bundled_denoiser": choice.bundled}
-        self._session.edits.change("Choose denoiser", fields)
+        self._session.edits.change("Choose denoiser", choice._asdict())
 
     def set_comparing(self, comparing: bool) -> None:
         """Show the map of the model before beside that of this one, or not."""
@@ -214,7 +226,10 @@ class DenoiseModel(ReportingModel):
             self.map.use(None)
 
     def _follow(self, fresh: bool = False) -> None:
-        choice = DenoiserChoice.of(self._document.recording)
+        choice, recording = _UNSAID, self._document.recording
+        if recording is not None:
+            bundled = None if recording.denoiser else recording.bundled_denoiser
+            choice = _Choice(recording.denoiser, bundled)
         if choice == self._choice and not fresh:
             return
         self._choice = choice
@@ -225,18 +240,19 @@ class DenoiseModel(ReportingModel):
             self._load()
         self.changed.emit()
 
-    def _path_of(self, choice: DenoiserChoice) -> Path | None:
-        if self._document.recording is None or choice == NO_MODEL:
+    def _path_of(self, choice: _Choice) -> Path | None:
+        if self._document.recording is None or choice == _NO_MODEL:
             return None
-        if choice.path is not None:
+        if choice.denoiser is not None:
             # What is missing was said when the recording was opened.
-            exists = choice.path.is_file()
-            self.problem = "" if exists else f"The model {choice.path} is not there"
-            return choice.path if exists else None
-        card = self._library.named(choice.bundled or default_name(limbs=self._splits))
-        if card is None and choice.bundled:
+            exists = choice.denoiser.is_file()
+            self.problem = "" if exists else f"The model {choice.denoiser} is not there"
+            return choice.denoiser if exists else None
+        name = choice.bundled_denoiser
+        card = self._library.named(name or default_name(limbs=self._splits))
+        if card is None and name:
             self._say_problem(
-                f"This recording was denoised with the model {choice.bundled}, which does not"
+                f"This recording was denoised with the model {name}, which does not"
                 " come with this version. Choose another under Model."
             )
         return card.path if card is not None else None
@@ -317,7 +333,7 @@ class DenoiseModel(ReportingModel):
         if self._loaded is not None:
             self._loaded = None
         # The user did not ask for the default; that it cannot be used here is no failure.
-        if self._choice != UNSAID:
+        if self._choice != _UNSAID:
             self.failed.emit(words)
         self.changed.emit()
 
@@ -334,7 +350,7 @@ class DenoiseModel(ReportingModel):
         """Take the model for the map alone, or say why the chosen one cannot be used."""
         self.map.use(None)
         self._loaded = None
-        if self._choice == UNSAID:
+        if self._choice == _UNSAID:
             self._splits = False
             self._follow(fresh=True)
         else:

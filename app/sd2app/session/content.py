@@ -277,30 +277,3 @@ def reference_of(values: np.ndarray, bins: Iterable[int] = ()) -> float:
     keep[list(bins)] = False
     top = float(values[keep].max(initial=0.0))
     return top if top > 0 else 1.0
-
-
-@dataclass(frozen=True)
-class DenoiserChoice:
-    """A file, a bundled model, no model, or no choice."""
-
-    path: Path | None = None  # model file
-    bundled: str | None = None  # name of a model that comes with the program; empty for none at all
-
-    @classmethod
-    def of(cls, recording: Recording | None) -> DenoiserChoice:
-        """Choice stored in a recording."""
-        if recording is None:
-            return UNSAID
-        return cls(recording.denoiser, None if recording.denoiser else recording.bundled_denoiser)
-
-    @classmethod
-    def of_file(cls, path: Path) -> DenoiserChoice:
-        """A model file; one that comes with the program is kept by its name."""
-        path = Path(path)
-        return cls(bundled=path.stem) if is_bundled(path) else cls(path=path.absolute())
-
-
-UNSAID = DenoiserChoice()
-"""The bundled default, where there is one."""
-NO_MODEL = DenoiserChoice(bundled="")
-"""The map is not denoised."""
