@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPushButton, QToolButton
+from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QToolButton
 from window_models import models_of
 
 from sd2app.shell.keys.dialog import KeyCapture, KeysDialog, KeyTable
@@ -40,13 +40,13 @@ def press(key, modifier=NONE) -> None:
 
 
 def click(dialog, text: str) -> None:
-    button = next(one for one in dialog.findChildren(QPushButton) if one.text() == text)
+    button = next(one for one in dialog.findChildren(QToolButton) if one.text() == text)
     assert button.isEnabled()
     QTest.mouseClick(button, LEFT)
 
 
-def button(dialog, text: str) -> QPushButton:
-    return next(one for one in dialog.findChildren(QPushButton) if one.text() == text)
+def button(dialog, text: str) -> QToolButton:
+    return next(one for one in dialog.findChildren(QToolButton) if one.text() == text)
 
 
 def said(dialog) -> str:

@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QDialogButtonBox,
     QHeaderView,
     QLineEdit,
-    QPushButton,
     QWidget,
 )
 
@@ -22,7 +21,7 @@ from sd2app.shell.keys.model import KEYS, KeyListModel
 from sd2app.widgets.dialogs import Dialog, closing, take_room
 from sd2app.widgets.inputs import SearchLine
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
-from sd2app.widgets.panel import sentence
+from sd2app.widgets.panel import outlined, sentence
 from sd2app.widgets.table import CellTable
 from sd2core.errors import Sd2Error
 
@@ -53,12 +52,14 @@ class KeysDialog(Dialog):
         bindings.changed.connect(self._refresh)
         model.modelReset.connect(self._refresh)
         self._warning = sentence("", "warning")
-        self._change = self._button("Change", "Wait for another key", self._begin)
-        self._add = self._button("Add", "Wait for a key besides", lambda: self._begin(besides=True))
+        add, tip = partial(self._begin, besides=True), "Wait for a key besides"
+        self._change = outlined("Change", "Wait for another key", self._begin, self)
+        self._add = outlined("Add", tip, add, self)
         clear, reset = partial(self._attempt, model.clear), partial(self._attempt, model.reset)
-        self._clear = self._button("Remove", "Leave it without a key", clear)
-        self._reset = self._button("Reset", "Give it its usual keys back", reset)
-        every = self._button("Reset all", "Give everything its usual keys", bindings.reset_all)
+        self._clear = outlined("Remove", "Leave it without a key", clear, self)
+        self._reset = outlined("Reset", "Give it its usual keys back", reset, self)
+        tip = "Give everything its usual keys"
+        every = outlined("Reset all", tip, bindings.reset_all, self)
         close = closing(self)
         close.button(QDialogButtonBox.StandardButton.Close).setAutoDefault(False)
         changing = (self._change, self._add, self._clear, self._reset)
@@ -67,14 +68,6 @@ class KeysDialog(Dialog):
         self.setLayout(column_of(head, (self._table, 1), self._warning, buttons))
         take_room(self, 760, 620)
         self._find()
-
-    def _button(self, text: str, tip: str, run: Callable[[], object]) -> QPushButton:
-        button = QPushButton(text, self)
-        button.setToolTip(tip)
-        button.setAccessibleDescription(tip)
-        button.setAutoDefault(False)
-        button.clicked.connect(lambda: run())
-        return button
 
     def _find(self) -> None:
         self._model.set_search(self._search.text())
