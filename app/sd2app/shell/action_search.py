@@ -8,12 +8,13 @@ from itertools import chain
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeyEvent, QKeySequence, QPalette
-from PySide6.QtWidgets import QHeaderView, QMainWindow, QMenu, QTreeWidget, QTreeWidgetItem, QWidget
+from PySide6.QtWidgets import QMainWindow, QMenu, QTreeWidgetItem, QWidget
 
 from sd2app.widgets.dialogs import Dialog
 from sd2app.widgets.inputs import SearchLine
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.panel import say, sentence
+from sd2app.widgets.table import entry_list
 
 _MOVING = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 _SIZE_PX = 640, 480
@@ -86,18 +87,8 @@ class ActionSearch(Dialog):
         self._entries = entries_of(window)
         self.chosen: QAction | None = None
         self._line = SearchLine("What do you want to do?", self)
-        self._list = QTreeWidget(self)
-        self._list.setAccessibleName("Actions found")
-        self._list.setHeaderLabels(["Action", "Where", "Keys"])
-        self._list.setRootIsDecorated(False)
-        self._list.setUniformRowHeights(True)
+        self._list = entry_list("Actions found", ("Action", "Where", "Keys"), 0, self)
         self._list.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._list.header().setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
-        for column in (1, 2):
-            self._list.header().setSectionResizeMode(
-                column, QHeaderView.ResizeMode.ResizeToContents
-            )
-        self._list.header().setStretchLastSection(False)
         self._list.itemClicked.connect(lambda: self._choose())
         self._list.currentItemChanged.connect(lambda: self._explain())
         self._about = sentence("")

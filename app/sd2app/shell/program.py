@@ -19,7 +19,7 @@ from sd2app.settings import Settings
 from sd2app.shell.action_search import ActionSearch
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.dialog import KeysDialog
-from sd2app.shell.keys.model import KeyListModel
+from sd2app.shell.keys.model import KeyList
 from sd2app.widgets.dialogs import Dialog, accepted, closing
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import column_of, form_of
@@ -191,8 +191,8 @@ class ProgramFeature(Feature):
     def _show_keys(self) -> None:
         bindings = self._shell.keys
         assert isinstance(bindings, KeyBindings)
-        model = KeyListModel(bindings, self._labels.model, MOUSE, self._labels.edits.apply)
-        accepted(KeysDialog(model, bindings, self._shell.dialog_parent))
+        keys = KeyList(bindings, self._labels.model, MOUSE, self._labels.edits.apply)
+        accepted(KeysDialog(keys, self._shell.dialog_parent))
 
     def _show_about(self) -> None:
         QMessageBox.about(

@@ -10,10 +10,12 @@ from PySide6.QtGui import QHideEvent, QIcon, QKeyEvent, QPainter, QPalette, QSho
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QComboBox,
+    QHeaderView,
     QStyle,
     QStyledItemDelegate,
     QStyleOptionViewItem,
     QTableView,
+    QTreeWidget,
     QWidget,
 )
 
@@ -21,6 +23,34 @@ from sd2app.widgets.inputs import claims
 from sd2app.widgets.record_table import RecordTableModel
 
 ROW_PX = 22
+
+
+def entry_list(name: str, headings: Sequence[str], wide: int, parent: QWidget) -> QTreeWidget:
+    """A list of rows to choose from, whose ``wide`` column takes the room that is left over.
+
+    Parameters
+    ----------
+    name : str
+        For screen readers.
+    headings : sequence of str
+        Of the columns.
+    wide : int
+        Number of a column.
+    parent : QWidget
+    """
+    made = QTreeWidget(parent)
+    made.setAccessibleName(name)
+    made.setHeaderLabels(list(headings))
+    made.setRootIsDecorated(False)
+    made.setUniformRowHeights(True)
+    modes = QHeaderView.ResizeMode
+    for column in range(len(headings)):
+        mode = modes.Stretch if column == wide else modes.ResizeToContents
+        made.header().setSectionResizeMode(column, mode)
+    made.header().setStretchLastSection(False)
+    return made
+
+
 _OWN_KEYS = (
     Qt.Key.Key_PageUp,
     Qt.Key.Key_PageDown,

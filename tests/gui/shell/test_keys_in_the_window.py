@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QToolButton
+from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QToolButton, QTreeWidget
 from window_models import models_of
 
-from sd2app.shell.keys.dialog import KeyCapture, KeysDialog, KeyTable
-from sd2app.shell.keys.model import KeyListModel
+from sd2app.shell.keys.dialog import KeyCapture, KeysDialog
+from sd2app.shell.keys.model import KeyList
 from sd2app.shell.program import MOUSE
 from sd2app.widgets.inputs import NumberBox
 
@@ -20,7 +20,7 @@ NONE, LEFT = Qt.KeyboardModifier.NoModifier, Qt.MouseButton.LeftButton
 @pytest.fixture
 def dialog(window, qtbot):
     c = models_of(window)
-    shown = KeysDialog(KeyListModel(c.keys, c.labels, MOUSE, c.label_edits.apply), c.keys, window)
+    shown = KeysDialog(KeyList(c.keys, c.labels, MOUSE, c.label_edits.apply), window)
     qtbot.addWidget(shown)
     shown.show()
     shown.activateWindow()
@@ -55,7 +55,7 @@ def said(dialog) -> str:
 
 def capture(dialog) -> None:
     """Return in the list waits for a key."""
-    dialog.findChild(KeyTable).setFocus()
+    dialog.findChild(QTreeWidget).setFocus()
     press(Qt.Key.Key_Return)
     assert isinstance(QApplication.focusWidget(), KeyCapture)
 
@@ -144,7 +144,7 @@ def test_a_labels_key_is_changed_as_one_step(window, dialog) -> None:
 
 def test_what_the_mouse_does_is_listed_and_not_changed(dialog) -> None:
     search(dialog, MOUSE[0][1])
-    assert dialog.findChild(KeyTable).model().rows[0].mouse == MOUSE[0][0]
+    assert dialog.findChild(QTreeWidget).topLevelItem(0).text(2) == MOUSE[0][0]
     assert not button(dialog, "Change").isEnabled()
 
 

@@ -6,26 +6,25 @@ from collections.abc import Callable
 from functools import partial
 
 from PySide6.QtCore import QEvent, QKeyCombination, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QKeySequence
+from PySide6.QtGui import QKeyEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QDialogButtonBox,
     QHeaderView,
     QLineEdit,
+    QTreeWidgetItem,
     QWidget,
 )
 
 from sd2app.manual.help import help_button
-from sd2app.shell.keys.bindings import KeyBindings
-from sd2app.shell.keys.model import KEYS, KeyListModel
+from sd2app.shell.keys.model import KeyList, KeyRow
 from sd2app.widgets.dialogs import Dialog, closing, take_room
 from sd2app.widgets.inputs import SearchLine
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
 from sd2app.widgets.panel import outlined, sentence
-from sd2app.widgets.table import CellTable
+from sd2app.widgets.table import entry_list
 from sd2core.errors import Sd2Error
 
-_KEYS_PX = 250
+_KEYS, _KEYS_PX = 2, 250
 _MODIFIERS = (
     Qt.Key.Key_Shift,
     Qt.Key.Key_Control,
@@ -40,107 +39,95 @@ _KEYPAD = Qt.KeyboardModifier.KeypadModifier
 class KeysDialog(Dialog):
     """A list of what keys and mouse do; Return or a double click waits for another key."""
 
-    def __init__(self, model: KeyListModel, bindings: KeyBindings, parent: QWidget) -> None:
+    def __init__(self, keys: KeyList, parent: QWidget) -> None:
         super().__init__("Keys", parent)
-        self._model = model
-        model.setParent(self)
+        self._keys = keys
+        self._rows: list[KeyRow] = []
         self._search = SearchLine("Search actions and keys", self)
-        self._search.textChanged.connect(self._find)
-        self._table = KeyTable(model, self)
-        self._table.activated.connect(lambda: self._begin())
-        self._table.selectionModel().currentRowChanged.connect(self._refresh)
-        bindings.changed.connect(self._refresh)
-        model.modelReset.connect(self._refresh)
+        self._search.textChanged.connect(self._fill)
+        self._list = entry_list("Keys", ("Menu", "What it does", "Keys"), 1, self)
+        self._list.header().setSectionResizeMode(_KEYS, QHeaderView.ResizeMode.Interactive)
+        self._list.setColumnWidth(_KEYS, _KEYS_PX)
+        self._list.itemActivated.connect(lambda: self._begin())
+        QShortcut(QKeySequence(Qt.Key.Key_F2), self._list, lambda: self._begin())
+        self._list.currentItemChanged.connect(self._refresh)
         self._warning = sentence("", "warning")
         add, tip = partial(self._begin, besides=True), "Wait for a key besides"
         self._change = outlined("Change", "Wait for another key", self._begin, self)
         self._add = outlined("Add", tip, add, self)
-        clear, reset = partial(self._attempt, model.clear), partial(self._attempt, model.reset)
+        clear, reset = partial(self._attempt, keys.clear), partial(self._attempt, keys.reset)
         self._clear = outlined("Remove", "Leave it without a key", clear, self)
         self._reset = outlined("Reset", "Give it its usual keys back", reset, self)
         tip = "Give everything its usual keys"
-        every = outlined("Reset all", tip, bindings.reset_all, self)
+        every = outlined("Reset all", tip, keys.bindings.reset_all, self)
         close = closing(self)
         close.button(QDialogButtonBox.StandardButton.Close).setAutoDefault(False)
         changing = (self._change, self._add, self._clear, self._reset)
         buttons = row_of(*changing, STRETCH, every, close)
         head = row_of((self._search, 1), help_button("Keys", self))
-        self.setLayout(column_of(head, (self._table, 1), self._warning, buttons))
+        self.setLayout(column_of(head, (self._list, 1), self._warning, buttons))
         take_room(self, 760, 620)
-        self._find()
+        keys.bindings.changed.connect(self._fill)
+        self._fill()
 
-    def _find(self) -> None:
-        self._model.set_search(self._search.text())
-        if self._model.rowCount():
-            self._table.setCurrentIndex(self._model.index(0, KEYS))
+    @property
+    def _row(self) -> KeyRow | None:
+        place = self._list.currentIndex().row()
+        return self._rows[place] if 0 <= place < len(self._rows) else None
+
+    def _fill(self) -> None:
+        """List what the search leaves; the row that was current stays so."""
+        current, self._rows = self._row, self._keys.rows(self._search.text())
+        self._list.clear()
+        for row in self._rows:
+            item = QTreeWidgetItem(self._list, [row.menu, row.text, self._keys.keys_text(row)])
+            font = item.font(_KEYS)
+            font.setBold(not self._keys.is_usual(row))
+            item.setFont(_KEYS, font)
+            for column in range(item.columnCount()):
+                item.setToolTip(column, row.tip)
+        at = self._rows.index(current) if current in self._rows else 0
+        self._list.setCurrentIndex(self._list.model().index(at, 0))
         self._refresh()
 
     def _begin(self, besides: bool = False) -> None:
         """Wait for a key in the current row."""
         self._warning.clear()
-        if not self._change.isEnabled():
+        row = self._row
+        if row is None or row.mouse:
             return
-        table, cell, field = self._table, self._model.index(self._row, KEYS), KeyCapture(self)
+        field = KeyCapture(self)
 
         def end() -> None:
-            table.setFocus()
+            self._list.setFocus()
             field.hide()
             field.deleteLater()
 
         def take(key: str) -> None:
             end()
-            self._attempt(lambda _: self._model.change(cell.row(), key, besides=besides))
+            self._attempt(lambda _: self._keys.change(row, key, besides=besides))
 
         field.given_up.connect(end)
         field.captured.connect(take)
-        table.setIndexWidget(cell, field)
+        self._list.setIndexWidget(self._list.currentIndex().siblingAtColumn(_KEYS), field)
         field.setFocus()
 
-    def _attempt(self, change: Callable[[int], None]) -> None:
+    def _attempt(self, change: Callable[[KeyRow], None]) -> None:
         """Change the current row, or say why that is refused."""
         self._warning.clear()
         try:
-            change(self._row)
+            if self._row is not None:
+                change(self._row)
         except Sd2Error as error:
             self._warning.setText(str(error))
 
-    @property
-    def _row(self) -> int:
-        return self._table.currentIndex().row()
-
     def _refresh(self) -> None:
-        is_row = 0 <= self._row < self._model.rowCount()
-        can = is_row and self._model.can_change(self._row)
+        row = self._row
+        can = row is not None and not row.mouse
         for button in (self._change, self._clear):
             button.setEnabled(can)
-        self._add.setEnabled(can and bool(self._model.rows[self._row].action))
-        self._reset.setEnabled(can and not self._model.is_usual(self._row))
-
-
-class KeyTable(CellTable):
-    """The list; Tab leaves it, Escape closes the dialog."""
-
-    def __init__(self, model: KeyListModel, parent: QWidget) -> None:
-        super().__init__("Keys", parent=parent)
-        self.setModel(model)
-        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        self.setTabKeyNavigation(False)
-        header = self.horizontalHeader()
-        header.setStretchLastSection(False)
-        header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
-        header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
-        self.setColumnWidth(KEYS, _KEYS_PX)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Return waits for another key."""
-        if event.key() == Qt.Key.Key_Escape:
-            event.ignore()
-            return
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_F2):
-            self.activated.emit(self.currentIndex())
-        else:
-            super().keyPressEvent(event)
+        self._add.setEnabled(row is not None and bool(row.action))
+        self._reset.setEnabled(row is not None and not self._keys.is_usual(row))
 
 
 class KeyCapture(QLineEdit):
