@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.latest import LatestRunner
+from sd2app.background.latest import LatestRunner, delayed
 from sd2app.background.runs import Runs
 from sd2app.batch.results import BatchResults
 from sd2app.batch.run import BatchMonitor, plan_of
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     # Imported where it is used: it takes long to load, and the window starts without.
     from sd2core.batch.estimate import BatchEstimate
     from sd2core.batch.plan import BatchPlan
+
+
+_ESTIMATE_MS = 600
 
 
 class BatchModel(Runs[BatchMonitor]):
@@ -52,6 +55,9 @@ class BatchModel(Runs[BatchMonitor]):
         self._estimating = LatestRunner("estimate", self, take, refuse)
         self.follow_setup(self.setup)
         self.results.changed.connect(self.changed)
+        # Not while the user still changes a number.
+        self._patience = delayed(self._estimate_if_seen, _ESTIMATE_MS, self)
+        self.changed.connect(self._patience.start)
 
     # --- the set-up -------------------------------------------------------------------------
 
@@ -71,6 +77,10 @@ class BatchModel(Runs[BatchMonitor]):
     def refused(self) -> bool:
         """True if what is set up cannot be done."""
         return bool(self._refusal) and self.why_not_start == self._refusal
+
+    def _estimate_if_seen(self) -> None:
+        if self._watched and self.run is None:
+            self.ask_estimate()
 
     def ask_estimate(self) -> None:
         """Compute the estimate for the set-up, unless it is known."""
@@ -140,6 +150,7 @@ class BatchModel(Runs[BatchMonitor]):
 
     def close(self) -> None:
         """Stop polling; a running batch goes on."""
+        self._patience.stop()
         self._estimating.close()
         self.results.close()
         super().close()

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtGui import QKeyEvent, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QFormLayout,
@@ -139,6 +139,11 @@ class BatchSetupView(QWidget):
         self._out.setText(str(setup.out or "–"))
         self._workers.show_value(setup.workers)
         self._show_estimate()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Follow what the open recording offers by now."""
+        super().showEvent(event)
+        self.refresh()
 
     def _show_estimate(self) -> None:
         batch = self._batch

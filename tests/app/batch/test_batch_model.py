@@ -306,7 +306,7 @@ def test_a_batch_outlives_the_model_and_is_found_again(qtbot, made, meshes):
     until(qtbot, second, "running")
     assert any("is under way" in words for words in said)
     until(qtbot, second, "finished")
-    assert any("come to its end" in words for words in said)
+    assert any("is done" in words for words in said)
 
 
 @pytest.mark.slow
