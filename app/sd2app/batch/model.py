@@ -183,7 +183,7 @@ class BatchModel(Runs[BatchMonitor]):
 
     def say_ended(self, run: BatchMonitor) -> None:
         """Tell the user how many tasks of a batch could not be done."""
-        failed = run.status.failed if run.status is not None else 0
+        failed = run.history.failed
         if run.phase == "finished" and failed:
             but = f"has come to its end, but {counted(failed, 'task')} could not be done"
             self.noted.emit(f"{run.path.name} {but}. File → Batch… opens results.")

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 from sd2app.background.run_monitor import History, RunMonitor, reason_in
-from sd2core.batch.folder import BatchFolder, BatchStatus, status_of
-from sd2core.errors import Sd2Error
+from sd2core.batch.folder import BatchFolder
 from sd2core.runs.command_folder import last_output
-from sd2core.runs.folder import State
 from sd2core.runs.progress import Event
 
 _KEPT_FAILURES = 500
@@ -28,7 +26,6 @@ class Failed:
 
 
 class _Facts(NamedTuple):
-    about: dict[str, Any]
     log: str  # its end
     has_plan: bool
 
@@ -41,8 +38,11 @@ def plan_of(folder: Path) -> Path:
 class BatchHistory(History):
     """Counts and failures of a batch's last start."""
 
+    steps: tuple[str, ...] = ()  # of the plan, in order
+    workers = failed = 0  # processes that share the work; tasks that cannot be done
+
     def __init__(self) -> None:
-        self.lines: list[Event] = []  # the first, and the newest with counts
+        self.tasks: dict[str, dict[str, int]] = {}  # per step: "total", "done", "there" already
         self.failures: list[Failed] = []
 
     @property
@@ -54,14 +54,15 @@ class BatchHistory(History):
         return elapsed_s / max(elapsed_s + left_s, 1e-9)
 
     def _start(self, event: Event) -> None:
-        self.lines, self.failures = [event], []
-        self.elapsed_s, self.told_left_s, self.error = None, None, ""
+        self.steps, self.failures = tuple(map(str, event.get("steps", ()))), []
+        self._count({})
 
     def _count(self, event: Event) -> None:
-        self.lines = [*self.lines[:1], event]
         elapsed_s, left_s = event.get("elapsed_s"), event.get("left_s")
         self.elapsed_s = None if elapsed_s is None else float(elapsed_s)
         self.told_left_s = None if left_s is None else float(left_s)
+        self.tasks = {name: dict(event.get(name, {})) for name in ("total", "done", "there")}
+        self.workers, self.failed = int(event.get("workers", 0)), int(event.get("failed", 0))
         self.error = reason_in(event)
 
     def _fail(self, event: Event) -> None:
@@ -84,34 +85,11 @@ class BatchMonitor(RunMonitor[BatchFolder]):
 
     folders, histories = BatchFolder, BatchHistory
     history: BatchHistory
-    facts = _Facts({}, "", False)
+    facts = _Facts("", False)
 
     def inspect(self) -> _Facts:
-        """Read the description and the end of the log."""
-        folder = self.folder
-        try:
-            about = folder.about()
-        except Sd2Error:
-            about = {}
-        return _Facts(about, last_output(folder.log), folder.plan.exists())
-
-    @property
-    def status(self) -> BatchStatus | None:
-        """Counts and times of the last start; None before there is a folder."""
-        about = self.facts.about
-        if not about:
-            return None
-        if self.under_way:
-            state: State = "running"
-        else:
-            state = "died" if about["state"] == "running" else about["state"]
-        return status_of(state, about, self.history.lines)
-
-    @property
-    def steps(self) -> tuple[str, ...]:
-        """Steps of the plan, in order."""
-        start = self.history.lines[:1]
-        return tuple(map(str, start[0].get("steps", ()))) if start else ()
+        """Read the end of the log, and look for a plan to go on with."""
+        return _Facts(last_output(self.folder.log), self.folder.plan.exists())
 
     @property
     def resumable(self) -> bool:

@@ -34,35 +34,33 @@ def entry_text(entry: Entry) -> str:
 
 def headline(batch: BatchMonitor) -> str:
     """Current phase of the run in words."""
-    status, words = batch.status, _PHASES[batch.phase]
-    if batch.phase == "finished" and status is not None and status.failed:
-        return f"{words}, but {counted(status.failed, 'task')} could not be done"
-    if batch.phase == "running" and status is not None and not status.workers:
+    history, words = batch.history, _PHASES[batch.phase]
+    if batch.phase == "finished" and history.failed:
+        return f"{words}, but {counted(history.failed, 'task')} could not be done"
+    if batch.phase == "running" and not history.workers:
         return f"{words}: waiting for workers"
     return words
 
 
 def batch_time_text(batch: BatchMonitor) -> str:
     """Time left, elapsed time, and the processes that share the work."""
-    status = batch.status
-    workers = status.workers if status is not None and batch.under_way else 0
+    workers = batch.history.workers if batch.under_way else 0
     return " · ".join(filter(None, (time_text(batch), counted(workers, "worker") * bool(workers))))
 
 
 def step_facts(batch: BatchMonitor) -> list[tuple[str, int, int, str]]:
     """Per step: its name, how many tasks are settled, how many there are, and both in words."""
-    status = batch.status
-    if status is None:
-        return []
     facts = []
-    for step in batch.steps:
-        if not (total := status.total.get(step, 0)):
+    for step in batch.history.steps:
+        total, done, there = (
+            batch.history.tasks[name].get(step, 0) for name in ("total", "done", "there")
+        )
+        if not total:
             continue
-        done, existing = status.done.get(step, 0), status.there.get(step, 0)
-        words = f"{done + existing:,} of {total:,}"
-        if existing:
-            words += f", {existing:,} there already"
-        facts.append((STEP_WORDS.get(step, step), done + existing, total, words))
+        words = f"{done + there:,} of {total:,}"
+        if there:
+            words += f", {there:,} there already"
+        facts.append((STEP_WORDS.get(step, step), done + there, total, words))
     return facts
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, NamedTuple, TypeVar, get_args
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 from sd2app.background.run_monitor import History, RunMonitor, reason_in
 from sd2core.errors import Sd2Error
@@ -14,7 +14,6 @@ from sd2core.runs.pace import Throughput
 from sd2core.train.config import read_config
 from sd2core.train.folder import TrainingFolder
 
-Outcome = Literal["finished", "stopped", "cancelled", "failed"]
 T = TypeVar("T")
 
 _MAX_POINTS = 2000
@@ -87,7 +86,6 @@ class TrainingHistory(StepHistory):
         self.step_points: list[StepPoint] = []
         self.epoch_points: list[EpochPoint] = []
         self.epoch = 0  # under way, from 1; zero before the first
-        self.outcome: Outcome | None = None
 
     @property
     def best(self) -> EpochPoint | None:
@@ -119,7 +117,7 @@ class TrainingHistory(StepHistory):
         self.epoch = math.ceil(at)
         self.left_s = None
         self.begun, self.paused = True, False
-        self.outcome, self.error = None, ""
+        self.error = ""
 
     def _stepped(self, event: dict[str, Any]) -> None:
         # Counted from the start of the run.
@@ -149,12 +147,8 @@ class TrainingHistory(StepHistory):
         self.epoch_points.append(point)
 
     def _ended(self, event: dict[str, Any]) -> None:
-        outcome = event["outcome"]
-        if outcome not in get_args(Outcome):
-            raise ValueError(f"outcome {outcome!r}")
         # Lines before the next start do not say that it works.
         self.begun, self.paused, self.left_s = False, False, None
-        self.outcome = outcome
         self.error = reason_in(event)
 
     def _pause(self, event: dict[str, Any]) -> None:

@@ -367,7 +367,7 @@ def test_a_batch_that_is_refused_says_what_it_was_told(qtbot, made, meshes, tmp_
 def test_two_are_not_started_in_one_folder(qtbot, made, meshes, tmp_path):
     model = made("--step-s", 30)
     begin(qtbot, model, meshes)
-    qtbot.waitUntil(lambda: model.run.status is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: model.run.folder.exists, timeout=20_000)
     model.select(None)
     model.ask_estimate()
     qtbot.waitUntil(lambda: not model.why_not_start, timeout=20_000)

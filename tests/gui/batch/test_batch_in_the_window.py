@@ -311,7 +311,7 @@ def test_the_window_closes_and_the_batch_goes_on(opened, qtbot):
     dialog = begin(window)
     ready(qtbot, batch)
     click(dialog, "Start")
-    qtbot.waitUntil(lambda: batch.run is not None and batch.run.status is not None)
+    qtbot.waitUntil(lambda: batch.run is not None and batch.run.folder.live)
     folder = batch.run.folder
     models_of(window).document.undo_stack.clear()
     window.close()
