@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QImage, QPixmap, QResizeEvent
+from PySide6.QtGui import QPainter
 from PySide6.QtWidgets import QDialogButtonBox, QLabel, QWidget
 
 from sd2app.live.process import PlaceCheck
+from sd2app.live.setup import ListenRequest
 from sd2app.manual.help import with_help
+from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import Dialog, closing
 from sd2app.widgets.layouts import STRETCH, column_of, grid_of, row_of
+from sd2app.widgets.mesh_painting import paint_picture
 from sd2app.widgets.panel import outlined, say, sentence, title
 from sd2core.placements.placements import Place
 
@@ -23,28 +26,12 @@ _WAITS = "Walk towards both and away again, a few times."
 
 
 class CheckDialog(Dialog):
-    """A view of :class:`PlaceCheck`.
+    """A view of :class:`PlaceCheck`; accepted where the place is to be kept."""
 
-    Parameters
-    ----------
-    check : PlaceCheck
-    again : callable
-        Begins it once more.
-    take_over : callable
-        Called with the place that was found, if it is to be kept.
-    parent : QWidget
-    """
-
-    def __init__(
-        self,
-        check: PlaceCheck,
-        again: Callable[[], object],
-        take_over: Callable[[Place], object],
-        parent: QWidget,
-    ) -> None:
+    def __init__(self, check: PlaceCheck, request: ListenRequest, parent: QWidget) -> None:
         super().__init__("Check the place", parent)
-        self._check, self._take_over = check, take_over
-        self._picture = _LivePicture(self)
+        self._check = check
+        picture = _LivePicture(check, self)
         self._head = sentence("", "title")
         self._rows = {
             name: (QLabel(self), title(text), sentence("")) for name, text in _NAMES.items()
@@ -56,20 +43,19 @@ class CheckDialog(Dialog):
         findings = grid_of(*self._rows.values(), gaps_px=(10, 12), wide=(2,))
         self._place = sentence("")
         tip = "Keep it as the planned placement of what is recorded"
-        self._take = outlined("Take over", tip, self._taken, self)
+        self._take = outlined("Take over", tip, self.accept, self)
         buttons = closing(self)
         action = QDialogButtonBox.ButtonRole.ResetRole
         self._stop = buttons.addButton("Stop", action)
         self._stop.clicked.connect(check.stop)
         self._again = buttons.addButton("Again", action)
-        self._again.clicked.connect(again)
+        self._again.clicked.connect(partial(check.start, request))
         column = column_of(self._head, findings, STRETCH, spacing_px=16, margins_px=0)
         below = row_of((self._place, 1), self._take, spacing_px=12)
-        parts = row_of((self._picture, 1), (column, 1), spacing_px=20)
+        parts = row_of((picture, 1), (column, 1), spacing_px=20)
         foot = with_help("Check the place", buttons)
         self.setLayout(column_of((parts, 1), below, foot, spacing_px=16, margins_px=16))
         check.changed.connect(self._refresh)
-        check.pictured.connect(self._picture.show_image)
         self._refresh()
         self.resize(1000, self.sizeHint().height() + _LINES * self.fontMetrics().lineSpacing())
 
@@ -77,11 +63,6 @@ class CheckDialog(Dialog):
         """Let go of radar and camera with it."""
         self._check.close()
         super().done(result)
-
-    def _taken(self) -> None:
-        if self._check.place is not None:
-            self._take_over(self._check.place)
-            self.accept()
 
     def _refresh(self) -> None:
         check = self._check
@@ -112,31 +93,22 @@ class CheckDialog(Dialog):
         return f"{bad} of {len(check.findings)} are bad." if bad else "All is good."
 
 
-class _LivePicture(QLabel):
+class _LivePicture(Canvas):
     """The newest picture of the camera, as large as there is room."""
 
-    def __init__(self, parent: QWidget) -> None:
+    def __init__(self, check: PlaceCheck, parent: QWidget) -> None:
         super().__init__(parent)
-        self._image = QImage()
+        self._check = check
         self.setObjectName("panel")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setAccessibleName("What the camera sees")
-        self.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.setMinimumSize(_PICTURE)
+        self.follow(check.changed)
 
-    def show_image(self, image: QImage) -> None:
-        """Show a picture."""
-        self._image = image
-        self._scale()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Fit the picture."""
-        super().resizeEvent(event)
-        self._scale()
-
-    def _scale(self) -> None:
-        if not self._image.isNull():
-            ways = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
-            self.setPixmap(QPixmap.fromImage(self._image.scaled(self.size(), *ways)))
+    def paint(self, painter: QPainter) -> None:
+        """Paint the picture."""
+        if self._check.picture is not None:
+            paint_picture(painter, self.rect(), self._check.picture)
 
 
 def _place_words(place: Place | None) -> str:

@@ -161,10 +161,10 @@ class ListenDialog(Dialog):
             self._choose_protocol(str(draft.path))
 
     def _check_place(self) -> None:
-        check = PlaceCheck(self)
-        again = partial(check.start, self._setup.chosen)
-        again()
-        accepted(CheckDialog(check, again, self._setup.choose_place, self))
+        check, chosen = PlaceCheck(self), self._setup.chosen
+        check.start(chosen)
+        if accepted(CheckDialog(check, chosen, self)):
+            self._setup.choose_place(check.place)
         check.deleteLater()
 
     def _ask_file(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import time
 from collections import deque
 from collections.abc import Iterable, Sequence
@@ -10,12 +9,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QObject
-from PySide6.QtGui import QImage
 
 from sd2app.background.latest import delayed
-from sd2app.live.process import COMMAND, SteeredCommand
+from sd2app.live.process import COMMAND, SteeredCommand, picture_in
 from sd2app.live.setup import ListenRequest
 from sd2app.session.content import Content
 from sd2app.session.session import Session
@@ -191,8 +188,7 @@ class LiveModel(SteeredCommand):
             case "preview":
                 self._count_pictures(event)
                 if self.on_screen:
-                    picture = base64.b64decode(event["picture"])
-                    self._session.video.show_live(_pixels(picture))
+                    self._session.video.show_live(picture_in(event))
 
     def _count_pictures(self, event: dict[str, Any]) -> None:
         self.pictures = int(event.get("pictures", self.pictures))
@@ -287,13 +283,6 @@ class LiveModel(SteeredCommand):
     def _note_latency(self) -> None:
         """Note how long the newest frame took: the window has just been painted."""
         self._latencies_s.append(time.time() - self.received_unix_s)
-
-
-def _pixels(jpeg: bytes) -> NDArray[np.uint8]:
-    """RGB picture (H, W, 3) of a JPEG."""
-    image = QImage.fromData(jpeg).convertToFormat(QImage.Format.Format_RGB888)
-    rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
-    return rows[:, : 3 * image.width()].reshape(image.height(), image.width(), 3).copy()
 
 
 def extended(doppler: DopplerMap, columns: Iterable[tuple[float, Sequence[float]]]) -> DopplerMap:

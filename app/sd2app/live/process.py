@@ -9,6 +9,8 @@ import sys
 from collections.abc import Sequence
 from typing import Any, ClassVar, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, Signal
 from PySide6.QtGui import QImage
 
@@ -134,10 +136,17 @@ class SteeredCommand(QObject):
             self.changed.emit()
 
 
+def picture_in(event: dict[str, Any]) -> NDArray[np.uint8]:
+    """RGB picture (H, W, 3) that an event holds as JPEG."""
+    image = QImage.fromData(base64.b64decode(event["picture"]))
+    image = image.convertToFormat(QImage.Format.Format_RGB888)
+    rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
+    return rows[:, : 3 * image.width()].reshape(image.height(), image.width(), 3).copy()
+
+
 class PlaceCheck(SteeredCommand):
     """``sd2 record --check`` beside the window."""
 
-    pictured = Signal(QImage)
     first_event = "findings"
 
     def __init__(self, parent: QObject) -> None:
@@ -145,6 +154,7 @@ class PlaceCheck(SteeredCommand):
         self.findings: tuple[Answer, ...] = ()
         self.place: Place | None = None  # of a radar beside the camera, as seen from what moves
         self.left_s = 0
+        self.picture: NDArray[np.uint8] | None = None  # newest of the camera, RGB (H, W, 3)
 
     def start(self, request: ListenRequest) -> None:
         """Watch both for a minute."""
@@ -155,7 +165,7 @@ class PlaceCheck(SteeredCommand):
     def _take(self, event: dict[str, Any]) -> None:
         match event["event"]:
             case "preview":
-                self.pictured.emit(QImage.fromData(base64.b64decode(event["picture"])))
+                self.picture = picture_in(event)
             case "findings":
                 self.findings = tuple(Answer(**one) for one in event["findings"])
                 self.place = None if event["place"] is None else Place(**event["place"])

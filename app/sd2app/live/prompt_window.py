@@ -60,22 +60,10 @@ def has_picture(gesture: str) -> bool:
     return bool(gesture) and gesture in _sample()[1]
 
 
-def draw_gesture(
+def _draw_gesture(
     painter: QPainter, room: QRectF, gesture: str, time_s: float, colour: QColor
 ) -> None:
-    """Draw a body that makes a gesture again and again, as in a mirror.
-
-    Parameters
-    ----------
-    painter : QPainter
-    room : QRectF
-        Where; the body fills its height.
-    gesture : str
-        One that has a picture.
-    time_s : float
-        Of a clock that goes on.
-    colour : QColor
-    """
+    """Draw a body, as high as the room, that makes a gesture again and again, as in a mirror."""
     mesh, spans = _sample()
     start_s, end_s = spans[gesture]
     shown_s = start_s - _AROUND_S + time_s % (end_s - start_s + 2 * _AROUND_S)
@@ -242,7 +230,7 @@ class PromptWindow(QWidget):
             if gesture := self._picture():
                 body = QRectF(middle)
                 body.setWidth(0.36 * room.width())
-                draw_gesture(painter, body, gesture, time.monotonic(), colours.color(figure))
+                _draw_gesture(painter, body, gesture, time.monotonic(), colours.color(figure))
                 middle.setLeft(body.right() + margin)
             if asks_consent(model):
                 middle.setBottom((_CONSENT_TOP - 0.03) * self.height())

@@ -32,14 +32,7 @@ _HEADINGS = tuple(
 
 
 class ProtocolDraft(QObject):
-    """Values of a protocol as they are typed.
-
-    Parameters
-    ----------
-    source : Path or str
-        A file, or the name of the bundled protocol.
-    parent : QObject
-    """
+    """Values of a protocol as they are typed, at first those of a file or of the bundled one."""
 
     changed = Signal()
 
