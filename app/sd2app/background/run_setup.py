@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from PySide6.QtCore import QObject, Signal
 
@@ -13,16 +14,12 @@ from sd2app.settings import Settings, StoredChoices
 from sd2core.files.paths import plain_path
 
 
-class Source(Protocol):
+@dataclass(frozen=True)
+class Source:
     """Something that a run works on."""
 
-    @property
-    def path(self) -> Path:
-        """Its file or folder."""
-
-    @property
-    def problem(self) -> str:
-        """Reason why it cannot be used; empty where it can."""
+    path: Path
+    problem: str = field(default="", kw_only=True)  # why it cannot be used
 
 
 D = TypeVar("D", bound=Source)

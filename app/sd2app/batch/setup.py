@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_setup import RunSetup
+from sd2app.background.run_setup import RunSetup, Source
 from sd2app.settings import Settings, StoredChoices
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path
@@ -43,13 +43,11 @@ _DEFAULTS: dict[str, Any] = {
 
 
 @dataclass(frozen=True)
-class Entry:
+class Entry(Source):
     """A file, or all recordings in a folder."""
 
-    path: Path
     patterns: tuple[str, ...] = ()  # as the plan names them; empty until it has been read
     count: int | None = None  # files; None until it has been read
-    problem: str = ""  # why it cannot be used
 
 
 class BatchSetupModel(RunSetup[Entry]):

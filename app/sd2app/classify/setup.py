@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_setup import RunSetup
+from sd2app.background.run_setup import RunSetup, Source
 from sd2app.settings import Settings, StoredChoices
 from sd2app.widgets.text import counted, duration_text
 from sd2core.classify.defaults import CLASSIFIERS, DELAYS_S, MODELS, FeatureKind, pace_kind
@@ -34,13 +34,11 @@ _CHOICES = {"features": get_args(FeatureKind)}
 
 
 @dataclass(frozen=True)
-class DataSource:
+class DataSource(Source):
     """A labelled recording, radar file, data set or folder that was chosen."""
 
-    path: Path
     person: str = ""  # empty where the user has named no one
     facts: tuple[LabelledFacts, ...] = ()  # of all that a folder holds; empty until read
-    problem: str = ""  # why it cannot be used
 
     @property
     def nameable(self) -> bool:

@@ -53,23 +53,11 @@ class FitOffer(Notice):
 
 
 class FitBar(StateBar):
-    """Progress and end of a fit; hidden otherwise.
+    """Progress and end of a fit; hidden otherwise."""
 
-    ``change`` asks again for what a fit needs, ``open_result`` opens the recording of a finished
-    fit, ``resume`` continues a stopped one, ``discard`` asks if it may be deleted.
-    """
-
-    def __init__(
-        self,
-        fit: FitModel,
-        on_screen: FitOnScreen,
-        change: Callable[[], None],
-        open_result: Callable[[], None],
-        resume: Callable[[], None],
-        discard: Callable[[], None],
-    ) -> None:
+    def __init__(self, feature: FitFeature) -> None:
         super().__init__("Fit of a body")
-        self._fit, self._on_screen = fit, on_screen
+        self._fit, self._on_screen = fit, on_screen = feature.model, feature.on_screen
         self._title = ElidedLabel(self, "title")
         self._stage = ElidedLabel(self, "muted")
         self._reason = sentence("", "warning")
@@ -79,12 +67,12 @@ class FitBar(StateBar):
         self._left.setMinimumWidth(self._left.fontMetrics().horizontalAdvance("about 55 min left"))
         buttons = {
             # First, so that it never comes to where another button was.
-            "discard": ("Discard…", "Delete what was done", discard),
-            "change": ("Change…", "Choose person, height and place again", change),
+            "discard": ("Discard…", "Delete what was done", feature.discard),
+            "change": ("Change…", "Choose person, height and place again", feature.new_from_video),
             "follow": ("Follow", "Show each frame as it is worked on", self._follow),
             "cancel": ("Cancel", "Stop; what is done can be continued", fit.cancel),
-            "resume": ("Resume", "Continue where it stopped", resume),
-            "open": ("Open", "Open the new recording", open_result),
+            "resume": ("Resume", "Continue where it stopped", feature.resume),
+            "open": ("Open", "Open the new recording", feature.open_result),
             "close": ("✕", "Close this message", fit.dismiss),
         }
         parts = (self._title, (self._reason, 1), (self._stage, 1), self._bar, self._left)
@@ -166,16 +154,7 @@ class FitFeature(Feature):
 
     def bars(self) -> Sequence[QWidget]:
         """Progress of the fit, and what can be done with it."""
-        return (
-            FitBar(
-                self.model,
-                self.on_screen,
-                change=self.new_from_video,
-                open_result=self._open_result,
-                resume=self._resume,
-                discard=self._discard,
-            ),
-        )
+        return (FitBar(self),)
 
     def notices(self) -> Sequence[Notice]:
         """Offer of a fit."""
@@ -214,14 +193,15 @@ class FitFeature(Feature):
         if not self.on_screen.visible and self._shell.may_discard():
             self._session.document.open([request.to_open])
 
-    def _resume(self) -> None:
+    def resume(self) -> None:
         """Continue a stopped fit; where nothing else is open, its video is."""
         if self._shell.attempt(lambda: (self.model.resume(), True)) is None:
             return
         if not self._session.has_content() and self.model.busy and self.model.request:
             self._session.document.open([self.model.request.to_open])
 
-    def _discard(self) -> None:
+    def discard(self) -> None:
+        """Ask whether what was done may be deleted, and delete it."""
         request, progress = self.model.request, self.model.progress
         if request is None:
             return
@@ -233,7 +213,8 @@ class FitFeature(Feature):
         if may_delete(self._shell.dialog_parent, "Discard this fit?", what):
             self.model.discard()
 
-    def _open_result(self) -> None:
+    def open_result(self) -> None:
+        """Open the recording of a finished fit."""
         if self._shell.may_discard():
             self.on_screen.open_result()
 

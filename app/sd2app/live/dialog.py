@@ -140,16 +140,17 @@ class ListenDialog(Dialog):
         self._begin.setText("Continue" if chosen.continues else "Record")
 
     def _choose_camera(self, camera: str) -> None:
-        if camera == "file":
-            camera = str(ask_file(self, "Video to play", _VIDEOS, "") or self._setup.chosen.camera)
-        self._setup.choose("camera", camera)
-        _show_file(self._camera, self._setup.chosen.camera)
+        self._choose("camera", camera, self._camera, "Video to play", _VIDEOS)
 
     def _choose_protocol(self, protocol: str) -> None:
-        if protocol == "file":
-            protocol = str(ask_file(self, "Protocol", TOML, "") or self._setup.chosen.protocol)
-        self._setup.choose("protocol", protocol)
-        _show_file(self._protocol, self._setup.chosen.protocol)
+        self._choose("protocol", protocol, self._protocol, "Protocol", TOML)
+
+    def _choose(self, name: str, value: str, choice: Choice, title: str, kinds: str) -> None:
+        """Choose a value, or a file that is asked for."""
+        if value == "file":
+            value = str(ask_file(self, title, kinds, "") or getattr(self._setup.chosen, name))
+        self._setup.choose(name, value)
+        _show_file(choice, getattr(self._setup.chosen, name))
 
     def _edit_protocol(self) -> None:
         try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from PySide6.QtCore import QObject, Qt
 from PySide6.QtWidgets import QLabel, QWidget
@@ -21,21 +21,19 @@ from sd2app.widgets.panel import ElidedLabel, StateBar, say, sentence
 
 
 class LiveBar(StateBar):
-    """Hidden until something is listened to; ``go_on`` and ``show_again`` ask before they act."""
+    """Hidden until something is listened to."""
 
-    def __init__(
-        self, live: LiveModel, go_on: Callable[[], None], show_again: Callable[[], None]
-    ) -> None:
+    def __init__(self, feature: LiveFeature) -> None:
         super().__init__("Radar that is listened to")
-        self._live = live
+        self._live = live = feature.model
         self._title = ElidedLabel(self, "title")
         self._frames, self._reason = QLabel(self), sentence("", "warning")
         self._numbers = ElidedLabel(self, "muted")
         gap = "Listen again, into the same recording: the pause is a gap"
         buttons = {
-            "show": ("Show", "Show this recording again", show_again),
+            "show": ("Show", "Show this recording again", feature.show_again),
             "stop": ("Stop", "Stop, and keep all that was received", live.stop),
-            "go_on": ("Continue", gap, go_on),
+            "go_on": ("Continue", gap, feature.go_on),
             "close": ("✕", "Close this message", live.dismiss),
         }
         parts = (self._title, (self._reason, 1), self._frames, (self._numbers, 1))
@@ -97,7 +95,7 @@ class LiveFeature(Feature):
 
     def bars(self) -> Sequence[QWidget]:
         """What comes in, and what can be done about it."""
-        return (LiveBar(self.model, self._go_on, self._show_again),)
+        return (LiveBar(self),)
 
     @property
     def _busy(self) -> bool:
@@ -122,11 +120,13 @@ class LiveFeature(Feature):
         self.guided.start(request)
         view.open_beside()
 
-    def _go_on(self) -> None:
+    def go_on(self) -> None:
+        """Listen again to the same, in place of what is open."""
         if self.model.on_screen or self._shell.may_discard():
             self.model.go_on()
 
-    def _show_again(self) -> None:
+    def show_again(self) -> None:
+        """Show what is listened to, in place of what is open."""
         if self._shell.may_discard():
             self.model.show()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -50,25 +50,21 @@ _TEXTS = {
 class StudySetupView(QWidget):
     """What is studied, and how to begin."""
 
-    def __init__(
-        self, runs: StudyRuns, shell: Shell, open_plan: Callable[[], object],
-        open_result: Callable[[], object],
-    ) -> None:  # fmt: skip
+    def __init__(self, feature: StudyFeature) -> None:
         super().__init__()
-        self._runs = runs
+        self._runs = runs = feature.runs
+        attempt = feature.shell.attempt
         self._data, self._problem = sentence(""), sentence("", "warning")
         self._switches = {
             name: CheckBox(text, self, partial(runs.turn, name), tip)
             for name, (text, tip) in _TEXTS.items()
         }
-        self._start = outlined(
-            "Start", "", partial(shell.attempt, runs.begin), self, look="primary"
-        )
+        self._start = outlined("Start", "", partial(attempt, runs.begin), self, look="primary")
         self._copy = copy_button(lambda: quoted(runs.arguments(Path(TABLE_NAME))), self)
         tip = "Run a STUDY.toml, or go on with it: folds, shares, denoisers, speeds, more video"
-        plan = outlined("Run a plan…", tip, open_plan, self)
+        plan = outlined("Run a plan…", tip, feature.open_plan, self)
         tip = "Show a study.json, or a matrix of sd2 classify eval"
-        show = outlined("Open a result…", tip, open_result, self)
+        show = outlined("Open a result…", tip, feature.open_result, self)
         self.setLayout(
             column_of(
                 title("Do synthetic data help?"), sentence(_ABOUT), self._data, self._problem,
@@ -98,10 +94,14 @@ class StudySetupView(QWidget):
 class StudyRunView(RunView[StudyRun]):
     """Progress of a study, and what it found."""
 
-    def __init__(self, runs: StudyRuns, shell: Shell, show_result: Callable[[], object]) -> None:
+    def __init__(self, feature: StudyFeature) -> None:
+        runs, shell = feature.runs, feature.shell
         tip = "Gains, learning curve and confusion matrices"
         buttons = (
-            Button("show", "Show result", tip, show_result, lambda run: run.result, primary=True),
+            Button(
+                "show", "Show result", tip, feature.show_result, lambda run: run.result,
+                primary=True,
+            ),
             Button(
                 "again", "Resume", "Train what is missing", partial(shell.attempt, runs.again),
                 lambda run: not run.under_way and run.phase != "finished",
@@ -145,7 +145,7 @@ class StudyFeature(Feature):
         command: Sequence[str] | None,
         parent: QObject,
     ) -> None:
-        self._session, self._shell = session, shell
+        self._session, self.shell = session, shell
         self.runs = StudyRuns(session.settings, data, parent, command=command or COMMAND_IN_FOLDER)
         report(shell, self.runs)
         self.closing, self.running = (self.runs,), (self.runs,)  # runs go on
@@ -156,25 +156,23 @@ class StudyFeature(Feature):
             Action(
                 "study", "Model", "Study what helps…", (),
                 "Find out whether synthetic data help a classifier on a radar",
-                lambda: self._shell.bring_up("Train", "Study"),
+                lambda: self.shell.bring_up("Train", "Study"),
             ),
         )  # fmt: skip
 
     def panel(self) -> QWidget:
         """Page of the Train panel."""
-        runs, shell = self.runs, self._shell
-        setup = StudySetupView(runs, shell, self.open_plan, self.open_result)
-        run = StudyRunView(runs, shell, self.show_result)
-        return RunPanel(runs, setup, run, "Studies: under way, or ended", new="New study")
+        setup, run = StudySetupView(self), StudyRunView(self)
+        return RunPanel(self.runs, setup, run, "Studies: under way, or ended", new="New study")
 
     def open_plan(self) -> None:
         """Let the user choose a plan, and run it."""
-        if path := ask_file(self._shell.dialog_parent, "Run a plan of a study", _PLANS):
-            self._shell.attempt(lambda: self.runs.begin_plan(path))
+        if path := ask_file(self.shell.dialog_parent, "Run a plan of a study", _PLANS):
+            self.shell.attempt(lambda: self.runs.begin_plan(path))
 
     def open_result(self) -> None:
         """Let the user choose a result, and show it."""
-        if path := ask_file(self._shell.dialog_parent, "Open a result", _RESULTS):
+        if path := ask_file(self.shell.dialog_parent, "Open a result", _RESULTS):
             self._show(path)
 
     def show_result(self) -> None:
@@ -188,5 +186,5 @@ class StudyFeature(Feature):
         from sd2app.study.result import read_result
         from sd2app.study.result_dialog import ClassResultDialog
 
-        display, parent = self._session.display, self._shell.dialog_parent
-        self._shell.attempt(lambda: ClassResultDialog(read_result(path), display, parent).show())
+        display, parent = self._session.display, self.shell.dialog_parent
+        self.shell.attempt(lambda: ClassResultDialog(read_result(path), display, parent).show())

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_setup import RunSetup
+from sd2app.background.run_setup import RunSetup, Source
 from sd2app.settings import Settings, StoredChoices
 from sd2app.widgets.text import counted, duration_text
 from sd2core.denoise.card import PARTS_OF, ModelCard
@@ -45,12 +45,10 @@ new model."""
 
 
 @dataclass(frozen=True)
-class Store:
+class Store(Source):
     """A chosen store of pairs."""
 
-    path: Path
     facts: PairFacts | None = None  # None until it has been read, and if it cannot be
-    problem: str = ""  # why it cannot be used
 
     @property
     def text(self) -> str:
