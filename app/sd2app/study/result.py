@@ -73,8 +73,7 @@ class ClassResult:
     seeds: int  # 0 if one classifier was judged
     matrices: tuple[Matrix, ...]  # the first is the reference of the others
     curves: tuple[tuple[CurvePoint, ...], ...] = ()  # from small to large shares
-    by_movement: bool = False  # all data is of one person: no result for other people
-    notes: tuple[str, ...] = ()  # further remarks
+    summary: str = ""  # conclusion in words, and what it does not say
 
     @property
     def heading(self) -> str:
@@ -83,14 +82,6 @@ class ClassResult:
         if self.seeds > 1:
             text += f", mean ± standard deviation of {self.seeds} seeds"
         return text
-
-    @property
-    def summary(self) -> str:
-        """Conclusion in words, and what it does not say."""
-        parts = [*self.notes]
-        if self.by_movement:
-            parts.append("All data is of one person: how it is with others stays unknown.")
-        return "\n".join(parts)
 
 
 def read_result(path: Path) -> ClassResult:
@@ -123,27 +114,26 @@ def _of_study(path: Path, content: Mapping[str, Any]) -> ClassResult:
         recall = Spread(float(one["mean"]), 0.5 * (high - low))
         point = CurvePoint(str(one["title"]), float(one["share"]), recall)
         curves.setdefault(point.title, []).append(point)
-    return ClassResult(
-        path,
-        str(content["radar"]),
-        classes,
-        len(totals[0][1]),
-        matrices,
-        tuple(tuple(one) for one in curves.values()),
-        len(content["takes"]) < 2,
-        (str(content["conclusion"]),),
-    )
+    summary = str(content["conclusion"])
+    if len(content["takes"]) < 2:
+        summary += "\nAll data is of one person: how it is with others stays unknown."
+    points = tuple(tuple(one) for one in curves.values())
+    seeds = len(totals[0][1])
+    return ClassResult(path, str(content["radar"]), classes, seeds, matrices, points, summary)
 
 
 def _matrix(
-    title: str, seeds: Sequence[NDArray[np.int64]], classes: tuple[str, ...], plain: Sequence[float]
+    title: str,
+    seeds: Sequence[NDArray[np.int64]],
+    classes: tuple[str, ...],
+    plain: Sequence[float] | None = None,
 ) -> Matrix:
     each = np.array([shares(counts) for counts in seeds])
     if each.shape[1:] != (len(classes), len(classes)):
         raise ValueError(f"a matrix of shape {each.shape[1:]}")
     recalls = [mean_recall(counts) for counts in seeds]
-    gains = [own - other for own, other in zip(recalls, plain, strict=True)]
-    gain = _spread(gains) if any(gains) else None
+    gains = [own - other for own, other in zip(recalls, plain or recalls, strict=True)]
+    gain = _spread(gains) if plain and any(gains) else None
     return Matrix(title, each.mean(axis=0), _sd(each), _spread(recalls), gain)
 
 
@@ -158,20 +148,15 @@ def _spread(values: Sequence[float]) -> Spread:
 
 def _of_score(path: Path, content: Mapping[str, Any]) -> ClassResult:
     classes = tuple(map(str, content["classes"]))
-    matrices = []
-    for name in ("frames", "gestures"):
-        counts = np.array(content[name], np.int64)
-        if counts.shape != (len(classes), len(classes)):
-            raise ValueError(f"a matrix of shape {counts.shape}")
-        mean = shares(counts)
-        known = np.diag(mean)[~np.isnan(np.diag(mean))]
-        recall = Spread(float(known.mean()) if known.size else math.nan, 0.0)
-        matrices.append(Matrix(name.capitalize(), mean, np.zeros_like(mean), recall))
+    matrices = tuple(
+        _matrix(name.capitalize(), [np.array(content[name], np.int64)], classes)
+        for name in ("frames", "gestures")
+    )
     kind = " and ".join(map(str, content["maps"]))
-    return ClassResult(path, kind, classes, 0, tuple(matrices), notes=_notes(content))
+    return ClassResult(path, kind, classes, 0, matrices, summary=_summary(content))
 
 
-def _notes(content: Mapping[str, Any]) -> tuple[str, ...]:
+def _summary(content: Mapping[str, Any]) -> str:
     """People and delay of an evaluation; files of earlier versions may lack them."""
     notes = []
     if subjects := content.get("subjects"):
@@ -186,4 +171,4 @@ def _notes(content: Mapping[str, Any]) -> tuple[str, ...]:
             f"A gesture is recognised after {float(latency_s):.2f} s (median);"
             f" {int(content['missed'])} of {gestures} never."
         )
-    return tuple(notes)
+    return "\n".join(notes)
