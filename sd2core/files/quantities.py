@@ -27,10 +27,7 @@ _NUMBER = re.compile(r"\s*([+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?)\s*
 def parse_quantity(text: str, unit: str) -> float:
     """Parse a number in a unit, or in another one of its kind.
 
-    Raises
-    ------
-    Sd2Error
-        For anything else than a finite number, with a unit of another kind among them.
+    Raises Sd2Error for anything else than a finite number, with a unit of another kind among them.
 
     Examples
     --------

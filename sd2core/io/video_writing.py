@@ -32,6 +32,8 @@ def write_video(
 ) -> None:
     """Encode sRGB pictures as H.264 in MP4.
 
+    Raises Sd2Error if this build of PyAV has no H.264 encoder.
+
     Parameters
     ----------
     path : Path
@@ -49,11 +51,6 @@ def write_video(
         Of x264: a slower one makes a smaller file.
     comment : str
         What the file says of itself.
-
-    Raises
-    ------
-    Sd2Error
-        If this build of PyAV has no H.264 encoder.
     """
     ticks = frames_per_s if times_s is None else _TICKS_PER_S
     encoder = VideoEncoder(
@@ -67,6 +64,8 @@ def write_video(
 
 class VideoEncoder:
     """H.264 in MP4, picture by picture.
+
+    Raises Sd2Error if this build of PyAV has no H.264 encoder.
 
     Parameters
     ----------
@@ -86,11 +85,6 @@ class VideoEncoder:
         True for a file that can be read up to the last second however writing ends.
     comment : str
         As of :func:`write_video`.
-
-    Raises
-    ------
-    Sd2Error
-        If this build of PyAV has no H.264 encoder.
     """
 
     def __init__(
