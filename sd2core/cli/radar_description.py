@@ -172,7 +172,7 @@ def _describe_points(path: Path, entries: dict[str, Any], *, as_json: bool) -> N
 
 
 def _entries_of_sigmf(path: Path) -> dict[str, Any]:
-    from sd2core.io.radar.sigmf import DATA, META, read_sigmf_meta
+    from sd2core.io.radar.stored_arrays import DATA, META, read_sigmf_meta
 
     if path.suffix.lower() not in (META, DATA):
         return {}

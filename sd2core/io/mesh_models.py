@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_size
 from sd2core.files.numpy_files import npz_names
-from sd2core.files.paths import PICKLE_SUFFIXES
+from sd2core.files.paths import PICKLE_SUFFIXES, is_pattern
 from sd2core.io.body_model import read_body_model
 from sd2core.io.body_parameters import PARAMETER_NAMES, first_of, parameters_of
 from sd2core.io.estimator_files import (
@@ -26,9 +26,10 @@ from sd2core.io.estimator_files import (
     holds_bodies,
     people_in,
 )
-from sd2core.io.frame_names import chosen_person
+from sd2core.io.frame_names import chosen_person, persons_among
 from sd2core.io.mesh_arrays import FACE_NAMES, VERTEX_NAMES, RawMesh, no_vertices
 from sd2core.io.mesh_clock import clock_of
+from sd2core.io.mesh_files import surface_files
 from sd2core.io.momentum_rig import RIG_NAMES, holds_rig, rigged
 from sd2core.io.readers import MeshHints
 from sd2core.plausibility.mesh import AT_ROOT_M
@@ -354,3 +355,34 @@ def _no_vertices(path: Path, entry: dict[Any, Any]) -> Sd2Error:
     """Error for what is there instead, of the first person if there is one."""
     first = next((one for one in entry.values() if isinstance(one, dict)), entry)
     return no_vertices(str(path), [str(one) for one in first if isinstance(one, str | int)])
+
+
+def persons_in(path: Path) -> dict[str, int]:
+    """Number of frames of each person, by what ``load_mesh`` takes as ``person``.
+
+    Empty for a file that tells no persons, or cannot be read: reading it says why.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> body = np.zeros((3, 500, 3))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     np.savez(Path(folder) / "two.npz", results={
+    ...         "0": {"verts": body}, "1": {"verts": body[:2]}})
+    ...     persons_in(Path(folder) / "two.npz")
+    {'0': 3, '1': 2}
+    """
+    try:
+        if is_pattern(path) or path.is_dir():
+            of_people = not is_pattern(path) and is_estimate(path)
+            files = files_of_people(path) if of_people else surface_files(path, [])
+            counts = persons_among(files, str(path))
+            return {str(number): count for number, count in counts.items()}
+        if not is_estimate(path):
+            return {}
+        people, _ = people_in(path, None, [])
+        return {str(name): frames_of(person, path) for name, person in people.items()}
+    except (Sd2Error, OSError, ArithmeticError, LookupError, TypeError, ValueError):
+        return {}

@@ -17,7 +17,7 @@ from sd2core.body.camera import PinholeCamera
 from sd2core.errors import Cure
 from sd2core.files.recording_json import MeshReading
 from sd2core.io.fitted import fitted_camera
-from sd2core.io.persons import persons_in
+from sd2core.io.mesh_models import persons_in
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.recording import Recording
 

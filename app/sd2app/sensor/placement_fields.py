@@ -9,8 +9,7 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.sensor.placements import PlacementsModel
 from sd2core.errors import Sd2Error
-from sd2core.files.number_lists import format_numbers, parse_interval, parse_numbers
-from sd2core.files.quantities import parse_quantity
+from sd2core.files.number_lists import format_numbers, parse_interval, parse_numbers, parse_quantity
 from sd2core.placements.placements import PlacementCloud, PlacementGrid, Placements
 
 Kind = Literal["none", "grid", "cloud"]

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 from sd2app.widgets.layouts import row_of
 from sd2app.widgets.time_axis import clock_text
 from sd2core.errors import Sd2Error
-from sd2core.files.quantities import parse_quantity
+from sd2core.files.number_lists import parse_quantity
 from sd2core.options.records import OptionRecord, option_named
 
 _ENDING_KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Return, Qt.Key.Key_Enter)

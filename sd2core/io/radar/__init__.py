@@ -43,8 +43,7 @@ from sd2core.io.radar.points import (
     holds_unnamed_columns,
     looks_like_points,
 )
-from sd2core.io.radar.sigmf import DATA, META
-from sd2core.io.radar.stored_arrays import array_names
+from sd2core.io.radar.stored_arrays import DATA, META, array_names
 from sd2core.io.readers import RADAR_FILES, FileReader, plug_in_for
 from sd2core.plausibility.radar import judge_map
 from sd2core.radar_config import RadarConfig

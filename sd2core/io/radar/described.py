@@ -23,8 +23,14 @@ from sd2core.files.toml import toml_lines
 from sd2core.io.radar.capture import LazySamples, RadarCapture
 from sd2core.io.radar.infineon import check_replaceable
 from sd2core.io.radar.points import PointsDescription, has_columns_told
-from sd2core.io.radar.sigmf import DATA, META
-from sd2core.io.radar.stored_arrays import MATLAB_SUFFIX, SUFFIXES, StoredArray, open_stored
+from sd2core.io.radar.stored_arrays import (
+    DATA,
+    MATLAB_SUFFIX,
+    META,
+    SUFFIXES,
+    StoredArray,
+    open_stored,
+)
 from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
 

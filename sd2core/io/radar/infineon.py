@@ -48,8 +48,6 @@ _FAR_TOO_SLOW = 100
 class _Shape(BaseModel):
     """``device_config.fmcw_single_shape`` of config.json; other keys are left alone."""
 
-    model_config = ConfigDict(extra="ignore")
-
     rx_antennas: list[int] = Field(min_length=1)
     tx_antennas: list[int] = Field(default=[1])
     mimo_mode: str | None = "off"

@@ -19,21 +19,19 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from sd2core.errors import Sd2Error
 from sd2core.files.texts import faults_in, read_toml
-from sd2core.io.radar.point_columns import (
-    COLUMNS,
-    IGNORED,
-    named_columns,
-    speed_unit_mps,
-    time_unit_s,
-)
 from sd2core.io.radar.point_tables import (
+    COLUMNS,
     EXPECTED,
+    IGNORED,
     MAX_COLUMNS,
     MIN_COLUMNS,
     SUFFIXES,
     Table,
     TextTable,
+    named_columns,
     open_table,
+    speed_unit_mps,
+    time_unit_s,
 )
 
 COLUMNS_OPTION = "--columns frame,x,y,z,doppler,intensity (- for others)"

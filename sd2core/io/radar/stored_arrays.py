@@ -1,8 +1,14 @@
-"""Arrays of radar samples in NumPy, HDF5, MATLAB and SigMF files, read in parts."""
+"""Arrays of radar samples in NumPy, HDF5, MATLAB and SigMF files, read in parts.
+
+Of SigMF's metadata (``.sigmf-meta``) type of the samples, rate and carrier are read, after the
+*Signal Metadata Format Specification* 1.x (sigmf.org): a few keys of one JSON file, for which the
+``sigmf`` package is not needed.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,24 +16,78 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AliasPath, BaseModel, Field
 
 from sd2core.errors import Sd2Error
 from sd2core.files.hdf5_files import member_of, open_hdf5_file, refusing_damage
 from sd2core.files.limits import check_regular, check_size
 from sd2core.files.numpy_files import open_npy_file
-from sd2core.io.radar.sigmf import DATA, META, read_sigmf_meta
+from sd2core.files.texts import faults_in, read_json
 
+META, DATA = ".sigmf-meta", ".sigmf-data"
 HDF5_SUFFIXES = (".h5", ".hdf5")
 MATLAB_SUFFIX = ".mat"
 SUFFIXES = (".npy", *HDF5_SUFFIXES, MATLAB_SUFFIX, META, DATA)
 """Files that such arrays are in."""
 
-
+_SIGMF = "the metadata of a SigMF recording"
 _HDF5 = "samples of a radar (.h5)"
 _MATLAB_NUMBERS = frozenset(
     {"double", "single", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))}
 )
 """Classes of MATLAB."""
+
+
+class SigmfMeta(NamedTuple):
+    """Layout of a SigMF recording: a stream of samples."""
+
+    word: np.dtype[np.generic]  # of one real number
+    is_complex: bool
+    channels: int
+    sample_rate_hz: float | None
+    carrier_hz: float | None
+
+
+class _SigmfCapture(BaseModel):
+    frequency: float | None = Field(default=None, alias="core:frequency", allow_inf_nan=False)
+    header_bytes: int = Field(default=0, alias="core:header_bytes")
+
+
+def _in_global(name: str, **how: Any) -> Any:
+    return Field(validation_alias=AliasPath("global", f"core:{name}"), **how)
+
+
+class _SigmfFile(BaseModel):
+    datatype: str = _in_global("datatype")
+    sample_rate: float | None = _in_global("sample_rate", default=None, gt=0, allow_inf_nan=False)
+    num_channels: int = _in_global("num_channels", default=1, ge=1, le=1024)
+    captures: list[_SigmfCapture] = Field(default_factory=list)
+
+
+def read_sigmf_meta(path: Path) -> SigmfMeta:
+    """Read the metadata that belong to a file of either suffix; Sd2Error if they are damaged."""
+    path = path.with_suffix(META)
+    with faults_in(path, _SIGMF):
+        meta = _SigmfFile.model_validate(read_json(path, _SIGMF))
+    kind = meta.datatype
+    match = re.fullmatch(r"([cr])([fiu])(8|16|32|64)(?:_([lb])e)?", kind)
+    if match is None or (match[2] == "f" and match[3] in ("8", "16")):
+        raise Sd2Error(
+            f"{path}: core:datatype is {kind!r:.40}", "a type such as ci16_le or cf32_le"
+        )
+    if len(meta.captures) > 1 or any(one.header_bytes for one in meta.captures):
+        raise Sd2Error(
+            f"{path} has {len(meta.captures)} captures, or headers between its samples",
+            "one capture, of samples alone",
+        )
+    order = ">" if match[4] == "b" else "<"
+    return SigmfMeta(
+        np.dtype(f"{order}{match[2]}{int(match[3]) // 8}"),
+        match[1] == "c",
+        meta.num_channels,
+        meta.sample_rate,
+        meta.captures[0].frequency if meta.captures else None,
+    )
 
 
 class StoredArray(NamedTuple):

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
-from sd2core.files.quantities import parse_quantity
+from sd2core.files.number_lists import parse_quantity
 
 NUMBERS = st.floats(-1e4, 1e4).map(lambda value: round(value, 3))
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sd2core.io.mesh import load_mesh
-from sd2core.io.persons import persons_in
+from sd2core.io.mesh_models import persons_in
 
 BODY = np.random.default_rng(0).uniform((-0.3, -0.9, 2.5), (0.3, 0.9, 2.9), (300, 3))
 
