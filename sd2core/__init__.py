@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from sd2core.imu.virtual import virtual_imu
     from sd2core.io.bodies import with_bodies
     from sd2core.io.mesh import load_mesh, save_mesh
-    from sd2core.io.radar import RadarCapture, load_capture
+    from sd2core.io.radar import load_capture
+    from sd2core.io.radar.capture import RadarCapture
     from sd2core.io.things import with_things, with_walls
     from sd2core.io.video import VideoReader, open_video
     from sd2core.maps import DopplerMap
@@ -81,7 +82,7 @@ _HOME = {
     "Beam": "sensor",
     "DopplerMap": "maps",
     "MeshSequence": "mesh.sequence",
-    "RadarCapture": "io.radar",
+    "RadarCapture": "io.radar.capture",
     "RadarConfig": "radar_config",
     "Recording": "recording.recording",
     "Sd2Error": "errors",

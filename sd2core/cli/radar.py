@@ -158,7 +158,8 @@ def _write_recorded(path: Path, offset_s: float, options: Radar, out: Path) -> N
     """Write a map that the radar made itself, or that of its points, on the axis asked for."""
     from sd2core.cli.info.description import describe_map, show
     from sd2core.cli.reading import chosen_axis
-    from sd2core.io.radar import load_recorded_map, looks_like_points
+    from sd2core.io.radar import load_recorded_map
+    from sd2core.io.radar.points import looks_like_points
 
     if looks_like_points(path):
         options.refuse(_OF_SAMPLES, f"and {path} holds points", "for raw samples only")

@@ -18,7 +18,7 @@ from sd2core.options.shared import Json, Limbs, MeshAndSensor, Overwrite, Simula
 
 if TYPE_CHECKING:
     from sd2core.fmcw import SignalOptions, WaveOptions
-    from sd2core.io.radar import RadarCapture
+    from sd2core.io.radar.capture import RadarCapture
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.radar_config import RadarConfig
     from sd2core.sensor import VirtualSensor
@@ -256,7 +256,9 @@ def _radar(options: SimulateRadar) -> None:
     from sd2core.cli.info.description import describe_capture, show
     from sd2core.cli.reading import mesh_and_sensor
     from sd2core.fmcw import LinkBudget, Mirror, SignalOptions, WaveOptions
-    from sd2core.io.radar import check_replaceable, named_radar, write_capture, write_described
+    from sd2core.io.radar import named_radar
+    from sd2core.io.radar.described import write_described
+    from sd2core.io.radar.infineon import check_replaceable, write_capture
     from sd2core.placements.body_extent import notes_on
 
     check_replaceable(options.out)

@@ -69,7 +69,6 @@ class Filmed:
     recorded: int = 0
     dropped: int = 0  # the encoder was too slow
     first_s: float | None = None  # arrival of the first picture
-    last_s: float = 0.0
     put_back: int = 0  # times that the video was deleted, and written again
 
 
@@ -290,7 +289,7 @@ class _Video:
             filmed.first_s = taken_s
         self._encoder.add(picture, taken_s - filmed.first_s)
         filmed.recorded += 1
-        filmed.last_s, filmed.dropped = taken_s, dropped
+        filmed.dropped = dropped
         now_s = time.monotonic()
         if now_s > self._looked_s + _LOOK_S:
             self._looked_s = now_s

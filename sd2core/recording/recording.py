@@ -67,7 +67,8 @@ from sd2core.recording.relinking import (
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
-    from sd2core.io.radar import RadarCapture, RecordedMap
+    from sd2core.io.radar.capture import RadarCapture
+    from sd2core.io.radar.kkt import RecordedMap
     from sd2core.io.video import VideoReader
     from sd2core.labels.spans import Labels
     from sd2core.mesh.sequence import MeshSequence

@@ -14,7 +14,8 @@ from sd2core.errors import Sd2Error
 from sd2core.files.recording_json import CameraEntry
 from sd2core.imu.files import read_signals, write_signals
 from sd2core.imu.signals import InertialSignals
-from sd2core.io.radar import load_recorded_map, write_capture
+from sd2core.io.radar import load_recorded_map
+from sd2core.io.radar.infineon import write_capture
 from sd2core.io.radar.mars import mars_parts, read_mars
 from sd2core.io.video import open_video
 from sd2core.labels import files

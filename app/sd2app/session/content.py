@@ -23,7 +23,7 @@ from sd2core.recording.relinking import role_words
 from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
-    from sd2core.io.radar import RadarCapture
+    from sd2core.io.radar.capture import RadarCapture
     from sd2core.io.video import VideoReader
 
 PARTS = ("video", "mesh", "radar")

@@ -43,7 +43,7 @@ from sd2core.recording.recording import Recording
 from sd2core.sensor import VelocityAxis
 
 if TYPE_CHECKING:
-    from sd2core.io.radar import RadarCapture
+    from sd2core.io.radar.capture import RadarCapture
     from sd2core.io.video import VideoReader
 
 

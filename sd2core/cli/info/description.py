@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sd2core.imu.signals import InertialSignals
-    from sd2core.io.radar import RadarCapture, RecordedMap
+    from sd2core.io.radar.capture import RadarCapture
+    from sd2core.io.radar.kkt import RecordedMap
     from sd2core.io.video import VideoReader
     from sd2core.maps import DopplerMap, LimbMaps
     from sd2core.mesh.sequence import MeshSequence

@@ -18,7 +18,7 @@ from sd2app.session.session import Session
 from sd2app.settings import Settings
 from sd2core.files.resources import resource_path
 from sd2core.fmcw.processing import doppler_map
-from sd2core.io.radar import write_capture
+from sd2core.io.radar.infineon import write_capture
 from sd2core.live.counts import Counts
 from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import Recording, open_recording

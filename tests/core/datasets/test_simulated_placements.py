@@ -15,7 +15,7 @@ from sd2core.datasets.source import Source
 from sd2core.datasets.sources import gather
 from sd2core.errors import Sd2Error
 from sd2core.fmcw import LinkBudget, SignalOptions, WaveOptions, simulate_radar
-from sd2core.io.radar import write_capture
+from sd2core.io.radar.infineon import write_capture
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import PlacementGrid

@@ -24,7 +24,8 @@ from sd2core.errors import Sd2Error
 from sd2core.fmcw.options import Reflector, SignalOptions
 from sd2core.fmcw.processing import doppler_map, range_doppler
 from sd2core.fmcw.scene import MeshScene
-from sd2core.io.radar import load_capture, write_capture
+from sd2core.io.radar import load_capture
+from sd2core.io.radar.infineon import write_capture
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Cancelled
 from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS

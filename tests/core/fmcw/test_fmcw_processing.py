@@ -17,7 +17,8 @@ from sd2core.errors import Sd2Error
 from sd2core.fmcw import chain
 from sd2core.fmcw.chain import FrameChain, ProcessingOptions, taper
 from sd2core.fmcw.processing import doppler_map, range_doppler, rebinning
-from sd2core.io.radar import RadarCapture, load_capture
+from sd2core.io.radar import load_capture
+from sd2core.io.radar.capture import RadarCapture
 from sd2core.progress import Cancelled
 from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS, Clutter, RadarConfig
 from sd2core.sensor import VelocityAxis

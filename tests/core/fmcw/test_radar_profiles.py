@@ -21,7 +21,8 @@ from sd2core.fmcw import (
     range_doppler,
     simulate_radar,
 )
-from sd2core.io.radar import load_capture, named_radar, write_described
+from sd2core.io.radar import load_capture, named_radar
+from sd2core.io.radar.described import write_described
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import PAPER_RADAR, RadarConfig
 from sd2core.radar_profiles import RADARS

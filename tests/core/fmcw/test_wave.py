@@ -33,7 +33,8 @@ from sd2core.fmcw.scene import MeshScene
 from sd2core.fmcw.simulation import simulate_radar
 from sd2core.fmcw.sums import Echoes, direct, nufft, recurrent
 from sd2core.fmcw.wave import WaveScene
-from sd2core.io.radar import load_capture, write_capture
+from sd2core.io.radar import load_capture
+from sd2core.io.radar.infineon import write_capture
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Cancelled
 from sd2core.radar_config import PAPER_RADAR, SPEED_OF_LIGHT_MPS, RadarConfig

@@ -17,7 +17,7 @@ from sd2app.live.feature import LiveBar
 from sd2app.live.setup import ListenRequest
 from sd2app.video.view import VideoView
 from sd2app.widgets.inputs import Choice
-from sd2core.io.radar import write_capture
+from sd2core.io.radar.infineon import write_capture
 from sd2core.recording.recording import open_recording
 from tests.core.live.fast_captures import fast_swipes
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from sd2core.errors import Sd2Error
-from sd2core.io.radar import load_capture, write_capture
+from sd2core.io.radar import load_capture
+from sd2core.io.radar.infineon import write_capture
 from sd2core.radar_config import PAPER_RADAR, RadarConfig
 
 CONFIG = replace(PAPER_RADAR, receivers=3, chirps_per_frame=5, samples_per_chirp=9)
