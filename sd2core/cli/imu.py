@@ -3,63 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from sd2core.cli.command_parser import command
 from sd2core.cli.output import print_facts, print_json, progress_bar
 from sd2core.errors import Sd2Error
-from sd2core.options.kinds import NotNegative, Positive, Vector
-from sd2core.options.records import Group, OptionRecord, given
+from sd2core.options.inertial import SensorErrors
+from sd2core.options.kinds import Positive, Vector
 from sd2core.options.shared import Json, MeshInput, Overwrite
 
-if TYPE_CHECKING:
-    from sd2core.imu.sensor_errors import SensorErrors
 
-
-_ERRORS = {
-    "acc_bias": "acceleration_bias_mps2",
-    "acc_noise": "acceleration_noise",
-    "acc_range": "acceleration_range_mps2",
-    "gyr_bias": "turn_rate_bias_radps",
-    "gyr_noise": "turn_rate_noise",
-    "gyr_range": "turn_rate_range_radps",
-}
-"""What the library calls the errors of a sensor."""
-
-
-class Errors(OptionRecord):
-    """Errors of the sensor.
-
-    Parameters
-    ----------
-    acc_bias : X,Y,Z
-        constant error of the accelerometer, in m/s²
-    acc_noise : DENSITY
-        density of its white noise, in m/s²/√Hz
-    acc_range : LARGEST
-        its range, plus and minus, in m/s²; what is beyond is clipped
-    gyr_bias : X,Y,Z
-        constant error of the gyroscope, in rad/s
-    gyr_noise : DENSITY
-        density of its white noise, in rad/s/√Hz
-    gyr_range : LARGEST
-        its range, plus and minus, in rad/s; what is beyond is clipped
-    seed : N
-        seed of the noise
-    """
-
-    GROUP = Group("sensor errors", "none by default")
-
-    acc_bias: Vector | None = None
-    acc_noise: NotNegative | None = None
-    acc_range: Positive | None = None
-    gyr_bias: Vector | None = None
-    gyr_noise: NotNegative | None = None
-    gyr_range: Positive | None = None
-    seed: int = 0
-
-
-class Imu(MeshInput, Overwrite, Errors, Json):
+class Imu(MeshInput, Overwrite, SensorErrors, Json):
     """Options of ``sd2 imu``.
 
     Parameters
@@ -107,7 +60,6 @@ def _imu(options: Imu) -> None:
     from sd2core.imu.virtual import virtual_imu
 
     _check_output(options.out)
-    errors = _errors(options)
     mesh, _ = mesh_and_its_sensor(options)
     with progress_bar("Moving the sensor") as progress:
         signals = virtual_imu(
@@ -116,7 +68,7 @@ def _imu(options: Imu) -> None:
             rate_hz=options.rate,
             cutoff_hz=options.cutoff,
             up=options.up,
-            errors=errors,
+            errors=options,
             progress=progress,
         )
     write_signals(options.out, signals)
@@ -139,14 +91,6 @@ def _imu(options: Imu) -> None:
             "turn rate": f"up to {summary['largest_turn_rate_radps']:.2f} rad/s",
         },
     )
-
-
-def _errors(options: Errors) -> SensorErrors | None:
-    from sd2core.imu.sensor_errors import SensorErrors
-
-    stated = {_ERRORS[name]: value for name, value in given(options, _ERRORS).items()}
-    errors = SensorErrors(**stated, seed=options.seed)
-    return None if errors == SensorErrors(seed=options.seed) else errors
 
 
 def _check_output(path: Path) -> None:

@@ -8,9 +8,10 @@ import numpy as np
 
 from sd2core.errors import Sd2Error, wanted
 from sd2core.imu.mounting import mounted
-from sd2core.imu.sensor_errors import SensorErrors
+from sd2core.imu.sensor_errors import with_errors
 from sd2core.imu.signals import MIN_FRAMES, UP, InertialSignals, imu_signals, usual_cutoff_hz
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.options.inertial import SensorErrors
 from sd2core.progress import Progress, silent
 from sd2core.sensor import Vector
 from sd2core.timebase import Timebase
@@ -84,7 +85,7 @@ def virtual_imu(
     count = int(np.floor((end_s - start_s) * rate_hz + 1e-6)) + 1
     times = Timebase.regular(count, rate_hz, float(start_s))
     signals = _ideal(mesh, at, times, cutoff_hz, up, progress)
-    return signals if errors is None else errors.applied(signals)
+    return signals if errors is None else with_errors(signals, errors)
 
 
 def imu_at_frames(mesh: MeshSequence, at: str | int) -> InertialSignals:

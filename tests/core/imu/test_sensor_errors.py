@@ -10,8 +10,9 @@ import pytest
 from scipy.signal import welch
 
 from sd2core.errors import Sd2Error
-from sd2core.imu.sensor_errors import SensorErrors
+from sd2core.imu.sensor_errors import with_errors
 from sd2core.imu.signals import InertialSignals
+from sd2core.options.inertial import SensorErrors
 
 
 def constant(samples: int, rate_hz: float, value: float = 0.0) -> InertialSignals:
@@ -22,7 +23,7 @@ def constant(samples: int, rate_hz: float, value: float = 0.0) -> InertialSignal
 @pytest.mark.parametrize("rate_hz", [50.0, 400.0])
 def test_noise_has_its_density_at_all_frequencies_and_rates(rate_hz: float) -> None:
     errors = SensorErrors(acceleration_noise=0.02, turn_rate_noise=0.003, seed=4)
-    noisy = errors.applied(constant(100_000, rate_hz))
+    noisy = with_errors(constant(100_000, rate_hz), errors)
     for values, density in ((noisy.acceleration_mps2, 0.02), (noisy.turn_rate_radps, 0.003)):
         _, power = welch(values, fs=rate_hz, nperseg=1000, axis=0)
         bands = np.sqrt(power[1:-1].reshape(499, 3).reshape(-1, 3)[:495].reshape(5, 99, 3))
@@ -33,7 +34,7 @@ def test_noise_has_its_density_at_all_frequencies_and_rates(rate_hz: float) -> N
 def test_a_seed_gives_the_same_noise_again() -> None:
     ideal = constant(100, 100.0)
     one, same, other = (
-        SensorErrors(turn_rate_noise=1.0, seed=seed).applied(ideal) for seed in (1, 1, 2)
+        with_errors(ideal, SensorErrors(turn_rate_noise=1.0, seed=seed)) for seed in (1, 1, 2)
     )
     assert (one.turn_rate_radps == same.turn_rate_radps).all()
     assert (one.turn_rate_radps != other.turn_rate_radps).all()
@@ -46,7 +47,7 @@ def test_bias_is_added_before_the_range_clips() -> None:
         turn_rate_bias_radps=(0.1, 0.2, 0.3),
         acceleration_range_mps2=2.0,
     )
-    found = errors.applied(constant(5, 100.0, 1.75))
+    found = with_errors(constant(5, 100.0, 1.75), errors)
     np.testing.assert_allclose(found.acceleration_mps2, [[2.0, 1.75, -2.0]] * 5)
     np.testing.assert_allclose(found.turn_rate_radps, [[1.85, 1.95, 2.05]] * 5)
 
@@ -54,11 +55,11 @@ def test_bias_is_added_before_the_range_clips() -> None:
 def test_what_is_not_known_stays_so() -> None:
     ideal = constant(4, 100.0, np.nan)
     errors = SensorErrors(acceleration_noise=1.0, turn_rate_range_radps=1.0)
-    assert not errors.applied(ideal).known.any()
+    assert not with_errors(ideal, errors).known.any()
 
 
 def test_the_samples_say_which_errors_they_have() -> None:
-    meta = SensorErrors(acceleration_noise=0.5, seed=3).applied(constant(4, 100.0)).meta
+    meta = with_errors(constant(4, 100.0), SensorErrors(acceleration_noise=0.5, seed=3)).meta
     assert json.loads(json.dumps(meta["errors"])) == {"acceleration_noise": 0.5, "seed": 3}
 
 
@@ -74,5 +75,5 @@ def test_the_samples_say_which_errors_they_have() -> None:
     ],
 )
 def test_numbers_that_cannot_be_are_refused(wrong: dict) -> None:
-    with pytest.raises(Sd2Error, match="errors of the sensor"):
-        SensorErrors(**wrong)
+    with pytest.raises(Sd2Error):
+        with_errors(constant(4, 100.0), SensorErrors(**wrong))
