@@ -15,6 +15,7 @@ import os
 import stat
 import zipfile
 from collections.abc import Iterable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -141,22 +142,23 @@ class StoredArray:
         sizes = zip(self.shape[1:], self.chunks[1:], strict=True)
         across = [range(-(-size // chunk)) for size, chunk in sizes]
         damage: list[Damage] = []
-        kind = _PackedChunkFiles if self.path.is_file() else _ChunkFiles
-        with kind(self.path) as files:
+        with zipfile.ZipFile(self.path) if self._packed else nullcontext() as archive:
             for number in range(rows.start // step, -(-rows.stop // step)):
                 progress(number * step - rows.start, len(rows))
                 start, stop = number * step, min((number + 1) * step, self.shape[0])
                 for place in itertools.product(*across):
-                    reason = self._reason(files, (number, *place), depth)
+                    reason = self._reason(archive, (number, *place), depth)
                     if reason is not None:
                         damage.append(Damage(self.name, start, stop, self._unit, reason))
                         break
         return tuple(damage)
 
-    def _reason(self, files: _ChunkFiles, place: tuple[int, ...], depth: Depth) -> str | None:
-        """What is wrong with a chunk; None: nothing."""
+    def _reason(
+        self, archive: zipfile.ZipFile | None, place: tuple[int, ...], depth: Depth
+    ) -> str | None:
+        """What is wrong with a chunk, in an archive or a folder; None: nothing."""
         key = f"{self._array.path}/{self._array.metadata.encode_chunk_key(place)}".lstrip("/")
-        size = files.size(key)
+        size = self._size(archive, key)
         if size is None or depth == "presence":
             return None if self._sparse or size is not None else f"{key} is missing"
 
@@ -167,7 +169,8 @@ class StoredArray:
         tail = 4 if self.checksums else 0
         summed = tail > 0 and depth != "lengths"
         try:
-            content = files.read(key) if summed else files.read(key, 16)
+            with archive.open(key) if archive else (self.path / key).open("rb") as file:
+                content = file.read(-1 if summed else 16)
             if self._codecs[-2 if tail else -1 :][:1] == ("blosc",):
                 check_blosc_frame(content[:16], size - tail)
         except DamagedChunkError as error:
@@ -178,56 +181,22 @@ class StoredArray:
             return f"{key} does not have its checksum"
         return self._undecodable(place, key) if depth == "values" else None
 
+    def _size(self, archive: zipfile.ZipFile | None, key: str) -> int | None:
+        """Bytes of a chunk; None where it is missing."""
+        try:
+            if archive is not None:
+                return archive.getinfo(key).file_size
+            status = os.stat(f"{self.path}/{key}")
+        except (OSError, KeyError):
+            return None
+        return status.st_size if stat.S_ISREG(status.st_mode) else None
+
     def _undecodable(self, place: tuple[int, ...], key: str) -> str | None:
         try:
             self._array.blocks[place]
         except Exception as error:  # as in __getitem__
             return f"{key}: {_error_text(error)}"
         return None
-
-
-class _ChunkFiles:
-    """Bytes of chunks by their keys, in a folder."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def __enter__(self) -> _ChunkFiles:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-    def size(self, key: str) -> int | None:
-        try:
-            status = os.stat(f"{self._folder}/{key}")
-        except OSError:
-            return None
-        return status.st_size if stat.S_ISREG(status.st_mode) else None
-
-    def read(self, key: str, most: int = -1) -> bytes:
-        with (self._folder / key).open("rb") as file:
-            return file.read(most)
-
-
-class _PackedChunkFiles(_ChunkFiles):
-    """The same in a zip, whose entries have checksums of their own."""
-
-    def __init__(self, path: Path) -> None:
-        self._archive = zipfile.ZipFile(path)
-
-    def __exit__(self, *_: object) -> None:
-        self._archive.close()
-
-    def size(self, key: str) -> int | None:
-        try:
-            return self._archive.getinfo(key).file_size
-        except KeyError:
-            return None
-
-    def read(self, key: str, most: int = -1) -> bytes:
-        with self._archive.open(key) as file:
-            return file.read(most)
 
 
 @functools.cache
