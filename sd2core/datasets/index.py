@@ -11,7 +11,7 @@ from sd2core.datasets.layout import Header
 from sd2core.datasets.source import Source
 from sd2core.denoise.resample_to_model import MAX_RESAMPLED, can_resample
 from sd2core.errors import Sd2Error
-from sd2core.files.texts import first_difference
+from sd2core.files.texts import refuse_change
 from sd2core.labels.per_frame import BACKGROUND
 from sd2core.maps import DopplerMap, joints_of
 from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, PARTS
@@ -187,10 +187,5 @@ def refuse_other_settings(out: Path, header: Header, options: Exporting) -> None
         ("the least purity", header.min_purity, options.min_purity),
         ("spans as", header.spans or "windows", options.spans or "windows"),
     ):
-        if now is not None and before != now:
-            what, begun, asked = first_difference(before, now, what)
-            raise Sd2Error(
-                f"{out} was begun with {what} {begun}",
-                f"{asked}, as it is asked for now",
-                "Go on with the same settings, or write another data set",
-            )
+        if now is not None:
+            refuse_change(out, before, now, what, "write another data set")

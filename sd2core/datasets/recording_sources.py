@@ -112,7 +112,22 @@ def recording_sources(
     synthetic and denoised map of them alone, and everybody's of a radar. ``subjects`` names the
     subject of each recording, the first person of a scene.
     """
-    shared = _Shared(making)
+    kept: list[_Opened] = []  # the recording used last
+
+    def opened(recording: Recording) -> _Opened:
+        if not kept or kept[0].recording is not recording:
+            kept.clear()  # before the next one takes memory
+            kept.append(_Opened(recording, making))
+        return kept[0]
+
+    def lazy(recording: Recording, key: SourceKey, person: str) -> LazySource:
+        return LazySource(
+            key,
+            lambda progress: opened(recording).source(key, person, progress),
+            lambda: _fingerprint(recording, key, person, making),
+            lambda: opened(recording).outline(key.placement, person),
+        )
+
     sources = []
     for path, subject in zip(paths, subjects, strict=True):
         recording = open_recording(path)
@@ -127,7 +142,7 @@ def recording_sources(
             for person in named or ("",):
                 who = subject_of(recording, person, subject)
                 key = SourceKey(who, recording.folder.stem, placement)
-                sources.append(_lazy(shared, recording, key, person))
+                sources.append(lazy(recording, key, person))
     return sources
 
 
@@ -158,29 +173,6 @@ def radar_map(
         capture = recording.load_capture()
         radar = doppler_map(capture, axis=axis, clutter=CLUTTER, progress=progress)
     return radar.shifted(recording.radar_offset_s)
-
-
-def _lazy(shared: _Shared, recording: Recording, key: SourceKey, person: str) -> LazySource:
-    return LazySource(
-        key,
-        lambda progress: shared.opened(recording).source(key, person, progress),
-        lambda: _fingerprint(recording, key, person, shared.making),
-        lambda: shared.opened(recording).outline(key.placement, person),
-    )
-
-
-class _Shared:
-    """Recording used last, kept open; others are closed."""
-
-    def __init__(self, making: Making) -> None:
-        self.making = making
-        self._opened: _Opened | None = None
-
-    def opened(self, recording: Recording) -> _Opened:
-        if self._opened is None or self._opened.recording is not recording:
-            self._opened = None  # before the next one takes memory
-            self._opened = _Opened(recording, self.making)
-        return self._opened
 
 
 class _Opened:

@@ -36,6 +36,7 @@ from sd2core.files.stores import (
     create_array,
     growing,
     open_group,
+    put_rows,
     read_attributes,
 )
 from sd2core.files.texts import append_lines, drop_torn_line, whole_lines
@@ -180,7 +181,7 @@ class SegmentStore:
         step = subject.chunks[0]
         for start in range(0, self.rows, step):
             stop = min(start + step, self.rows)
-            self._put("split", start, stop, split_of_subject[subject[start:stop]])
+            put_rows(self._arrays["split"], start, split_of_subject[subject[start:stop]])
         self._group.attrs.put(header.as_dict() | {"complete": True})
         self.header = header
 
@@ -202,13 +203,7 @@ class SegmentStore:
             for at, block in pending:
                 if name in block:
                     values[at - start : at - start + len(block["start_s"])] = block[name]
-            self._put(name, start, stop, values)
-
-    def _put(self, name: str, start: int, stop: int, values: np.ndarray) -> None:
-        array = self._arrays[name]
-        if array.shape[0] < stop:
-            array.resize((stop, *array.shape[1:]))
-        array[start:stop] = values
+            put_rows(array, start, values)
 
 
 def open_arrays(path: Path) -> tuple[Header, dict[str, StoredArray]]:

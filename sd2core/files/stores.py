@@ -321,6 +321,14 @@ def growing(group: Any, path: Path, name: str) -> Any:
     return group[name].with_config(_EVERY_CHUNK)
 
 
+def put_rows(array: Any, start: int, values: NDArray[Any]) -> None:
+    """Write rows into an array of :func:`growing`, which grows where they are beyond its end."""
+    stop = start + len(values)
+    if array.shape[0] < stop:
+        array.resize((stop, *array.shape[1:]))
+    array[start:stop] = values
+
+
 def create_group(path: Path, attributes: Mapping[str, Any] | None = None) -> Any:
     """Make an empty group in a folder, in place of what is there."""
     return _zarr().open_group(str(path), mode="w", attributes=dict(attributes or {}))

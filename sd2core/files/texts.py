@@ -303,6 +303,17 @@ def first_difference(before: Any, now: Any, name: str = "") -> tuple[str, str, s
     return name, _in_words(before), _in_words(now)
 
 
+def refuse_change(path: Path, before: Any, now: Any, name: str, other: str) -> None:
+    """Raise Sd2Error for what was begun with another value of a setting; ``other``: a way out."""
+    if before != now:
+        what, begun, asked = first_difference(before, now, name)
+        raise Sd2Error(
+            f"{path} was begun with {what} {begun}",
+            f"{asked}, as it is asked for now",
+            f"Go on with the same settings, or {other}",
+        )
+
+
 def _in_words(value: Any) -> str:
     if isinstance(value, list | tuple):
         value = ", ".join(map(str, value))

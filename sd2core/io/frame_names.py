@@ -87,7 +87,12 @@ def numbered_frames(files: Sequence[Path], person: int | str | None, source: str
             )
         elif numbers:
             _count(listing, numbers[0], numbers[0])
-        return _without_persons(listing, person, source)
+        if person is not None:
+            raise Sd2Error(
+                f"Person {person} is asked for, and the names in {source} tell no persons",
+                "names such as 000012_0.obj, of frame 12 and person 0",
+            )
+        return listing
     frames, persons = numbers
     counts = _counted(persons)
     notes: list[str] = []
@@ -214,15 +219,6 @@ def _refuse_two_kinds(files: Sequence[Path], kinds: list[list[int]], source: str
             "the frames of one body, named alike",
             "Name those that are meant by a pattern such as 'body_*.obj'",
         )
-
-
-def _without_persons(listing: FrameFiles, person: int | str | None, source: str) -> FrameFiles:
-    if person is not None:
-        raise Sd2Error(
-            f"Person {person} is asked for, and the names in {source} tell no persons",
-            "names such as 000012_0.obj, of frame 12 and person 0",
-        )
-    return listing
 
 
 def _named(files: Sequence[Path]) -> str:

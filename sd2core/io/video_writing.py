@@ -26,13 +26,9 @@ def write_video(
     size: tuple[int, int],
     *,
     times_s: NDArray[np.float64] | None = None,
-    crf: int = 21,
-    preset: str = "slow",
-    comment: str = "",
+    **how: Any,
 ) -> None:
-    """Encode sRGB pictures as H.264 in MP4.
-
-    Raises Sd2Error if this build of PyAV has no H.264 encoder.
+    """Encode sRGB pictures as H.264 in MP4; raises as :class:`VideoEncoder`.
 
     Parameters
     ----------
@@ -45,18 +41,11 @@ def write_video(
         Width and height in pixels, both even.
     times_s : float64 array, shape (frames,), optional
         Times of the frames instead, the first of which is 0.
-    crf : int
-        Constant rate factor of x264: lower is better; 18 is hard to tell from the source.
-    preset : str
-        Of x264: a slower one makes a smaller file.
-    comment : str
-        What the file says of itself.
+    **how
+        Quality, speed and comment, as of :class:`VideoEncoder`.
     """
     ticks = frames_per_s if times_s is None else _TICKS_PER_S
-    encoder = VideoEncoder(
-        path, frames_per_s, size, crf=crf, preset=preset, ticks_per_s=ticks, comment=comment
-    )
-    with encoder:
+    with VideoEncoder(path, frames_per_s, size, ticks_per_s=ticks, **how) as encoder:
         for number, picture in enumerate(frames):
             time_s = number / frames_per_s if times_s is None else float(times_s[number])
             encoder.add(picture, time_s)
@@ -76,15 +65,15 @@ class VideoEncoder:
     size : (int, int)
         Width and height in pixels, both even.
     crf : int
-        As of :func:`write_video`.
+        Constant rate factor of x264: lower is better; 18 is hard to tell from the source.
     preset : str
-        As of :func:`write_video`.
+        Of x264: a slower one makes a smaller file.
     ticks_per_s : int
         Times are rounded to these.
     grows : bool
         True for a file that can be read up to the last second however writing ends.
     comment : str
-        As of :func:`write_video`.
+        What the file says of itself.
     """
 
     def __init__(

@@ -25,8 +25,9 @@ from sd2core.files.stores import (
     create_group,
     growing,
     open_group,
+    put_rows,
 )
-from sd2core.files.texts import append_lines, drop_torn_line, first_difference
+from sd2core.files.texts import append_lines, drop_torn_line, refuse_change
 from sd2core.maps import LimbMaps, joints_of
 from sd2core.pairs.rows import check_array, check_labels, kept_parts, read_rows, row_kinds
 from sd2core.pairs.summary import (
@@ -271,11 +272,8 @@ class PairWriter:
                 raise Sd2Error(f"Take {take.title} has no kinematics", f"some, as {self._path} has")
             written["kinematics"] = take.limbs.kinematics.transpose(2, 0, 1)
         for name, values in written.items():
-            array = self._arrays[name]
             # What a killed writer left beyond the last line is written over.
-            if array.shape[0] < stop:
-                array.resize((stop, *array.shape[1:]))
-            array[start:stop] = values
+            put_rows(self._arrays[name], start, values)
         x, y, z = (float(value) for value in take.sensor_position_m)
         entry = TakeEntry(**take.key._asdict(), start=start, stop=stop, sensor_position_m=(x, y, z))
         append_lines(self._path / INDEX_NAME, [json.dumps(entry.model_dump()) + "\n"])
@@ -382,11 +380,5 @@ def _reopened(path: Path, header: dict[str, Any]) -> Any:
     # Labels may have been put on it since (:mod:`sd2core.pairs.labelling`).
     attributes["labels"] = attributes.get("labels", [])[: len(header["labels"])]
     for name, value in header.items():
-        if attributes.get(name, []) != value:
-            what, before, now = first_difference(attributes.get(name), value, name)
-            raise Sd2Error(
-                f"{path} was begun with {what} {before}",
-                f"{now}, as it is asked for now",
-                "Go on with the same settings, or choose another folder",
-            )
+        refuse_change(path, attributes.get(name, []), value, name, "choose another folder")
     return group

@@ -166,20 +166,14 @@ class _Array(Table):
             raise Sd2Error(f"{path} is of {stored.dtype}", "real numbers")
         self._by_frame = dimensions == 3
         if self._by_frame:
-            self.frame = self._frames
-
-    def _rows(self, most: int | None = None) -> NDArray[Any]:
-        """Points, (P, columns); rows of zeros fill up frames, and are left out."""
-        if most is None:
-            return self._whole[0]
-        return self._filled(-(-most // self._stored.shape[1]) if self._by_frame else most)[0]
+            self.frame = lambda: self._whole[1]
 
     @cached_property
-    def _whole(self) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    def _whole(self) -> tuple[NDArray[Any], NDArray[np.float64]]:
         return self._filled(None)
 
-    def _filled(self, most: int | None) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-        """Points of the first rows or all, and where they are in the array."""
+    def _filled(self, most: int | None) -> tuple[NDArray[Any], NDArray[np.float64]]:
+        """Points of the first rows or all, (P, columns), and their frames; no rows of zeros."""
         values = np.asarray(self._stored.read((slice(0, most),)))
         if values.dtype.names:
             values = np.stack([values[name].astype(np.float64) for name in values.dtype.names], -1)
@@ -187,13 +181,12 @@ class _Array(Table):
         filled = np.ones(len(values), bool)
         if self._by_frame:
             filled = np.asarray(values.any(axis=-1))
-        return values[filled], filled
-
-    def _frames(self) -> NDArray[np.float64]:
-        return np.nonzero(self._whole[1])[0].astype(np.float64)
+        return values[filled], np.nonzero(filled)[0].astype(np.float64)
 
     def read(self, places: tuple[int, ...], most: int | None = None) -> list[NDArray[np.float64]]:
-        rows = self._rows(most)
+        if most is not None and self._by_frame:
+            most = -(-most // self._stored.shape[1])
+        rows = (self._whole if most is None else self._filled(most))[0]
         return [np.ascontiguousarray(rows[:, place]) for place in places]
 
 
