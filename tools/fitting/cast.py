@@ -8,39 +8,27 @@ from sd2core.body.shape import BodyShape, ShapeSpace
 from tools.build_sample.clothing import Outfit
 from tools.build_sample.render import Studio
 
+_PHENOTYPES = ("gender", "muscle", "weight", "proportions")
+
 
 @dataclass(frozen=True)
 class Person:
     """One simulated person."""
 
-    # From 0 to 1; see PHENOTYPES of sd2core.body.shape.
-    gender: float
-    muscle: float
-    weight: float
-    proportions: float
+    phenotypes: tuple[float, float, float, float]  # from 0 to 1, see _PHENOTYPES
     stature_m: float
     outfit: Outfit
 
     def shape(self, space: ShapeSpace) -> BodyShape:
         """Shape of this person."""
-        return BodyShape(
-            space.coefficients(
-                gender=self.gender,
-                muscle=self.muscle,
-                weight=self.weight,
-                proportions=self.proportions,
-            ),
-            self.stature_m,
-        )
+        phenotypes = dict(zip(_PHENOTYPES, self.phenotypes, strict=True))
+        return BodyShape(space.coefficients(**phenotypes), self.stature_m)
 
 
 PEOPLE = {
-    "ada": Person(0.95, 0.45, 0.40, 0.7, 1.64, Outfit()),
+    "ada": Person((0.95, 0.45, 0.40, 0.7), 1.64, Outfit()),
     "bo": Person(
-        0.05,
-        0.70,
-        0.50,
-        0.5,
+        (0.05, 0.70, 0.50, 0.5),
         1.83,
         Outfit(
             skin=(0.52, 0.36, 0.27),
@@ -53,10 +41,7 @@ PEOPLE = {
         ),
     ),
     "chen": Person(
-        0.40,
-        0.40,
-        0.30,
-        0.4,
+        (0.40, 0.40, 0.30, 0.4),
         1.72,
         Outfit(
             hair=(0.12, 0.10, 0.10),
@@ -68,10 +53,7 @@ PEOPLE = {
         ),
     ),
     "dora": Person(
-        0.90,
-        0.35,
-        0.80,
-        0.5,
+        (0.90, 0.35, 0.80, 0.5),
         1.58,
         Outfit(
             skin=(0.86, 0.69, 0.60),
@@ -85,10 +67,7 @@ PEOPLE = {
         ),
     ),
     "emil": Person(
-        0.10,
-        0.55,
-        0.85,
-        0.3,
+        (0.10, 0.55, 0.85, 0.3),
         1.78,
         Outfit(
             skin=(0.70, 0.51, 0.40),
@@ -100,10 +79,7 @@ PEOPLE = {
         ),
     ),
     "femi": Person(
-        0.60,
-        0.80,
-        0.45,
-        0.8,
+        (0.60, 0.80, 0.45, 0.8),
         1.90,
         Outfit(
             skin=(0.38, 0.26, 0.20),
