@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from sd2core.body.model import Body
 from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import BodyShape, ShapeSpace
-from tools.build_sample.posing import posed
 from tools.build_sample.render import Camera, Renderer
-from tools.build_sample.swipes import swipes
+from tools.build_sample.swipes import posed, swipes
 
 CAMERA = Camera(320, 240, 300.0)
 DISTANCE_M = 2.6

@@ -1,6 +1,6 @@
 """Fast posing of a surface: linear blend skinning of many frames, compiled and on all cores.
 
-The bundled sample is posed by ``tools.build_sample.posing``, slot by slot in double precision,
+The bundled sample is posed by ``tools.build_sample.swipes``, slot by slot in double precision,
 which comes out bit for bit alike everywhere.
 """
 

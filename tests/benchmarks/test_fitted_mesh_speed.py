@@ -20,7 +20,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.numerics.compiled import warm_up
 from sd2core.sensor import VirtualSensor
-from tools.build_sample.posing import posed
+from tools.build_sample.swipes import posed
 
 FRAMES = 64
 

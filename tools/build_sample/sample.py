@@ -32,9 +32,8 @@ from sd2core.radar_config import PAPER_RADAR
 from sd2core.recording.recording import SUFFIX, Recording
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
-from tools.build_sample.posing import posed
 from tools.build_sample.render import Camera, Renderer
-from tools.build_sample.swipes import DURATION_S, SPANS, swipes
+from tools.build_sample.swipes import DURATION_S, SPANS, posed, swipes
 
 FRAMES_PER_S = 30
 DISTANCE_M = 2.2

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -17,14 +18,31 @@ from numpy.typing import NDArray
 from sd2core.body.fit_people import fit_people
 from sd2core.body.fit_video import FitChoices, FitReport, fit_video
 from sd2core.body.landmark_models import landmark_models
+from sd2core.body.model import Body, Skeleton
 from sd2core.body.people import SeenPerson, find_people
+from sd2core.body.rig import KeypointSpace
+from sd2core.body.shape import ShapeSpace
+from sd2core.body.skinning import pose_vertices
 from sd2core.files.tables import markdown_table
 from sd2core.io.mesh import load_mesh
 from sd2core.io.video import open_video
 from sd2core.io.video_writing import write_video
 from sd2core.progress import Progress, silent
-from tools.fitting.cast import PEOPLE
-from tools.fitting.meetings import CAMERA, FRAMES_PER_S, Actor, Part, actor, scenes
+from sd2core.simulate.gait import Path as GaitPath
+from sd2core.simulate.gait import gait
+from sd2core.simulate.limbs import arm_length_m
+from sd2core.simulate.people.arms import STYLES
+from sd2core.simulate.people.motion import Deed, random_motion
+from tools.build_sample.clothing import Clothes, srgb
+from tools.build_sample.render import Camera, Renderer, _tone
+from tools.fitting.cast import PEOPLE, ROOMS, Person
+
+FRAMES_PER_S = 10
+CAMERA = Camera(320, 240, 260.0, above_floor_m=1.1)
+Floats = NDArray[np.float64]
+
+OUT_M = 2.6
+"""Way to the side after which nothing of a person is in the picture."""
 
 OWN = PEOPLE["chen"]
 OTHERS = {
@@ -40,7 +58,95 @@ _NEAR_M = 3.0
 _SILENT = FitReport(lambda stage: silent, lambda *_: None, lambda *_: None)
 
 
-Way = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...] | None]
+@dataclass(frozen=True)
+class Part:
+    """Part of a person: across the picture they go along ``x_m``, and turn by ``yaw_deg``."""
+
+    person: Person
+    times_s: tuple[float, ...]
+    x_m: tuple[float, ...]  # at those times, positive to the right
+    away_m: float  # from the camera
+    yaw_deg: tuple[float, ...]  # at those times; 0 faces the camera
+    sits: bool = False  # facing the camera, moving their arms
+
+
+@dataclass(frozen=True)
+class Actor:
+    """A person of a scene, ready to be drawn."""
+
+    drawer: Renderer
+    vertices_m: NDArray[np.float32]  # (T, V, 3)
+    points_px: Floats  # (T, 33, 2)
+    away_m: float
+
+
+@lru_cache(maxsize=1)
+def _space() -> ShapeSpace:
+    return ShapeSpace()
+
+
+def actor(part: Part, frames: int, room: str) -> Actor:
+    """A person who walks and turns as their part says."""
+    space, shape = _space(), part.person.shape(_space())
+    skeleton, body = space.skeleton(shape), space.load("low", shape)
+    times = np.arange(frames) / FRAMES_PER_S
+    rotations, move = (_sitting if part.sits else _walking)(part, skeleton, times)
+    place = np.array([0.0, CAMERA.above_floor_m, part.away_m])
+    transforms = skeleton.transforms(rotations, move + place)
+    studio = replace(ROOMS[room], wall_m=4.8, shadow_m=6.0, shadow_depth_m=3.0, noise=0.012)
+    drawer = Renderer(body, CAMERA, studio, Clothes.of(Body.load("low"), part.person.outfit))
+    points = CAMERA.project(KeypointSpace(space).of(shape).positions(transforms))
+    return Actor(drawer, pose_vertices(body, transforms), points, part.away_m)
+
+
+def _sitting(part: Part, skeleton: Skeleton, times_s: Floats) -> tuple[Floats, Floats]:
+    """Rotations and places of one who sits and talks with their hands."""
+    deed = Deed("sit", (STYLES["talk"], STYLES["wave"]), still=False)
+    rng = np.random.default_rng(round(100.0 * part.away_m))
+    motion = random_motion(rng, skeleton, part.person.stature_m, times_s, deed)
+    return motion.rotations, motion.translation_m + np.array([part.x_m[0], 0.0, 0.0])
+
+
+def _walking(part: Part, skeleton: Skeleton, times: Floats) -> tuple[Floats, Floats]:
+    """Rotations and places of one who walks across the picture."""
+    x = np.array(part.x_m)
+    along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(x)))])
+    way = GaitPath(
+        lambda t: np.interp(t, part.times_s, along),
+        lambda t: np.interp(t, part.times_s, part.yaw_deg),
+    )
+    scale = arm_length_m(skeleton) / arm_length_m(_space().base_skeleton)
+    motion = gait(skeleton, times, way, scale)
+    # The way of the gait leads to the camera; here it leads across.
+    forward = -motion.translation_m[:, 2]
+    across = np.interp(times, part.times_s, x) - np.interp(times, part.times_s, along) + forward
+    move = np.stack([across, motion.translation_m[:, 1], motion.translation_m[:, 0]], axis=1)
+    return motion.rotations, move
+
+
+def scenes(actors: Sequence[Actor]) -> Iterator[tuple[NDArray[np.uint8], Floats]]:
+    """Pictures, and the share of each actor that nobody hides in them, (A,)."""
+    far_to_near = sorted(range(len(actors)), key=lambda row: -actors[row].away_m)
+    layers = [actors[row] for row in far_to_near]
+    for frame in range(len(actors[0].vertices_m)):
+        seen = [each.vertices_m[frame] for each in layers]
+        shadows = [each.drawer.light_buffer(part) for each, part in zip(layers, seen, strict=True)]
+        picture = layers[0].drawer.background(np.maximum.reduce(shadows))
+        drawn = []
+        for each, part, shadow in zip(layers, seen, shadows, strict=True):
+            colours, coverage = each.drawer.person(part, shadow)
+            picture = picture * (1.0 - coverage[..., None]) + colours
+            drawn.append(coverage)
+        shares, free = np.zeros(len(actors)), np.ones(picture.shape[:2])
+        for row, coverage in zip(far_to_near[::-1], drawn[::-1], strict=True):
+            shares[row] = (free * coverage).sum() / max(float(coverage.sum()), 1.0)
+            free *= 1.0 - coverage
+        noise = np.random.default_rng(frame).standard_normal(picture.shape, dtype=np.float32)
+        bright = np.clip(srgb(_tone(picture)) + 0.012 * noise, 0.0, 1.0)
+        yield (bright * 255.0).astype(np.uint8), shares
+
+
+Way = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
 
 
 @dataclass(frozen=True)
@@ -85,7 +191,7 @@ def meetings() -> Iterator[Meeting]:
         yield Meeting("stops in front", apart_m, (_STANDS, waits), 5.2, fitted=apart_m == 1.5)
         turns: Way = ((0.1, 2.0, 2.5, 4.4), (-2.0, 0.0, 0.0, -2.0), (-90.0, -90.0, 90.0, 90.0))
         yield Meeting("turns back in front", apart_m, (_STANDS, turns), 4.8)
-    sides: list[Way] = [((0.0,), (x,), None) for x in (-0.4, 0.4)]
+    sides: list[Way] = [((0.0,), (x,), (0.0,)) for x in (-0.4, 0.4)]
     yield Meeting("sit side by side", 0.8, tuple(sides), 4.0, fitted=True, sits=True)
 
 

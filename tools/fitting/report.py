@@ -10,8 +10,7 @@ import numpy as np
 
 from sd2core.compare.measures import correlation, rms
 from sd2core.files.tables import markdown_table
-from tools.fitting.clip_score import LIMBS, ClipScore, StrokeScore, coverage, pooled
-from tools.fitting.real_score import RealScore
+from tools.fitting.clip_score import LIMBS, ClipScore, RealScore, StrokeScore, coverage, pooled
 
 Table = list[list[str]]
 

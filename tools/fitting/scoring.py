@@ -16,8 +16,7 @@ from sd2core.cli.output import progress_bar
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh
 from sd2core.io.video import open_video
-from tools.fitting.clip_score import ClipScore, score_clip
-from tools.fitting.real_score import RealScore, score_real
+from tools.fitting.clip_score import ClipScore, RealScore, score_clip, score_real
 from tools.fitting.truth import Truth
 
 

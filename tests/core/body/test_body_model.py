@@ -11,7 +11,7 @@ from sd2core.body.model import Body, Resolution, vertex_normals
 from sd2core.body.rotations import about
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
-from tools.build_sample.posing import posed
+from tools.build_sample.swipes import posed
 
 SURFACES: tuple[tuple[Resolution, int], ...] = (("low", 1229), ("medium", 5000), ("high", 13348))
 

@@ -10,7 +10,7 @@ from sd2core.body.model import Body
 from sd2core.body.rotations import about
 from sd2core.body.track import LANDMARKS
 from sd2core.errors import Sd2Error
-from tools.build_sample.posing import posed
+from tools.build_sample.swipes import posed
 
 
 @pytest.fixture(scope="module")

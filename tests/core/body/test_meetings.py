@@ -15,7 +15,7 @@ from sd2core.body.person_selection import Rectangle
 from sd2core.body.track import LANDMARK, LandmarkTrack
 from sd2core.io.video import open_video
 from tools.fitting.cast import PEOPLE
-from tools.fitting.meetings import FRAMES_PER_S, OUT_M, Actor, Part, actor, pictures
+from tools.fitting.people import FRAMES_PER_S, OUT_M, Actor, Part, actor, scenes
 
 pytestmark = pytest.mark.slow
 
@@ -47,7 +47,9 @@ def rectangle(person: Actor, frame: int = 0) -> Rectangle:
 def followed(
     path: Path, models: LandmarkModels, people: list[Actor], around: Rectangle | None
 ) -> LandmarkTrack:
-    with open_video(film(path, pictures(people), frames_per_s=FRAMES_PER_S)) as video:
+    with open_video(
+        film(path, (picture for picture, _ in scenes(people)), frames_per_s=FRAMES_PER_S)
+    ) as video:
         return find_landmarks(video, models, person=around).part(0, len(video))
 
 

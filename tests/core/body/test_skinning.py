@@ -6,7 +6,7 @@ import pytest
 from sd2core.body import skinning
 from sd2core.body.model import Body
 from sd2core.body.rotations import about
-from tools.build_sample.posing import posed
+from tools.build_sample.swipes import posed
 
 
 def random_transforms(body: Body, frames: int) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ from sd2core.compare.joints import (
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
-from tools.build_sample.posing import posed
+from tools.build_sample.swipes import posed
 
 BONES = {
     "pelvis": "root",

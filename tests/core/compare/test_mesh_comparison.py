@@ -20,7 +20,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.scattering.resampling import resample_mesh
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
-from tools.build_sample.posing import posed
+from tools.build_sample.swipes import posed
 
 TIMES = np.arange(24) / 30.0
 

@@ -13,7 +13,7 @@ from sd2core.imu.mounting import PLACES, checked_places, mounted, place_near
 from sd2core.imu.virtual import imu_at_frames, virtual_imu
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
-from tools.build_sample.posing import posed
+from tools.build_sample.swipes import posed
 
 FRAMES = 12
 TURNS = Rotation.from_rotvec(np.outer(np.arange(FRAMES) / 10, [0.3, -1.0, 0.5]))

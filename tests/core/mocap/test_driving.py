@@ -14,8 +14,7 @@ from sd2core.body.track import LANDMARKS
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.mars import JOINTS
 from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, SkeletonClip, puppet_of, resample_pose
-from tools.build_sample.posing import posed
-from tools.build_sample.swipes import swipes
+from tools.build_sample.swipes import posed, swipes
 
 FRAMES = 40
 SHAPE = SPACE.random(np.random.default_rng(3))

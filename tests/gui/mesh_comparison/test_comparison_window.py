@@ -24,7 +24,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.recording import Recording
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
-from tools.build_sample.posing import posed
+from tools.build_sample.swipes import posed
 
 ASIDE_M = 0.05
 TIMES = np.arange(36) / 30.0

@@ -13,7 +13,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.progress import Progress
 from tools.build_body import export_body as exporting
-from tools.build_sample.posing import posed
+from tools.build_sample.swipes import posed
 from tools.bundled import main
 
 needs_anny = pytest.mark.skipif(

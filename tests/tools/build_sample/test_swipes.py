@@ -7,8 +7,7 @@ import pytest
 
 from sd2core.body.model import Body
 from sd2core.files.recording_json import Span
-from tools.build_sample.posing import posed
-from tools.build_sample.swipes import DURATION_S, SPANS, swipes
+from tools.build_sample.swipes import DURATION_S, SPANS, posed, swipes
 
 PLACE = np.array([0.05, 1.1, 2.2])
 RATE = 100.0

@@ -13,7 +13,7 @@ from sd2core.body.rotations import about
 from sd2core.io.mesh import save_mesh
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
-from tools.build_sample.posing import posed
+from tools.build_sample.swipes import posed
 from tools.fitting.truth import FORMAT, VERSION
 
 TIMES = np.arange(36) / 30.0

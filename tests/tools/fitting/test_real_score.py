@@ -14,8 +14,7 @@ from sd2core.compare.joints import JOINTS, own_patches
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
-from tools.fitting.clip_score import score_clip
-from tools.fitting.real_score import reprojection_m, score_real
+from tools.fitting.clip_score import reprojection_m, score_clip, score_real
 from tools.fitting.truth import read_truth
 
 CAMERA = PinholeCamera()
