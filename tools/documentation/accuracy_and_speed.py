@@ -11,21 +11,16 @@ from collections.abc import Iterator
 
 from matplotlib.figure import Figure
 
+from sd2core import PRESETS, MeshSequence, VirtualSensor, load_mesh, open_recording
 from sd2core.accuracy.choosing import choose
 from sd2core.accuracy.measuring import measure
 from sd2core.accuracy.plans import AccuracyPlan, reference_plan
 from sd2core.accuracy.results import Measurement, plot_cost_and_error
 from sd2core.accuracy.survey import survey_scene
-from sd2core.doppler import PRESETS
 from sd2core.files.figure_files import save_figure
-from sd2core.files.resources import resource_path
-from sd2core.io.mesh import load_mesh
-from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.compiled import warm_up
-from sd2core.recording.recording import open_recording
-from sd2core.sensor import VirtualSensor
 from tools.documentation.pages import filled, table, write_filled
-from tools.documentation.places import BENCHMARKS, IMAGES, SHARED
+from tools.documentation.places import BENCHMARKS, IMAGES, SAMPLE, SHARED
 
 sys.path.insert(0, str(BENCHMARKS.parent))
 sys.path.insert(0, str(BENCHMARKS))
@@ -55,7 +50,7 @@ def main() -> None:
 
 
 def _scenes() -> Iterator[tuple[str, str, MeshSequence, VirtualSensor]]:
-    sample = open_recording(resource_path("swipes.sd2"))
+    sample = open_recording(SAMPLE)
     yield "sample", "The bundled sample (simulated gestures)", sample.load_mesh(), sample.sensor
     walk = SHARED / "mesh" / "walk.npz"
     if walk.exists():
@@ -128,7 +123,7 @@ def _scaling() -> str:
 
 def _precision() -> dict[str, str]:
     """Errors of single precision far from the origin, and the cost of double, on the sample."""
-    mesh = open_recording(resource_path("swipes.sd2")).load_mesh()
+    mesh = open_recording(SAMPLE).load_mesh()
     rows = [["from the origin, m", "predicted", "single", "double", "is used"]]
     for at in errors(mesh):
         off = (f"{value:.0e}" for value in (at.predicted, at.single, at.double))

@@ -20,7 +20,6 @@ from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL, load_model
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.texture import Texture
 from sd2core.doppler import Synthesizer
-from sd2core.files.resources import resource_path
 from sd2core.fmcw import doppler_map
 from sd2core.io.mesh import load_mesh
 from sd2core.mesh.sequence import MeshSequence
@@ -34,7 +33,7 @@ from sd2core.simulate.campaign.takes import OPTIONS
 from sd2core.train.evaluation import Evaluation, Group, Score, evaluate
 from tools.documentation.long_sequences import long_sequences
 from tools.documentation.pages import spread, table, write_filled
-from tools.documentation.places import BUILD, SHARED
+from tools.documentation.places import BUILD, SAMPLE, SHARED
 from tools.documentation.runs import (
     ERRORS,
     Job,
@@ -136,7 +135,7 @@ def _take(name: str, mesh: MeshSequence, sensor: VirtualSensor, radar: np.ndarra
 
 
 def _sample_takes() -> list[Take]:
-    recording = open_recording(resource_path("swipes.sd2"))
+    recording = open_recording(SAMPLE)
     radar = doppler_map(
         recording.load_capture(), axis=OPTIONS.axis, clutter=CLUTTER
     ).values.T.copy()

@@ -30,11 +30,10 @@ from sd2core.files.figure_files import save_figure
 from sd2core.files.resources import resource_path
 from sd2core.fmcw.options import SignalOptions
 from sd2core.fmcw.simulation import simulate_radar
-from tools.documentation.places import IMAGES, REPOSITORY
+from tools.documentation.places import IMAGES, REPOSITORY, SAMPLE
 from tools.fitting.clip_score import speed_mps
 
 CONCEPTS = IMAGES / "concepts"
-SAMPLE = resource_path("swipes.sd2")
 SWIPE_S = (1.4, 3.0)
 """A swipe of the sample, with what lies around it."""
 

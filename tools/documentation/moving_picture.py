@@ -12,9 +12,8 @@ from PIL import Image
 from PySide6.QtGui import QImage
 
 from sd2app.shell.window import MainWindow
-from sd2core.files.resources import resource_path
-from tools.documentation.places import IMAGES, REPOSITORY
-from tools.documentation.windows import opened, wait_for
+from tools.documentation.places import IMAGES, REPOSITORY, SAMPLE
+from tools.documentation.screenshots import opened, wait_for
 
 SIZE = (1280, 720)
 SHOWN_WIDTH = 880
@@ -31,7 +30,7 @@ LIMIT_BYTES = 3_000_000
 
 def main() -> None:
     """Drag, draw, write."""
-    with opened([resource_path("swipes.sd2")], size=SIZE) as window:
+    with opened([SAMPLE], size=SIZE) as window:
         window.session.playback.seek(1.9)
         _run(1.0)
         edits = window.session.edits

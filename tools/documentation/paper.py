@@ -29,7 +29,6 @@ from sd2core.figures.strip import plot_strip
 from sd2core.figures.strip_source import StripOptions, StripSource
 from sd2core.figures.surface import Frame, find_visible_triangles, project_vertices
 from sd2core.files.figure_files import save_figure
-from sd2core.files.resources import resource_path
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.pairs.store import PairSet, Take, read_pairs
@@ -41,7 +40,7 @@ from sd2core.simulate.campaign.takes import Campaign
 from sd2core.timebase import Timebase
 from tools.documentation.measured import write_page
 from tools.documentation.pages import filled, spread, spread_of, table
-from tools.documentation.places import BUILD, DOCS, IMAGES, REPOSITORY
+from tools.documentation.places import BUILD, DOCS, IMAGES, REPOSITORY, SAMPLE
 from tools.documentation.runs import Job, epochs_in, evaluated, settings, train
 
 FOLDER, STUDY = BUILD / "paper", BUILD / "classifier" / "to-and-fro"
@@ -271,7 +270,7 @@ _HEIGHT_PX, _PIXELS_PER_INCH = 560, 150
 
 def draw_bodies(mesh_figure: Path, range_figure: Path) -> dict[str, float]:
     """Draw both figures, and return the numbers that are told of the second."""
-    recording = open_recording(resource_path("swipes.sd2"))
+    recording = open_recording(SAMPLE)
     mesh = recording.load_mesh()
     with recording.open_video() as video:
         source = StripSource.of(recording, video, mesh, recording.title)

@@ -15,10 +15,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core import MeshSequence, Synthesizer, Timebase, VirtualSensor
 from sd2core.denoise.card import DENOISER_PARTS
-from sd2core.doppler import Synthesizer
 from sd2core.io.radar.mars import MarsPart, MarsStretch, mars_parts, read_mars
-from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, SkeletonClip, puppet_of
 from sd2core.mocap.mars_pairs import (
@@ -31,8 +30,6 @@ from sd2core.mocap.mars_pairs import (
 )
 from sd2core.mocap.radar_place import RadarPlace, estimate_place
 from sd2core.pairs.store import PairSet, read_pairs
-from sd2core.sensor import VirtualSensor
-from sd2core.timebase import Timebase
 from tools.documentation.pages import table, write_filled
 from tools.documentation.places import BUILD, SHARED
 from tools.documentation.runs import sd2

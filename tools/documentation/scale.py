@@ -24,12 +24,11 @@ from sd2core.batch.synthesis import Choosing, synthesise
 from sd2core.batch.task_graph import TaskGraph
 from sd2core.cli.batch import bytes_words
 from sd2core.files.limits import size_bytes
-from sd2core.files.resources import resource_path
 from sd2core.numerics.compiled import warm_up
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
 from tools.documentation.pages import table, write_filled
-from tools.documentation.places import BENCHMARKS
+from tools.documentation.places import BENCHMARKS, SAMPLE
 
 sys.path.insert(0, str(BENCHMARKS))
 from batches import (
@@ -196,7 +195,7 @@ def _million(costs: list[Cost], own_s: float, files_per_s: float) -> dict[str, o
 
 
 def _costs(folder: Path, fits: list[Fitted]) -> list[Cost]:
-    sample = resource_path("swipes.sd2")
+    sample = SAMPLE
     costs = []
     if fits:
         longest = fits[-1]
@@ -260,7 +259,7 @@ def _cost(title: str, work: Callable[[int], None], out: Callable[[int], Path]) -
 
 def _fits(folder: Path) -> list[Fitted]:
     """Fits of the sample's video; none where the landmark models are missing."""
-    video = open_recording(resource_path("swipes.sd2")).video
+    video = open_recording(SAMPLE).video
     assert video is not None
     fits = []
     for count in _FIT_FRAMES:

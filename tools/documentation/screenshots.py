@@ -13,9 +13,13 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
+
+from PySide6.QtWidgets import QApplication, QWidget
 
 from sd2app.background.runs import Runs
 from sd2app.batch.feature import BatchWindow
@@ -23,29 +27,78 @@ from sd2app.dataset_export.dialog import ExportDialog
 from sd2app.fit.request import FitRequest
 from sd2app.live.setup import ListenRequest
 from sd2app.mesh_comparison.window import ComparisonWindow
+from sd2app.settings import Settings
+from sd2app.shell.app import wait_until_settled
 from sd2app.shell.window import MainWindow
 from sd2app.study.result_dialog import ClassResultDialog
+from sd2app.widgets.theme import apply_theme
 from sd2core.figures.strip import plot_strip
 from sd2core.figures.strip_source import StripOptions, StripSource
 from sd2core.files.figure_files import save_figure
-from sd2core.files.resources import resource_path
 from sd2core.mesh.walls import Wall
 from sd2core.placements.placements import PlacementCloud, PlacementGrid
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import Beam, VirtualSensor, aimed_at
 from sd2core.simulate.two_people import two_people
-from tools.documentation.places import IMAGES, REPOSITORY, SHARED
-from tools.documentation.windows import application, opened, save, settle, wait_for
+from tools.documentation.places import IMAGES, REPOSITORY, SAMPLE, SHARED
 
 SIZES = (1280, 720), (1600, 1000), (2560, 1440)
 """Windows of small, usual and large screens."""
 
-SAMPLE = resource_path("swipes.sd2")
 TALL = (1280, 960)
 WALK = SHARED / "video" / "walk.mkv"
 _CAMPAIGN = ("--people", "4", "--minutes", "4", "--seed", "1")
 _COMPARE_STEPS = 40
 _LONG_S = 1800.0
+_LIMIT_S = 120.0
+
+
+def application() -> QApplication:
+    """The application, made if need be."""
+    return cast(QApplication, QApplication.instance() or QApplication(sys.argv[:1]))
+
+
+def wait_for(condition: Callable[[], bool], limit_s: float = 300.0) -> None:
+    """Run the event loop until something is so, or the time is over."""
+    deadline = time.monotonic() + limit_s
+    while not condition() and time.monotonic() < deadline:
+        application().processEvents()
+        time.sleep(0.01)
+
+
+def settle(window: MainWindow) -> None:
+    """Wait until nothing is under way; ends the program where something never is over."""
+    if not wait_until_settled(application(), window, _LIMIT_S):
+        sys.exit(f"The window was still busy after {_LIMIT_S:.0f} s")
+
+
+@contextmanager
+def opened(
+    paths: list[Path], runs: Path | None = None, size: tuple[int, int] = (1280, 800)
+) -> Iterator[MainWindow]:
+    """The window on some files, everything computed; trainings are kept in ``runs``."""
+    apply_theme(application(), False)
+    settings = Settings.forgetful()
+    settings.dark = False
+    if runs is not None:
+        settings.set_value("training/folder", str(runs))
+    window = MainWindow(settings)
+    window.resize(*size)
+    window.show()
+    window.populate()
+    if paths:
+        window.open_paths(paths)
+    settle(window)
+    yield window
+    window.session.document.undo_stack.setClean()
+    window.close()
+    application().processEvents()
+
+
+def save(widget: QWidget, name: str) -> None:
+    """Write a picture of a window."""
+    widget.grab().save(str(IMAGES / name))
+    print(IMAGES.joinpath(name).relative_to(REPOSITORY))
 
 
 def sample(window: MainWindow) -> None:
@@ -213,7 +266,7 @@ def learning() -> None:
         # Runs and models of whoever takes the pictures are left alone.
         os.environ["XDG_DATA_HOME"] = str(place / "own")
         sample = place / "swipes.sd2"
-        shutil.copytree(resource_path("swipes.sd2"), sample)
+        shutil.copytree(SAMPLE, sample)
         export(sample)
         batch(sample)
         campaign = place / "campaign.zarr"
@@ -228,7 +281,7 @@ def learning() -> None:
 
 def training(campaign: Path) -> None:
     """The Train panel while a denoiser learns from a small simulated campaign."""
-    with opened([resource_path("swipes.sd2")], campaign.with_name("runs"), TALL) as window:
+    with opened([SAMPLE], campaign.with_name("runs"), TALL) as window:
         window.session.playback.seek(1.9)
         window.bring_up("Train", "Denoiser")
         model = window.features.training.model

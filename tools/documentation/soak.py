@@ -31,9 +31,9 @@ from PySide6.QtWidgets import QApplication
 from sd2app.settings import Settings
 from sd2app.shell.window import MainWindow
 from sd2app.widgets.theme import apply_theme
-from sd2core.files.resources import resource_path
 from sd2core.files.tables import markdown_table
 from sd2core.processes import keep_little_free_memory
+from tools.documentation.places import SAMPLE
 
 LIMIT_S = 120.0
 TICK_MS = 5
@@ -240,7 +240,7 @@ def soak(
     """
     recordings = [folder / "left.sd2", folder / "right.sd2"]
     for copy in recordings:
-        shutil.copytree(resource_path("swipes.sd2"), copy)
+        shutil.copytree(SAMPLE, copy)
     window = MainWindow(Settings.forgetful())
     window.resize(1280, 800)
     window.show()

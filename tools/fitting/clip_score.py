@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from sd2core import MeshSequence, Sd2Error, Span, Synthesizer, VirtualSensor
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.model import Body, own_resolution
 from sd2core.body.shaping import overlap, silhouette
@@ -24,15 +25,10 @@ from sd2core.compare.measures import (
     synthesize_alike,
 )
 from sd2core.doppler.body_error import body_error
-from sd2core.doppler.synthesizer import Synthesizer
-from sd2core.errors import Sd2Error
-from sd2core.files.recording_json import Span
 from sd2core.mesh.presence import Presence
-from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.scattering.resampling import resample_mesh
 from sd2core.scattering.velocity import moments
-from sd2core.sensor import VirtualSensor
 from tools.fitting.truth import Truth
 
 Floats = NDArray[np.float64]

@@ -15,20 +15,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core import MeshSequence, Sd2Error, Span, Timebase
 from sd2core.body.model import Body, Resolution, Skeleton
 from sd2core.body.rig import KeypointSpace, Rig
 from sd2core.body.rotations import Floats, applied
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
-from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder
-from sd2core.files.recording_json import Span
 from sd2core.io.video_writing import write_video
-from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.body_motion import RATE_HZ, BodyMotion, Role
 from sd2core.progress import Progress, silent
 from sd2core.simulate.limbs import arm_length_m, turn_about
-from sd2core.timebase import Timebase
 from tools.build_sample.clothing import Clothes
 from tools.build_sample.render import Camera, Renderer
 from tools.build_sample.sample import write_compact_mesh

@@ -8,14 +8,12 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
+from sd2core import Sd2Error, load_mesh, open_video
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.landmark_files import load_track
 from sd2core.body.landmark_models import landmark_models
 from sd2core.body.landmarks import find_landmarks
 from sd2core.cli.output import progress_bar
-from sd2core.errors import Sd2Error
-from sd2core.io.mesh import load_mesh
-from sd2core.io.video import open_video
 from tools.fitting.clip_score import ClipScore, RealScore, score_clip, score_real
 from tools.fitting.truth import Truth
 

@@ -8,11 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sd2core import MeshSequence, Sd2Error, Span, load_mesh
 from sd2core.body.camera import PinholeCamera
-from sd2core.errors import Sd2Error
-from sd2core.files.recording_json import Span
-from sd2core.io.mesh import load_mesh
-from sd2core.mesh.sequence import MeshSequence
 
 FORMAT = "sd2-fit-truth"
 VERSION = 1

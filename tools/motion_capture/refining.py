@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from sd2core import MeshSequence, Sd2Error, Timebase
 from sd2core.body.fitted import fitted_vertices
 from sd2core.body.initial import Pose
 from sd2core.body.mesh_refining import refined
@@ -18,11 +19,8 @@ from sd2core.body.rig import KeypointSpace
 from sd2core.body.rotations import from_vector
 from sd2core.body.shape import ShapeSpace
 from sd2core.compare.measures import line_of_sight_velocity, rms
-from sd2core.errors import Sd2Error
-from sd2core.mesh.sequence import MeshSequence
 from sd2core.mocap.body_motion import RATE_HZ, BodyMotion
 from sd2core.progress import Progress, silent
-from sd2core.timebase import Timebase
 
 Floats = NDArray[np.float64]
 

@@ -8,20 +8,17 @@ from typing import Annotated
 
 import numpy as np
 
+from sd2core import PAPER_RADAR, MeshSequence, Sd2Error, Synthesizer, VirtualSensor
 from sd2core.body.parts import synthetic_map
 from sd2core.body.skinning import pose_vertices
 from sd2core.body.track import LANDMARKS
-from sd2core.doppler import Synthesizer
-from sd2core.errors import Sd2Error
-from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.options.records import ARGUMENT
 from sd2core.pairs.store import PairWriter
 from sd2core.pairs.store import Take as Pair
 from sd2core.pairs.summary import TakeKey
 from sd2core.progress import Progress, silent
-from sd2core.radar_config import PAPER_RADAR
-from sd2core.sensor import Vector, VirtualSensor, aimed_at, position_from_spherical
+from sd2core.sensor import Vector, aimed_at, position_from_spherical
 from sd2core.simulate.campaign.motion import LABELS
 from sd2core.simulate.campaign.radar import TargetOptions, radar_target
 from sd2core.simulate.campaign.scene import RANGES_M
