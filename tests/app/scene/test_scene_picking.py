@@ -71,15 +71,14 @@ def test_a_slanted_surface_is_in_front_where_it_is() -> None:
 
 
 def test_a_surface_that_reaches_behind_the_eye_is_found() -> None:
-    """From 1 m before the eye at the left to 1 m behind it, by way of infinity on the picture."""
     right, down, forward = POSE.axes
-    ends = [-right + forward, right - forward, down + 0.5 * forward]
-    vertices = POSE.position + np.stack(ends)
-    x, y, _ = POSE.project(vertices[:2].T @ (0.8, 0.2) * 0.9 + vertices[2] * 0.1)[0]
+    vertices = POSE.position + np.stack([forward - right, right - forward + down, 0.5 * forward])
+    place = (0.7, 0.2, 0.1) @ vertices
+    x, y, depth = POSE.project(place)[0]
     hit = POSE.foremost((vertices, np.array([(0, 1, 2)], np.int32)), x, y)
     assert hit is not None
-    assert hit[0] == pytest.approx(0.9 * 0.6 + 0.1 * 0.5)
-    assert hit[1] in (0, 2)
+    assert hit[0] == pytest.approx(depth)
+    assert hit[1] in (0, 2)  # the other has no pixel
 
 
 def test_triangles_without_area_are_no_surface() -> None:

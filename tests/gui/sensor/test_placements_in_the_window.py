@@ -8,6 +8,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QToolButton
 from window_models import models_of
 
+from sd2app.scene.navigation import Target
 from sd2app.sensor.placements_page import PlacementsPage
 from sd2app.widgets.inputs import Choice, TypedLine
 from sd2core.placements.placements import (
@@ -129,7 +130,8 @@ def test_a_click_in_the_scene_puts_the_sensor_there_and_undo_takes_it_back(windo
     view.grab()
     places = view.scene.markers.positions_m
     pixels = view.scene.pose.project(places)[:, :2]
-    number = next(n for n in range(6) if view.navigator.marker_at(*pixels[n]) == n)
+    target_at = view.navigator.target_at
+    number = next(n for n in range(6) if target_at(*pixels[n]) == Target("marker", n))
     before = context.sensor.sensor
     place = QPoint(*(round(value) for value in pixels[number]))
     widget = view.childAt(place)
