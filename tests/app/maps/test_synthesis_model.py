@@ -324,8 +324,13 @@ def test_a_place_that_was_left_comes_back_without_being_computed(context, qtbot,
     context.edits.place_sensor(VirtualSensor(position_m=(0.4, 0.0, 0.0)))
     wait_until_done(context, qtbot)
     assert not np.array_equal(context.synthetic.map.values, before)
-    made, completed = [], []
-    monkeypatch.setattr(Synthesizer, "stretch", lambda *_, **__: made.append(1))
+    made, completed, stretch = [], [], Synthesizer.stretch
+
+    def counted(*arguments, **more):
+        made.append(1)
+        return stretch(*arguments, **more)
+
+    monkeypatch.setattr(Synthesizer, "stretch", counted)
     context.synthesis.completed.connect(lambda: completed.append(1))
     context.document.undo_stack.undo()
     assert context.synthesis.complete
@@ -528,7 +533,8 @@ def test_the_library_chooses_for_a_small_scene(qapp, qtbot, ball, compiled_kerne
 def test_a_long_clip_waits_with_what_is_out_of_view_until_the_plan_is_known(
     context, fake, qtbot, ball, monkeypatch
 ):
-    monkeypatch.setattr("sd2app.maps.quality.AT_ONCE", 1000)
+    for module in ("quality", "model"):
+        monkeypatch.setattr(f"sd2app.maps.{module}.AT_ONCE", 1000)
     fake.gate.clear()
     open_ball(context, qtbot, ball)
     context.span.set_span(1.0, 2.0)

@@ -19,6 +19,7 @@ from sd2app.shell.keys.model import KeyList, KeyRow
 from sd2app.shell.program import MOUSE
 from sd2app.widgets.key_text import canonical
 from sd2core.errors import Sd2Error
+from sd2core.labels.edits import Edits
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels
 from sd2core.timebase import Timebase
@@ -173,7 +174,7 @@ def test_usual_keys_are_written_as_qt_writes_them() -> None:
 @pytest.fixture
 def listed(bindings, labels) -> KeyList:
     def apply(change) -> bool:
-        labels.set_labels(change(labels.labels, Timebase.regular(10, 10.0)).labels)
+        labels.set_labels(change(Edits(labels.labels, Timebase.regular(10, 10.0))).labels)
         return True
 
     return KeyList(bindings, labels, MOUSE, apply)
