@@ -63,6 +63,10 @@ class Clip:
         """Name for messages."""
         return f"{self.subject}/{self.movement}"
 
+    def until(self, frames: int) -> Clip:
+        """Return the first frames of the clip."""
+        return replace(self, energies=self.energies[:frames], label=self.label[:frames])
+
 
 @dataclass(frozen=True, eq=False)
 class ClipSet:

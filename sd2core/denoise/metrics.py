@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from sd2core.denoise.scaling import Compression
 from sd2core.errors import Sd2Error
-from sd2core.maps import peak_velocity_mps
+from sd2core.maps import mean_velocity_mps, peak_velocity_mps
 from sd2core.numerics.map_accuracy import relative_l1
 from sd2core.sensor import VelocityAxis
 
@@ -115,6 +115,24 @@ def peak_error(
     """
     return velocity_error(
         peak_velocity_mps(estimate, axis), peak_velocity_mps(target, axis), frames
+    )
+
+
+def mean_velocity_error(
+    estimate: NDArray[np.floating],
+    target: NDArray[np.floating],
+    axis: VelocityAxis,
+    frames: NDArray[np.bool_] | None = None,
+) -> VelocityError:
+    """Error of the energy-weighted mean velocity.
+
+    Parameters
+    ----------
+    estimate, target, axis, frames
+        As for :func:`peak_error`.
+    """
+    return velocity_error(
+        mean_velocity_mps(estimate, axis), mean_velocity_mps(target, axis), frames
     )
 
 

@@ -20,9 +20,8 @@ import torch
 from torch import Tensor, nn
 
 from sd2core.denoise.causal_models import GruDenoiser
-from sd2core.denoise.metrics import map_error, peak_error, stands_out, velocity_error
+from sd2core.denoise.metrics import map_error, mean_velocity_error, peak_error, stands_out
 from sd2core.denoise.scaling import Compression, Scaling
-from sd2core.maps import mean_velocity_mps
 from sd2core.pairs.segments import cut, segment_starts
 from sd2core.pairs.store import PairSet, read_pairs
 
@@ -112,8 +111,7 @@ def measure(pairs: PairSet, scaling: Scaling, network: nn.Module | None) -> Row:
     estimate, target = np.concatenate(estimates), np.concatenate(targets)
     frames = np.concatenate(moving)
     peak = peak_error(estimate, target, pairs.axis, frames)
-    estimate_mps, target_mps = (mean_velocity_mps(one, pairs.axis) for one in (estimate, target))
-    mean = velocity_error(estimate_mps, target_mps, frames)
+    mean = mean_velocity_error(estimate, target, pairs.axis, frames)
     cells = map_error(estimate, target, Compression(1.0), pairs.null_bins)
     return Row(peak.mae_mps, peak.sd_mps, mean.mae_mps, mean.correlation, cells.relative_l1)
 
