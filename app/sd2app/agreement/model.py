@@ -90,13 +90,12 @@ class AgreementModel(ReportingModel):
     def step(self, towards: Literal[-1, 1]) -> None:
         """Go to the start of the next disagreement, or of the previous one."""
         now_s = self._playback.timebase.time_of(self._playback.frame)
-        if towards > 0:
-            ahead = [one for one in self.disagreements if one.start_s > now_s]
-        else:
-            ahead = [one for one in reversed(self.disagreements) if one.start_s < now_s]
-        if ahead:
-            self._playback.seek(ahead[0].start_s)
-            self._span.reveal(ahead[0].start_s)
+        starts_s = [one.start_s for one in self.disagreements]
+        ahead_s = [start_s for start_s in starts_s if (start_s - now_s) * towards > 0]
+        if ahead_s:
+            start_s = ahead_s[0 if towards > 0 else -1]
+            self._playback.seek(start_s)
+            self._span.reveal(start_s)
             self.changed.emit()
 
     def _receive(self, result: tuple[Path, LabelReading]) -> None:

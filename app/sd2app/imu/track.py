@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,14 +107,8 @@ _LEGEND_PX = (16, 5, 12)
 """Length of a line in the legend, room to its name, room to the next."""
 
 
-class Lane(NamedTuple):
-    """Quantity with a plot of its own."""
-
-    name: str  # of the array in the signals
-    unit: str
-
-
-LANES = (Lane("acceleration_mps2", "m/s²"), Lane("turn_rate_radps", "rad/s"))
+LANES = {"acceleration_mps2": "m/s²", "turn_rate_radps": "rad/s"}
+"""Quantities with a plot of their own: arrays of the signals, with their units."""
 
 
 class InertialTrack(TrackMouse):
@@ -143,7 +136,7 @@ class InertialTrack(TrackMouse):
         model, signals = self._model, [one for one, *_ in self._curves()]
         if signals != self._followed or not self._extents:
             self._followed = signals
-            self._extents = {lane.name: extent(signals, lane.name) for lane in LANES}
+            self._extents = {name: extent(signals, name) for name in LANES}
         self.setVisible(model.visible)
         lanes_px = len(LANES) * (_LANE_PX + _GAP_PX) - _GAP_PX + BELOW_PX
         self.setFixedHeight(HEADER_PX + (0 if model.folded else lanes_px))
@@ -203,8 +196,8 @@ class InertialTrack(TrackMouse):
         if self._model.folded:
             return
         shown = list(self._curves())
-        for number, lane in enumerate(LANES):
-            self._paint_lane(painter, self.lane_rect(number), lane, shown)
+        for number, name in enumerate(LANES):
+            self._paint_lane(painter, self.lane_rect(number), name, shown)
 
     def _paint_header(self, painter: QPainter) -> None:
         colours = self._display.palette
@@ -252,12 +245,12 @@ class InertialTrack(TrackMouse):
         self,
         painter: QPainter,
         plot: QRectF,
-        lane: Lane,
+        name: str,
         shown: list[tuple[InertialSignals, float, bool]],
     ) -> None:
         colours = self._display.palette
         painter.fillRect(plot, QColor(colours.well))
-        low, high = self._extents[lane.name]
+        low, high = self._extents[name]
         marks = scale_marks(low, high) if shown else ()
 
         def y_of(value: float) -> float:
@@ -270,7 +263,7 @@ class InertialTrack(TrackMouse):
                 style = Qt.PenStyle.DashLine if of_file else Qt.PenStyle.SolidLine
                 curves = curve_lines(
                     signals.times_s,
-                    getattr(signals, lane.name),
+                    getattr(signals, name),
                     self._span.start_s - shift_s,
                     self._span.end_s - shift_s,
                     plot.width(),
@@ -280,7 +273,7 @@ class InertialTrack(TrackMouse):
                     for x_px, heights in lines:
                         y_px = plot.bottom() - plot.height() * (heights - low) / (high - low)
                         _paint_line(painter, (plot.left() + x_px).tolist(), y_px.tolist())
-        self._paint_scale(painter, plot, lane.unit, [(one, y_of(one)) for one in marks])
+        self._paint_scale(painter, plot, LANES[name], [(one, y_of(one)) for one in marks])
 
     def _paint_scale(
         self, painter: QPainter, plot: QRectF, unit: str, marks: list[tuple[float, float]]

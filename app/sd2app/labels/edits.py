@@ -192,12 +192,9 @@ class LabelEdits(QObject):
         track = chosen[0].track if chosen else self.labels.track
         spans = self.labels.labels.of_track(track) if track else ()
         from_s = chosen[0].start_s if chosen else self._now_s
-        if towards > 0:
-            span = next((one for one in spans if one.start_s > from_s), None)
-        else:
-            span = next((one for one in reversed(spans) if one.start_s < from_s), None)
-        if span is not None:
-            self.go_to(span)
+        ahead = [one for one in spans if (one.start_s - from_s) * towards > 0]
+        if ahead:
+            self.go_to(ahead[0 if towards > 0 else -1])
 
     def go_to(self, span: Span) -> None:
         """Select a span and show its first frame."""

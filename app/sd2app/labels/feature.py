@@ -23,7 +23,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import map_overlay, strip_overlay
 from sd2app.labels.panel import LabelsPanel
 from sd2app.labels.recovery import LabelNotice, recover
-from sd2app.labels.span_buttons import Decision, SpanButtons
+from sd2app.labels.span_buttons import SpanButtons
 from sd2app.labels.timeline import LabelArea, LabelTimeline, TargetLine
 from sd2app.labels.tracks import LabelTracks, TrackMenu
 from sd2app.maps.track_mouse import TimePlot
@@ -327,7 +327,7 @@ class LabelsFeature(Feature):
         s, shell = self._session, self._shell
         panel = LabelsPanel(s, self.edits, shell)
         signs = ("✓", "accept_suggestion"), ("✗", "reject_suggestion")
-        decisions = [Decision(sign, shell.action(name)) for sign, name in signs]
+        decisions = [(sign, shell.action(name)) for sign, name in signs]
         buttons = SpanButtons(self.model, decisions)
         timeline = LabelTimeline(s, self.edits, self.dragging, self.loop, buttons)
         self._offer_places(timeline)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QAction, QColor, QKeySequence, QPainter, QPen
@@ -21,34 +20,28 @@ _TEXT_PX = 48.0
 """Width that is left to the label of a span where the buttons are on it."""
 
 
-class Decision(NamedTuple):
-    """One of the buttons: its sign, and what it does."""
-
-    sign: str
-    action: QAction
-
-
 class SpanButtons:
     """Places, looks and hits of the buttons; nowhere while not just one suggestion is selected.
 
+    Each has a sign, and what it does.
     They stand on the suggestion, or beside it where that is short, and never on another span.
     """
 
-    def __init__(self, labels: LabelsModel, decisions: Sequence[Decision]) -> None:
+    def __init__(self, labels: LabelsModel, decisions: Sequence[tuple[str, QAction]]) -> None:
         self._labels, self._decisions = labels, decisions
 
     def placed(
         self, scale: TimeScale, plot: QRectF, rows: LabelRows
-    ) -> Iterator[tuple[QRectF, Decision]]:
-        """Yield the buttons with their places."""
-        shown = [one for one in self._decisions if one.action.isEnabled()]
+    ) -> Iterator[tuple[QRectF, str, QAction]]:
+        """Yield places of the buttons with what is on them and what they do."""
+        shown = [one for one in self._decisions if one[1].isEnabled()]
         for width_px in _WIDTHS_PX if shown else ():
             step_px = width_px + _GAP_PX
             corner = self._corner(scale, plot, rows, len(shown) * step_px - _GAP_PX)
             if corner is not None:
                 for place, one in enumerate(shown):
                     left_px = corner.left() + place * step_px
-                    yield QRectF(left_px, corner.top(), width_px, corner.height()), one
+                    yield QRectF(left_px, corner.top(), width_px, corner.height()), *one
                 return
 
     def _corner(
@@ -91,19 +84,17 @@ class SpanButtons:
         self, painter: QPainter, scale: TimeScale, plot: QRectF, rows: LabelRows, palette: Palette
     ) -> None:
         """Paint the buttons: sign and key."""
-        for place, one in self.placed(scale, plot, rows):
+        for place, sign, action in self.placed(scale, plot, rows):
             painter.setPen(QPen(QColor(palette.accent), 1.0))
             painter.setBrush(QColor(palette.panel))
             painter.drawRoundedRect(place.adjusted(0.5, 0.5, -0.5, -0.5), 3.0, 3.0)
             painter.setPen(QColor(palette.text))
-            key = one.action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
+            key = action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
             roomy = len(key) == 1 and place.width() == max(_WIDTHS_PX)
-            text = f"{one.sign} {key}" if roomy else one.sign
+            text = f"{sign} {key}" if roomy else sign
             painter.drawText(place, Qt.AlignmentFlag.AlignCenter, text)
 
-    def at(
-        self, place: QPointF, scale: TimeScale, plot: QRectF, rows: LabelRows
-    ) -> Decision | None:
-        """Return the button at a place."""
-        hits = (one for box, one in self.placed(scale, plot, rows) if box.contains(place))
-        return next(hits, None)
+    def at(self, place: QPointF, scale: TimeScale, plot: QRectF, rows: LabelRows) -> QAction | None:
+        """Return what the button at a place does."""
+        placed = self.placed(scale, plot, rows)
+        return next((action for box, _, action in placed if box.contains(place)), None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, QRect, QRectF, QSize, Qt, QTimer
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QResizeEvent
+from PySide6.QtGui import QAction, QColor, QMouseEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QScrollBar, QSizePolicy, QToolTip
 
 from sd2app.labels.dragging import MOVED_PX, LabelDragging, attraction_s
@@ -13,7 +13,7 @@ from sd2app.labels.edits import LabelEdits
 from sd2app.labels.loop import SpanLoop
 from sd2app.labels.model import LabelsModel
 from sd2app.labels.painting import ROW_PX, LabelRows, lane_box, paint_span, paint_tracks
-from sd2app.labels.span_buttons import Decision, SpanButtons
+from sd2app.labels.span_buttons import SpanButtons
 from sd2app.maps.track_mouse import ZoomedPlot
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT
@@ -67,7 +67,7 @@ class LabelTimeline(ZoomedPlot):
         self._edits, self._dragging, self._loop = edits, dragging, loop
         self._labels = labels = edits.labels
         self.buttons = buttons
-        self._pressed: Decision | None = None
+        self._pressed: QAction | None = None
         self._target: HitTarget | None = None
         self._pointer_px = 0.0
         self._within_s, self._cutting = 0.0, False
@@ -199,7 +199,7 @@ class LabelTimeline(ZoomedPlot):
         pressed, self._pressed = self._pressed, None
         if pressed is not None:
             if pressed is self._button_at(event.position()):
-                pressed.action.trigger()
+                pressed.trigger()
             return
         target, self._target = self._target, None
         if self._dragging.dragging:
@@ -216,7 +216,7 @@ class LabelTimeline(ZoomedPlot):
         else:
             self.mousePressEvent(event)
 
-    def _button_at(self, place: QPointF) -> Decision | None:
+    def _button_at(self, place: QPointF) -> QAction | None:
         return self.buttons.at(place, self.scale, self.plot_rect(), self.rows)
 
     def _click(self, target: HitTarget, modifiers: Qt.KeyboardModifier) -> None:
@@ -266,10 +266,10 @@ class LabelTimeline(ZoomedPlot):
         self._target = self._target._replace(x_px=self._target.x_px - moved_px)
         self._drag()
 
-    def _show_target(self, target: HitTarget | None, button: Decision | None) -> None:
+    def _show_target(self, target: HitTarget | None, button: QAction | None) -> None:
         if button is not None:
             self.setCursor(Qt.CursorShape.ArrowCursor)
-            self.setToolTip(f"{button.action.text().replace('&', '')}\n{button.action.toolTip()}")
+            self.setToolTip(f"{button.text().replace('&', '')}\n{button.toolTip()}")
             return
         shapes = {
             "start": Qt.CursorShape.SizeHorCursor,

@@ -288,7 +288,7 @@ def buttons_of(window) -> dict[str, QRect]:
     """Places of the buttons on the selected suggestion, by their signs."""
     view = hands.timeline(window)
     placed = view.buttons.placed(view.scale, view.plot_rect(), view.rows)
-    return {one.sign: place.toAlignedRect() for place, one in placed}
+    return {sign: place.toAlignedRect() for place, sign, _ in placed}
 
 
 def boxes_of_others(window) -> list[QRectF]:
