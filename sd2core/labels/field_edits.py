@@ -267,6 +267,8 @@ def remove_label(labels: Labels, name: str, instead: str | None = None) -> Edit:
 
 def _renamed(labels: Labels, field: str, names: Mapping[str, str]) -> tuple[Span, ...]:
     """All spans, those with a field of an old name with the new one."""
+    if all(old == new for old, new in names.items()):
+        return labels.spans
     spans: list[Span] = []
     for span in labels.spans:
         old = getattr(span, field)

@@ -55,7 +55,7 @@ class ImuModel(ReportingModel):
         self._chosen: str | None = None
         self._request = _Request(None, (), None)
         self._known: dict[str, InertialSignals] = {}
-        self._read: tuple[Path, InertialSignals | None] | None = None  # None: being read, or not
+        self._read: Path | None = None  # file that is read, or being read
         self._runner = ListedRunner("inertial sensor", session.jobs, self, self._receive)
         self._runner.failed.connect(lambda error: self._say_problem(str(error)))
         self._runner.partial.connect(self._take_seats)
@@ -231,24 +231,20 @@ class ImuModel(ReportingModel):
 
     def _follow_file(self) -> None:
         path = self.file
-        if path == (None if self._read is None else self._read[0]):
+        if path == self._read:
             if self.measured is not None:
                 self.changed.emit()  # its offset
             return
-        self.measured = None
-        if path is None:
-            self._read = None
-            self._reader.cancel()
-        else:
-            self._read = (path, None)
-            # One that is missing was named when the recording was opened.
-            if path.exists():
-                self._reader.submit(lambda emit: (path, read_signals(path)))
+        self._read, self.measured = path, None
+        self._reader.cancel()
+        # One that is missing was named when the recording was opened.
+        if path is not None and path.exists():
+            self._reader.submit(lambda emit: (path, read_signals(path)))
         self.changed.emit()
 
     def _take_file(self, read: tuple[Path, InertialSignals]) -> None:
-        self._read = read
-        self.measured = signals = read[1]
+        self._read, signals = read
+        self.measured = signals
         for finding in judge_inertial(
             signals.times_s, signals.acceleration_mps2, signals.turn_rate_radps
         ):
