@@ -244,20 +244,10 @@ def action_button(action: QAction, text: str, *, outlined: bool = False) -> QToo
     """A button for an action; it keeps its short text, the menu has the full one."""
     button = QToolButton()
     button.setObjectName("outlined" if outlined else "")
-    button.setText(text)
     button.setAccessibleName(text)
-    button.setToolTip(action.toolTip())
     button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-    button.setCheckable(action.isCheckable())
-    button.setEnabled(action.isEnabled())
-    button.clicked.connect(action.trigger)
-
-    def follow() -> None:
-        button.setEnabled(action.isEnabled())
-        button.setChecked(action.isChecked())
-        button.setToolTip(action.toolTip())
-
-    action.changed.connect(follow)
+    action.setIconText(text)
+    button.setDefaultAction(action)
     return button
 
 
