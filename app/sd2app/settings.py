@@ -47,20 +47,17 @@ class Settings:
         groups = [paths, *(known for known in self.recent if known != paths)]
         self.set_paths("recent", [Path("\n".join(map(str, one))) for one in groups[:MAX_RECENT]])
 
-    def flag(self, name: str, default: bool) -> bool:
-        """Boolean, which may have been stored as text."""
-        value = self._store.value(name)
-        return default if value is None else str(value).lower() == "true"
-
     def choice(self, name: str) -> bool | None:
         """Boolean that the user chose; None where the user left it open."""
-        return None if self._store.value(name) is None else self.flag(name, False)
+        return None if self._store.value(name) is None else self.stored(name, False)
 
     def stored(self, name: str, default: T) -> T:
         """A value of the default's type; the default where what is stored is none."""
-        value = self._store.value(name)
+        value, kind = self._store.value(name), type(default)
+        if kind is bool and value is not None:
+            value = str(value).lower() == "true"  # it may have been stored as text
         try:
-            return default if value is None else type(default)(value)  # type: ignore[call-arg]
+            return default if value is None else kind(value)  # type: ignore[call-arg]
         except (TypeError, ValueError):
             return default
 
@@ -146,10 +143,7 @@ class StoredChoices:
         self._settings, self._place = settings, place
         self.defaults = dict(defaults)
         self._values = {
-            name: settings.flag(f"{place}/{name}", default)
-            if isinstance(default, bool)
-            else settings.stored(f"{place}/{name}", default)
-            for name, default in defaults.items()
+            name: settings.stored(f"{place}/{name}", default) for name, default in defaults.items()
         }
         for name, values in (known or {}).items():
             if self._values[name] not in values:

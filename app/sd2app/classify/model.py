@@ -69,13 +69,13 @@ class ClassifyModel(ReportingModel, SpanFinder):
         # The classifier that is in use or being loaded, and the card of the one in use.
         self.path: Path | None = next(iter(self._settings.paths(_MODEL)), None)
         self.card: ClassifierCard | None = None
-        chosen = self.path is not None or self._settings.flag(_NONE, False)
+        chosen = self.path is not None or self._settings.stored(_NONE, False)
         usual = None if chosen else library.named(GESTURES)
         if usual is not None:
             self.path, self.card = usual.path, usual
         self._problem = ""
         # Under the maps, as the user wants it.
-        self.shown = self._settings.flag(_SHOWN, usual is None)
+        self.shown = self._settings.stored(_SHOWN, usual is None)
         # The bundled one is loaded once it is asked for.
         self._asleep = usual is not None and not self.shown
         self._runner = LatestRunner("classifier", self, self._set_loaded, self._fail)

@@ -67,7 +67,7 @@ class DenoiseModel(ReportingModel):
         self._before: RemoteDenoiser | None = None
         self._comparing = False
         self.textured, self.live = (  # by the user
-            session.settings.flag(name, False) for name in (_TEXTURED, _LIVE)
+            session.settings.stored(name, False) for name in (_TEXTURED, _LIVE)
         )
         self._awake = False
         self._splits = True  # False once it is known that the mesh's parts are not

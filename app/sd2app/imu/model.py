@@ -51,7 +51,7 @@ class ImuModel(ReportingModel):
         self.measured: InertialSignals | None = None  # of the real one, on its own clock
         self.problem = ""  # why the current sensor has no signals
         self.vertices: Mapping[str, int] = {}  # that sensors sit on, by their places
-        self.folded = session.settings.flag(_FOLDED, False)
+        self.folded = session.settings.stored(_FOLDED, False)
         self._chosen: str | None = None
         self._request = _Request(None, (), None)
         self._known: dict[str, InertialSignals] = {}

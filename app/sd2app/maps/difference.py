@@ -29,7 +29,7 @@ class DifferenceModel(QObject):
         super().__init__(parent)
         self.denoised, self.real = session.maps.denoised, session.maps.real
         self._session = session
-        self.wanted = session.settings.flag(_SHOWN, False)  # by the user
+        self.wanted = session.settings.stored(_SHOWN, False)  # by the user
         self._state = self.wanted, self.why_not
         self._gain: float | None = None
         for signal in (self.denoised.changed, self.real.changed, session.display.levels_changed):

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeVar
 
 from PySide6.QtCore import QByteArray, QObject, Signal
 
 from sd2app.palette import Palette, palette_for
 from sd2app.settings import Settings
+
+T = TypeVar("T")
 
 MeshColour = Literal["velocity", "range", "visibility", "plain"]
 Scale = Literal["dB", "linear"]
@@ -144,19 +146,15 @@ class Layouts(QObject):
 
     def shows(self, pane: str) -> bool:
         """True where the layout has a pane."""
-        return self.flag(pane, pane in self.usual.panes)
+        return self.kept(pane, pane in self.usual.panes)
 
     def show(self, pane: str, shown: bool) -> None:
         """Give the layout a pane, or take it away."""
         self.keep(pane, shown)
         self.panes_changed.emit()
 
-    def flag(self, name: str, usual: bool) -> bool:
+    def kept(self, name: str, usual: T) -> T:
         """What is kept for the layout under a name."""
-        return self._settings.flag(self._place(name), usual)
-
-    def text(self, name: str, usual: str) -> str:
-        """Text that is kept for the layout under a name."""
         return self._settings.stored(self._place(name), usual)
 
     def keep(self, name: str, value: bool | str) -> None:

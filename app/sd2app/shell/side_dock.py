@@ -68,10 +68,10 @@ class SideDock(QObject):
     def restore(self) -> None:
         """Open the panel that the layout had, or none."""
         layouts = self._layouts
-        shown = layouts.text(_SHOWN, layouts.usual.panel)
+        shown = layouts.kept(_SHOWN, layouts.usual.panel)
         with QSignalBlocker(self._side):  # widths are to stay what was chosen
             self._side.bring_up(shown if shown in self._side.names else layouts.usual.panel)
-            self._side.set_folded(layouts.flag(_FOLDED, layouts.usual.folded))
+            self._side.set_folded(layouts.kept(_FOLDED, layouts.usual.folded))
         self._shown = self._side.shown
         self._widen()
 

@@ -219,7 +219,7 @@ def test_playing_live_shows_frames_as_the_clock_reaches_them(denoised, fake_mode
     assert c.denoised.covered is None
     assert "live" not in c.denoised.status
     np.testing.assert_allclose(c.denoised.map.values, whole, rtol=1e-5, atol=1e-9)
-    assert c.settings.flag("denoise_live", False)
+    assert c.settings.stored("denoise_live", False)
 
 
 @pytest.mark.slow

@@ -90,7 +90,7 @@ def test_it_follows_the_sensor_and_is_remembered(fitted, qtbot):
         qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
         wait(fitted, qtbot)
         assert button.isChecked() == checked
-    assert c.settings.flag("uncertain_cells", False)
+    assert c.settings.stored("uncertain_cells", False)
     ahead = c.synthetic.uncertainty
     # From aside, across the camera's view, velocities are known well.
     c.edits.place_sensor(VirtualSensor(position_m=(2.0, 0.0, 2.0)), "Move sensor")
