@@ -368,15 +368,35 @@ class RunMonitor(QObject, Generic[F]):
 
 
 class CommandRun(RunMonitor[CommandFolder]):
-    """A command of ``sd2`` under way, or one that has ended."""
+    """A command of ``sd2`` under way, or one that has ended.
+
+    Its ``facts`` are whether there is a result.
+    """
 
     folders = CommandFolder
+    result_name: ClassVar[str] = ""
+    """Of the file that is its result; empty where there is none."""
+    facts: Any = False
 
     def __init__(
         self, path: Path, parent: QObject | None = None, *, process: ProcessId | None = None
     ) -> None:
         self.about = CommandFolder(path).facts  # as noted at the start
         super().__init__(path, parent, process=process)
+
+    @property
+    def out(self) -> Path:
+        """Where it puts what it makes."""
+        return Path(str(self.about.get("out", self.path)))
+
+    @property
+    def result(self) -> Path | None:
+        """What it made; None where there is nothing yet."""
+        return self.out / self.result_name if self.facts else None
+
+    def inspect(self) -> Any:
+        """Look for a result."""
+        return bool(self.result_name) and (self.out / self.result_name).is_file()
 
 
 def _is_begun_by(process: ProcessId | None, launched: ProcessId) -> bool:

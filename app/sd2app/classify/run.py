@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
 from sd2app.background.run_monitor import CommandRun
@@ -65,13 +64,4 @@ class ClassRun(CommandRun):
 
     histories = ClassHistory
     history: ClassHistory
-    facts = False  # there is a model
-
-    @property
-    def result(self) -> Path | None:
-        """The model; None where there is none."""
-        return self.path / MODEL_NAME if self.facts else None
-
-    def inspect(self) -> bool:
-        """Check for a model."""
-        return (self.path / MODEL_NAME).is_file()
+    result_name = MODEL_NAME

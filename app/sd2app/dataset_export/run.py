@@ -44,8 +44,3 @@ class ExportRun(CommandRun):
 
     histories = ExportHistory
     history: ExportHistory
-
-    @property
-    def out(self) -> Path:
-        """The data set."""
-        return Path(str(self.about.get("out", "data set")))

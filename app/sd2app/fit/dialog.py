@@ -3,7 +3,17 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, QSignalBlocker, QSize, Qt
-from PySide6.QtGui import QColor, QIcon, QImage, QMouseEvent, QPainter, QPainterPath, QPen, QPixmap
+from PySide6.QtGui import (
+    QColor,
+    QIcon,
+    QImage,
+    QMouseEvent,
+    QPainter,
+    QPainterPath,
+    QPen,
+    QPixmap,
+    QTransform,
+)
 from PySide6.QtWidgets import QLabel, QListWidget, QListWidgetItem, QSizePolicy, QWidget
 
 from sd2app.fit.setup import DEFAULT_STATURE_M, PICTURE_PX, FitSetupModel, Portrait
@@ -52,15 +62,17 @@ class PersonPicker(Canvas):
         self.follow(setup.changed, setup.picture_changed)
 
     @property
+    def _placed(self) -> QTransform:
+        """From pixels of the picture to those of the widget."""
+        width, height = self.setup.size or (1, 1)
+        scale = min(self.width() / width, self.height() / height)
+        left, top = (self.width() - width * scale) / 2, (self.height() - height * scale) / 2
+        return QTransform.fromTranslate(left, top).scale(scale, scale)
+
+    @property
     def box(self) -> QRectF:
         """Rectangle of the picture."""
-        size = self.setup.size
-        if size is None:
-            return QRectF()
-        scale = min(self.width() / size[0], self.height() / size[1])
-        box = QRectF(0, 0, size[0] * scale, size[1] * scale)
-        box.moveCenter(QRectF(self.rect()).center())
-        return box
+        return self._placed.mapRect(QRectF(0, 0, *(self.setup.size or (0, 0))))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Set a corner of the rectangle."""
@@ -81,18 +93,12 @@ class PersonPicker(Canvas):
         corner, self._from = self._from, None
         end = event.position()
         self.update()
-        box, size = self.box, self.setup.size
-        if size is None:
-            return
         if (end - corner).manhattanLength() < 6:
             self.setup.change(person=None)
             return
-        scale = size[0] / box.width()
-        (x0, y0), (x1, y1) = (
-            ((point.x() - box.x()) * scale, (point.y() - box.y()) * scale)
-            for point in (corner, end)
-        )
-        self.setup.set_person(x0, y0, x1, y1)
+        there, _ = self._placed.inverted()
+        begun, ended = there.map(corner), there.map(end)
+        self.setup.set_person(begun.x(), begun.y(), ended.x(), ended.y())
 
     def paint(self, painter: QPainter) -> None:
         """Paint the picture, dimmed outside the rectangle."""
@@ -129,17 +135,10 @@ class PersonPicker(Canvas):
         """Rectangle on the widget: the one being drawn, else the chosen one."""
         if self._from is not None:
             return QRectF(self._from, self._to).normalized().intersected(self.box)
-        person, size = self.setup.choices.person, self.setup.size
-        if person is None or size is None:
+        person = self.setup.choices.person
+        if person is None or self.setup.size is None:
             return None
-        box = self.box
-        scale = box.width() / size[0]
-        return QRectF(
-            box.x() + person.x * scale,
-            box.y() + person.y * scale,
-            person.width * scale,
-            person.height * scale,
-        )
+        return self._placed.mapRect(QRectF(*person.box))
 
 
 class PeopleList(QListWidget):

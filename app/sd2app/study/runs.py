@@ -40,17 +40,7 @@ class StudyRun(CommandRun):
 
     histories = StudyHistory
     history: StudyHistory
-    facts = False  # there is a result
-
-    @property
-    def out(self) -> Path:
-        """Folder of what it found."""
-        return Path(str(self.about.get("out", self.path / TABLE_NAME)))
-
-    @property
-    def result(self) -> Path | None:
-        """What it found; None where there is nothing yet."""
-        return self.out / RESULT_NAME if self.facts else None
+    result_name = RESULT_NAME
 
     @cached_property
     def _conclusion(self) -> str:
@@ -64,10 +54,6 @@ class StudyRun(CommandRun):
     def conclusion(self) -> str:
         """Sentence of its page; empty without one."""
         return "" if self.result is None else self._conclusion
-
-    def inspect(self) -> bool:
-        """Check for a result."""
-        return (self.out / RESULT_NAME).is_file()
 
 
 class StudyRuns(Runs[StudyRun]):
