@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QPixmap
 from PySide6.QtWidgets import QFileDialog, QLabel, QLineEdit, QProgressBar, QScrollArea, QWidget
 
 from sd2app.dataset_export.model import MAPS, ExportModel
-from sd2app.dataset_export.text import inertial_words, label_words, size_words, split_words
 from sd2app.manual.help import help_button
 from sd2app.widgets.dialogs import Dialog, ask_folder, take_room, with_suffix
 from sd2app.widgets.inputs import CheckBox, Choice, option_box
@@ -28,11 +29,15 @@ from sd2app.widgets.text import counted
 from sd2core.cli.export import Export
 from sd2core.recording.recording import is_recording
 
+if TYPE_CHECKING:
+    from sd2core.datasets.forecast import Forecast
+
 _FORMATS = {
     ".zarr": "Zarr: a folder, read in parts",
     ".h5": "HDF5: one file, read in parts",
     ".npz": "NPZ: one file, read whole; for small sets",
 }
+_MAX_NAMED = 4
 _SIZE_PX = (680, 360)
 _SHEET_PX = 940
 """Width of the preview sheet."""
@@ -272,3 +277,51 @@ class ExportDialog(Dialog):
         result = self._model.result
         if result is not None:
             QDesktopServices.openUrl(QUrl.fromLocalFile(str(result.path.absolute().parent)))
+
+
+def size_words(forecast: Forecast, length: int) -> str:
+    """Size in words: ``24 segments of 2.4 s from 3 views · 0.7 MB before compression``."""
+    seconds = length / forecast.frame_rate_hz
+    segments, views = counted(forecast.segments, "segment"), counted(forecast.sources, "view")
+    size = bytes_words(forecast.total_bytes)
+    return f"{segments} of {seconds:.1f} s from {views} · {size} before compression"
+
+
+def label_words(forecast: Forecast) -> str:
+    """Number of segments of each label."""
+    named = " · ".join(f"{name} {count:,}" for name, count in forecast.of_label.items())
+    return f"Labels: {named}" if named else ""
+
+
+def split_words(forecast: Forecast) -> str:
+    """Number of segments and people of each split."""
+    if not (forecast.split.validation or forecast.split.test):
+        who = _named(forecast.split.training)
+        return f"Split: all {forecast.segments:,} to train ({who}); none to validate or test on"
+    people = {
+        "train": forecast.split.training,
+        "validation": forecast.split.validation,
+        "test": forecast.split.test,
+    }
+    return "Split: " + " · ".join(
+        f"{name} {count:,} ({_named(people[name])})" for name, count in forecast.of_split().items()
+    )
+
+
+def inertial_words(places: Sequence[str]) -> str:
+    """Places of inertial sensors that can be exported: ``at head, left wrist``."""
+    names = [place.replace("-", " ") for place in places]
+    more = len(names) - _MAX_NAMED
+    listed = ", ".join(names[:_MAX_NAMED]) + (f" and {more} more" if more > 0 else "")
+    return f"at {listed}" if names else "none placed"
+
+
+def bytes_words(count: int) -> str:
+    """Size of a file, such as ``1.2 MB``."""
+    return f"{count / 1e9:,.1f} GB" if count >= 1e9 else f"{count / 1e6:,.1f} MB"
+
+
+def _named(people: tuple[str, ...]) -> str:
+    if not people:
+        return "no person"
+    return ", ".join(people) if len(people) <= 3 else f"{len(people)} people"

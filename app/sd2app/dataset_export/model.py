@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from pydantic import TypeAdapter
 from PySide6.QtCore import QObject
 
 from sd2app.background.latest import Emit, LatestRunner
 from sd2app.background.quoting import quoted
+from sd2app.background.run_monitor import CommandRun, History
 from sd2app.background.runs import Runs, free_folder
-from sd2app.dataset_export.run import Exported, ExportRun
 from sd2app.session.tasks import Job, TaskList
 from sd2app.settings import Settings
 from sd2app.widgets.text import about, counted
@@ -46,6 +46,43 @@ class _Counted(NamedTuple):
     counting: Counting
     forecast: Forecast
     pace: Kind
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A finished data set."""
+
+    path: Path
+    card: Path
+    sheet: Path
+    segments: int
+    sources: int
+    left_out: tuple[str, ...] = ()  # sources that could not be made, each with its reason
+
+
+class ExportHistory(History):
+    """Steps of an export, none while the preview sheet is drawn, and the data set at its end."""
+
+    written: Exported | None = None
+
+    def _done(self, event: dict[str, Any]) -> None:
+        self.written = Exported(
+            Path(event["dataset"]),
+            Path(event["card"]),
+            Path(event["sheet"]),
+            int(event["segments"]),
+            int(event["sources"]),
+            tuple(map(str, event["failed"])),
+        )
+
+    readers: ClassVar = {**History.readers, "done": _done}
+
+
+class ExportRun(CommandRun):
+    """An export; its folder is that of the command, not the data set."""
+
+    histories = ExportHistory
+    history: ExportHistory
 
 
 class ExportModel(Runs[ExportRun]):

@@ -20,8 +20,8 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QScrollBar, QWidget
 
-from sd2app.live.guided import GuidedModel
-from sd2app.live.guided_text import (
+from sd2app.live.guided import (
+    GuidedModel,
     asks_consent,
     count_text,
     detail,

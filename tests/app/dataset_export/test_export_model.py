@@ -14,15 +14,14 @@ from PySide6.QtCore import QObject
 from swinging_recordings import recording
 from turning_bodies import turning_body
 
-from sd2app.dataset_export.model import MAPS, ExportModel
-from sd2app.dataset_export.run import Exported, ExportRun
-from sd2app.dataset_export.text import (
+from sd2app.dataset_export.dialog import (
     bytes_words,
     inertial_words,
     label_words,
     size_words,
     split_words,
 )
+from sd2app.dataset_export.model import MAPS, Exported, ExportModel, ExportRun
 from sd2app.session.tasks import TaskList
 from sd2core.errors import Sd2Error
 from sd2core.imu.mounting import PLACES

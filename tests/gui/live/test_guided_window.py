@@ -12,8 +12,14 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QScrollArea, QToolButton
 
 from sd2app.live.dialog import ListenDialog
-from sd2app.live.guided import GuidedModel, Step
-from sd2app.live.guided_text import count_text, detail, headline, progress_text
+from sd2app.live.guided import (
+    GuidedModel,
+    Step,
+    count_text,
+    detail,
+    headline,
+    progress_text,
+)
 from sd2app.live.prompt_window import PromptWindow, has_picture
 from sd2app.live.setup import ListenRequest, ListenSetup
 from sd2app.settings import Settings
