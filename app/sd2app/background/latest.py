@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from functools import partial
+from queue import SimpleQueue
 from typing import Any
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
@@ -49,9 +50,8 @@ class LatestRunner(QObject):
     ) -> None:
         super().__init__(parent)
         self._name = name
-        self._wakeup = threading.Condition()
         self._revision = 0
-        self._pending: tuple[int, Task] | None = None
+        self._asked = SimpleQueue[tuple[int, Task] | None]()
         self._closed = False
         self.busy = False  # true while the newest request waits for its result
         self._thread: threading.Thread | None = None
@@ -61,48 +61,35 @@ class LatestRunner(QObject):
         if refuse is not None:
             self.failed.connect(refuse)
 
-    def submit(self, task: Task) -> int:
-        """Ask for ``task(emit)`` in the background; returns its revision number."""
-        with self._wakeup:
-            if self._closed:
-                return self._revision
-            self._revision += 1
-            revision = self._revision
-            self._pending = (revision, task)
-            self._wakeup.notify()
+    def submit(self, task: Task) -> None:
+        """Ask for ``task(emit)`` in the background."""
+        if self._closed:
+            return
+        self._revision += 1
+        self._asked.put((self._revision, task))
         if self._thread is None:
             self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
             self._thread.start()
         self._set_busy(True)
-        return revision
 
     def cancel(self) -> None:
         """Drop the running and the waiting task; nothing of them is delivered."""
-        with self._wakeup:
-            self._revision += 1
-            self._pending = None
+        self._revision += 1
         self._set_busy(False)
 
     def close(self, timeout_s: float = 5.0) -> None:
         """Cancel, and wait until the thread has left its task."""
-        with self._wakeup:
-            self._closed = True
-            self._revision += 1
-            self._pending = None
-            self._wakeup.notify()
+        self._closed = True
+        self._revision += 1
+        self._asked.put(None)
         if self._thread is not None:
             self._thread.join(timeout_s)
         self._set_busy(False)
 
     def _run(self) -> None:
-        while True:
-            with self._wakeup:
-                while self._pending is None and not self._closed:
-                    self._wakeup.wait()
-                if self._pending is None:
-                    return
-                revision, task = self._pending
-                self._pending = None
+        for revision, task in iter(self._asked.get, None):
+            if revision != self._revision:
+                continue  # a newer one waits
             try:
                 self._post(revision, "finished", task(partial(self._emit, revision)))
             except Cancelled:
@@ -124,6 +111,7 @@ class LatestRunner(QObject):
         except RuntimeError:
             # The window is gone and takes no results.
             self._closed = True
+            self._asked.put(None)
 
     def _deliver(self, revision: int, what: str, value: object) -> None:
         if revision != self._revision:

@@ -84,16 +84,15 @@ class ListedRunner(LatestRunner):
         self.partial.connect(self._report)
         self.idle_changed.connect(lambda idle: self._end() if idle else None)
 
-    def submit(self, task: Task, title: str = "") -> int:
+    def submit(self, task: Task, title: str = "") -> None:
         """Ask for ``task(emit)`` in the background, in place of the one before."""
         self._end()
         if title:
             self.job = Job(title, self._cancel)
             self._tasks.add(self.job)
-        revision = super().submit(task)
+        super().submit(task)
         if not self.busy:
             self._end()  # closed
-        return revision
 
     def _report(self, result: object) -> None:
         if self.job is not None and isinstance(result, tuple):
