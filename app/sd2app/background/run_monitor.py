@@ -154,8 +154,7 @@ class RunMonitor(QObject, Generic[F]):
         self.text = ""  # why it failed
         self._has_begun = False
         self._request: Command | None = None
-        self._cancelled_s: float | None = None
-        self._stopped_s: float | None = None
+        self._asked_s = 0.0  # time of the request
         self._looker = LatestRunner("run", self, self._take, self._fail)
         self._timer = QTimer(self)
         self._timer.timeout.connect(self.poll)
@@ -183,15 +182,7 @@ class RunMonitor(QObject, Generic[F]):
     @property
     def phase(self) -> Phase:
         """Current phase; an order that was just given counts at once."""
-        if self._phase not in UNDER_WAY or self._request is None:
-            return self._phase
-        if self._request == "cancel":
-            return "cancelling"
-        if self._request == "stop":
-            return "stopping"
-        if self._request == "pause":
-            return self._phase if self._phase == "paused" else "pausing"
-        return "resuming" if self._phase in ("paused", "pausing") else self._phase
+        return self._phase
 
     @property
     def under_way(self) -> bool:
@@ -202,15 +193,14 @@ class RunMonitor(QObject, Generic[F]):
 
     def tell(self, word: Command) -> None:
         """Give the process an order, or raise OSError; only a cancel may follow a stop."""
-        if not self.under_way or (self._request in ("stop", "cancel") and word != "cancel"):
+        if not self.under_way or word == self._request:
+            return
+        if self._request in ("stop", "cancel") and word != "cancel":
             return
         if word == "stop" and self.history.saving:
             return
-        self._request = word
-        if word == "cancel" and self._cancelled_s is None:
-            self._cancelled_s = self._clock_s()
-        elif word == "stop":
-            self._stopped_s = self._clock_s()
+        self._request, self._asked_s = word, self._clock_s()
+        self._phase = self._phase_under_way(word)
         if self.path.is_dir():
             write_control(self.folder.control, word)
         elif word in ("stop", "cancel") and self._launched is not None:
@@ -287,11 +277,12 @@ class RunMonitor(QObject, Generic[F]):
 
     def _phase_of(self, status: _Status) -> Phase:
         if status.live:
-            return self._phase_under_way(status.word)
+            return self._phase_under_way(self._request or status.word)
         ended = status.state in ("finished", "stopped", "failed", "cancelled")
         if status.launching and not (self._has_begun and ended):
             # It is taking its folder while one looks, or about to exit.
-            return self._phase if self._has_begun else "starting"
+            is_told = self._request in ("stop", "cancel")
+            return self._phase if self._has_begun or is_told else "starting"
         if self._request == "cancel":
             # It may have ended before it could clear up.
             self.folder.discard()
@@ -309,12 +300,12 @@ class RunMonitor(QObject, Generic[F]):
         return "died"
 
     def _phase_under_way(self, word: Command) -> Phase:
-        if not self.history.begun:
-            return "starting"
         if word == "cancel":
             return "cancelling"
         if word == "stop":
             return "stopping"
+        if not self.history.begun:
+            return "starting"
         if self.history.paused:
             return "paused" if word == "pause" else "resuming"
         return "pausing" if word == "pause" else "running"
@@ -329,17 +320,16 @@ class RunMonitor(QObject, Generic[F]):
                 write_control(self.folder.control, self._request)
         elif not status.live and self._request in ("stop", "cancel") and self._launched is not None:
             self._launched.terminate()
-        if self._phase == {"run": "running", "pause": "paused"}.get(self._request):
+        elif self._phase == {"run": "running", "pause": "paused"}.get(self._request):
             self._request = None
         process = status.process if status.live else self._launched
-        if self._stopped_s is not None and self.stop_patience_s is not None:
-            waited_s = self._clock_s() - self._stopped_s
-            if waited_s > self.stop_patience_s and process is not None:
-                process.terminate(at_once=True)
-        if self._cancelled_s is not None:
-            waited_s = self._clock_s() - self._cancelled_s
-            if waited_s > _ASK_AGAIN_S and process is not None:
-                process.terminate(at_once=waited_s > _GIVE_UP_S)
+        if process is None:
+            return
+        waited_s, patience_s = self._clock_s() - self._asked_s, self.stop_patience_s
+        if self._request == "stop" and patience_s is not None and waited_s > patience_s:
+            process.terminate(at_once=True)
+        elif self._request == "cancel" and waited_s > _ASK_AGAIN_S:
+            process.terminate(at_once=waited_s > _GIVE_UP_S)
 
     def _settle(self) -> None:
         """Take over another phase."""
