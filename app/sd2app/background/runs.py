@@ -157,6 +157,11 @@ class Runs(QObject, Generic[Run]):
         elif self.run is None or self.run.path != path:
             self.follow(self.monitor(path, self))  # type: ignore[arg-type]
 
+    def open_run(self, path: Path) -> None:
+        """Show a run of another folder, such as a terminal's; Sd2Error if there is none."""
+        self.monitor.folders(path).about()
+        self.select(path)
+
     def start_command(self, path: Path, words: Sequence[str], **about: Any) -> None:
         """Start an ``sd2`` command in a folder, and show it.
 

@@ -111,11 +111,6 @@ class BatchModel(Runs[BatchMonitor]):
         """Folder of the last batch, which may lie anywhere."""
         return (Path(self._last),) if self._last else ()
 
-    def open_batch(self, path: Path) -> None:
-        """Show a batch of another folder, such as a terminal's; Sd2Error if there is none."""
-        BatchFolder(path).about()
-        self.select(path)
-
     @property
     def replaces(self) -> bool:
         """True if the folder of the results holds those of other recordings, which would go."""

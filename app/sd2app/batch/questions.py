@@ -201,7 +201,7 @@ class BatchQuestions(QObject):
     def open_batch(self) -> None:
         """Let the user choose a batch in another folder, such as one started in a terminal."""
         if path := ask_folder(self._over, "Folder of a batch"):
-            self._attempt(lambda: self._batch.open_batch(path))
+            self._attempt(lambda: self._batch.open_run(path))
 
     def resume(self) -> None:
         """Resume the batch in view."""

@@ -92,11 +92,6 @@ class TrainingModel(Runs[TrainingMonitor]):
 
     # --- one run after another ------------------------------------------------------------
 
-    def open_run(self, path: Path) -> None:
-        """Show a run of another folder; Sd2Error if there is none."""
-        TrainingFolder(path).state()
-        self.select(path)
-
     def start(self) -> None:
         """Begin as set up; Sd2Error if it cannot start, OSError if its folder cannot be made."""
         if self.why_not_start:
@@ -105,13 +100,6 @@ class TrainingModel(Runs[TrainingMonitor]):
         self._folder.mkdir(parents=True, exist_ok=True)
         path = _new_run(self._folder, config)
         self._launch(path, train_arguments(config, path))
-
-    def make_pairs(self, place: Path) -> None:
-        """Make pairs of a recording, or of those in a folder, for the input that is set up.
-
-        Raises what :meth:`PairMaker.make` does.
-        """
-        self.pair_maker.make(place, limbs=bool(self.setup.parts))
 
     def resume(self) -> None:
         """Go on with the run in view where it ended; raises what :meth:`start` does."""

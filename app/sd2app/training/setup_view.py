@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from PySide6.QtWidgets import QGridLayout, QWidget
 
 from sd2app.feature import Shell
@@ -159,10 +161,14 @@ class TrainingSetupView(TrainingForm):
         return "Save the recording first" if unsaved else ""
 
     def _make_of_this(self) -> None:
-        recording = self._document.recording
-        if recording is not None:
-            self._shell.attempt(lambda: self._training.make_pairs(recording.folder))
+        if (recording := self._document.recording) is not None:
+            self._make_of(recording.folder)
 
     def _ask_recordings(self) -> None:
         if path := ask_folder(self._shell.dialog_parent, "A recording, or a folder of some"):
-            self._shell.attempt(lambda: self._training.make_pairs(path))
+            self._make_of(path)
+
+    def _make_of(self, place: Path) -> None:
+        """Make pairs of a recording, or of those in a folder, for the input that is set up."""
+        limbs = bool(self._pairs.parts)
+        self._shell.attempt(lambda: self._training.pair_maker.make(place, limbs=limbs))

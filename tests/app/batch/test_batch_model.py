@@ -373,10 +373,10 @@ def test_two_are_not_started_in_one_folder(qtbot, made, meshes, tmp_path):
     qtbot.waitUntil(lambda: not model.why_not_start, timeout=20_000)
     with pytest.raises(Sd2Error, match="A process is at work"):
         model.start()
-    model.open_batch(meshes[0].parent / "ann batch")
+    model.open_run(meshes[0].parent / "ann batch")
     until(qtbot, model, "running")
     with pytest.raises(Sd2Error, match="no folder of a batch"):
-        model.open_batch(tmp_path)
+        model.open_run(tmp_path)
 
 
 def test_a_batch_that_was_deleted_is_looked_at_no_more(qtbot, made, meshes):
