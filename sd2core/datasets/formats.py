@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from sd2core.datasets.layout import (
     FORMAT,
     VERSION,
-    FileFormat,
     Header,
     bytes_per_segment,
     check_arrays,
@@ -46,37 +45,6 @@ def refuse_large_npz(out: Path, segments: int, header: Header) -> None:
             f"up to {NPZ_LIMIT_BYTES / 1e9:.1f} GB in an .npz, which is read whole",
             "Write it as .zarr or .h5, which are read in parts",
         )
-
-
-def write_packed(
-    out: Path,
-    form: FileFormat,
-    header: Header,
-    arrays: dict[str, Any],
-    sources: Iterable[dict[str, Any]],
-    progress: Progress = silent,
-) -> None:
-    """Write a data set as one file, in one step.
-
-    Parameters
-    ----------
-    out : Path
-        File to write.
-    form : {"hdf5", "npz"}
-        HDF5 is written in parts, an NPZ from memory.
-    header : Header
-        Description, which says what arrays there are.
-    arrays : dict
-        Arrays of Zarr or h5py by name, (segments, …).
-    sources : iterable of dict
-        Lines of the sources.
-    progress : Progress
-        Counts rows of all arrays of an HDF5; may raise Cancelled.
-    """
-    if form == "npz":
-        _write_npz(out, header, arrays, sources)
-    else:
-        _write_hdf5(out, header, arrays, sources, progress)
 
 
 class Hdf5Rows:
@@ -163,9 +131,22 @@ def hdf5_sources(file: Any, path: Path) -> Iterator[dict[str, Any]]:
             yield _json(line.decode("utf-8"), path)
 
 
-def _write_npz(
+def write_npz(
     out: Path, header: Header, arrays: dict[str, Any], sources: Iterable[dict[str, Any]]
 ) -> None:
+    """Write a data set as an NPZ, in one step and from memory.
+
+    Parameters
+    ----------
+    out : Path
+        File to write.
+    header : Header
+        Description, which says what arrays there are.
+    arrays : dict
+        Arrays of Zarr or h5py by name, (segments, …).
+    sources : iterable of dict
+        Lines of the sources.
+    """
     content: dict[str, Any] = {name: np.asarray(arrays[name][:]) for name in row_shapes(header)}
     content[META] = json.dumps(header.as_dict())
     content[SOURCES] = np.array([json.dumps(entry, ensure_ascii=False) for entry in sources])
@@ -173,13 +154,22 @@ def _write_npz(
         np.savez_compressed(stream, **content)
 
 
-def _write_hdf5(
+def write_hdf5(
     out: Path,
     header: Header,
     arrays: dict[str, Any],
     sources: Iterable[dict[str, Any]],
-    progress: Progress,
+    progress: Progress = silent,
 ) -> None:
+    """Write a data set as HDF5, in one step and in parts.
+
+    Parameters
+    ----------
+    out, header, arrays, sources
+        As for :func:`write_npz`.
+    progress : Progress
+        Counts rows of all arrays; may raise Cancelled.
+    """
     import h5py
 
     rows = arrays["start_s"].shape[0]

@@ -12,7 +12,7 @@ import numpy as np
 
 from sd2core.datasets.card import write_card
 from sd2core.datasets.cutting import cut_source
-from sd2core.datasets.formats import refuse_large_npz, write_packed
+from sd2core.datasets.formats import refuse_large_npz, write_hdf5, write_npz
 from sd2core.datasets.index import Names, check_fits, entry_of, header_of, refuse_other_settings
 from sd2core.datasets.layout import SPLITS, FileFormat, Header, format_of
 from sd2core.datasets.options import dataset_options
@@ -289,7 +289,10 @@ class _Writer:
             store.finish(header, table)
         if self._form != "zarr":
             header, arrays = open_arrays(self._work)
-            write_packed(self._out, self._form, header, arrays, store.entries(), progress)
+            if self._form == "npz":
+                write_npz(self._out, header, arrays, store.entries())
+            else:
+                write_hdf5(self._out, header, arrays, store.entries(), progress)
         return store.rows, store.sources
 
     def _final(self, header: Header) -> Header:

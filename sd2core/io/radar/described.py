@@ -56,17 +56,7 @@ _PLAIN: dict[int, tuple[Axis, ...]] = {
 
 
 class RadarDescription(BaseModel):
-    """Content of a description; quantities in SI units.
-
-    ``axes`` name the dimensions of the array: ``frame``, ``chirp`` and ``sample``, and where there
-    are any ``transmitter``, ``receiver`` and ``iq`` (real and imaginary part); or ``stream``,
-    samples without gaps, with ``receiver`` where there are several, of which ``samples_per_chirp``
-    make a chirp and ``chirps_per_frame`` of these a frame. Without ``frame`` the chirps have no
-    gaps, and ``chirps_per_frame`` make a frame. ``chirp_repetition_s`` is the time
-    between chirps of the same transmitter. ``sign`` is 1 where the phase grows with the distance,
-    and -1 where it falls. A value of ``zero`` is no signal, and ``full_scale`` more fills the
-    converter. With ``range_start_m`` and ``range_step_m`` samples are at distances already.
-    """
+    """Content of a description in SI units; `sd2 radar describe --help` says what each means."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
