@@ -62,8 +62,6 @@ class MarsChoices:
     """``share`` divides each frame of the target by the sum of its intensities, ``intensity``
     keeps them as they are."""
     resolution: Resolution = "low"  # 1,229 vertices; medium 5,000, high 13,348
-    moments: int = 1
-    """Poses of the body per radar frame; velocities are differences over two of these steps."""
     limbs: bool = False  # The input is also split by the parts of the body.
     place: RadarPlace | None = None
     """Of the radar beside the Kinect, and of its clock; None: estimated for each person."""
@@ -112,23 +110,16 @@ def body_doppler(
     ----------
     driven : DrivenClip
     choices : MarsChoices
-        Synthesis, resolution, poses per frame, and whether the map is also split by limbs.
+        Synthesis, resolution, and whether the map is also split by limbs.
     place : RadarPlace
         Position and clock's offset of the radar.
     progress : Progress
     """
-    frames = len(driven.clip.times_s)
-    times_s = np.arange((frames - 1) * choices.moments + 1) / (FRAMES_PER_S * choices.moments)
+    times_s = np.arange(len(driven.clip.times_s)) / FRAMES_PER_S
     mesh = driven.mesh(times_s + place.offset_s, choices.resolution)
     maker, sensor = Synthesizer(mesh, choices.synthesis), VirtualSensor(place.position_m)
     doppler = synthetic_map(maker, sensor, limbs=choices.limbs, progress=progress)
-    every, limbs = choices.moments, doppler.limbs
-    return replace(
-        doppler,
-        values=doppler.values[:, ::every],
-        timebase=Timebase(times_s[::every]),
-        limbs=None if limbs is None else limbs.of_frames(slice(None, None, every)),
-    )
+    return replace(doppler, timebase=Timebase(times_s))
 
 
 def make_mars_pairs(
@@ -284,5 +275,6 @@ def _provenance(parts: Sequence[MarsPart], choices: MarsChoices) -> dict[str, An
         "parts": [[Path(part.source).name, part.name] for part in parts],
         "radar": "points of a 77 GHz radar (MARS, MIT licence)",
         "input": "a body driven by a Kinect skeleton",
+        "moments": 1,  # poses per frame
         **{name: value for name, value in asdict(choices).items() if name != "limbs"},
     }
