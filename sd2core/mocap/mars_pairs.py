@@ -42,8 +42,6 @@ from sd2core.version import __version__
 
 Target = Literal["share", "intensity"]
 
-AT_THE_CAMERA = RadarPlace()
-
 _LABELS = ("background",)
 _POINTS_STEP = 16
 """Of the vertices; the others say the same of where the radar stands."""
@@ -98,27 +96,12 @@ def skeleton_clip(stretch: MarsStretch) -> SkeletonClip:
     return SkeletonClip.on_grid(stretch.frames, stretch.joints_m, FRAMES_PER_S)
 
 
-def body_doppler(
-    driven: DrivenClip,
-    choices: MarsChoices,
-    place: RadarPlace = AT_THE_CAMERA,
-    progress: Progress = silent,
-) -> DopplerMap:
-    """Synthetic Doppler of a driven body from the radar's place, on the radar's frames.
-
-    Parameters
-    ----------
-    driven : DrivenClip
-    choices : MarsChoices
-        Synthesis, resolution, and whether the map is also split by limbs.
-    place : RadarPlace
-        Position and clock's offset of the radar.
-    progress : Progress
-    """
+def body_doppler(driven: DrivenClip, choices: MarsChoices, place: RadarPlace) -> DopplerMap:
+    """Synthetic Doppler of a driven body from the radar's place, on the radar's frames."""
     times_s = np.arange(len(driven.clip.times_s)) / FRAMES_PER_S
     mesh = driven.mesh(times_s + place.offset_s, choices.resolution)
     maker, sensor = Synthesizer(mesh, choices.synthesis), VirtualSensor(place.position_m)
-    doppler = synthetic_map(maker, sensor, limbs=choices.limbs, progress=progress)
+    doppler = synthetic_map(maker, sensor, limbs=choices.limbs)
     return replace(doppler, timebase=Timebase(times_s))
 
 

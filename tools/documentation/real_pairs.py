@@ -21,7 +21,6 @@ from sd2core.io.radar.mars import MarsPart, MarsStretch, mars_parts, read_mars
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, SkeletonClip, puppet_of
 from sd2core.mocap.mars_pairs import (
-    AT_THE_CAMERA,
     MarsChoices,
     body_doppler,
     radar_doppler,
@@ -136,7 +135,7 @@ def inputs(people: Sequence[Parts]) -> tuple[str, str]:
             radar = [radar_doppler(stretch, DEFAULT.synthesis.axis) for stretch in part.stretches]
             rows[nothing] += errors([0.0 * values for values in radar], radar)
             rows[joints] += errors(cloud_maps(part), radar)
-            rows[at_kinect] += errors(body_maps(clips, DEFAULT, AT_THE_CAMERA), radar)
+            rows[at_kinect] += errors(body_maps(clips, DEFAULT, RadarPlace()), radar)
             for name, choices in WAYS.items():
                 rows[name] += errors(body_maps(clips, choices, place), radar)
     return table([head, *rows.values()]), "\n".join(notes)
