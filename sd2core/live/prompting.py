@@ -81,7 +81,7 @@ def label_take(folder: Path, protocol: Protocol, take: Take, prompt_s: float, en
         raise Sd2Error(f"{folder} has no clocks", "a recording of a camera and a radar")
     recording = open_recording(folder)
     doppler = doppler_map(recording.load_capture(), axis=VelocityAxis(), clutter=CLUTTER)
-    doppler = replace(doppler, timebase=doppler.timebase.shifted(recording.radar_offset_s))
+    doppler = doppler.shifted(recording.radar_offset_s)
     shown_s = (clocks.recording_s(prompt_s), clocks.recording_s(end_s))
     span = prompted_span(doppler, take.gesture, *shown_s, protocol.reaction_s)
     recording.labels = Labels((LabelTrack(TRACK),), (span,), protocol.label_set)
