@@ -13,7 +13,7 @@ from PySide6.QtGui import QImage
 
 from sd2app.shell.window import MainWindow
 from tools.documentation.places import IMAGES, REPOSITORY, SAMPLE
-from tools.documentation.screenshots import opened, wait_for
+from tools.documentation.windows import opened, wait_for
 
 SIZE = (1280, 720)
 SHOWN_WIDTH = 880

@@ -13,13 +13,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, cast
-
-from PySide6.QtWidgets import QApplication, QWidget
+from typing import Any
 
 from sd2app.background.runs import Runs
 from sd2app.batch.feature import BatchWindow
@@ -27,11 +23,8 @@ from sd2app.dataset_export.dialog import ExportDialog
 from sd2app.fit.request import FitRequest
 from sd2app.live.setup import ListenRequest
 from sd2app.mesh_comparison.window import ComparisonWindow
-from sd2app.settings import Settings
-from sd2app.shell.app import wait_until_settled
 from sd2app.shell.window import MainWindow
 from sd2app.study.result_dialog import ClassResultDialog
-from sd2app.widgets.theme import apply_theme
 from sd2core.figures.strip import plot_strip
 from sd2core.figures.strip_source import StripOptions, StripSource
 from sd2core.files.figure_files import save_figure
@@ -41,6 +34,7 @@ from sd2core.recording.recording import open_recording
 from sd2core.sensor import Beam, VirtualSensor, aimed_at
 from sd2core.simulate.two_people import two_people
 from tools.documentation.places import IMAGES, REPOSITORY, SAMPLE, SHARED
+from tools.documentation.windows import application, opened, save, settle, wait_for
 
 SIZES = (1280, 720), (1600, 1000), (2560, 1440)
 """Windows of small, usual and large screens."""
@@ -50,55 +44,6 @@ WALK = SHARED / "video" / "walk.mkv"
 _CAMPAIGN = ("--people", "4", "--minutes", "4", "--seed", "1")
 _COMPARE_STEPS = 40
 _LONG_S = 1800.0
-_LIMIT_S = 120.0
-
-
-def application() -> QApplication:
-    """The application, made if need be."""
-    return cast(QApplication, QApplication.instance() or QApplication(sys.argv[:1]))
-
-
-def wait_for(condition: Callable[[], bool], limit_s: float = 300.0) -> None:
-    """Run the event loop until something is so, or the time is over."""
-    deadline = time.monotonic() + limit_s
-    while not condition() and time.monotonic() < deadline:
-        application().processEvents()
-        time.sleep(0.01)
-
-
-def settle(window: MainWindow) -> None:
-    """Wait until nothing is under way; ends the program where something never is over."""
-    if not wait_until_settled(application(), window, _LIMIT_S):
-        sys.exit(f"The window was still busy after {_LIMIT_S:.0f} s")
-
-
-@contextmanager
-def opened(
-    paths: list[Path], runs: Path | None = None, size: tuple[int, int] = (1280, 800)
-) -> Iterator[MainWindow]:
-    """The window on some files, everything computed; trainings are kept in ``runs``."""
-    apply_theme(application(), False)
-    settings = Settings.forgetful()
-    settings.dark = False
-    if runs is not None:
-        settings.set_value("training/folder", str(runs))
-    window = MainWindow(settings)
-    window.resize(*size)
-    window.show()
-    window.populate()
-    if paths:
-        window.open_paths(paths)
-    settle(window)
-    yield window
-    window.session.document.undo_stack.setClean()
-    window.close()
-    application().processEvents()
-
-
-def save(widget: QWidget, name: str) -> None:
-    """Write a picture of a window."""
-    widget.grab().save(str(IMAGES / name))
-    print(IMAGES.joinpath(name).relative_to(REPOSITORY))
 
 
 def sample(window: MainWindow) -> None:

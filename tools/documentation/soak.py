@@ -28,12 +28,11 @@ from PySide6.QtCore import QEventLoop, QObject, QPoint, Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from sd2app.settings import Settings
 from sd2app.shell.window import MainWindow
-from sd2app.widgets.theme import apply_theme
 from sd2core.files.tables import markdown_table
 from sd2core.processes import keep_little_free_memory
 from tools.documentation.places import SAMPLE
+from tools.documentation.windows import opened
 
 LIMIT_S = 120.0
 TICK_MS = 5
@@ -47,42 +46,21 @@ Row = dict[str, float]
 """State of the process at a moment of rest, and what happened since the row before."""
 
 
-class Pulse(QObject):
-    """Times between turns of the event loop, by a timer of 5 ms, and the most threads."""
+class Meter(QObject):
+    """Measures rows, and the minutes since it was made.
 
-    def __init__(self, process: psutil.Process) -> None:
+    Gaps are times between turns of the event loop, by a timer of 5 ms.
+    """
+
+    def __init__(self) -> None:
         super().__init__()
-        self._process = process
+        self._process = psutil.Process()
+        self._began_s = time.monotonic()
         self._timer = QTimer(self, interval=TICK_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._tick)
         self._threads = QTimer(self, interval=200)
         self._threads.timeout.connect(self._count)
-        self.restart()
-
-    def restart(self) -> None:
-        """Forget what was measured."""
-        self.gaps_ms: list[float] = []
-        self.most_threads = self._process.num_threads()
-        self._last_s = time.perf_counter()
-        self._timer.start()
-        self._threads.start()
-
-    def _tick(self) -> None:
-        now_s = time.perf_counter()
-        self.gaps_ms.append(1000 * (now_s - self._last_s))
-        self._last_s = now_s
-
-    def _count(self) -> None:
-        self.most_threads = max(self.most_threads, self._process.num_threads())
-
-
-class Meter:
-    """Measures rows, and the minutes since it was made."""
-
-    def __init__(self) -> None:
-        self._process = psutil.Process()
-        self._pulse = Pulse(self._process)
-        self._began_s = time.monotonic()
+        self._restart()
 
     @property
     def minute(self) -> float:
@@ -95,21 +73,37 @@ class Meter:
 
     def row(self, rounds: int) -> Row:
         """Measure a row."""
-        gaps_ms = np.percentile(self._pulse.gaps_ms or [0.0], (50, 95, 99, 100))
+        gaps_ms = np.percentile(self._gaps_ms or [0.0], (50, 95, 99, 100))
         row = {
             "minute": round(self.minute, 2),
             "rounds": rounds,
             "RSS, MB": round(self.resident_mb(), 1),
             "threads": self._process.num_threads(),
-            "most": self._pulse.most_threads,  # also while something was computed
+            "most": self._most_threads,  # also while something was computed
             "descriptors": self._process.num_fds(),
             "objects": len(gc.get_objects()),
             "windows": len(QApplication.topLevelWidgets()),
         }
         names = ("gap, ms", "95 %", "99 %", "largest")
         row |= {name: round(gap, 1) for name, gap in zip(names, gaps_ms.tolist(), strict=True)}
-        self._pulse.restart()
+        self._restart()
         return row
+
+    def _restart(self) -> None:
+        """Forget what was measured."""
+        self._gaps_ms: list[float] = []
+        self._most_threads = self._process.num_threads()
+        self._last_s = time.perf_counter()
+        self._timer.start()
+        self._threads.start()
+
+    def _tick(self) -> None:
+        now_s = time.perf_counter()
+        self._gaps_ms.append(1000 * (now_s - self._last_s))
+        self._last_s = now_s
+
+    def _count(self) -> None:
+        self._most_threads = max(self._most_threads, self._process.num_threads())
 
 
 class Hand:
@@ -161,10 +155,10 @@ class Hand:
         self.rest()
         self._save()
 
-    def train(self, pairs: Path) -> None:
+    def train(self, pairs: Path | None) -> None:
         """Have a denoiser learn from pairs, again when it has ended; wait for its first epoch."""
         training = self._window.features.training.model
-        if training.under_way:
+        if pairs is None or training.under_way:
             return
         training.setup.keep(())
         training.setup.add(pairs)
@@ -216,20 +210,6 @@ def spin(seconds: float) -> None:
     loop.exec()
 
 
-class Raised:
-    """What Python raised in slots and threads, where nobody else would know."""
-
-    def __init__(self) -> None:
-        self.count = 0
-        sys.excepthook = lambda *raised: self._note(*raised)
-        threading.excepthook = lambda args: self._note(*args[:3])
-        sys.unraisablehook = lambda args: self._note(*args[:3])
-
-    def _note(self, *raised: Any) -> None:
-        self.count += 1
-        traceback.print_exception(*raised)
-
-
 def soak(
     minutes: float, folder: Path, say: Callable[[Row], None], training: Path | None = None
 ) -> float:
@@ -241,33 +221,25 @@ def soak(
     recordings = [folder / "left.sd2", folder / "right.sd2"]
     for copy in recordings:
         shutil.copytree(SAMPLE, copy)
-    window = MainWindow(Settings.forgetful())
-    window.resize(1280, 800)
-    window.show()
-    window.populate()
-    window.activateWindow()
-    hand, meter, rounds, rows = Hand(window), Meter(), 0, 1
-    hand.open(recordings[0])
-    if training is not None:
+    with opened([]) as window:
+        window.activateWindow()
+        hand, meter, rounds, rows = Hand(window), Meter(), 0, 1
+        hand.open(recordings[0])
         hand.train(training)
-    say(meter.row(rounds))
-    while meter.minute < minutes:
-        if training is not None:
+        say(meter.row(rounds))
+        while meter.minute < minutes:
             hand.train(training)
-        hand.round()
-        rounds += 1
-        hand.open(recordings[rounds % 2])
-        if meter.minute >= minutes * rows / ROWS:
-            say(meter.row(rounds))
-            rows += 1
-    if training is not None:
+            hand.round()
+            rounds += 1
+            hand.open(recordings[rounds % 2])
+            if meter.minute >= minutes * rows / ROWS:
+                say(meter.row(rounds))
+                rows += 1
         hand.end_training()
-    before_mb = meter.resident_mb()
-    for number in range(1, REOPENINGS + 1):
-        hand.open(recordings[(rounds + number) % 2])
-    added_mb = meter.resident_mb() - before_mb
-    window.close()
-    return added_mb
+        before_mb = meter.resident_mb()
+        for number in range(1, REOPENINGS + 1):
+            hand.open(recordings[(rounds + number) % 2])
+        return meter.resident_mb() - before_mb
 
 
 def main() -> int:
@@ -277,7 +249,15 @@ def main() -> int:
     parser.add_argument("--training", type=Path, help="pairs that a denoiser learns from beside it")
     parser.add_argument("--json", action="store_true", help="one row a line, as JSON")
     options = parser.parse_args()
-    raised = Raised()
+    raised: list[Any] = []  # in slots and threads, where nobody else would know
+
+    def note(*raising: Any) -> None:
+        raised.append(raising[0])
+        traceback.print_exception(*raising)
+
+    sys.excepthook = note
+    threading.excepthook = lambda args: note(*args[:3])
+    sys.unraisablehook = lambda args: note(*args[:3])
 
     def say(row: Row) -> None:
         *heading, line = markdown_table([list(row), [f"{value:g}" for value in row.values()]])
@@ -288,13 +268,11 @@ def main() -> int:
         print(line, flush=True)
 
     keep_little_free_memory()
-    application = QApplication(sys.argv[:1])
-    apply_theme(application, False)
     with tempfile.TemporaryDirectory(prefix="sd2-soak-") as name:
         os.environ["XDG_DATA_HOME"] = name
         added_mb = soak(options.minutes, Path(name), say, options.training)
     print(f"\n{REOPENINGS} more openings of a recording added {added_mb:.0f} MB.")
-    return 1 if raised.count else 0
+    return 1 if raised else 0
 
 
 if __name__ == "__main__":
