@@ -79,7 +79,7 @@ def cut_out(
     """Write the folders that do not exist yet, and an index of all; return the written folders.
 
     A folder has its name only once it is complete. Folders with the same content are kept, so a
-    stopped export continues where it was. Raises Sd2Error when another process is writing there.
+    stopped export continues where it was.
 
     Parameters
     ----------
@@ -93,6 +93,11 @@ def cut_out(
         True to replace folders of the same name that hold something else; otherwise they stay.
     progress : Progress
         Counts frames; may raise ``Cancelled``.
+
+    Raises
+    ------
+    Sd2Error
+        When another process is writing there.
     """
     folder.mkdir(parents=True, exist_ok=True)
     lock = FileLock(folder / _LOCK)

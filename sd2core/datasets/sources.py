@@ -57,8 +57,6 @@ def gather(
 ) -> list[LazySource]:
     """Return the sources of all files named, in their order.
 
-    Raises Sd2Error when a path is something else, or their numbers do not fit.
-
     Parameters
     ----------
     paths : sequence of Path
@@ -69,6 +67,11 @@ def gather(
         Pairs name their subjects themselves.
     label_files : sequence of Path
         One for each map (``.npz``), or none.
+
+    Raises
+    ------
+    Sd2Error
+        When a path is something else, or their numbers do not fit.
     """
     files = [one for path in paths for one in _expanded(Path(path))]
     check_distinct(files)

@@ -58,11 +58,10 @@ def write_dataset(
     """Write segments of all sources, or continue a data set that was begun.
 
     One source is in memory at a time. A source that is there already is left alone and a
-    :class:`~sd2core.datasets.source.LazySource` not even loaded, so a writer that was killed, or
-    that gets more sources later, does only what is missing. Zarr grows in place; HDF5 and NPZ grow
-    in the folder ``OUT.partial`` and appear complete. The card is written beside it. Raises
-    Sd2Error when the place holds something else or a data set of other settings, a source of the
-    same key was made of something else, no source can be made, or there is no segment.
+    :class:`~sd2core.datasets.source.LazySource` not even loaded, so a writer that was
+    killed, or that gets more sources later, does only what is missing. Zarr grows in place;
+    HDF5 and NPZ grow in the folder ``OUT.partial`` and appear complete. The card is written
+    beside it.
 
     Parameters
     ----------
@@ -77,6 +76,12 @@ def write_dataset(
     -------
     Written
         Sources that raised ``Sd2Error`` are in ``failed``; they do not stop the others.
+
+    Raises
+    ------
+    Sd2Error
+        When the place holds something else or a data set of other settings, a source of the
+        same key was made of something else, no source can be made, or there is no segment.
     """
     out = Path(out)
     options = dataset_options(options or Exporting())

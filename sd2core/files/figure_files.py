@@ -34,8 +34,6 @@ def save_figure(
 ) -> None:
     """Write a figure as PNG, SVG or PDF, by the name's ending.
 
-    Raises Sd2Error for another ending, or a folder that does not exist.
-
     Parameters
     ----------
     figure : Figure
@@ -46,6 +44,11 @@ def save_figure(
         are then text, and the same figure gives the same bytes.
     pixels_per_inch : float, optional
         By default the figure's own.
+
+    Raises
+    ------
+    Sd2Error
+        For another ending, or a folder that does not exist.
     """
     import io
 

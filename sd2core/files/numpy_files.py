@@ -48,9 +48,6 @@ class NpzArrays(Mapping[str, NDArray[Any]]):
 def open_npz_file(path: Path, what: str, expected: str, remedy: str = "") -> Iterator[NpzArrays]:
     """Open an ``.npz``, whose arrays are read where asked for.
 
-    Raises Sd2Error if it is damaged or declares more than its size allows, also for what goes wrong
-    while it is open, except in another file.
-
     Parameters
     ----------
     path : Path
@@ -64,6 +61,12 @@ def open_npz_file(path: Path, what: str, expected: str, remedy: str = "") -> Ite
     Yields
     ------
     NpzArrays
+
+    Raises
+    ------
+    Sd2Error
+        If it is damaged or declares more than its size allows, also for what goes wrong while it is
+        open, except in another file.
     """
     try:
         with open_zip(path) as archive:

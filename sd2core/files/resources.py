@@ -53,9 +53,6 @@ def open_bundled_arrays(
 ) -> Iterator[tuple[dict[str, Any], Mapping[str, NDArray[Any]]]]:
     """Open an ``.npz`` whose ``meta`` tells its format; arrays are read where asked for.
 
-    Raises Sd2Error if the file is missing, damaged, of another format or version, or lacks an array
-    that is asked for while it is open.
-
     Parameters
     ----------
     path : Path
@@ -74,6 +71,12 @@ def open_bundled_arrays(
     ------
     meta : dict
     arrays : mapping of str to array
+
+    Raises
+    ------
+    Sd2Error
+        If the file is missing, damaged, of another format or version, or lacks an array that is
+        asked for while it is open.
     """
     from sd2core.files.numpy_files import open_npz_file
 

@@ -70,9 +70,6 @@ def lost_in_words(frames: int) -> str:
 class StoredArray:
     """Numbers that stay on disk until they are sliced; Sd2Error names what is damaged.
 
-    Raises Sd2Error if it does not hold plain numbers, or is coded in a way that is not safe to
-    decode.
-
     Parameters
     ----------
     array : zarr.Array
@@ -84,6 +81,11 @@ class StoredArray:
     sparse : bool, optional
         True if a chunk may be missing, because it holds nothing but the fill value; by default it
         may where chunks have no checksums.
+
+    Raises
+    ------
+    Sd2Error
+        If it does not hold plain numbers, or is coded in a way that is not safe to decode.
     """
 
     def __init__(
@@ -296,13 +298,16 @@ def array_in(
 ) -> StoredArray:
     """Array of an open group, to be read.
 
-    Raises Sd2Error if the array is missing, or its description is damaged or not safe.
-
     Parameters
     ----------
     group : zarr.Group
     path, name, unit, sparse
         As for :class:`StoredArray`; the name is that within the group.
+
+    Raises
+    ------
+    Sd2Error
+        If the array is missing, or its description is damaged or not safe.
     """
     try:
         return StoredArray(group[name], path, name, unit, sparse=sparse)

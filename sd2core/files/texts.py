@@ -135,9 +135,6 @@ def read_json(path: Path, expected: str = EXPECTED_JSON, remedy: str = "") -> An
 def parse_json(text: str, place: str | Path, expected: str, remedy: str = "") -> Any:
     """Parse JSON that stands at a place.
 
-    Raises Sd2Error where it is none, or holds what no reader copes with: lists or tables in each
-    other more than a hundred deep, a number of more than 300 digits, or half a character.
-
     Parameters
     ----------
     text : str
@@ -147,6 +144,12 @@ def parse_json(text: str, place: str | Path, expected: str, remedy: str = "") ->
         What was expected, for the error.
     remedy : str
         What to do, for the error; by default to correct the file or copy it again.
+
+    Raises
+    ------
+    Sd2Error
+        Where it is none, or holds what no reader copes with: lists or tables in each other more
+        than a hundred deep, a number of more than 300 digits, or half a character.
     """
     return _parsed("JSON", text, place, expected, remedy)
 

@@ -68,13 +68,16 @@ def read_signals(
 ) -> InertialSignals:
     """Read samples of a virtual sensor, or the CSV of a real one.
 
-    Raises Sd2Error when the file is no such file or damaged.
-
     Parameters
     ----------
     path : Path
         What :func:`write_signals` wrote, or another ``.csv``: see
         :func:`sd2core.imu.tables.read_table`, also for the other parameters, which are for a CSV.
+
+    Raises
+    ------
+    Sd2Error
+        When the file is no such file or damaged.
     """
     path = Path(path)
     if not path.exists():

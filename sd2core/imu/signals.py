@@ -148,9 +148,6 @@ def imu_signals(
 ) -> InertialSignals:
     """Acceleration and turn rate that an ideal sensor feels on a path.
 
-    Raises Sd2Error when the cut-off is above 0.45 of the frame rate, or there is no direction
-    upwards.
-
     Parameters
     ----------
     path : RigidPath
@@ -168,6 +165,11 @@ def imu_signals(
     -------
     InertialSignals
         NaN at times in a gap, outside of the path, and in runs of fewer than six frames.
+
+    Raises
+    ------
+    Sd2Error
+        When the cut-off is above 0.45 of the frame rate, or there is no direction upwards.
 
     Examples
     --------

@@ -47,9 +47,7 @@ def read_table(
 
     Lines that begin with ``#`` are skipped; those before the heading of the form ``# name: value``
     are metadata, of which ``# rate_hz: 100`` stands for a column of times. An empty cell or NaN is
-    a value that is not known. Raises Sd2Error when the file is no such table, a column or a unit is
-    missing or there twice, a value is no number, or times do not increase or come at a rate that no
-    sensor has.
+    a value that is not known.
 
     Parameters
     ----------
@@ -59,6 +57,12 @@ def read_table(
         Samples per second of a table without times.
     acceleration_unit, turn_rate_unit : str, optional
         Of columns that do not state it.
+
+    Raises
+    ------
+    Sd2Error
+        When the file is no such table, a column or a unit is missing or there twice, a value is no
+        number, or times do not increase or come at a rate that no sensor has.
     """
     given: dict[str, str] = {"acc": acceleration_unit or "", "gyr": turn_rate_unit or ""}
     with open_regular(path) as stream:

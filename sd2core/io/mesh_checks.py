@@ -136,8 +136,6 @@ def uncertainty_of(raw: RawMesh, source: str) -> VelocityUncertainty | None:
 def check_mesh(raw: RawMesh, times_s: NDArray[np.float64], source: str, check_size: bool) -> None:
     """Check size, rounding and faces on a few frames; flip faces that look inwards.
 
-    Raises Sd2Error for a size that no body has, or faces that cannot belong to the mesh.
-
     Parameters
     ----------
     raw : RawMesh
@@ -149,6 +147,11 @@ def check_mesh(raw: RawMesh, times_s: NDArray[np.float64], source: str, check_si
         Name of the file, for errors.
     check_size : bool
         False if whoever reads it has said that the size is right.
+
+    Raises
+    ------
+    Sd2Error
+        For a size that no body has, or faces that cannot belong to the mesh.
     """
     count = int(raw.vertices.shape[0])
     chosen = np.unique(np.linspace(0, count - 1, _SAMPLE_FRAMES).astype(int))

@@ -47,9 +47,6 @@ def rigged(
 ) -> tuple[NDArray[np.float32], NDArray[np.int64] | None]:
     """Vertices (T, V, 3) about the root in metres, y down, and the model's faces.
 
-    Raises Sd2Error where a parameter is missing, or the file is no such model or would do more than
-    compute.
-
     Parameters
     ----------
     entry : mapping
@@ -60,6 +57,11 @@ def rigged(
         File of the parameters, for errors.
     progress : callable
         Called with frames; may raise ``Cancelled``.
+
+    Raises
+    ------
+    Sd2Error
+        Where a parameter is missing, or the file is no such model or would do more than compute.
     """
     missing = [name for name in RIG_NAMES if entry.get(name) is None]
     if missing:

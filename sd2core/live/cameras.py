@@ -41,8 +41,6 @@ def open_camera(
 ) -> Camera:
     """Open a camera.
 
-    Raises Sd2Error if there is no such camera, or it gives no picture.
-
     Parameters
     ----------
     name : str
@@ -53,6 +51,11 @@ def open_camera(
         Frames per second to ask for.
     exposure : float, optional
         Fixed exposure, in the driver's own unit; by default the camera chooses.
+
+    Raises
+    ------
+    Sd2Error
+        If there is no such camera, or it gives no picture.
     """
     if name == TEST:
         return TestCamera(size_px or (640, 360), rate_hz or TEST_RATE_HZ)

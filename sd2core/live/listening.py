@@ -64,8 +64,6 @@ class Column(NamedTuple):
 class Listening:
     """A source being recorded, with its live map.
 
-    Raises Sd2Error when the source does not fit the recording or the classifier.
-
     Parameters
     ----------
     source : Source or Reception
@@ -76,6 +74,11 @@ class Listening:
         Of the map; that of the classifier where there is one.
     classifier : TrainedClassifier, optional
         Asked about every column. Its card must be of the radar's frame rate.
+
+    Raises
+    ------
+    Sd2Error
+        When the source does not fit the recording or the classifier.
     """
 
     def __init__(

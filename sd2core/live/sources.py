@@ -149,8 +149,6 @@ class ReplaySource(Source):
 class Dca1000Source:
     """Frames of a DCA1000 that sends its packets to this computer.
 
-    Raises Sd2Error when the configuration is damaged, or the address cannot be listened on.
-
     Parameters
     ----------
     setup : path
@@ -159,6 +157,11 @@ class Dca1000Source:
         Of this computer, to which the card sends. Port 0 is any free one.
     opened : socket, optional
         Instead, a socket that it sends to.
+
+    Raises
+    ------
+    Sd2Error
+        When the configuration is damaged, or the address cannot be listened on.
     """
 
     def __init__(

@@ -113,8 +113,7 @@ def make_mars_pairs(
 ) -> MadePairs:
     """Write the pairs of some folders, each with one person's parts; resume a stopped run.
 
-    The subject of a take is the person; every stretch is a take. Raises Sd2Error if a folder cannot
-    be used, two hold the same, or the store holds other pairs.
+    The subject of a take is the person; every stretch is a take.
 
     Parameters
     ----------
@@ -125,6 +124,11 @@ def make_mars_pairs(
     choices : MarsChoices, optional
     progress : Progress
         Counts frames.
+
+    Raises
+    ------
+    Sd2Error
+        If a folder cannot be used, two hold the same, or the store holds other pairs.
     """
     choices = choices or MarsChoices()
     parts = [read_mars(folder, name) for folder in folders for name in mars_parts(folder)]

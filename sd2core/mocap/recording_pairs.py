@@ -57,11 +57,9 @@ def make_recording_pairs(
 ) -> PairsMade:
     """Put recordings into a store of pairs; resume a store that was begun.
 
-    Every recording is seen by its own sensor. The radar's frame that is nearest to a frame of the
-    mesh, by the recording's offset, is its target. A radar shows everybody in a scene, and so does
-    the input; labels are those of :func:`frame_labels`. Raises Sd2Error if a recording lacks mesh
-    or radar, two are called alike, there is not one person for each, or frame rates or kinds of
-    radar differ.
+    Every recording is seen by its own sensor. The radar's frame that is nearest to a frame
+    of the mesh, by the recording's offset, is its target. A radar shows everybody in a scene, and
+    so does the input; labels are those of :func:`frame_labels`.
 
     Parameters
     ----------
@@ -75,6 +73,12 @@ def make_recording_pairs(
     limbs : bool
         The input is also split by the parts of the body.
     progress : Progress
+
+    Raises
+    ------
+    Sd2Error
+        If a recording lacks mesh or radar, two are called alike, there is not one person for each,
+        or frame rates or kinds of radar differ.
     """
     named = named_recordings(recordings, subjects)
     opened = [recording for recording, _ in named]

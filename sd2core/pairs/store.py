@@ -285,7 +285,11 @@ def read_pairs(path: Path) -> PairSet:
     """Read a store of pairs.
 
     Frames in damaged chunks are left out: a take is read in parts of the same name around them.
-    Raises Sd2Error when it is none, of a newer version, empty or damaged.
+
+    Raises
+    ------
+    Sd2Error
+        When it is none, of a newer version, empty or damaged.
     """
     path = Path(path)
     facts, lazily = open_takes(path)
