@@ -65,6 +65,7 @@ def write_pairs(
     labels: tuple[str, ...] = LABELS,
     placements: int = 1,
     limbs: bool = False,
+    made_by: str = "a test",
 ) -> Path:
     writer = PairWriter(
         path,
@@ -73,7 +74,7 @@ def write_pairs(
         null_bins=null_bins,
         frame_rate_hz=rate_hz,
         labels=labels,
-        provenance={"made_for": "a test"},
+        provenance={"made_by": made_by},
         parts=PARTS if limbs else (),
     )
     seed = 0

@@ -39,7 +39,7 @@ from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.pairs.rows import UNKNOWN, check_labels, lost_frames, read_around
 from sd2core.pairs.store import SPLIT, limbs_of, open_takes
-from sd2core.pairs.summary import REMAKE, TakeEntry
+from sd2core.pairs.summary import REMAKE, TakeEntry, names_together
 from sd2core.progress import Progress, silent
 from sd2core.recording.recording import SUFFIX, is_recording
 from sd2core.sensor import VelocityAxis, VirtualSensor
@@ -192,9 +192,9 @@ def _sensor(meta: dict[str, Any]) -> VirtualSensor:
 def pair_sources(paths: Sequence[Path], making: Making) -> list[LazySource]:
     """Return one source per take of the stores of pairs.
 
-    Subjects of the same name in different stores are different people: they are then called
-    ``STORE:NAME``. Of the making count its kinds, model, texture and limbs: with those, stores
-    without limb maps raise Sd2Error.
+    People are called as :func:`~sd2core.pairs.summary.names_together` says, and takes that several
+    stores have of one of them ``STORE:TAKE``. Of the making count its kinds, model, texture and
+    limbs: with those, stores without limb maps raise Sd2Error.
     """
     stores = [_PairStore(path, making) for path in paths]
     unsplit = [str(one.path) for one in stores if not one.facts.parts]
@@ -205,11 +205,16 @@ def pair_sources(paths: Sequence[Path], making: Making) -> list[LazySource]:
             "Make them again with `sd2 simulate campaign --limbs` or `sd2 pairs … --limbs`, or"
             " export without limbs",
         )
-    people = Counter(name for one in stores for name in set(one.facts.subjects))
+    together = names_together([one.facts for one in stores])
+    keys = [
+        (one, number, take.key._replace(subject=names[take.subject]))
+        for one, names in zip(stores, together, strict=True)
+        for number, take in enumerate(one.facts.takes)
+    ]
+    count = Counter(key for _, _, key in keys)
     return [
-        one.lazy(number, f"{one.path.stem}:{name}" if people[name] > 1 else name)
-        for one in stores
-        for number, name in enumerate(take.subject for take in one.facts.takes)
+        one.lazy(number, key.subject, f"{one.path.stem}:{key.name}" if count[key] > 1 else key.name)
+        for one, number, key in keys
     ]
 
 
@@ -226,9 +231,9 @@ class _PairStore:
         if "denoised" in self._kinds:
             self._model = find_model(making.model or default_name(limbs=self.facts.has_limbs))
 
-    def lazy(self, number: int, subject: str) -> LazySource:
+    def lazy(self, number: int, subject: str, name: str) -> LazySource:
         take = self.facts.takes[number]
-        key = SourceKey(subject, take.name, take.placement)
+        key = SourceKey(subject, name, take.placement)
         return LazySource(
             key,
             lambda progress: self._source(key, take),

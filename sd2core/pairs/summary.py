@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, get_args
+from typing import Annotated, Any, Literal, NamedTuple, Protocol, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -28,6 +29,7 @@ PairKind = Literal["simulated", "real"]
 FORMAT = "sd2-pairs"
 VERSION = 1
 INDEX_NAME = "takes.jsonl"
+_MADE_OF_MARS = "sd2 pairs mars"
 REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
 
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -109,6 +111,11 @@ class PairFacts(BaseModel):
         return tuple(dict.fromkeys(take.subject for take in self.takes))
 
     @property
+    def known_people(self) -> str:
+        """Recordings whose people are the same in all stores that are made of them, or nothing."""
+        return "MARS" if self.provenance.get("made_by") == _MADE_OF_MARS else ""
+
+    @property
     def placements(self) -> int:
         """Number of places from which the movements are seen."""
         return len({take.placement for take in self.takes})
@@ -141,6 +148,40 @@ class PairFacts(BaseModel):
             for take in self.takes
             if take.subject in wanted and not (first_only and take.placement)
         )
+
+
+class StoreOfPeople(Protocol):
+    """What the names of people depend on where stores of pairs are used together."""
+
+    @property
+    def path(self) -> Path:
+        """Folder of the store."""
+
+    @property
+    def subjects(self) -> tuple[str, ...]:
+        """Names of its people."""
+
+    @property
+    def known_people(self) -> str:
+        """As :attr:`PairFacts.known_people`."""
+
+
+def names_together(stores: Sequence[StoreOfPeople]) -> list[dict[str, str]]:
+    """Names of the people of each store among all of them, by their names in it.
+
+    People of the same name in different stores are different ones, called ``STORE:NAME``, but for
+    stores of the same recordings (MARS).
+    """
+    origins = [one.known_people or number for number, one in enumerate(stores)]
+    people = {(at, name) for at, one in zip(origins, stores, strict=True) for name in one.subjects}
+    count = Counter(name for _, name in people)
+    return [
+        {
+            name: name if count[name] == 1 else f"{one.known_people or one.path.stem}:{name}"
+            for name in one.subjects
+        }
+        for one in stores
+    ]
 
 
 def is_pair_store(path: Path) -> bool:
@@ -187,7 +228,7 @@ def pair_facts(path: Path) -> PairFacts:
 
 def read_takes(path: Path, provenance: dict[str, Any]) -> tuple[TakeEntry, ...]:
     """Read the lines of takes; an incomplete last line is left out."""
-    by_part = provenance.get("made_by") == "sd2 pairs mars"
+    by_part = provenance.get("made_by") == _MADE_OF_MARS
     index = path / INDEX_NAME
     if not index.exists():
         return ()

@@ -18,6 +18,7 @@ from sd2core.options.training import DataConfig
 from sd2core.pairs.rows import UNKNOWN
 from sd2core.pairs.segments import cut, segment_starts
 from sd2core.pairs.store import PairSet, Take, read_pairs
+from sd2core.pairs.summary import names_together, pair_facts
 from sd2core.sensor import VelocityAxis
 
 _LARGEST_WEIGHT, _MIN_LEVEL = 8.0, 1e-3
@@ -99,10 +100,9 @@ class TrainingData:
 def read_mixed(paths: Sequence[Path]) -> PairSet:
     """Read one or several stores of pairs as one.
 
-    Subjects of the same name in different stores are different people, but for stores of the same
-    recordings (MARS): they are then called ``STORE:NAME``. Labels are those of all stores. What
-    holds anything simulated is called simulated. Raises Sd2Error if axes, frame rates or null
-    bins differ.
+    People are called as :func:`~sd2core.pairs.summary.names_together` says. Labels are those of all
+    stores. What holds anything simulated is called simulated. Raises Sd2Error if axes, frame rates
+    or null bins differ.
     """
     sets = [read_pairs(path) for path in paths]
     first = sets[0]
@@ -122,24 +122,13 @@ def read_mixed(paths: Sequence[Path]) -> PairSet:
                     "Make one of them again with the settings of the other",
                 )
     labels = tuple(dict.fromkeys(label for one in sets for label in one.labels))
-    # One recording's people are the same in all stores that are made of it.
-    origins = [
-        "MARS" if one.provenance.get("made_by") == "sd2 pairs mars" else path.stem
-        for path, one in zip(paths, sets, strict=True)
-    ]
-    people = {
-        (origin if origin == "MARS" else number, subject)
-        for number, (origin, one) in enumerate(zip(origins, sets, strict=True))
-        for subject in one.subjects
-    }
-    names = [subject for _, subject in people]
     takes = tuple(
         replace(
             take,
-            subject=take.subject if names.count(take.subject) == 1 else f"{origin}:{take.subject}",
+            subject=names[take.subject],
             label=np.array([*map(labels.index, one.labels), UNKNOWN], np.int8)[take.label],
         )
-        for origin, one in zip(origins, sets, strict=True)
+        for names, one in zip(names_together([*map(pair_facts, paths)]), sets, strict=True)
         for take in one.takes
     )
     simulated = any(one.kind == "simulated" for one in sets)

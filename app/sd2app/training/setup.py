@@ -21,7 +21,7 @@ from sd2core.options.training import (
     TrainConfig,
     TrainingConfig,
 )
-from sd2core.pairs.summary import PairFacts, pair_facts
+from sd2core.pairs.summary import PairFacts, names_together, pair_facts
 from sd2core.runs.pace import known_pace_s
 from sd2core.train.data import Split, split_subjects
 
@@ -190,15 +190,10 @@ class TrainingSetupModel(RunSetup[Store]):
     def _people(self) -> list[tuple[str, PairFacts, str]]:
         """All people as the library names them, with store and name in it."""
         known = [store.facts for store in self.data if store.facts is not None]
-        names = [subject for facts in known for subject in facts.subjects]
         return [
-            (
-                f"{facts.path.stem}:{subject}" if names.count(subject) > 1 else subject,
-                facts,
-                subject,
-            )
-            for facts in known
-            for subject in facts.subjects
+            (name, facts, subject)
+            for facts, names in zip(known, names_together(known), strict=True)
+            for subject, name in names.items()
         ]
 
     def _segments(self) -> int:

@@ -19,6 +19,8 @@ from sd2core.accuracy.trial import synthesizer_for
 from sd2core.body.parts import synthetic_map
 from sd2core.datasets.card import describe_dataset, limits
 from sd2core.datasets.forecast import Counting
+from sd2core.datasets.labelled import labelled_facts, people_of
+from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.source import Source
@@ -36,11 +38,13 @@ from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.mocap.recording_pairs import make_recording_pairs
 from sd2core.options.exporting import Exporting
 from sd2core.pairs.store import read_pairs
+from sd2core.pairs.summary import names_together, pair_facts
 from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import PlacementGrid
 from sd2core.progress import silent
 from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import Recording
+from sd2core.train.data import read_mixed
 from tests.damaged_files import lose
 
 GRID = PlacementGrid((1.0, 2.5), (0.0, 30.0))
@@ -217,6 +221,24 @@ def test_people_of_two_stores_are_different_people(tmp_path: Path) -> None:
     paths = [write_pairs(tmp_path / f"{name}.zarr", ("s1", name), takes=1) for name in "ab"]
     sources = gather(paths, Making(kinds=("synthetic",)))
     assert [one.key.subject for one in sources] == ["a:s1", "a", "b:s1", "b"]
+
+
+def test_stores_of_the_same_recordings_have_the_same_people(tmp_path: Path) -> None:
+    """Else one person would be in the training and in the test."""
+    mars = [
+        write_pairs(tmp_path / f"{name}.zarr", ("1", "4"), made_by="sd2 pairs mars")
+        for name in ("plain", "varied")
+    ]
+    other = write_pairs(tmp_path / "own.zarr", ("4", "anna"))
+    stores = [pair_facts(path) for path in (*mars, other)]
+    same = {"1": "1", "4": "MARS:4"}
+    assert names_together(stores) == [same, same, {"4": "own:4", "anna": "anna"}]
+    people = {"1", "MARS:4", "own:4", "anna"}
+    assert set(read_mixed([*mars, other]).subjects) == people
+    assert set(people_of([labelled_facts(LabelledSource(one.path)) for one in stores])) == people
+    keys = [one.key for one in gather([*mars, other], Making(kinds=("synthetic",)))]
+    assert {key.subject for key in keys} == people
+    assert len(set(keys)) == len(keys)
 
 
 def test_a_map_is_labelled_by_a_file(tmp_path: Path) -> None:
