@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from PySide6.QtCore import QObject
 
-from sd2app.background.latest import Emit, LatestRunner
-from sd2app.session.content import OfferedCure, camera_of, notes_of, offers_of, words_of
-from sd2app.session.mesh_reading import ReadMesh, mesh_fields
+from sd2app.background.latest import LatestRunner
+from sd2app.session.content import OfferedCure, camera_of, notes_of
+from sd2app.session.mesh_reading import ReadMesh, read_mesh
 from sd2app.session.video_frames import VideoFrames
 from sd2core.body.camera import PinholeCamera
 from sd2core.errors import Cure
@@ -41,7 +41,7 @@ class MeshPreview(VideoFrames):
         self.mesh_problem = ""
         self.offers: tuple[OfferedCure, ...] = ()
         self._lister = LatestRunner("persons", self, self._take_persons)
-        self._loader = LatestRunner("mesh to look at", self, self._take_mesh, self._refuse_mesh)
+        self._loader = LatestRunner("mesh to look at", self, self._take_mesh, self._refuse)
         path = recording.mesh
         assert path is not None
         self._lister.submit(lambda emit: persons_in(path))
@@ -77,9 +77,7 @@ class MeshPreview(VideoFrames):
     @property
     def taken(self) -> ReadMesh | None:
         """The mesh as it would be taken; None while there is none."""
-        if self.mesh is None or self.loading:
-            return None
-        return ReadMesh(mesh_fields(self.recording), self.mesh, self.offers)
+        return None if self.mesh is None or self.loading else self._seen
 
     def first_frame(self) -> int:
         """The middle frame, or the one in the middle of those in which the mesh has somebody."""
@@ -114,28 +112,19 @@ class MeshPreview(VideoFrames):
 
     def _read(self) -> None:
         asked = replace(self.recording)
-
-        def read(emit: Emit) -> tuple[Recording, MeshSequence]:
-            asked.learn_camera()
-            return asked, asked.load_mesh(lambda *_: emit(None))
-
-        self._loader.submit(read)
+        self._loader.submit(lambda emit: (asked, read_mesh(asked, emit)))
         self.changed.emit()
 
     def _take_persons(self, persons: dict[str, int]) -> None:
         self.persons = persons
         self.changed.emit()
 
-    def _take_mesh(self, read: tuple[Recording, MeshSequence]) -> None:
-        self.recording, self.mesh = read
-        if not self.someone and self.frame == super().first_frame():
-            self.show_frame(self.first_frame())  # the user has not looked elsewhere
-        self._tell("", offers_of(self.mesh.findings))
-
-    def _refuse_mesh(self, error: Exception) -> None:
-        self.mesh = None
-        self._tell(words_of(error), offers_of([error]))
-
-    def _tell(self, problem: str, offers: tuple[OfferedCure, ...]) -> None:
-        self.mesh_problem, self.offers = problem, offers
+    def _take_mesh(self, seen: tuple[Recording, ReadMesh]) -> None:
+        asked, self._seen = seen
+        self.mesh, self.mesh_problem = self._seen.mesh, self._seen.problem
+        self.offers = self._seen.offers
+        if self.mesh is not None:
+            self.recording = asked
+            if not self.someone and self.frame == super().first_frame():
+                self.show_frame(self.first_frame())  # the user has not looked elsewhere
         self.changed.emit()

@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject, Signal
 from sd2app.background.latest import Emit
 from sd2app.session.content import OfferedCure, offers_of, words_of
 from sd2app.session.tasks import ListedRunner, TaskList
+from sd2core.errors import Sd2Error, of_the_system
 from sd2core.io.bodies import with_bodies
 from sd2core.mesh.bodies import Body
 from sd2core.mesh.sequence import MeshSequence
@@ -23,16 +24,28 @@ _KEPT = 2
 
 @dataclass(frozen=True, eq=False)
 class ReadMesh:
-    """A mesh, or none where it could not be read, and the recording's fields that say which."""
+    """A mesh, or none and why it could not be read, and the recording's fields that say which."""
 
     fields: dict[str, Any]
     mesh: MeshSequence | None
     offers: tuple[OfferedCure, ...] = ()
+    problem: str = ""
 
 
 def mesh_fields(recording: Recording) -> dict[str, Any]:
     """Fields of a recording on which its mesh depends."""
     return {name: getattr(recording, name) for name in MESH}
+
+
+def read_mesh(asked: Recording, emit: Emit) -> ReadMesh:
+    """Read the mesh of a recording, whose camera it may bring; ``emit`` gets how much is read."""
+    try:
+        asked.learn_camera()
+        mesh = asked.load_mesh(lambda done, total: emit((done, total)))
+    except (Sd2Error, OSError) as error:
+        told = error if isinstance(error, Sd2Error) else of_the_system(error)
+        return ReadMesh(mesh_fields(asked), None, offers_of([told]), told.words)
+    return ReadMesh(mesh_fields(asked), mesh, offers_of(mesh.findings))
 
 
 class MeshReader(QObject):
@@ -46,11 +59,7 @@ class MeshReader(QObject):
         self._kept: list[ReadMesh] = []  # the newest first
         self._jobs = jobs
         self._bodies: list[tuple[Body, ListedRunner]] = []  # and what reads the file of each
-        self._take: Callable[[ReadMesh], object] = self._tell  # what is done with the next one
-        self._refuse: Callable[[Exception], object] = self._say
-        self._runner = ListedRunner(
-            "mesh", jobs, self, lambda read: self._take(read), lambda error: self._refuse(error)
-        )
+        self._runner = ListedRunner("mesh", jobs, self, self._receive, self._say)
 
     def reset(self, read: ReadMesh) -> None:
         """Begin with the mesh of another recording."""
@@ -72,11 +81,11 @@ class MeshReader(QObject):
         """
 
         def take(read: ReadMesh) -> None:
-            self.keep(read)
-            then(read.fields)
+            if read.mesh is not None:
+                self.keep(read)
+                then(read.fields)
 
-        self._take, self._refuse = take, self._say
-        self._submit(replace(recording, **fields))
+        self._submit(replace(recording, **fields), take)
 
     def read_body(self, mesh: MeshSequence, body: Body, then: Callable[[], object]) -> None:
         """Read the file of another body beside a mesh, and call ``then``: it is then at hand."""
@@ -97,14 +106,8 @@ class MeshReader(QObject):
         if kept is not None or recording.mesh is None:
             self._runner.cancel()
             self._tell(kept or ReadMesh(fields, None))
-            return
-
-        def refuse(error: Exception) -> None:
-            self._tell(ReadMesh(fields, None, offers_of([error])))
-            self._say(error)
-
-        self._take, self._refuse = self._tell, refuse
-        self._submit(replace(recording))
+        else:
+            self._submit(replace(recording), self._tell)
 
     def close(self) -> None:
         """Stop reading, for good."""
@@ -115,14 +118,15 @@ class MeshReader(QObject):
     def _runners(self) -> list[ListedRunner]:
         return [self._runner, *(runner for _, runner in self._bodies)]
 
-    def _submit(self, asked: Recording) -> None:
-        def read(emit: Emit) -> ReadMesh:
-            asked.learn_camera()
-            mesh = asked.load_mesh(lambda done, total: emit((done, total)))
-            return ReadMesh(mesh_fields(asked), mesh, offers_of(mesh.findings))
-
+    def _submit(self, asked: Recording, take: Callable[[ReadMesh], object]) -> None:
         name = "" if asked.mesh is None else asked.mesh.name
-        self._runner.submit(read, f"Reading {name}")
+        self._runner.submit(lambda emit: (take, read_mesh(asked, emit)), f"Reading {name}")
+
+    def _receive(self, result: tuple[Callable[[ReadMesh], object], ReadMesh]) -> None:
+        take, read = result
+        take(read)
+        if read.problem:
+            self.failed.emit(read.problem)
 
     def _say(self, error: Exception) -> None:
         self.failed.emit(words_of(error))
