@@ -19,7 +19,7 @@ from sd2app.session.document import DocumentModel
 from sd2app.session.mesh_reading import ReadMesh
 from sd2app.session.session import Session
 from sd2app.session.undo import Edits
-from sd2app.shell.mesh_readings import MeshReadings
+from sd2app.shell.mesh_readings import keep_reading, kept_reading
 from sd2app.shell.open_dialog import ask_to_open
 from sd2app.widgets.dialogs import Answer, ask_folder, ask_new, confirmed
 from sd2app.widgets.notices import Notice
@@ -62,7 +62,6 @@ class FilesFeature(Feature):
         self._session, self._shell, self._fit, self._labels = session, shell, fit, labels
         self._add_inertial, self._see_mesh = add_inertial, see_mesh
         self._document = session.document
-        self._readings = MeshReadings(session.settings)
         self._document.opened.connect(self._remember)
         self._document.changed.connect(self._remember_reading)
         self._document.saved.connect(self._remember)
@@ -140,11 +139,12 @@ class FilesFeature(Feature):
         """Remember how the mesh of loose files is read; a recording says it itself."""
         recording = self._document.recording
         if recording is not None and recording.folder == UNTITLED and recording.mesh is not None:
-            self._readings.keep([*map(plain_path, self._document.paths)], recording)
+            paths = [*map(plain_path, self._document.paths)]
+            keep_reading(self._session.settings, paths, recording)
 
     def reopen(self, paths: Sequence[Path]) -> None:
         """Open what was open lately; its mesh is read as it was then."""
-        fields = self._readings.fields(paths)
+        fields = kept_reading(self._session.settings, paths)
         if fields is None:
             self.replace(paths)
         elif self.may_discard():
