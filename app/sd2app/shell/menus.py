@@ -91,28 +91,11 @@ Its keys hold, and *Find an action* has it."""
 def in_order(actions: Iterable[Action]) -> tuple[Action, ...]:
     """Actions by their menus, in each as it stands there, and then those that stand elsewhere.
 
-    Raises
-    ------
-    ValueError
-        Where an action stands nowhere or in another menu than it says, or a place has no action.
+    Raises ValueError for one that stands nowhere.
     """
-    known = {action.id: action for action in actions}
-    places = {
-        entry: menu
-        for menu, entries in (*LAYOUT.items(), *ELSEWHERE.items())
-        for entry in entries
-        if entry[0] not in (_LINE, _FILLED)
-    }
-    differ = places.keys() ^ known.keys()
-    for name in known.keys() - differ:
-        stands, says = places[name], known[name].menu
-        if says not in LAYOUT or (stands in LAYOUT and stands != says):
-            differ.add(name)
-    if differ:
-        raise ValueError(f"Menus and actions differ: {sorted(differ)}")
     menus = list(LAYOUT)
-    rows = [known[name] for name in places]
-    return tuple(sorted(rows, key=lambda row: menus.index(row.menu)))
+    places = [entry for one in (LAYOUT, ELSEWHERE) for entries in one.values() for entry in entries]
+    return tuple(sorted(actions, key=lambda one: (menus.index(one.menu), places.index(one.id))))
 
 
 def menus_in(bar: QWidget) -> Iterator[QMenu]:

@@ -8,11 +8,11 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QKeySequence
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
-from window_models import menu_of, models_of
+from window_models import all_actions, menu_of, models_of
 
 from sd2app.labels.marking import reaction_ms
 from sd2app.settings import MAX_RECENT
-from sd2app.shell.menus import menus_in
+from sd2app.shell.menus import ELSEWHERE, LAYOUT, menus_in
 from sd2app.widgets.inputs import Choice, NumberBox
 
 ALT, LEFT = Qt.KeyboardModifier.AltModifier, Qt.MouseButton.LeftButton
@@ -26,6 +26,18 @@ def entries_of(menu) -> list[str]:
 
 def letter_of(text: str) -> str:
     return QKeySequence.mnemonic(text).toString()[-1:]
+
+
+def test_every_action_stands_once_and_in_the_menu_that_it_names(qapp) -> None:
+    named = {one.id: one.menu for one in all_actions()}
+    places = [
+        (menu, entry)
+        for menu, entries in (*LAYOUT.items(), *ELSEWHERE.items())
+        for entry in entries
+        if entry[0] not in "-@"
+    ]
+    assert sorted(entry for _, entry in places) == sorted(named)
+    assert all(named[entry] == menu for menu, entry in places if menu in LAYOUT)
 
 
 def test_every_entry_has_a_letter_and_shares_it_only_where_letters_run_out(window) -> None:
