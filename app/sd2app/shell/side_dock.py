@@ -12,6 +12,8 @@ from sd2app.settings import Settings
 from sd2app.shell.side_panel import SidePanel
 from sd2app.widgets.layouts import ANY_WIDTH_PX
 
+_USUAL_PX = {"Labels": 560}
+"""Widths of panels with one of their own, until the user chooses another: of the table of spans."""
 _SHOWN, _FOLDED = "panel", "folded"
 _MAX_SHARE = 0.44
 """Share of the window that a panel with a width of its own takes before the user says so."""
@@ -33,8 +35,6 @@ class SideDock(QObject):
         Holds the panels; a child of a widget around the splitter.
     splitter : QSplitter
     side : SidePanel
-    usual : dict
-        Widths in pixels of the panels with one of their own, until the user chooses another.
     settings : Settings
     layouts : Layouts
         Remember which panel is open, if any, and where it stands.
@@ -45,7 +45,6 @@ class SideDock(QObject):
         frame: QWidget,
         splitter: QSplitter,
         side: SidePanel,
-        usual: dict[str, int],
         settings: Settings,
         layouts: Layouts,
     ) -> None:
@@ -53,7 +52,7 @@ class SideDock(QObject):
         room = splitter.widget(splitter.count() - 1)
         assert room is not None
         self._frame, self._splitter, self._room, self._side = frame, splitter, room, side
-        self._usual, self._settings, self._layouts = usual, settings, layouts
+        self._settings, self._layouts = settings, layouts
         self._otherwise_px = splitter.sizes()[-1]
         self._shown = side.shown
         self._fits: tuple[bool, bool] | None = None
@@ -98,7 +97,7 @@ class SideDock(QObject):
             self._settings.set_value(self._name(self._shown), wide_px)
 
     def _turn(self) -> None:
-        if self._shown not in self._usual:
+        if self._shown not in _USUAL_PX:
             # A wide panel's width counts where a hand chose it: a small window may have cut it.
             self._remember()
         before, self._shown = self._shown, self._side.shown
@@ -108,7 +107,7 @@ class SideDock(QObject):
     @property
     def _wide_px(self) -> int:
         """Width of the open panel that the user chose, or its usual one, for its content."""
-        usual_px = min(self._usual.get(self._shown, 0), round(_MAX_SHARE * self._splitter.width()))
+        usual_px = min(_USUAL_PX.get(self._shown, 0), round(_MAX_SHARE * self._splitter.width()))
         usual_px = max(usual_px, self._otherwise_px)
         chosen_px = self._settings.stored(self._name(self._shown), usual_px)
         return max(chosen_px, self._frame.minimumSizeHint().width())
@@ -165,4 +164,4 @@ class SideDock(QObject):
         return False
 
     def _name(self, shown: str) -> str:
-        return f"panel/width/{shown if shown in self._usual else ''}"
+        return f"panel/width/{shown if shown in _USUAL_PX else ''}"

@@ -49,8 +49,6 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-_LABELS_PX = 560
-"""Room for the usual columns of the table of spans."""
 _PANELS = ("video", "scene", "tracks", "spectrum", "side")
 _SPLITTERS = ("views", "main")  # whose sizes each layout remembers
 _SIDE_PX = 328
@@ -221,10 +219,8 @@ class MainWindow(QMainWindow):
         self.side = SidePanel(side_pages(self.features, views), self._menus["pane_over"])
         self.fold_side = self.side.set_folded
         fill(self._panels["side"], self.side)
-        self._dock = SideDock(
-            self._panels["side"], self._across, self.side, {"Labels": _LABELS_PX}, self._settings,
-            self.session.layouts,
-        )  # fmt: skip
+        frame, layouts = self._panels["side"], self.session.layouts
+        self._dock = SideDock(frame, self._across, self.side, self._settings, layouts)
         self._suggestions = views["suggestions"]  # as wide as all panes, which is one row
         self._below.addWidget(self._suggestions)
         stack, self.maps = track_stack(self.session, self.features, views)

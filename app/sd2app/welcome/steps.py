@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from operator import gt as shrank
+from operator import lt as grew
+
 from sd2app.denoise.model import DenoiseModel
 from sd2app.labels.model import LabelsModel
 from sd2app.maps.difference import DifferenceModel
@@ -42,12 +45,6 @@ def tour_steps(
 
     def moved(before: object, now: object) -> bool:
         return now is not None and now != before
-
-    def grew(before: int, now: int) -> bool:
-        return now > before
-
-    def shrank(before: int, now: int) -> bool:
-        return now < before
 
     return (
         Step(

@@ -120,15 +120,11 @@ class NoticeStack(QWidget):
         right_px = room.right() - _MARGIN_PX - width_px
         pointer = parent.mapFromGlobal(QCursor.pos())
         if appears or not self.geometry().contains(pointer):
-            self._at = (right_px, low_px)
-            for at in (
-                self._at,
-                (room.left() + _MARGIN_PX, low_px),
-                (right_px, room.top() + _MARGIN_PX),
-            ):
-                if not QRect(*at, width_px, height_px).contains(pointer):
-                    self._at = at
-                    break
+            left_px, high_px = room.left() + _MARGIN_PX, room.top() + _MARGIN_PX
+            corners = [(right_px, low_px), (left_px, low_px), (right_px, high_px)]
+            size = width_px, height_px
+            free = [one for one in corners if not QRect(*one, *size).contains(pointer)]
+            self._at = (free or corners)[0]
         self.setGeometry(*self._at, width_px, height_px)
         self.show()
         self.raise_()
