@@ -53,12 +53,9 @@ class Finding:
 
 def examine() -> list[Finding]:
     """Look at the installation."""
+    here = f"{__version__}, Python {platform.python_version()}, {worker_count()} cores"
     return [
-        Finding(
-            "SD² Studio",
-            "ok",
-            f"{__version__}, Python {platform.python_version()}, {worker_count()} cores",
-        ),
+        Finding("SD² Studio", "ok", here),
         _libraries(),
         *_window(),
         _kernels(),
@@ -72,14 +69,10 @@ def examine() -> list[Finding]:
 
 def _libraries() -> Finding:
     missing = missing_libraries()
-    if missing:
-        return Finding(
-            "System libraries",
-            "problem",
-            f"{', '.join(missing)} missing",
-            how_to_install(missing.values()),
-        )
-    return Finding("System libraries", "ok", "all there")
+    if not missing:
+        return Finding("System libraries", "ok", "all there")
+    found, remedy = f"{', '.join(missing)} missing", how_to_install(missing.values())
+    return Finding("System libraries", "problem", found, remedy)
 
 
 def _window() -> list[Finding]:
@@ -105,39 +98,26 @@ def _window() -> list[Finding]:
     except (IndexError, ValueError):
         why = (run.stderr.strip().splitlines() or [f"it ended with code {run.returncode}"])[-1]
         return [Finding("Window", "problem", why, "Install what is missing above, or named here")]
-    return [
-        Finding("Window", "ok", f"opens ({seen['platform']})")
-        if on_screen or not sys.platform.startswith("linux")
-        else Finding(
-            "Window",
-            "note",
-            "there is no display",
-            "Pictures can be drawn without: sd2 demo --screenshot window.png",
-        ),
-        Finding("3D view", "ok", "OpenGL answers")
-        if "gl" not in seen
-        else Finding("3D view", "problem", *seen["gl"].split(". ", 1)),
-        Finding("Fonts", "ok", f"{seen['fonts']} families")
-        if seen["fonts"]
-        else Finding(
-            "Fonts",
-            "problem",
-            "none with letters: texts would be boxes",
-            how_to_install(["fonts-dejavu-core"]),
-        ),
-    ]
+    window = Finding("Window", "ok", f"opens ({seen['platform']})")
+    if not on_screen and sys.platform.startswith("linux"):
+        remedy = "Pictures can be drawn without: sd2 demo --screenshot window.png"
+        window = Finding("Window", "note", "there is no display", remedy)
+    view = Finding("3D view", "ok", "OpenGL answers")
+    if "gl" in seen:
+        view = Finding("3D view", "problem", *seen["gl"].split(". ", 1))
+    fonts = Finding("Fonts", "ok", f"{seen['fonts']} families")
+    if not seen["fonts"]:
+        found, remedy = "none with letters: texts would be boxes", "fonts-dejavu-core"
+        fonts = Finding("Fonts", "problem", found, how_to_install([remedy]))
+    return [window, view, fonts]
 
 
 def _kernels() -> Finding:
     if kernels_ready():
         return Finding("Kernels", "ok", "compiled for this processor")
     done, total = kernels_compiled()
-    return Finding(
-        "Kernels",
-        "note",
-        f"{done} of {total} compiled",
-        "sd2 doctor --warm-up (half a minute; otherwise that is done in the background)",
-    )
+    remedy = "sd2 doctor --warm-up (half a minute; otherwise that is done in the background)"
+    return Finding("Kernels", "note", f"{done} of {total} compiled", remedy)
 
 
 def _bundled() -> Finding:
@@ -155,12 +135,8 @@ def _landmark_models() -> Finding:
     try:
         models = [landmark_models(download=False, model=model) for model in LANDMARKERS]
     except Sd2Error as error:
-        return Finding(
-            "Landmark models",
-            "note",
-            error.found,
-            "sd2 doctor --fetch-models (some 80 MB, once; only fits of videos need them)",
-        )
+        remedy = "sd2 doctor --fetch-models (some 80 MB, once; only fits of videos need them)"
+        return Finding("Landmark models", "note", error.found, remedy)
     names = " and ".join(LANDMARKERS)
     return Finding("Landmark models", "ok", f"{names} in {models[0].detector.parent}")
 
@@ -169,9 +145,8 @@ def _gpu() -> Finding:
     try:
         import torch
     except (ImportError, OSError) as error:
-        return Finding(
-            "Learning", "problem", f"torch cannot be loaded ({error})", "Install it again"
-        )
+        found = f"torch cannot be loaded ({error})"
+        return Finding("Learning", "problem", found, "Install it again")
     if torch.cuda.is_available():
         return Finding("Learning", "ok", f"on {torch.cuda.get_device_name()}")
     return Finding("Learning", "ok", f"torch {torch.__version__} on the processor, no GPU")
@@ -195,9 +170,8 @@ def plug_in_findings() -> list[Finding]:
     for plug_in, made in (one for group in groups for one in group.loaded()):
         if isinstance(made, Sd2Error):
             remedy = made.remedy or f"Uninstall {plug_in.package}"
-            finding = Finding(
-                "Plug-in", "problem", str(Sd2Error(made.found, made.expected)), remedy
-            )
+            words = str(Sd2Error(made.found, made.expected))
+            finding = Finding("Plug-in", "problem", words, remedy)
         else:
             words = f"{plug_in.name} ({plug_in.group.name}) of {plug_in.package}"
             finding = Finding("Plug-in", "ok", words)
