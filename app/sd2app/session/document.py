@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoStack
 
-from sd2app.background.latest import Emit, LatestRunner
+from sd2app.background.latest import BackgroundModel, Emit, LatestRunner
 from sd2app.session.content import (
     PARTS,
     UNTITLED,
@@ -61,7 +61,7 @@ class _Asked:
     cure: Cure | None = None
 
 
-class DocumentModel(QObject):
+class DocumentModel(BackgroundModel):
     """One recording, its parts, and the history of its edits."""
 
     opened = Signal()  # another recording, or none
@@ -289,8 +289,7 @@ class DocumentModel(QObject):
 
     def close(self) -> None:
         """Stop all work and let go of the files."""
-        for runner in (self._runner, self._reader, self._maps, self.meshes):
-            runner.close()
+        super().close()
         if self.content is not None:
             self.content.close()
             self.content = None

@@ -8,7 +8,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import Emit
+from sd2app.background.latest import BackgroundModel, Emit
 from sd2app.session.content import OfferedCure, offers_of, words_of
 from sd2app.session.tasks import ListedRunner, TaskList
 from sd2core.errors import Sd2Error, of_the_system
@@ -48,7 +48,7 @@ def read_mesh(asked: Recording, emit: Emit) -> ReadMesh:
     return ReadMesh(mesh_fields(asked), mesh, offers_of(mesh.findings))
 
 
-class MeshReader(QObject):
+class MeshReader(BackgroundModel):
     """Reads meshes in the background, and keeps the last ones."""
 
     ready = Signal(object)  # ReadMesh of the fields that were followed
@@ -63,7 +63,7 @@ class MeshReader(QObject):
 
     def reset(self, read: ReadMesh) -> None:
         """Begin with the mesh of another recording."""
-        for runner in self._runners():
+        for runner in self.findChildren(ListedRunner):
             runner.cancel()
         self._kept = [read]
 
@@ -108,15 +108,6 @@ class MeshReader(QObject):
             self._tell(kept or ReadMesh(fields, None))
         else:
             self._submit(replace(recording), self._tell)
-
-    def close(self) -> None:
-        """Stop reading, for good."""
-        for runner in self._runners():
-            runner.close()
-        self._kept = []
-
-    def _runners(self) -> list[ListedRunner]:
-        return [self._runner, *(runner for _, runner in self._bodies)]
 
     def _submit(self, asked: Recording, take: Callable[[ReadMesh], object]) -> None:
         name = "" if asked.mesh is None else asked.mesh.name
