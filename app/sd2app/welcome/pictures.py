@@ -9,7 +9,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, QPoint, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QImage
 
-from sd2app.background.latest import LatestRunner, delayed
+from sd2app.background.latest import BackgroundModel, LatestRunner, delayed
 from sd2app.maps.heatmap_image import heatmap_image
 from sd2app.session.session import Session
 from sd2app.widgets.picture import png_of
@@ -26,7 +26,7 @@ _MAX_PICTURES = 60
 """Number that are kept."""
 
 
-class RecordingPictures(QObject):
+class RecordingPictures(BackgroundModel):
     """Makes a picture of what is open, of its video or else of a map, and finds it again.
 
     ``folder`` holds the pictures. One that cannot be written is not there; nothing else is lost.
@@ -46,15 +46,10 @@ class RecordingPictures(QObject):
         for signal in (session.video.frame_changed, maps.real.changed, maps.synthetic.changed):
             signal.connect(self._wait)
 
-    @property
-    def busy(self) -> bool:
-        """True while a picture is being written."""
-        return self._writer.busy
-
     def close(self) -> None:
         """Finish."""
         self._patience.stop()
-        self._writer.close()
+        super().close()
 
     def path_of(self, paths: Sequence[Path]) -> Path:
         """File of the picture of what is opened together, which may not be there."""
