@@ -180,12 +180,10 @@ class Menus:
     def refresh(self, rows: Collection[Action] | None = None) -> None:
         """Follow the models, with all actions or some."""
         rows = self._rows.values() if rows is None else rows
-        enabled = {question: question() for question in {row.enabled for row in rows}}
-        reasons = {question: question() for question in {row.why_not for row in rows} if question}
         for row in rows:
             action = self._actions[row.id]
-            reason = reasons[row.why_not] if row.why_not is not None else ""
-            action.setEnabled(enabled[row.enabled] and not reason)  # which many actions ask alike
+            reason = "" if row.why_not is None else row.why_not()
+            action.setEnabled(row.enabled() and not reason)
             if row.why_not is not None:
                 action.setToolTip(reason or self._tips[row.id])
             if row.checked is not None:
