@@ -297,7 +297,7 @@ class RunMonitor(QObject, Generic[F]):
             return "starting"  # a process took it up between the two looks
         if state == "finished" or state == "stopped" or state == "failed":
             return state
-        return "died"
+        return "stopped" if self._request == "stop" else "died"  # it was ended for not stopping
 
     def _phase_under_way(self, word: Command) -> Phase:
         if word == "cancel":

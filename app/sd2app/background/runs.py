@@ -14,7 +14,7 @@ from sd2app.background.run_monitor import RunMonitor
 from sd2app.background.run_setup import RunSetup
 from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
-from sd2core.processes import ProcessId
+from sd2core.processes import ONE_THREAD, ProcessId
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder
 from sd2core.runs.control import Command
 from sd2core.runs.folder import LIVE, State
@@ -49,6 +49,8 @@ class Runs(QObject, Generic[Run]):
     remembered: ClassVar[str]
     """Setting that names the run in view."""
     shown_by: ClassVar[str] = "The Train panel"
+    environment: ClassVar[Mapping[str, str]] = ONE_THREAD
+    """Of commands: what moves on the screen comes first, where they get by with one processor."""
 
     changed = Signal()
     listed = Signal()  # the runs on disk have been looked at again
@@ -170,7 +172,15 @@ class Runs(QObject, Generic[Run]):
         """
         if self.busy:
             raise Sd2Error(self.busy)
-        self.follow_new(path, CommandFolder(path).start(words, about, self._command))
+        folder = CommandFolder(path)
+        is_new = not folder.exists
+        try:
+            process = folder.start(words, about, self._command, self.environment)
+        except (Sd2Error, OSError):
+            if is_new:
+                folder.discard()
+            raise
+        self.follow_new(path, process)
 
     def follow_new(self, path: Path, process: ProcessId) -> None:
         """Show a run whose process was just started."""

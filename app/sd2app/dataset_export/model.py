@@ -26,7 +26,7 @@ from sd2core.maps import MapKind
 from sd2core.options.records import words_of
 from sd2core.progress import Cancelled
 from sd2core.recording.recording import is_recording, open_recording
-from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder
+from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 from sd2core.runs.pace import Kind, known_pace_s
 
 if TYPE_CHECKING:
@@ -94,6 +94,7 @@ class ExportModel(Runs[ExportRun]):
 
     monitor, remembered = ExportRun, "run"
     shown_by = "File → Export data set…"
+    environment: ClassVar = {}  # it gives way to whatever else wants the processors
 
     def __init__(
         self,
@@ -199,16 +200,12 @@ class ExportModel(Runs[ExportRun]):
         about = {"what": "export", "out": str(out), "choice": choice}
         path = free_folder(self._folder, "export", [out])
         try:
-            # It may use all processors: it gives way to whatever else wants them.
-            process = CommandFolder(path).start(
-                words_of("export", command), about, self._command, {}
-            )
+            self.start_command(path, words_of("export", command), **about)
         except (Sd2Error, OSError) as error:
-            CommandFolder(path).discard()
             self.failed.emit(str(error))
             return
         self.result = None
-        self.follow_new(path, process)
+        self.changed.emit()
 
     def stop(self) -> None:
         """Stop writing; what is complete stays, and the same export goes on from there."""

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import ClassVar
 
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.run_monitor import CommandRun
+from sd2app.background.runs import Runs
+from sd2app.settings import Settings
 from sd2core.cli.pairs import Recordings
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import remove
 from sd2core.options.records import words_of
 from sd2core.recording.recording import is_recording, open_recording
-from sd2core.runs.command_folder import COMMAND, CommandFolder
+from sd2core.runs.command_folder import COMMAND
 
 
 class PairRun(CommandRun):
@@ -22,25 +25,30 @@ class PairRun(CommandRun):
     stop_patience_s = 3.0
 
 
-class PairMaker(QObject):
+class PairMaker(Runs[PairRun]):
     """Runs ``sd2 pairs recordings`` once at a time, with ``command``.
 
     Pairs are kept in ``folder``, which is made on demand.
     """
 
-    changed = Signal()  # making pairs began or ended
+    monitor, remembered = PairRun, "run"
+    environment: ClassVar = {}
+
     made = Signal(object)  # path of a finished store
-    failed = Signal(str)  # why there is none
 
     def __init__(
         self, folder: Path, parent: QObject | None = None, command: Sequence[str] = COMMAND
     ) -> None:
-        super().__init__(parent)
-        self._folder = folder
-        self._command = (*command, "--folder")
-        self._run: PairRun | None = None
-        self.out: Path | None = None  # store that is being made
-        self.cancelling = False  # it has been asked to end
+        super().__init__(Settings.forgetful(), folder, parent, (*command, "--folder"))
+
+    @property
+    def out(self) -> Path | None:
+        """Store that is being made."""
+        return None if self.run is None else self.run.out
+
+    def candidates(self) -> Iterable[Path]:
+        """None: those of another window are its own."""
+        return ()
 
     def make(self, place: Path, *, limbs: bool = False) -> None:
         """Make pairs of a recording, or of all recordings in a folder; with ``limbs`` also split.
@@ -54,55 +62,33 @@ class PairMaker(QObject):
         recordings = usable_recordings(place)
         self._folder.mkdir(parents=True, exist_ok=True)
         out = _free(self._folder, place.stem)
-        folder = CommandFolder(out.with_name(f".{out.stem}"))
-        command = Recordings(recordings=tuple(recordings), out=out, limbs=limbs)
-        words = words_of("pairs recordings", command)
-        try:
-            process = folder.start(words, {"what": "pairs"}, self._command, {})
-        except Sd2Error:
-            folder.discard()
-            raise
-        self._run = run = PairRun(folder.path, self, process=process)
-        self.out, self.cancelling = out, False
-        run.ended.connect(self._end)
-        self.changed.emit()
-
-    def cancel(self) -> None:
-        """Cancel, and remove the unfinished pairs."""
-        if self._run is not None and not self.cancelling:
-            self.cancelling = True
-            self._run.stop()
-            self.changed.emit()
+        words = words_of(
+            "pairs recordings", Recordings(recordings=tuple(recordings), out=out, limbs=limbs)
+        )
+        self.start_command(out.with_name(f".{out.stem}"), words, what="pairs", out=str(out))
 
     def close(self) -> None:
         """End the process at once."""
-        if self._run is not None:
-            self._run.kill()
-            self._let_go(self._run)
+        if self.run is not None:
+            self.run.kill()
+            self._clear_up(self.run)
+        super().close()
 
-    def _end(self) -> None:
-        out, run = self.out, self._run
-        assert out is not None
-        assert run is not None
-        run.close()
+    def say_ended(self, run: PairRun) -> None:
+        """Say what was made, or why it was not, unless it was cancelled."""
+        self._clear_up(run)
         if run.phase == "finished":
-            self.out = None  # it is kept
-        self._let_go(run)
-        if run.phase == "finished":
-            self.made.emit(out)
-        elif not self.cancelling:
-            lines = run.text.splitlines() or [f"{out.stem} could not be made."]
+            self.made.emit(run.out)
+        elif run.phase != "stopped":
+            lines = run.text.splitlines() or [f"{run.out.stem} could not be made."]
             self.failed.emit(lines[-1].removeprefix("sd2: "))
-        self.cancelling = False
-        self.changed.emit()
 
-    def _let_go(self, run: PairRun) -> None:
+    def _clear_up(self, run: PairRun) -> None:
         """Forget the process, and remove what it left."""
-        out, self._run, self.out = self.out, None, None
-        run.deleteLater()
+        self.select(None)
         run.folder.discard()
-        if out is not None and out.exists():
-            remove(out)
+        if run.phase != "finished" and run.out.exists():
+            remove(run.out)
 
 
 def usable_recordings(place: Path) -> list[Path]:

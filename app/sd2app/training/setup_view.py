@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtWidgets import QGridLayout, QWidget
@@ -70,11 +71,11 @@ class TrainingSetupView(TrainingForm):
         self._refresh()
 
     def _making_part(self) -> QWidget:
-        maker = self._training.pair_maker
+        stop = partial(self._training.pair_maker.tell, "stop")
         self._making_text = ElidedLabel(self, "muted")
         bar = ProgressBar("Pairs are being made", width_px=64)
         bar.show_share(None)
-        self._making_cancel = outlined("Cancel", "Make no pairs", maker.cancel, self)
+        self._making_cancel = outlined("Cancel", "Make no pairs", stop, self)
         self._making = pane(row_of((self._making_text, 1), bar, self._making_cancel))
         return self._making
 
@@ -107,12 +108,13 @@ class TrainingSetupView(TrainingForm):
             return
         division = setup.division if not setup.problem else None
         self.show_setup(division_text(division) if division is not None else "")
-        self._making.setVisible(maker.out is not None)
-        if maker.out is not None:
+        self._making.setVisible(maker.run is not None)
+        if maker.run is not None:
             self.nothing.hide()
-            doing = "Cancelling…" if maker.cancelling else "Making"
-            self._making_text.setText(f"{doing} {maker.out.name}")
-            self._making_cancel.setEnabled(not maker.cancelling)
+            cancelling = maker.run.phase == "stopping"
+            doing = "Cancelling…" if cancelling else "Making"
+            self._making_text.setText(f"{doing} {maker.run.out.name}")
+            self._making_cancel.setEnabled(not cancelling)
         card = setup.start
         for one in (self._kind, self._inputs):
             one.setEnabled(card is None)

@@ -90,8 +90,8 @@ def test_cancelling_leaves_nothing_and_says_nothing(made, qtbot, tmp_path) -> No
     maker.make(recording(tmp_path / "a.sd2"))
     out = maker.out
     qtbot.waitUntil(lambda: (out / "recordings").exists(), timeout=10_000)
-    maker.cancel()
-    assert maker.cancelling
+    maker.tell("stop")
+    assert maker.run.phase == "stopping"
     qtbot.waitUntil(lambda: maker.out is None, timeout=10_000)
     assert maker.told == []
     assert not out.exists()
@@ -106,7 +106,7 @@ def test_one_that_will_not_stop_is_ended(made, qtbot, tmp_path, monkeypatch) -> 
     )
     maker.make(recording(tmp_path / "a.sd2"))
     qtbot.waitUntil((maker.out / "deaf").exists, timeout=10_000)
-    maker.cancel()
+    maker.tell("stop")
     qtbot.waitUntil(lambda: maker.out is None, timeout=10_000)
     assert maker.told == []
 

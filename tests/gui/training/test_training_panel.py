@@ -274,7 +274,7 @@ def test_the_open_recording_is_made_into_pairs(made, qtbot, small_recording) -> 
     assert maker.out is not None
     assert maker.out.name == "ball.zarr"
     assert this().toolTip() == "Pairs are being made"
-    maker.cancel()
+    maker.tell("stop")
     qtbot.waitUntil(lambda: maker.out is None, timeout=10_000)
 
 
