@@ -209,10 +209,6 @@ class RunMonitor(QObject, Generic[F]):
         self.phase_changed.emit()
         self.changed.emit()
 
-    def stop(self) -> None:
-        """End it now and keep what there is."""
-        self.tell("stop")
-
     def delete(self) -> None:
         """Delete what it made; only after its end."""
         if not self.under_way:

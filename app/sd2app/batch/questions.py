@@ -7,8 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar
 
-from PySide6.QtCore import QObject, QUrl, Signal
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 
 from sd2app.background.quoting import quoted
@@ -19,7 +18,7 @@ from sd2app.feature import Shell
 from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.saving import saved_first
 from sd2app.session.session import Session
-from sd2app.widgets.dialogs import Answer, ask_file, ask_folder, ask_new, confirmed
+from sd2app.widgets.dialogs import Answer, ask_file, ask_folder, ask_new, confirmed, show_in_files
 from sd2app.widgets.text import counted
 from sd2core.denoise.card import ModelCard
 from sd2core.errors import Sd2Error
@@ -210,7 +209,7 @@ class BatchQuestions(QObject):
     def open_folder(self) -> None:
         """Show the folder of the results."""
         if self._batch.run is not None:
-            _show_in_files(self._batch.run.path)
+            show_in_files(self._batch.run.path)
 
     def open_result(self, row: int) -> None:
         """Open a recording in the window, with the sensor where a result says."""
@@ -266,7 +265,3 @@ def paths_of(result: Result) -> list[Path]:
 def _count_text(placements: Placements) -> str:
     # There may be ten thousand, and this is asked for whenever something changes.
     return counted(len(placements.places()), "placement")
-
-
-def _show_in_files(folder: Path) -> None:
-    QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder)))

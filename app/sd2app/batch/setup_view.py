@@ -122,7 +122,7 @@ class BatchSetupView(QWidget):
         if self._batch.run is not None:
             return
         setup = self._setup
-        self._list.show_entries([(e.path, entry_text(e), bool(e.problem)) for e in setup.data])
+        self._list.show_entries([(one.path, entry_text(one)) for one in setup.data])
         self._follow_selection()
         allowed = percent(setup.tolerance)
         self._accuracy.setItemText(1, _ACCURACY_TEXT["tolerance"].format(percent=allowed))
@@ -174,7 +174,7 @@ class _Paths(QListWidget):
     def __init__(self, drop: Callable[[], None], parent: QWidget) -> None:
         super().__init__(parent)
         self._drop = drop
-        self._shown: list[tuple[Path, str, bool]] = []
+        self._shown: list[tuple[Path, str]] = []
         self.setAccessibleName("Recordings to work on")
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.setTextElideMode(Qt.TextElideMode.ElideMiddle)
@@ -184,13 +184,13 @@ class _Paths(QListWidget):
         """Selected entries."""
         return [self._shown[self.row(item)][0] for item in self.selectedItems()]
 
-    def show_entries(self, entries: list[tuple[Path, str, bool]]) -> None:
-        """Show paths, each with a remark and a flag if that is a problem."""
+    def show_entries(self, entries: list[tuple[Path, str]]) -> None:
+        """Show paths, each with a remark."""
         if entries == self._shown:
             return
         self._shown = entries
         self.clear()
-        for path, words, _ in entries:
+        for path, words in entries:
             item = QListWidgetItem(f"{path.name} · {words}" if words else path.name)
             item.setToolTip(f"{path}\n{words}".rstrip())
             self.addItem(item)

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QDesktopServices, QPixmap
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QFileDialog, QLabel, QLineEdit, QProgressBar, QScrollArea, QWidget
 
 from sd2app.dataset_export.model import MAPS, ExportModel
 from sd2app.manual.help import help_button
-from sd2app.widgets.dialogs import Dialog, ask_folder, take_room, with_suffix
+from sd2app.widgets.dialogs import Dialog, ask_folder, show_in_files, take_room, with_suffix
 from sd2app.widgets.inputs import CheckBox, Choice, option_box
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import (
@@ -25,7 +26,7 @@ from sd2app.widgets.panel import (
     show_words,
     side_by_side,
 )
-from sd2app.widgets.text import counted
+from sd2app.widgets.text import bytes_text, counted
 from sd2core.cli.export import Export
 from sd2core.recording.recording import is_recording
 
@@ -132,9 +133,13 @@ class ExportDialog(Dialog):
         self._bar.setAccessibleName("How far the export is")
         tip = "Choose a name and write"
         self._export = outlined("Export…", tip, self._ask_out, self, look="primary")
-        self._copy = copy_button(lambda: self._model.line, self)
+        model = self._model
+        self._copy = copy_button(lambda: model.line, self)
         self._stop = outlined(
-            "Stop", "What is complete stays; the same export goes on there", self._model.stop, self
+            "Stop",
+            "What is complete stays; the same export goes on there",
+            partial(model.tell, "stop"),
+            self,
         )
         self._open = outlined("Open folder", "Show the data set's folder", self._show_folder, self)
         self._close = outlined("Close", "An export under way goes on", self.close, self)
@@ -276,14 +281,14 @@ class ExportDialog(Dialog):
     def _show_folder(self) -> None:
         result = self._model.result
         if result is not None:
-            QDesktopServices.openUrl(QUrl.fromLocalFile(str(result.path.absolute().parent)))
+            show_in_files(result.path.absolute().parent)
 
 
 def size_words(forecast: Forecast, length: int) -> str:
     """Size in words: ``24 segments of 2.4 s from 3 views · 0.7 MB before compression``."""
     seconds = length / forecast.frame_rate_hz
     segments, views = counted(forecast.segments, "segment"), counted(forecast.sources, "view")
-    size = bytes_words(forecast.total_bytes)
+    size = bytes_text(forecast.total_bytes)
     return f"{segments} of {seconds:.1f} s from {views} · {size} before compression"
 
 
@@ -314,11 +319,6 @@ def inertial_words(places: Sequence[str]) -> str:
     more = len(names) - _MAX_NAMED
     listed = ", ".join(names[:_MAX_NAMED]) + (f" and {more} more" if more > 0 else "")
     return f"at {listed}" if names else "none placed"
-
-
-def bytes_words(count: int) -> str:
-    """Size of a file, such as ``1.2 MB``."""
-    return f"{count / 1e9:,.1f} GB" if count >= 1e9 else f"{count / 1e6:,.1f} MB"
 
 
 def _named(people: tuple[str, ...]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -207,10 +208,6 @@ class ExportModel(Runs[ExportRun]):
         self.result = None
         self.changed.emit()
 
-    def stop(self) -> None:
-        """Stop writing; what is complete stays, and the same export goes on from there."""
-        self.tell("stop")
-
     def close(self) -> None:
         """Stop polling; a running export goes on."""
         self._runner.close()
@@ -248,7 +245,7 @@ class ExportModel(Runs[ExportRun]):
         if run is None:
             self.look_for_runs()
         else:
-            self._job = self._jobs.start(f"Exporting {run.out.name}", self.stop)
+            self._job = self._jobs.start(f"Exporting {run.out.name}", partial(self.tell, "stop"))
             run.changed.connect(self._report)
 
     def _report(self) -> None:

@@ -103,7 +103,7 @@ class FitModel(QObject):
         """Stop; what was done is kept."""
         if self.state == "running" and self._run is not None:
             self._set_state("cancelling")
-            self._run.stop()
+            self._run.tell("stop")
 
     def discard(self) -> None:
         """Give up what was stopped, and remove it."""

@@ -72,20 +72,16 @@ class TrainingHistory(StepHistory):
     """Steps and epochs of the training of a denoiser."""
 
     left_s: float | None = None  # as its process says
+    model = device = ""
+    parameters = segments = epochs = steps_per_epoch = 0
+    epoch = 0  # under way, from 1; zero before the first
+    minutes = 0.0
+    simulated = False  # the radar that is learnt from
 
     def __init__(self) -> None:
         super().__init__()
-        self.model = ""
-        self.device = ""
-        self.parameters = 0
-        self.epochs = 0
-        self.minutes = 0.0
-        self.steps_per_epoch = 0
-        self.segments = 0
-        self.simulated = False  # the radar that is learnt from
         self.step_points: list[StepPoint] = []
         self.epoch_points: list[EpochPoint] = []
-        self.epoch = 0  # under way, from 1; zero before the first
 
     @property
     def best(self) -> EpochPoint | None:

@@ -272,7 +272,7 @@ def test_stop_keeps_the_best(set_up, qtbot):
     set_up.ready(model)
     model.train()
     qtbot.waitUntil(lambda: model.run.history.done >= 1, timeout=20_000)
-    model.run.stop()
+    model.run.tell("stop")
     assert model.run.phase == "stopping"
     set_up.ended(model)
     assert model.run.phase == "stopped"
@@ -322,7 +322,7 @@ def test_another_window_finds_what_is_under_way(set_up, qtbot):
     with qtbot.waitSignal(second.noted, timeout=20_000):
         second.look_for_runs()
     qtbot.waitUntil(lambda: second.run.phase == "running", timeout=20_000)
-    second.run.stop()
+    second.run.tell("stop")
     set_up.ended(first)
     assert first.run.phase == "stopped"
 

@@ -15,7 +15,6 @@ from swinging_recordings import recording
 from turning_bodies import turning_body
 
 from sd2app.dataset_export.dialog import (
-    bytes_words,
     inertial_words,
     label_words,
     size_words,
@@ -175,7 +174,7 @@ def test_it_can_be_stopped(made, people, qtbot) -> None:
     model.failed.connect(said.append)
     model.start(people / "set.zarr")
     qtbot.waitUntil(lambda: model.run is not None and model.run.history.done == 500, timeout=20_000)
-    model.stop()
+    model.tell("stop")
     qtbot.waitUntil(lambda: not model.under_way, timeout=20_000)
     assert not said
     assert model.ready
@@ -291,8 +290,3 @@ def test_inertial_sensors_of_the_recordings_are_offered(made, tmp_path: Path, qt
 def test_sensors_in_words() -> None:
     assert inertial_words(()) == "none placed"
     assert inertial_words(PLACES[:6]).endswith(" and 2 more")
-
-
-def test_bytes_in_words() -> None:
-    assert bytes_words(1_234_567) == "1.2 MB"
-    assert bytes_words(2_500_000_000) == "2.5 GB"

@@ -109,7 +109,7 @@ def test_a_study_that_was_stopped_goes_on_in_its_folder(studies, qtbot):
     studies.ready()
     model.begin()
     qtbot.waitUntil(lambda: model.run.history.done >= 1, timeout=20_000)
-    model.run.stop()
+    model.run.tell("stop")
     studies.ended(model)
     assert model.run.result is None
     folder = model.run.folder.path

@@ -155,7 +155,7 @@ def test_a_batch_is_set_up_started_and_its_results_opened(
     assert "2 of 2" in words(dialog)
     qtbot.waitUntil(lambda: bool(batch.results.rows), timeout=20_000)
     shown: list[Path] = []
-    monkeypatch.setattr(questions, "_show_in_files", shown.append)
+    monkeypatch.setattr(questions, "show_in_files", shown.append)
     click(dialog, "Open folder")
     assert shown == [tmp_path / "made"]
     click(dialog, "Data set")

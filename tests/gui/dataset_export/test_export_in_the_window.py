@@ -40,7 +40,7 @@ def dialog(window, qtbot):
     yield found
     model = models_of(window).export
     if model.under_way:
-        model.stop()
+        model.tell("stop")
         qtbot.waitUntil(lambda: not model.under_way, timeout=20_000)
 
 
