@@ -9,8 +9,6 @@ drawings read alike on light and dark pages.
 from __future__ import annotations
 
 import argparse
-import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -31,6 +29,7 @@ from sd2core.files.resources import resource_path
 from sd2core.fmcw.options import SignalOptions
 from sd2core.fmcw.simulation import simulate_radar
 from tools.documentation.places import IMAGES, REPOSITORY, SAMPLE
+from tools.documentation.runs import run
 from tools.fitting.clip_score import speed_mps
 
 CONCEPTS = IMAGES / "concepts"
@@ -213,8 +212,7 @@ def uncertainty() -> Figure:
     truth = sd2.load_mesh(SAMPLE / "mesh.zarr")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "fit.zarr"
-        command = [sys.executable, "-m", "sd2core.cli", "fit", str(SAMPLE / "video.mp4")]
-        subprocess.run([*command, "--out", str(path)], check=True, stdout=subprocess.DEVNULL)
+        run("sd2core.cli", "fit", SAMPLE / "video.mp4", "--out", path)
         fitted = sd2.load_mesh(path)
         fitted = replace(fitted, vertices=np.asarray(fitted.vertices[:]))
     assert fitted.uncertainty is not None

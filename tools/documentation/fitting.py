@@ -8,24 +8,17 @@ there (``SD2_SHARED_DATA``).
 from __future__ import annotations
 
 import shutil
-import sys
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from sd2core.compare.figure import draw_comparison
-from sd2core.compare.meshes import compare_meshes
 from sd2core.files.figure_files import save_figure
-from sd2core.io.mesh import load_mesh
 from sd2core.io.video import open_video
 from sd2core.numerics.compiled import warm_up
 from tools.documentation.pages import write_filled
 from tools.documentation.places import BUILD, DOCS, IMAGES, SHARED
-from tools.fitting.__main__ import main as run_fitting
-from tools.fitting.truth import read_truth
-from tools.motion_capture.__main__ import main as run_motion_capture
+from tools.documentation.runs import run, sd2
 
 REAL = ("walk.mkv", "help.mkv", "again.mkv")
 
@@ -50,26 +43,19 @@ def main() -> None:
     clips, fits, tables = folder / "clips", folder / "fits", folder / "tables.md"
     motions = []
     if (SHARED / "motion").is_dir():
-        _run(run_motion_capture, "drive", SHARED / "motion", folder / "motions")
+        run("tools.motion_capture", "drive", SHARED / "motion", folder / "motions")
         motions = ["--motions", folder / "motions"]
-    _run(run_fitting, "clips", clips, *motions)
+    run("tools.fitting", "clips", clips, *motions)
     _frames(clips)
     videos = [SHARED / "video" / name for name in REAL]
     real = [video for video in videos if video.exists()]
     score = ["score", clips, "--keep", fits, "--markdown", tables]
-    _run(run_fitting, *score, *(["--real", *real] * bool(real)))
-    truth = read_truth(clips / COMPARED)
-    pair = [truth.mesh(), load_mesh(fits / f"{COMPARED}.zarr")]
-    compared = compare_meshes(pair, ["true", "fitted"])
-    save_figure(draw_comparison(compared), IMAGES / "fit-compared.png")
+    run("tools.fitting", *score, *(["--real", *real] * bool(real)))
+    pair = clips / COMPARED / "mesh.zarr", fits / f"{COMPARED}.zarr"
+    figure = IMAGES / "fit-compared.png"
+    sd2("compare-meshes", *pair, "--names", "true,fitted", "--figure", figure, "--overwrite")
     shutil.copyfile(tables.with_suffix(".csv"), DOCS / "fitting-clips.csv")
     write_filled("fitting.md", tables=tables.read_text("utf-8"), compared=COMPARED)
-
-
-def _run(program: Callable[[Sequence[str]], int], *arguments: object) -> None:
-    code = program([str(argument) for argument in arguments])
-    if code:
-        sys.exit(code)
 
 
 def _frames(clips: Path) -> None:

@@ -43,11 +43,16 @@ def settings(given: Mapping[str, object]) -> list[str]:
     return [word for name, value in given.items() for word in ("--set", f"{name}={value}")]
 
 
-def sd2(*arguments: object) -> None:
-    """Run a command; what fails ends the program."""
-    command = [sys.executable, "-m", "sd2core.cli", *map(str, arguments)]
+def run(module: str, *arguments: object) -> None:
+    """Run ``python -m MODULE``; what fails ends the program."""
+    command = [sys.executable, "-m", module, *map(str, arguments)]
     if code := subprocess.run(command).returncode:
         sys.exit(code)
+
+
+def sd2(*arguments: object) -> None:
+    """Run a command of ``sd2``; what fails ends the program."""
+    run("sd2core.cli", *arguments)
 
 
 def printed(*arguments: object) -> str:
