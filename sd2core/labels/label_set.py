@@ -10,6 +10,8 @@ from sd2core.errors import Sd2Error
 
 _COLOUR = re.compile(r"#[0-9a-f]{6}")
 LONGEST_NAME = 200
+UNKNOWN = "#8a8f98"
+"""Colour of labels outside the set."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,10 @@ class LabelSet:
     def find(self, name: str) -> Label | None:
         """Return the label of that name, or None."""
         return next((one for one in self.labels if one.name == name), None)
+
+    def colour_of(self, name: str) -> str:
+        """Return the ``#rrggbb`` of a label, or of the first one of a class; grey for others."""
+        return next((one.colour for one in (self.find(name), *self.of_class(name)) if one), UNKNOWN)
 
     def of_class(self, name: str) -> tuple[Label, ...]:
         """Return the labels of a class of the classifier."""

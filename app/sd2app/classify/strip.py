@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from sd2app.classify.model import ClassifyModel
 from sd2app.classify.text import ago_text, delay_text, reading_text
 from sd2app.classify.track import ClassReading
-from sd2app.labels.model import UNKNOWN_COLOUR, LabelsModel
+from sd2app.labels.model import LabelsModel
 from sd2app.maps.track_mouse import SeekingPlot, ZoomedPlot
 from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
@@ -21,7 +21,6 @@ from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.model_menu import ModelButton
 from sd2app.widgets.panel import ElidedLabel, title
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, paint_cursor
-from sd2core.labels.label_set import LabelSet
 
 _PLOT_PX = 30
 _BAR_PX = (28, 8)
@@ -29,13 +28,6 @@ _GAP_PX = 10
 _LEAST_PX = 60
 _FAINT = 90
 """Opacity of probabilities that are not of the current map."""
-
-
-def class_colour(name: str, offered: LabelSet) -> str:
-    """Colour of a class: that of the first label that it stands for."""
-    labels = offered.of_class(name)
-    known = offered.find(name) or (labels[0] if labels else None)
-    return UNKNOWN_COLOUR if known is None else known.colour
 
 
 class ClassStrip(QWidget):
@@ -162,7 +154,7 @@ class ClassReadout(Canvas):
             x += width + 4
             box = QRectF(x, centre - _BAR_PX[1] / 2, *_BAR_PX)
             painter.fillRect(box, QColor(palette.well))
-            colour = QColor(class_colour(name, offered))
+            colour = QColor(offered.colour_of(name))
             colour.setAlpha(255 if reading.current else _FAINT)
             box.setWidth(share * box.width())
             painter.fillRect(box, colour)
@@ -209,7 +201,7 @@ class ClassPlot(ZoomedPlot, SeekingPlot):
         columns = max(round(plot.width() * ratio), 1)
         frames = self._frames(columns)
         offered = self._labels.labels.label_set
-        colours = [QColor(class_colour(name, offered)).rgb() for name in track.card.classes]
+        colours = [QColor(offered.colour_of(name)).rgb() for name in track.card.classes]
         done = track.done if track.current else np.zeros_like(track.done)
         image = stacked_image(track.shares, done, frames, colours, round(plot.height() * ratio))
         painter.drawImage(plot, image)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from sd2core.labels.formats.lanes import apart
+from sd2core.labels.label_set import UNKNOWN
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.labels.suggest import LABEL as UNNAMED
 from sd2core.labels.suggest import TRACK as SUGGESTIONS
@@ -18,8 +19,6 @@ from sd2core.labels.suggest import TRACK as SUGGESTIONS
 WIDE_PX = 4.0
 """Smallest width of a span with a box of its own."""
 _SEEN = 1e-3
-UNKNOWN_COLOUR = "#8a8f98"
-"""Colour of labels outside the label set."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +70,7 @@ class SpanArrays:
             if track.overlap == "free":
                 rows = np.flatnonzero(tracks == number)
                 lanes[rows], counts[number] = _lanes([labels.spans[row] for row in rows])
-        colours = (*(one.colour for one in offered), UNKNOWN_COLOUR)
+        colours = (*(one.colour for one in offered), UNKNOWN)
         return cls(
             labels.spans, columns[0], columns[1], ids, tracks, lanes, tones, tuple(counts), colours
         )
@@ -206,11 +205,6 @@ class LabelsModel(QObject):
         rows = np.flatnonzero((arrays.starts_s <= time_s) & (time_s < arrays.ends_s))
         spans = [self.labels.spans[row] for row in rows]
         return min(spans, key=lambda one: (one.track != self.track, one.duration_s), default=None)
-
-    def colour_of(self, label: str) -> str:
-        """Return the ``#rrggbb`` of a label."""
-        known = self.labels.label_set.find(label)
-        return known.colour if known is not None else UNKNOWN_COLOUR
 
     @property
     def targets(self) -> tuple[LabelTrack, ...]:

@@ -285,7 +285,8 @@ def map_overlay(model: LabelsModel) -> Overlay:
                 painter.drawLines(lines)
 
     def legend(start_s: float, end_s: float) -> dict[str, str]:
-        return {span.label: model.colour_of(span.label) for span in model.within(start_s, end_s)}
+        colour_of = model.labels.label_set.colour_of
+        return {span.label: colour_of(span.label) for span in model.within(start_s, end_s)}
 
     return Overlay(paint, (model.changed, model.selection_changed), legend)
 

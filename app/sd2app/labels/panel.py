@@ -65,7 +65,7 @@ class StatisticsTableModel(RecordTableModel[tuple[str, ...]]):
         return record[column]
 
     def _icon(self, record: tuple[str, ...], column: int) -> QIcon | None:
-        return None if column else swatch_icon(self._labels.colour_of(record[0]))
+        return None if column else swatch_icon(self._labels.labels.label_set.colour_of(record[0]))
 
 
 class StatisticsPage(QWidget):

@@ -45,7 +45,7 @@ class SpanCells(FramedCells):
             line.setToolTip(column.tip)
             return line
         coloured = column.id == "label"
-        colour_of = self._labels.colour_of
+        colour_of = self._labels.labels.label_set.colour_of
         choices = [
             Choosable(one or _NOBODY, one, swatch_icon(colour_of(one)) if coloured else None)
             for one in self._table.choices(column.listed)

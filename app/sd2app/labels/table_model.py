@@ -311,7 +311,9 @@ class SpanTableModel(RecordTableModel[Span]):
 
     def _icon(self, record: Span, column: int) -> QIcon | None:
         coloured = COLUMNS[column].id == "label"
-        return swatch_icon(self._labels.colour_of(record.label)) if coloured else None
+        return (
+            swatch_icon(self._labels.labels.label_set.colour_of(record.label)) if coloured else None
+        )
 
     # --- typing ---------------------------------------------------------------------------
 

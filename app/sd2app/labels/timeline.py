@@ -95,6 +95,7 @@ class LabelTimeline(ZoomedPlot):
         """Paint names, spans, marks and the cursor."""
         scale, model, rows = self.scale, self._labels, self.rows
         plot = self.plot_rect()
+        colour_of, palette = model.labels.label_set.colour_of, self._session.display.palette
         self.paint_kept(painter, self._paint_rows)
         painter.setClipRect(plot)
         if not (model.labels.spans or model.marks or self._edits.refusal) and rows.tracks:
@@ -102,10 +103,10 @@ class LabelTimeline(ZoomedPlot):
         for mark, lane in zip(model.marks, rows.mark_lanes, strict=True):
             left, right = sorted((scale.x_of(mark.start_s), scale.x_of(self._playback.time_s)))
             box = lane_box(rows.row_of(mark.track), lane, left, right)
-            colour, palette = model.colour_of(mark.label), self._session.display.palette
-            paint_span(painter, box, f"{mark.label} …", colour, palette, selected=True)
+            text, colour = f"{mark.label} …", colour_of(mark.label)
+            paint_span(painter, box, text, colour, palette, selected=True)
         paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
-        self.buttons.paint(painter, scale, plot, rows, self._session.display.palette)
+        self.buttons.paint(painter, scale, plot, rows, palette)
 
     def _paint_rows(self, painter: QPainter) -> None:
         """Paint the parts that do not move: names, rows, spans."""

@@ -247,10 +247,10 @@ def test_search_filters_and_escape_leaves(labelled) -> None:
     search = QApplication.focusWidget()
     assert isinstance(search, QLineEdit)
     QTest.keyClicks(search, "bac")
-    assert [span.label for span in table(labelled).model().spans] == ["back"]
+    assert [span.label for span in table(labelled).model().rows] == ["back"]
     assert table(labelled).model().words == "1 of 2 spans"
     press(labelled, "Escape")
-    assert len(table(labelled).model().spans) == 2
+    assert len(table(labelled).model().rows) == 2
     press(labelled, "Escape")
     assert QApplication.focusWidget() is not search
 
