@@ -235,8 +235,9 @@ class LabelImportDialog(Dialog):
         observation, mark_s = self._observed, self._mark.value() or None
 
         def read(emit: Emit) -> tuple[LabelReading, Incoming]:
-            emit(observations(path, name))
-            reading = read_label_file(path, base, name, observation=observation, mark_s=mark_s)
+            emit(names := observations(path, name))
+            chosen = observation or next(iter(names), None)
+            reading = read_label_file(path, base, name, observation=chosen, mark_s=mark_s)
             return reading, Incoming.of(reading.labels, base)
 
         self._runner.submit(read)
@@ -244,16 +245,13 @@ class LabelImportDialog(Dialog):
 
     def _learn(self, names: tuple[str, ...]) -> None:
         self.observations = names if len(names) > 1 else ()
+        self._observed = self._observed or next(iter(self.observations), None)
 
     def _receive(self, result: tuple[LabelReading, Incoming]) -> None:
         self.reading, self.incoming = result
         self._refresh()
 
     def _refuse(self, error: Exception) -> None:
-        if self.observations and self._observed is None:
-            # Not a fault: the user has not chosen yet.
-            self._observe(self.observations[0])
-            return
         self.problem = str(error)
         self._refresh()
 

@@ -157,7 +157,7 @@ def _header(
     SubElement(header, "PROPERTY", NAME=PROPERTY).text = shown
 
 
-def _time_order(document: Element, lanes: list[Lane]) -> dict[int, tuple[str, str]]:
+def _time_order(document: Element, lanes: list[Lane]) -> dict[int, list[str]]:
     """Two slots of its own for every span, in the order of time; their names by id."""
     order = SubElement(document, "TIME_ORDER")
     edges = sorted(
@@ -166,19 +166,17 @@ def _time_order(document: Element, lanes: list[Lane]) -> dict[int, tuple[str, st
         for span in lane.spans
         for side, edge_ms in enumerate(edges_ms(span))
     )
-    names: dict[tuple[int, int], str] = {}
-    for number, (edge_ms, side, span_id) in enumerate(edges, start=1):
-        names[span_id, side] = f"ts{number}"
+    names: dict[int, list[str]] = {}
+    for number, (edge_ms, _, span_id) in enumerate(edges, start=1):
+        names.setdefault(span_id, []).append(f"ts{number}")  # of the start first
         SubElement(order, "TIME_SLOT", {"TIME_SLOT_ID": f"ts{number}", "TIME_VALUE": str(edge_ms)})
-    return {
-        span.id: (names[span.id, 0], names[span.id, 1]) for lane in lanes for span in lane.spans
-    }
+    return names
 
 
 def _tiers(
     document: Element,
     lanes: list[Lane],
-    slots: dict[int, tuple[str, str]],
+    slots: dict[int, list[str]],
     entries: dict[str, str],
     details: list[tuple[str, Callable[[Span], str]]],
     last_id: int,
