@@ -25,7 +25,7 @@ from sd2app.labels.panel import LabelsPanel
 from sd2app.labels.recovery import LabelNotice, recover
 from sd2app.labels.span_buttons import SpanButtons
 from sd2app.labels.timeline import LabelArea, LabelTimeline, TargetLine
-from sd2app.labels.tracks import LabelTracks, TrackMenu
+from sd2app.labels.tracks import LabelTracks, offer_tracks
 from sd2app.maps.track_mouse import TimePlot
 from sd2app.session.session import Session
 from sd2app.widgets.layouts import pane
@@ -303,7 +303,10 @@ class LabelsFeature(Feature):
 
     def menus(self) -> Mapping[str, Callable[[QMenu], object]]:
         """Labels with their keys, and tracks."""
-        return {"label keys": self._fill_keys, "tracks": lambda menu: TrackMenu(menu, self.model)}
+        return {
+            "label keys": self._fill_keys,
+            "tracks": lambda menu: offer_tracks(menu, self.model),
+        }
 
     def _fill_keys(self, menu: QMenu) -> None:
         keys = LabelActions(self.edits, self._use_label, menu, self._shell.dialog_parent)

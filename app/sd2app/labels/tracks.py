@@ -13,7 +13,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.widgets.dialogs import Dialog, accepted, accepting
 from sd2app.widgets.text import counted
 from sd2core.labels import field_edits
-from sd2core.labels.spans import LabelTrack, Overlap
+from sd2core.labels.spans import Overlap
 
 
 class LabelTracks:
@@ -125,38 +125,25 @@ class TrackDialog(Dialog):
         return "free" if self._free.isChecked() else "exclusive"
 
 
-class TrackMenu:
-    """Menu of tracks, the first entries of which choose the one for new spans."""
+def offer_tracks(menu: QMenu, labels: LabelsModel) -> None:
+    """List the tracks for new spans first in a menu, as they are when it is shown."""
+    group, first = QActionGroup(menu), menu.addSeparator()
 
-    def __init__(self, menu: QMenu, labels: LabelsModel) -> None:
-        self._menu, self._labels = menu, labels
-        self._group = QActionGroup(menu)
-        self._first = menu.addSeparator()
-        self._shown: tuple[LabelTrack, ...] = ()
-        labels.choices_changed.connect(self._follow)
-        labels.selection_changed.connect(self._check)
-        self._follow()
+    def fill() -> None:
+        for action in group.actions():
+            action.deleteLater()
+            group.removeAction(action)
+            menu.removeAction(action)
+        for track in labels.targets:
+            # An ampersand would underline what comes after it.
+            action = QAction(track.name.replace("&", "&&"), menu)
+            action.setCheckable(True)
+            action.setChecked(track.name == labels.track)
+            action.setToolTip(_TIPS[track.overlap])
+            action.triggered.connect(lambda _=False, name=track.name: labels.set_track(name))
+            menu.insertAction(first, group.addAction(action))
 
-    def _follow(self) -> None:
-        tracks = self._labels.targets
-        if tracks != self._shown:
-            self._shown = tracks
-            for action in self._group.actions():
-                self._group.removeAction(action)
-                self._menu.removeAction(action)
-                action.deleteLater()
-            self._menu.insertActions(self._first, [self._made(track) for track in tracks])
-        self._check()
+    menu.aboutToShow.connect(fill)
 
-    def _made(self, track: LabelTrack) -> QAction:
-        # An ampersand would underline what comes after it.
-        action = QAction(track.name.replace("&", "&&"), self._menu)
-        action.setCheckable(True)
-        action.setToolTip("Spans may overlap" if track.overlap == "free" else "One span at a time")
-        action.triggered.connect(lambda _=False: self._labels.set_track(track.name))
-        self._group.addAction(action)
-        return action
 
-    def _check(self) -> None:
-        for action, track in zip(self._group.actions(), self._shown, strict=True):
-            action.setChecked(track.name == self._labels.track)
+_TIPS: dict[Overlap, str] = {"free": "Spans may overlap", "exclusive": "One span at a time"}

@@ -190,8 +190,9 @@ def test_many_tracks_are_scrolled_and_the_chosen_one_is_in_view(labelled, qtbot)
 
 @pytest.mark.slow
 def test_the_menu_shows_the_tracks_and_the_one_that_is_chosen(two_tracks) -> None:
-    c = models_of(two_tracks)
-    entries = [one for one in menu_of(two_tracks, "Tracks").actions() if one.actionGroup()]
+    c, menu = models_of(two_tracks), menu_of(two_tracks, "Tracks")
+    menu.aboutToShow.emit()
+    entries = [one for one in menu.actions() if one.actionGroup()]
     assert [(one.text().replace("&", ""), one.isChecked()) for one in entries] == [
         ("Gestures", False),
         ("Hands", True),
@@ -199,5 +200,6 @@ def test_the_menu_shows_the_tracks_and_the_one_that_is_chosen(two_tracks) -> Non
     entries[0].trigger()
     assert c.labels.track == "Gestures"
     c.document.undo_stack.undo()
-    entries = [one for one in menu_of(two_tracks, "Tracks").actions() if one.actionGroup()]
+    menu.aboutToShow.emit()
+    entries = [one for one in menu.actions() if one.actionGroup()]
     assert [one.text().replace("&", "") for one in entries] == ["Gestures"]
