@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.background.model_worker.client import ClassifierLibrary
 from sd2app.classify.model import ClassifyModel
-from sd2app.classify.panel import ClassPanel
+from sd2app.classify.panel import ClassRunView, ClassSetupView
 from sd2app.classify.strip import ClassStrip
 from sd2app.classify.text import classifier_page, learned_text, network_text
 from sd2app.classify.training import ClassTraining
@@ -22,6 +22,7 @@ from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2app.widgets.model_menu import ModelButton, ModelMenu, Words
+from sd2app.widgets.run_panel import RunPanel
 from sd2core.errors import Sd2Error
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 
@@ -122,7 +123,10 @@ class ClassifyFeature(Feature):
 
     def panel(self) -> QWidget:
         """Page of the Train panel."""
-        return ClassPanel(self.training, self._session, self._shell)
+        s, shell, training = self._session, self._shell, self.training
+        setup = ClassSetupView(training, s.document, shell)
+        run = ClassRunView(training, s.display, shell)
+        return RunPanel(training, setup, run, "Trainings: under way, or ended")
 
     def drop_of(self, path: Path) -> Drop | None:
         """Use a classifier that is dropped."""

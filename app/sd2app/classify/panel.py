@@ -15,14 +15,13 @@ from sd2app.feature import Shell
 from sd2app.session.content import UNTITLED
 from sd2app.session.display import DisplayModel
 from sd2app.session.document import DocumentModel
-from sd2app.session.session import Session
 from sd2app.training.text import division_text
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.dialogs import ask_file, ask_folder
 from sd2app.widgets.inputs import CheckBox, TypedLine
 from sd2app.widgets.layouts import grid_of, row_of
 from sd2app.widgets.panel import FactRows, sentence, side_by_side
-from sd2app.widgets.run_panel import Button, RunPanel, RunView, RunWords
+from sd2app.widgets.run_panel import Button, RunView, RunWords
 from sd2app.widgets.text import counted
 from sd2app.widgets.training_form import Field, TrainingForm, labelled
 from sd2core.classify.defaults import model_names
@@ -138,18 +137,6 @@ class ClassSetupView(TrainingForm):
         field = QWidget(self)
         field.setLayout(row_of(QLabel("Person"), (line, 1), spacing_px=8, margins_px=(0, 2, 0, 2)))
         return field
-
-
-class ClassPanel(RunPanel):
-    """Panel of trainings of classifiers."""
-
-    def __init__(self, training: ClassTraining, session: Session, shell: Shell) -> None:
-        super().__init__(
-            training,
-            ClassSetupView(training, session.document, shell),
-            ClassRunView(training, session.display, shell),
-            "Trainings: under way, or ended",
-        )
 
 
 class ClassRunView(RunView[ClassRun]):

@@ -48,29 +48,23 @@ class SpanArrays:
     @classmethod
     def of(cls, labels: Labels) -> SpanArrays:
         """Make the arrays of labels."""
-        offered = labels.label_set.labels
-        # A class looks like the first of its labels; a label's own name goes before that.
-        tone_of = {
-            name: number
-            for names in ("gesture_class", "name")
-            for number, one in reversed(tuple(enumerate(offered)))
-            if (name := getattr(one, names))
-        }
+        offered = labels.label_set
+        colours = (*(one.colour for one in offered.labels), UNKNOWN)
+        names = {one.label for one in labels.spans}
+        tone_of = {name: colours.index(offered.colour_of(name)) for name in names}
         track_of = {one.name: number for number, one in enumerate(labels.tracks)}
         facts = [
-            (one.start_s, one.end_s, one.id, track_of[one.track], tone_of.get(one.label, -1))
+            (one.start_s, one.end_s, one.id, track_of[one.track], tone_of[one.label])
             for one in labels.spans
         ]
         columns = np.array(facts, np.float64).reshape(-1, 5).T
         ids, tracks, tones = columns[2:].astype(np.int64)
-        tones[tones < 0] = len(offered)
         lanes = np.zeros(len(facts), np.int64)
         counts = [1] * len(labels.tracks)
         for number, track in enumerate(labels.tracks):
             if track.overlap == "free":
                 rows = np.flatnonzero(tracks == number)
                 lanes[rows], counts[number] = _lanes([labels.spans[row] for row in rows])
-        colours = (*(one.colour for one in offered), UNKNOWN)
         return cls(
             labels.spans, columns[0], columns[1], ids, tracks, lanes, tones, tuple(counts), colours
         )

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import QFileDialog, QLabel, QToolButton
 from small_pairs import write_pairs
 from window_models import models_of
 
-from sd2app.classify.panel import ClassPanel
+from sd2app.classify.panel import ClassSetupView
 from sd2app.classify.strip import ClassPlot, ClassReadout, ClassStrip, stacked_image
 from sd2app.labels.timeline import LabelTimeline
 from sd2app.shell.side_panel import RailButton
@@ -282,12 +282,17 @@ def test_what_is_no_classifier_is_said(window, tmp_path):
 # --- training and comparing -------------------------------------------------------------------
 
 
+def panel_of(window):
+    """The page of classifiers."""
+    return window.findChild(ClassSetupView).parentWidget()
+
+
 @pytest.fixture
 def trainable(window, tmp_path, qtbot):
     """The page of classifiers with data, and a command that learns nothing."""
     training = models_of(window).class_training
     key(window, "C", SHIFT)
-    panel = window.findChild(ClassPanel)
+    panel = panel_of(window)
     assert panel.isVisible()
     training.setup.add(write_pairs(tmp_path / "campaign.zarr"))
     qtbot.waitUntil(lambda: not training.setup.problem, timeout=60_000)
@@ -298,7 +303,10 @@ def trainable(window, tmp_path, qtbot):
 
 
 def test_trained_by_clicks_watched_and_used(trainable, fake_classes, qtbot):
-    training, panel = models_of(trainable).class_training, trainable.findChild(ClassPanel)
+    training, panel = (
+        models_of(trainable).class_training,
+        panel_of(trainable),
+    )
     training.select(None)
     press(panel, "Start training", qtbot)
     qtbot.waitUntil(lambda: training.run is not None and not training.run.under_way, timeout=20_000)
@@ -321,7 +329,10 @@ def test_trained_by_clicks_watched_and_used(trainable, fake_classes, qtbot):
 
 @pytest.mark.slow
 def test_a_person_is_typed_and_who_does_what_is_said(trainable, tmp_path, qtbot):
-    training, panel = models_of(trainable).class_training, trainable.findChild(ClassPanel)
+    training, panel = (
+        models_of(trainable).class_training,
+        panel_of(trainable),
+    )
     setup = training.setup
     shutil.copytree(resource_path("swipes.sd2"), copy := tmp_path / "copy.sd2")
     setup.remove(tmp_path / "campaign.zarr")
@@ -358,7 +369,10 @@ def test_a_person_is_typed_and_who_does_what_is_said(trainable, tmp_path, qtbot)
 
 @pytest.mark.slow
 def test_stopped_by_a_click(trainable, qtbot, monkeypatch):
-    training, panel = models_of(trainable).class_training, trainable.findChild(ClassPanel)
+    training, panel = (
+        models_of(trainable).class_training,
+        panel_of(trainable),
+    )
     monkeypatch.setenv(fake_class_command.STEP_S, "0.5")
     press(panel, "Start training", qtbot)
     qtbot.waitUntil(lambda: training.run.history.done >= 1, timeout=20_000)
