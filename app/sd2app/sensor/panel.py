@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from PySide6.QtCore import Qt
@@ -20,6 +21,7 @@ from sd2core.cli.importing import Content, SensorPlace
 from sd2core.radar_config import RadarConfig, range_in_words
 from sd2core.sensor import aimed_at, position_from_spherical, spherical_from_position
 
+_CHANNELS: tuple[Literal["receiver", "transmitter"], ...] = ("receiver", "transmitter")
 _CLUTTER_TEXT = {
     "regression": "regression over chirps",
     "mean": "mean over chirps",
@@ -135,19 +137,16 @@ class SensorPanel(QWidget):
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
         offset = pane(row_of((self._offset, 1), find, spacing_px=6, margins_px=0))
-        self._receiver = Choice("Receiver whose signal is shown", self)
-        self._transmitter = Choice("Transmitter whose signal is shown", self)
-        self._receiver.currentIndexChanged.connect(
-            lambda place: edits.change("Choose receiver", {"radar_receiver": place or None})
-        )
-        self._transmitter.currentIndexChanged.connect(
-            lambda place: edits.change("Choose transmitter", {"radar_transmitter": place or None})
-        )
+        self._channels = {
+            of: Choice(f"{of.capitalize()} whose signal is shown", self) for of in _CHANNELS
+        }
+        for of, choice in self._channels.items():
+            choice.currentIndexChanged.connect(
+                lambda place, of=of: edits.change(f"Choose {of}", {f"radar_{of}": place or None})
+            )
+        channels = [(of.capitalize(), choice) for of, choice in self._channels.items()]
         self._capture_form = form = _form_of(
-            ("Offset", offset),
-            ("Clutter", self._clutter),
-            ("Receiver", self._receiver),
-            ("Transmitter", self._transmitter),
+            ("Offset", offset), ("Clutter", self._clutter), *channels
         )
         limits = grid_of(gaps_px=(12, 3), wide=(1, 3))
         self._limits = {name: _value(self, tip) for name, (tip, _) in _LIMITS.items()}
@@ -237,8 +236,12 @@ class SensorPanel(QWidget):
         self._offset.show_value(recording.radar_offset_s)
         self._clutter.show_value(document.clutter)
         config = capture.config
-        self._show_channel(self._receiver, config.receivers, recording.radar_receiver)
-        self._show_channel(self._transmitter, config.transmitters, recording.radar_transmitter)
+        for of, choice in self._channels.items():
+            count, chosen = getattr(config, f"{of}s"), getattr(recording, f"radar_{of}")
+            numbers = [str(number) for number in range(1, count + 1)]
+            choice.offer(["all (mean power)", *numbers], chosen or 0)
+            # A number that this capture does not have can be replaced.
+            self._capture_form.setRowVisible(choice, count > 1 or chosen is not None)
         for name, (_, text_of) in _LIMITS.items():
             self._limits[name].setText(text_of(config))
         blind = len(radar_map.unseen_bins) if radar_map is not None else 0
@@ -246,13 +249,6 @@ class SensorPanel(QWidget):
         self._warning.setText(
             f"The axis goes beyond this radar's v max: it cannot see {blind} of the bins."
         )
-
-    def _show_channel(self, choice: Choice, count: int, chosen: int | None) -> None:
-        """Offer receivers or transmitters, where there are several."""
-        numbers = [str(number) for number in range(1, count + 1)]
-        choice.offer(["all (mean power)", *numbers], chosen or 0)
-        # A number that this capture does not have can be replaced.
-        self._capture_form.setRowVisible(choice, count > 1 or chosen is not None)
 
 
 def _form_of(*rows: tuple[str | QWidget, QWidget]) -> QFormLayout:
