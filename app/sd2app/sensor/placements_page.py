@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from PySide6.QtCore import QRectF, QSize
@@ -28,7 +29,7 @@ from sd2app.widgets.inputs import CheckBox, Choice, TypedLine
 from sd2app.widgets.layouts import STRETCH, column_of, grid_of, pane, row_of
 from sd2app.widgets.panel import FactRows, outlined, rule, sentence, show_words, title
 from sd2core.figures.colours import SEQUENTIAL
-from sd2core.placements.placements import read_placements, write_placements
+from sd2core.placements.placements import Placements, read_placements, write_placements
 
 _READ = "Placements (*.json *.toml);;All files (*)"
 _WRITTEN = "Placements (*.json)"
@@ -122,20 +123,15 @@ class PlacementsPage(QWidget):
             self._shell.attempt(lambda: self._model.edits.plan_placements(read_placements(path)))
 
     def _export_plan(self) -> None:
-        plan = self._model.plan
+        plan, parent, name = self._model.plan, self._shell.dialog_parent, self._model.file_name
         if plan is None:
             return
-        parent = self._shell.dialog_parent
-        name = self._model.file_name
-        path = ask_new(parent, "Export placements", name, _WRITTEN, ".json")
-        if path is None:
-            return
-        try:
-            write_placements(path, plan)
-        except OSError as error:
-            self._shell.warn(f"{path} cannot be written ({error.strerror}).")
-        else:
-            self._shell.note(f"The placements are in {path}.")
+        if path := ask_new(parent, "Export placements", name, _WRITTEN, ".json"):
+            self._shell.attempt(lambda: self._write(path, plan))
+
+    def _write(self, path: Path, plan: Placements) -> None:
+        write_placements(path, plan)
+        self._shell.note(f"The placements are in {path}.")
 
     def _refresh(self) -> None:
         model, fields = self._model, self._fields
