@@ -92,7 +92,8 @@ class SynthesisModel(ReportingModel):
         self._runner.partial.connect(self._receive)
         self._runner.cancelled.connect(self._say_quality)
         self._compiler = Compiler("compile", session.jobs, self)
-        for signal in (self._compiler.finished, self._compiler.cancelled):
+        compiler = self._compiler
+        for signal in (compiler.finished, compiler.failed, compiler.cancelled):
             signal.connect(self._follow)
         self._rest = delayed(self._settle, _REST_MS, self)
         session.sensor.changed.connect(self._follow)

@@ -40,18 +40,12 @@ class MapStack(QScrollArea):
         super().__init__()
         self._session, self._difference, maps = session, difference, session.maps
         self._content = QWidget()
-        self.synthetic = HeatmapView(maps.synthetic, session, over_maps)
-        self.denoised = HeatmapView(maps.denoised, session, over_maps)
-        self.before = HeatmapView(maps.before, session, over_maps)
-        self.real = HeatmapView(maps.real, session, over_maps, alignable=True)
-        self.difference = DifferenceView(difference, session, over_maps)
         self._named = {
-            "synthetic": self.synthetic,
-            "denoised": self.denoised,
-            "before": self.before,
-            "real": self.real,
-            "difference": self.difference,
+            name: HeatmapView(track, session, over_maps, alignable=track is maps.real)
+            for name, track in vars(maps).items()
         }
+        self.synthetic, self.denoised, self.before, self.real = self._named.values()
+        self._named["difference"] = self.difference = DifferenceView(difference, session, over_maps)
         self.arrangement = Arrangement(tuple(self._named), session.settings, self)
         self.overview = Overview(session, over_all)
         self._offer: QWidget | None = None
