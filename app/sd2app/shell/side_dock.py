@@ -118,8 +118,7 @@ class SideDock(QObject):
         fits = wide_px >= _BESIDE_FROM_PX, wide_px >= _WORDED_FROM_PX
         if fits != self._fits:
             self._fits = fits
-            self._side.set_choice(fits[0])
-            self._side.set_worded(fits[1])
+            self._side.set_room(*fits)
             self._widen()
 
     @property

@@ -65,7 +65,7 @@ class SidePanel(QFrame):
         self._open.setObjectName("opened")
         self._open.setLayout(column_of(head, (self._stack, 1), spacing_px=2, margins_px=0))
         self._rail = rail = QFrame(self)
-        self.set_worded(True)
+        self.set_room(True, True)
         rail.setLayout(column_of(*self._icons, STRETCH, spacing_px=4, margins_px=(4, 4, 3, 4)))
         self.setLayout(row_of((self._open, 1), rail, spacing_px=0, margins_px=0))
         self._turn(0)
@@ -92,19 +92,12 @@ class SidePanel(QFrame):
         """Width of the icons, which stand alone while the panel is folded."""
         return self._rail.width()
 
-    def set_choice(self, offered: bool) -> None:
-        """Offer to lay the panel over the maps, where it has room beside them."""
-        self._floating.setVisible(offered)
-
-    def set_worded(self, worded: bool) -> None:
-        """Write its word below each icon, or not where there is little room."""
+    def set_room(self, beside: bool, worded: bool) -> None:
+        """Offer a place over the maps where one is beside, and words where icons have room."""
+        self._floating.setVisible(beside)
         for icon in self._icons:
             icon.set_worded(worded)
         self._rail.setFixedWidth(self._icons[0].width() + _RAIL_MARGINS_PX)
-
-    def set_mark(self, name: str, mark: str, share: float | None = None) -> None:
-        """Say a word about a panel with its name, and show how much is done as a ring."""
-        self._icons[self.names.index(name)].set_mark(mark, share)
 
     def bring_up(self, name: str, page: str = "") -> None:
         """Show a panel, and a page of one that has several."""
@@ -171,9 +164,8 @@ class RailButton(QToolButton):
 
     def set_mark(self, mark: str, share: float | None) -> None:
         """Say how far what is being done is; nothing is being done without a word."""
-        if (mark, share) != (self.mark, self.share):
-            self.mark, self.share = mark, share
-            self._say()
+        self.mark, self.share = mark, share
+        self._say()
 
     def _say(self) -> None:
         words = f"{self.name} · {self.mark}" if self.mark else self.name

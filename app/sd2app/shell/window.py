@@ -263,7 +263,7 @@ class MainWindow(QMainWindow):
     def _mark_training(self) -> None:
         runs = self.features.training.model, self.features.classify.training
         marked = next((model for model in runs if model.mark), runs[0])
-        self.side.set_mark("Train", marked.mark, marked.share)
+        self.side.button("Train").set_mark(marked.mark, marked.share)
 
     # --- following the models -------------------------------------------------------------
 

@@ -60,7 +60,7 @@ def sized(window):
         return window
 
     yield make
-    window.side.set_mark("Train", "")
+    window.side.button("Train").set_mark("", None)
     make(1280, 800)
 
 
@@ -129,7 +129,7 @@ def test_it_stands_beside_scene_and_maps_and_shows_every_icon(sized, size) -> No
         side.top() <= window.menuBar().mapToGlobal(QPoint(0, 0)).y() + window.menuBar().height() + 8
     )
     assert line.top() - 12 <= side.bottom() <= line.top()
-    window.side.set_mark("Train", "0 %", 0.0)
+    window.side.button("Train").set_mark("0 %", 0.0)
     QApplication.processEvents()
     for name in NAMES:
         icon = place_of(window.side.button(name))
@@ -179,13 +179,13 @@ def test_icons_have_names_tips_and_a_ring_for_what_is_under_way(sized) -> None:
         assert (side.button(name).accessibleName(), side.button(name).toolTip()) == (name, name)
     icon = side.button("Train")
     before, size = icon.grab().toImage(), icon.size()
-    side.set_mark("Train", "25 %", 0.25)
+    side.button("Train").set_mark("25 %", 0.25)
     assert icon.size() == size
     assert icon.toolTip() == icon.accessibleName() == "Train · 25 %"
     quarter = icon.grab().toImage()
-    side.set_mark("Train", "75 %", 0.75)
+    side.button("Train").set_mark("75 %", 0.75)
     assert before != quarter != icon.grab().toImage()
-    side.set_mark("Train", "")
+    side.button("Train").set_mark("", None)
     assert icon.grab().toImage() == before
 
 
