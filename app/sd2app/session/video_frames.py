@@ -46,31 +46,23 @@ class VideoModel(ReportingModel):
 
     def _follow(self) -> None:
         reader = self.reader
-        if reader is None:
+        # One picture at a time: cancelling would show none while scrubbing fast.
+        if reader is None or self._runner.busy:
             return
         frame = reader.timebase.frame_at(self._playback.time_s)
-        if frame == self._wanted:
-            return
-        self._wanted = frame
-        # One picture at a time: cancelling would show none while scrubbing fast.
-        if not self._runner.busy:
-            self._request(frame)
-
-    def _request(self, frame: int) -> None:
-        reader = self.reader
-        assert reader is not None
 
         def decode(emit: Emit) -> tuple[int, NDArray[np.uint8]]:
             emit(None)
             return frame, reader.read(frame)
 
-        self._runner.submit(decode)
+        if frame != self._wanted:
+            self._wanted = frame
+            self._runner.submit(decode)
 
     def _receive(self, result: Any) -> None:
         self.shown_frame, self.picture = result
         self.frame_changed.emit()
-        if self._wanted != self.shown_frame and self.reader is not None:
-            self._request(self._wanted)
+        self._follow()
 
 
 class VideoFrames(ProblemModel):
