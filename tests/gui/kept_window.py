@@ -43,7 +43,7 @@ _PASSING = (
     *("_tabbed", "_behind"),  # where Tab went last; actions that are followed soon
     *("_notices._at", "limb_menu._offered"),  # found anew when a notice or the menu appears
     # Of the start page, hidden.
-    *("start.recent", "_pictures._wanted", "_pictures._writer.busy", "_pictures._writer._pending"),
+    *("start.recent", "_pictures._writer.busy", "_pictures._writer._pending"),
     *("_tour._before", "]._target"),  # of a tour that is over
     *("edges_s", "limb_hand._model._mesh_parts"),  # worked out once, when first asked for
     # Of places and a search that are no more.

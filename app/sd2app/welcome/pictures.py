@@ -37,14 +37,10 @@ class RecordingPictures(BackgroundModel):
     def __init__(self, session: Session, folder: Path, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._session, self._folder = session, folder
-        self._wanted = False  # what is open, or where it lies, has no picture yet
         self._writer = LatestRunner("picture", self, lambda _: self.changed.emit())
         self._patience = delayed(self._keep, _PATIENCE_MS, self)
-        document, maps = session.document, session.maps
-        for signal in (document.opened, document.saved):
-            signal.connect(self._want)
-        for signal in (session.video.frame_changed, maps.real.changed, maps.synthetic.changed):
-            signal.connect(self._wait)
+        for signal in (session.document.opened, session.document.saved):
+            signal.connect(self._patience.start)
 
     def close(self) -> None:
         """Finish."""
@@ -56,22 +52,14 @@ class RecordingPictures(BackgroundModel):
         names = "\n".join(str(plain_path(path)) for path in paths)
         return self._folder / f"{sha256(names.encode()).hexdigest()[:24]}.png"
 
-    def _want(self) -> None:
-        self._wanted = True
-        self._wait()
-
-    def _wait(self) -> None:
-        # Frames and maps change many times a second.
-        if self._wanted and not self._patience.isActive():
-            self._patience.start()
-
     def _keep(self) -> None:
+        """Write a picture of what is open, or look again where there is none yet."""
         paths, picture = self._session.document.paths, self._picture()
-        if not paths or picture is None or self._session.document.growing:
-            return
-        self._wanted = False
-        path = self.path_of(paths)
-        self._writer.submit(lambda emit: _write(picture, path))
+        if paths and (picture is None or self._session.document.growing):
+            self._patience.start()
+        elif paths and picture is not None:
+            path = self.path_of(paths)
+            self._writer.submit(lambda emit: _write(picture, path))
 
     def _picture(self) -> QImage | None:
         session = self._session
