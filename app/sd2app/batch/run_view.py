@@ -19,7 +19,7 @@ from sd2app.batch.questions import BatchQuestions
 from sd2app.batch.run import BatchMonitor
 from sd2app.batch.text import batch_time_text, failure_text, headline, step_facts
 from sd2app.widgets.layouts import STRETCH, grid_of, pane, row_of
-from sd2app.widgets.panel import ElidedLabel, InnerPage, InnerPages, ProgressBar, outlined, sentence
+from sd2app.widgets.panel import ElidedLabel, InnerPages, ProgressBar, outlined, sentence
 from sd2app.widgets.run_panel import Button, RunView, RunWords
 from sd2app.widgets.table import RecordTable
 
@@ -78,12 +78,10 @@ class BatchRunView(RunView[BatchMonitor]):
         open_row = row_of(self._open_result, STRETCH)
         results = pane(self._no_results, (self._table, 1), open_row, spacing_px=6)
         self._inner = InnerPages(
-            (
-                InnerPage("Results", "The maps that were made", results),
-                InnerPage("Data set", "What was exported to learn from", self._card),
-                InnerPage(_FAILURES, "Tasks that could not be done, and why", self._failures),
-                InnerPage("Log", "What happened, as it happened", self._log),
-            )
+            ("Results", "The maps that were made", results),
+            ("Data set", "What was exported to learn from", self._card),
+            (_FAILURES, "Tasks that could not be done, and why", self._failures),
+            ("Log", "What happened, as it happened", self._log),
         )
         return self._inner
 

@@ -21,7 +21,7 @@ from sd2app.widgets.canvas import AT_RIGHT
 from sd2app.widgets.icons import swatch_icon
 from sd2app.widgets.inputs import Choice, SearchLine
 from sd2app.widgets.layouts import STRETCH, column_of, row_of
-from sd2app.widgets.panel import ElidedLabel, InnerPage, InnerPages, outlined
+from sd2app.widgets.panel import ElidedLabel, InnerPages, outlined
 from sd2app.widgets.record_table import Heading, RecordTableModel
 from sd2app.widgets.table import RecordTable
 from sd2core.labels.statistics import HEADINGS, label_statistics, statistics_rows, statistics_text
@@ -178,8 +178,8 @@ class LabelsPanel(QWidget):
         self._count.setAlignment(AT_RIGHT)
         pages = self.spans, StatisticsPage(labels, edits.playback, self), self._label_set
         self._pages = InnerPages(
-            [InnerPage(*words, page) for words, page in zip(_PAGES, pages, strict=True)],
-            self._count,
+            *((*words, page) for words, page in zip(_PAGES, pages, strict=True)),
+            beside=self._count,
         )
         self.setLayout(column_of(self._pages, margins_px=(8, 6, 8, 6)))
         for signal in (model.rowsInserted, model.rowsRemoved, labels.changed, self._pages.turned):

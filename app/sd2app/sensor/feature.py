@@ -19,7 +19,7 @@ from sd2app.sensor.placements_page import PlacementsPage
 from sd2app.sensor.things_page import ThingsPage
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import accepted
-from sd2app.widgets.panel import InnerPage, LatePage, paged_panel
+from sd2app.widgets.panel import InnerPages, LatePage
 
 
 class SensorFeature(Feature):
@@ -120,10 +120,11 @@ class SensorFeature(Feature):
         things = LatePage(lambda: ThingsPage(self._session, self._synthesis, shell.warn))
         bodies = LatePage(lambda: BodiesPage(self._session, shell.warn))
         return {
-            "Sensor": paged_panel(
-                InnerPage("Sensor", "Where the sensor is and what it sees", sensor),
-                InnerPage("Placements", "Many places around the body, for a map each", placements),
-                InnerPage("Things", "What stands around the body, and walls", things),
-                InnerPage("Bodies", "Who else moves in the scene", bodies),
+            "Sensor": InnerPages(
+                ("Sensor", "Where the sensor is and what it sees", sensor),
+                ("Placements", "Many places around the body, for a map each", placements),
+                ("Things", "What stands around the body, and walls", things),
+                ("Bodies", "Who else moves in the scene", bodies),
+                inset_px=8,
             )
         }

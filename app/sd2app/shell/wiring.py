@@ -43,7 +43,7 @@ from sd2app.video.feature import VideoFeature
 from sd2app.welcome.feature import WelcomeFeature
 from sd2app.welcome.steps import tour_steps
 from sd2app.widgets.layouts import pane
-from sd2app.widgets.panel import InnerPage, LatePage, paged_panel
+from sd2app.widgets.panel import InnerPages, LatePage
 from sd2core.cli import build_parser
 from sd2core.files.paths import user_cache
 from sd2core.labels.recovery import recovery_folder
@@ -202,10 +202,11 @@ def side_pages(features: Features, views: Mapping[str, QWidget]) -> dict[str, QW
     denoisers, classifiers, studies = (
         LatePage(one.panel) for one in (features.training, features.classify, features.study)
     )
-    train = paged_panel(
-        InnerPage("Denoiser", "Train what makes synthetic maps a radar's", denoisers),
-        InnerPage("Classifier", "Train what tells gestures apart", classifiers),
-        InnerPage("Study", "Find out whether synthetic data help", studies),
+    train = InnerPages(
+        ("Denoiser", "Train what makes synthetic maps a radar's", denoisers),
+        ("Classifier", "Train what tells gestures apart", classifiers),
+        ("Study", "Find out whether synthetic data help", studies),
+        inset_px=8,
     )
     pages = {**views, "Train": train}
     return {name: pages[name] for name in ("Sensor", "Accuracy", "Train", "Labels", "Agreement")}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent, QShowEvent
@@ -327,30 +327,26 @@ class LatePage(QFrame):
         super().showEvent(event)
 
 
-class InnerPage(NamedTuple):
-    """Button text, tooltip and content of a page."""
-
-    name: str
-    tip: str
-    page: QWidget
-
-
 class InnerPages(QWidget):
-    """Buttons on top, the page below; ``beside`` is put to the right of the buttons."""
+    """Buttons on top, the page below; ``beside`` is put to the right of the buttons.
+
+    Each of the ``pages`` has a name and a tip for its button.
+    """
 
     turned = Signal(int)  # number of the page that is shown now
 
     def __init__(
-        self, pages: Sequence[InnerPage], beside: QWidget | None = None, inset_px: int = 0
+        self, *pages: tuple[str, str, QWidget], beside: QWidget | None = None, inset_px: int = 0
     ) -> None:
         super().__init__()
-        self.names = [page.name for page in pages]
+        self.setObjectName("page")
+        self.names = [name for name, _, _ in pages]
         self._pages = QStackedWidget(self)
         self._pages.currentChanged.connect(self.turned)
         self._buttons = QButtonGroup(self)
-        for place, page in enumerate(pages):
-            self._pages.addWidget(page.page)
-            button = outlined(page.name, page.tip, None, self, look="")
+        for place, (name, tip, page) in enumerate(pages):
+            self._pages.addWidget(page)
+            button = outlined(name, tip, None, self, look="")
             button.setCheckable(True)
             button.setChecked(place == 0)
             self._buttons.addButton(button, place)
@@ -396,10 +392,3 @@ class InnerPages(QWidget):
             # The arrows lead to the others.
             focus = Qt.FocusPolicy.TabFocus if place == shown else Qt.FocusPolicy.NoFocus
             self._buttons.button(place).setFocusPolicy(focus)
-
-
-def paged_panel(*pages: InnerPage) -> InnerPages:
-    """A panel at the side that has pages of its own."""
-    panel = InnerPages(pages, inset_px=8)
-    panel.setObjectName("page")
-    return panel
