@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QPixmap
@@ -21,24 +20,15 @@ from sd2core.files.resources import is_bundled
 _COLUMNS, _WIDTH_PX, _GAP_PX = 4, 1040, 16
 
 
-class Way(NamedTuple):
-    """A card: what it is called, what comes of it, its icon, and the action that it does."""
-
-    name: str
-    words: str
-    icon: str
-    action: str
-
-
-WAYS = (
-    Way("Open the sample", "A simulated person, eight swipes, a simulated radar", "Sample",
-        "sample"),
-    Way("New from video…", "Fit a body to the person in a video, and see its Doppler", "Video",
-        "new_from_video"),
-    Way("Open a radar capture…", "Samples, point clouds or maps of a real radar", "Sensor",
-        "open_radar"),
-    Way("Record…", "A camera and a radar together, or a radar alone", "Record", "listen"),
+_WAYS = (
+    ("sample", "Open the sample", "A simulated person, eight swipes, a simulated radar", "Sample"),
+    ("new_from_video", "New from video…",
+     "Fit a body to the person in a video, and see its Doppler", "Video"),
+    ("open_radar", "Open a radar capture…", "Samples, point clouds or maps of a real radar",
+     "Sensor"),
+    ("listen", "Record…", "A camera and a radar together, or a radar alone", "Record"),
 )  # fmt: skip
+"""Cards: the action that each does, what it is called, what comes of it, and its icon."""
 
 
 class StartPage(QScrollArea):
@@ -70,9 +60,8 @@ class StartPage(QScrollArea):
         head.setFont(font)
         about = sentence("Video of a person in, Doppler of a radar out.")
         ways = row_of(spacing_px=_GAP_PX)
-        for way in WAYS:
-            done = action(way.action)
-            card = WayCard(way.name, way.words, way.icon, self)
+        for name, text, words, icon in _WAYS:
+            done, card = action(name), WayCard(text, words, icon, self)
             card.clicked.connect(done.trigger)
             done.changed.connect(lambda card=card, done=done: card.setEnabled(done.isEnabled()))
             ways.addWidget(card, 1)
