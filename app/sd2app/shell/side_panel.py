@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Protocol, runtime_checkable
 
-from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QAction, QColor, QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QFrame, QScrollArea, QStackedWidget, QToolButton, QWidget
 
@@ -210,8 +210,8 @@ class RailButton(QToolButton):
                 ring = place.adjusted(4, 4, -4, -4) if self._worded else place
                 draw_ring(painter, ring, self.share, palette.highlight().color(), ground)
             inset_px = (place.width() - _ICON_PX) // 2
-            painter.translate(place.left() + inset_px, place.top() + inset_px)
-            draw_panel_icon(painter, self.name, colour)
+            inset = place.adjusted(inset_px, inset_px, -inset_px, -inset_px)
+            draw_panel_icon(painter, QRectF(inset), self.name, colour)
 
 
 class _Scrolled(QScrollArea):

@@ -68,9 +68,9 @@ def transport_icon(name: str, colour: str) -> QIcon:
     return icon
 
 
-def draw_panel_icon(painter: QPainter, name: str, colour: QColor) -> None:
-    """Draw the icon of a panel at the side, 20 pixels in the square, in one colour."""
-    _drawing(name, colour.name(), 20).render(painter, QRectF(0, 0, 20, 20))
+def draw_panel_icon(painter: QPainter, box: QRectF, name: str, colour: QColor) -> None:
+    """Draw the icon of a panel at the side into a box, in one colour."""
+    _drawing(name, colour.name(), 20).render(painter, box)
 
 
 def draw_ring(
