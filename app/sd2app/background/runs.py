@@ -53,7 +53,7 @@ class Runs(QObject, Generic[Run]):
     """Of commands: what moves on the screen comes first, where they get by with one processor."""
 
     changed = Signal()
-    listed = Signal()  # the runs on disk have been looked at again
+    ended = Signal(object)  # the run in view came to its end
     noted = Signal(str)
     failed = Signal(str)
 
@@ -72,8 +72,6 @@ class Runs(QObject, Generic[Run]):
         self._taking_up = self._watched = False
         self._set_up: RunSetup[Any] | None = None
         self._lister = LatestRunner("runs", self, self._list)
-        # The disk may be away for a moment; it is looked at again.
-        self._lister.failed.connect(lambda error: self.listed.emit())
         self._timer = QTimer(self, interval=_LIST_MS)
         self._timer.timeout.connect(self.refresh)
 
@@ -236,8 +234,10 @@ class Runs(QObject, Generic[Run]):
             return
         ended = self.under_way and not run.under_way
         self.under_way = run.under_way and (run.loaded or self.under_way)
-        if ended and not self._watched:
-            self.say_ended(run)
+        if ended:
+            self.ended.emit(run)
+            if not self._watched:
+                self.say_ended(run)
 
     def say_ended(self, run: Run) -> None:
         """Tell the user how a run ended that nobody watched."""
@@ -254,7 +254,6 @@ class Runs(QObject, Generic[Run]):
         if self._taking_up:
             self._taking_up = False
             self._take_up()
-        self.listed.emit()
 
     def _take_up(self) -> None:
         live = self.live

@@ -23,7 +23,7 @@ from sd2app.widgets.layouts import grid_of, row_of
 from sd2app.widgets.panel import FactRows, sentence, side_by_side
 from sd2app.widgets.run_panel import Button, RunView, RunWords
 from sd2app.widgets.text import counted
-from sd2app.widgets.training_form import Field, TrainingForm, labelled
+from sd2app.widgets.training_form import Field, TrainingForm
 from sd2core.classify.defaults import model_names
 from sd2core.cli.classify.train import Train
 
@@ -100,7 +100,8 @@ class ClassSetupView(TrainingForm):
             grid.addWidget(choice, row, 1, 1, 3)
         for number, field in enumerate(_FIELDS):
             row, column = divmod(number, 2)
-            labelled(grid, (3 + row, 2 * column), field, self.number(field))
+            for beside, part in enumerate(self.number(field)):
+                grid.addWidget(part, 3 + row, 2 * column + beside)
         self.column.addLayout(grid)
 
     def _refresh(self) -> None:

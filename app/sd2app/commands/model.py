@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 
 from sd2app.background.quoting import quoted
 from sd2app.background.run_monitor import CommandRun
@@ -49,8 +49,6 @@ class CommandForms(Runs[AnyCommandRun]):
 
     monitor, remembered = AnyCommandRun, "commands/run"
     shown_by = "File → Any command…"
-
-    ended = Signal(object)  # a run came to its end while it was in view
 
     def __init__(
         self,
@@ -168,12 +166,6 @@ class CommandForms(Runs[AnyCommandRun]):
         paths = {name: getattr(record, name, None) for name in ("mesh", "out")}
         about = {name: str(plain_path(path)) for name, path in paths.items() if path is not None}
         self.start_command(path, words, what=self.chosen.name, **about)
-
-    def follow(self, run: AnyCommandRun | None, under_way: bool = False) -> None:
-        """Show a run, and say when it has come to its end."""
-        super().follow(run, under_way)
-        if run is not None:
-            run.ended.connect(lambda: self.ended.emit(run))
 
     @property
     def _typed(self) -> dict[str, str]:

@@ -35,7 +35,7 @@ class GuidedModel(SteeredCommand):
     def __init__(self, parent: QObject, command: Sequence[str] = COMMAND) -> None:
         super().__init__(parent, command)
         self.step: Step | None = None
-        self.title = self.consent = ""
+        self.consent = ""
         self.missing: tuple[str, ...] = ()  # names of takes, once it has ended
         self.not_agreed: tuple[str, ...] = ()  # people of whom takes are missing, likewise
 
@@ -50,7 +50,7 @@ class GuidedModel(SteeredCommand):
     def _take(self, event: dict[str, Any]) -> None:
         match event["event"]:
             case "session":
-                self.title, self.consent = event["title"], event["consent"]
+                self.consent = event["consent"]
             case "step":
                 self.step = Step(**{name: event[name] for name in _STEP if name in event})
             case "stored":

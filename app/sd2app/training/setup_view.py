@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtWidgets import QGridLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from sd2app.feature import Shell
 from sd2app.session.document import DocumentModel
@@ -16,7 +16,7 @@ from sd2app.widgets.layouts import STRETCH, grid_of, pane, row_of
 from sd2app.widgets.model_page import model_title
 from sd2app.widgets.panel import ElidedLabel, Fold, ProgressBar, outlined, sentence, title
 from sd2app.widgets.text import counted
-from sd2app.widgets.training_form import Field, TrainingForm, labelled
+from sd2app.widgets.training_form import Field, TrainingForm
 from sd2core.denoise.registry import DENOISERS
 from sd2core.files.resources import is_bundled
 from sd2core.options.training import DataConfig, TrainingConfig
@@ -81,22 +81,17 @@ class TrainingSetupView(TrainingForm):
 
     def _add_settings(self) -> None:
         # Labels to the left; several boxes share what room there is.
-        grid = grid_of(gaps_px=(8, 0), wide=(1, 3))
-        for column, field in enumerate(_FIELDS):
-            labelled(grid, (0, 2 * column), field, self.number(field))
+        first = (part for field in _FIELDS for part in self.number(field))
+        grid = grid_of([*first], gaps_px=(8, 0), wide=(1, 3))
         tip = "Put all settings back to the paper's"
         self._reset = outlined("Reset", tip, self._pairs.reset, self)
-        hidden = QWidget(self)
-        rest = QGridLayout(hidden)
-        rest.setContentsMargins(0, 0, 0, 0)
-        rest.setVerticalSpacing(4)
-        rest.setColumnStretch(0, 1)
-        boxes = [self.number(field) for field in _MORE]
-        for at, (field, box) in enumerate(zip(_MORE, boxes, strict=True)):
+        rest = [self.number(field) for field in _MORE]
+        boxes = [box for _, box in rest]
+        for box in boxes:
             box.setMinimumWidth(112)
-            labelled(rest, (at, 0), field, box)
         boxes[0].setSpecialValueText("never")
         boxes[2].setPrefix("× ")
+        hidden = pane(grid_of(*rest, gaps_px=(8, 4), wide=(0,)))
         more = Fold("More settings", "Learning rate, early stopping, range, seed", hidden, self)
         self.column.addLayout(grid)
         self.column.addLayout(row_of(more, STRETCH, self._reset))

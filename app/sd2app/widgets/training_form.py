@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QLabel, QMenu, QSizePolicy, QWidget
+from PySide6.QtWidgets import QLabel, QMenu, QSizePolicy, QWidget
 
 from sd2app.background.run_setup import RunSetup
 from sd2app.feature import Shell
@@ -62,8 +62,8 @@ class TrainingForm(QWidget):
         self.column.addWidget(self._division)
         return menu
 
-    def number(self, field: Field) -> NumberBox:
-        """Make the box of a setting."""
+    def number(self, field: Field) -> tuple[QLabel, NumberBox]:
+        """Make the box of a setting, and its name."""
         box = option_box(
             field.record, field.name, field.suffix, decimals=field.decimals, step=field.step
         )
@@ -71,7 +71,9 @@ class TrainingForm(QWidget):
         box.setGroupSeparatorShown(field.decimals == 0 and field.name != "seed")
         box.valueChanged.connect(partial(self._setup.set_value, field.name))
         self._numbers[field.name] = box
-        return box
+        label = QLabel(field.text)
+        label.setToolTip(option_named(field.record, field.name).sentence)
+        return label, box
 
     def choice(self, name: str, tip: str, words: Mapping[str, str]) -> Choice:
         """Make the list of a setting; ``words`` are the texts of its values."""
@@ -148,16 +150,11 @@ class TrainingForm(QWidget):
         facts = sentence(one.problem or one.text, "warning" if one.problem else "muted")
         tip, remove = f"Do not learn from {one.path.name}", partial(self._setup.remove, one.path)
         button = outlined("✕", tip, remove, row, name=tip, look="")
-        grid = QGridLayout(row)
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setSpacing(0)
-        grid.addWidget(heading, 0, 0)
-        grid.addWidget(button, 0, 1, 2, 1, Qt.AlignmentFlag.AlignTop)
-        grid.addWidget(facts, 1, 0)
         below = self.below_row(one)
-        if below is not None:
-            grid.addWidget(below, 2, 0)
-        grid.setColumnStretch(0, 1)
+        words = column_of(*filter(None, (heading, facts, below)), spacing_px=0)
+        whole = row_of((words, 1), button, spacing_px=0, margins_px=0)
+        whole.setAlignment(button, Qt.AlignmentFlag.AlignTop)
+        row.setLayout(whole)
         return row
 
 
@@ -166,11 +163,3 @@ def step_text(seconds: float) -> str:
     if seconds >= 0.95:
         return f"{seconds:.1f} s"
     return f"{float(f'{1000 * seconds:.2g}'):g} ms"
-
-
-def labelled(grid: QGridLayout, place: tuple[int, int], field: Field, box: NumberBox) -> None:
-    """Put a box with its label into a grid, at a row and a column."""
-    label = QLabel(field.text)
-    label.setToolTip(option_named(field.record, field.name).sentence)
-    grid.addWidget(label, *place)
-    grid.addWidget(box, place[0], place[1] + 1)

@@ -208,7 +208,7 @@ def test_it_outlives_the_window_and_is_found_by_the_next(made, people, qtbot) ->
     qtbot.waitUntil(lambda: not second.under_way, timeout=20_000)
     assert second.result.segments == 7
     third = made()
-    with qtbot.waitSignal(third.listed, timeout=20_000):
+    with qtbot.waitSignal(third._lister.finished, timeout=20_000):
         third.look_for_runs()
     assert not third.under_way
 
@@ -247,7 +247,7 @@ def test_one_that_cannot_be_started_is_said(made, people, qtbot) -> None:
         model.start(people / "set.h5")
     assert "cannot be started" in failed.args[0]
     assert not model.under_way
-    with qtbot.waitSignal(model.listed, timeout=20_000):
+    with qtbot.waitSignal(model._lister.finished, timeout=20_000):
         model.look_for_runs()
     assert not model.under_way
 

@@ -227,7 +227,7 @@ def test_the_next_window_shows_what_ended_meanwhile(made, qtbot) -> None:
     # Not shown again once it was put away.
     second.select(None)
     third = made(settings=settings)
-    with qtbot.waitSignal(third.listed):
+    with qtbot.waitSignal(third._lister.finished):
         third.look_for_runs()
     assert third.run is None
     assert [run.path for run in third.known] == [path]
