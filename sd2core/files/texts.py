@@ -154,9 +154,9 @@ def parse_json(text: str, place: str | Path, expected: str, remedy: str = "") ->
     return _parsed("JSON", text, place, expected, remedy)
 
 
-def read_toml(path: Path, expected: str) -> dict[str, Any]:
+def read_toml(path: Path, expected: str, remedy: str = "") -> dict[str, Any]:
     """Read a TOML file; raises Sd2Error as :func:`read_text` and :func:`parse_toml`."""
-    return parse_toml(read_text(path, expected), path, expected)
+    return parse_toml(read_text(path, expected), path, expected, remedy)
 
 
 def parse_toml(text: str, place: str | Path, expected: str, remedy: str = "") -> dict[str, Any]:

@@ -57,6 +57,11 @@ def test_what_changes_is_named_and_goes_again(made_from: Path, monkeypatch) -> N
     assert "Older" not in stamped(old, NAME, "2026-01-03", "ef", made_from)
 
 
+def test_the_same_code_has_the_same_hash_in_every_python(tmp_path: Path) -> None:
+    (tmp_path / "one.py").write_text('def f(a):\n    return [f"{a:<{1}}", f"{a}", ""]\n')
+    assert digest(tmp_path) == "5d97058c"
+
+
 def test_comments_and_docstrings_are_no_change(made_from: Path) -> None:
     folder = made_from / PAGES[NAME].of[0]
     before = digest(folder)

@@ -16,6 +16,7 @@ import subprocess
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from sd2core.files.atomic import atomic_write_text
 from tools.documentation.places import DOCS, REPOSITORY
@@ -131,20 +132,24 @@ def _content(file: Path, changed_ns: int) -> bytes:
     """What of a file counts; several pages are made from the same files."""
     if file.suffix != ".py":
         return file.read_bytes()
-    tree = ast.parse(file.read_text("utf-8"))
-    for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        if isinstance(body, list):
-            node.body = [one for one in body if not _is_text(one)]  # type: ignore[attr-defined]
-    return ast.dump(tree).encode()
+    return repr(_plain(ast.parse(file.read_text("utf-8")))).encode()
 
 
-def _is_text(statement: ast.AST) -> bool:
-    return (
-        isinstance(statement, ast.Expr)
-        and isinstance(statement.value, ast.Constant)
-        and isinstance(statement.value.value, str)
-    )
+def _plain(code: Any) -> Any:
+    """Code without docstrings, in the same words whatever version of Python reads it."""
+    if isinstance(code, list):
+        return [_plain(one) for one in code if not _is_text(one)]
+    if not isinstance(code, ast.AST):
+        return code
+    if isinstance(code, ast.JoinedStr):  # Python 3.12 has empty pieces in f-strings
+        code.values = [one for one in code.values if getattr(one, "value", None) != ""]
+    named = ((name, _plain(value)) for name, value in ast.iter_fields(code))
+    return type(code).__name__, [one for one in named if one[1] not in (None, [])]
+
+
+def _is_text(code: object) -> bool:
+    value = code.value if isinstance(code, ast.Expr) else None
+    return isinstance(value, ast.Constant) and isinstance(value.value, str)
 
 
 def _git(*arguments: str) -> str:
