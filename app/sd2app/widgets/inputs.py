@@ -70,11 +70,15 @@ class NumberBox(QDoubleSpinBox):
         self.setKeyboardTracking(False)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMinimumWidth(72)
+        self._typing = False
+        self.lineEdit().textEdited.connect(self._begin_typing)
+        self.editingFinished.connect(self._end_typing)
 
     def show_value(self, value: float) -> None:
         """Follow a model, unless the user is typing; emits nothing."""
-        typing = self.hasFocus() and self.lineEdit().isModified()
-        if not typing and abs(value - self.value()) >= 0.5 * 10.0 ** -self.decimals():
+        if self._typing:
+            return
+        if abs(value - self.value()) >= 0.5 * 10.0 ** -self.decimals():
             with QSignalBlocker(self):
                 self.setValue(value)
 
@@ -128,8 +132,10 @@ class NumberBox(QDoubleSpinBox):
         """End the editing with Return or Escape."""
         ends = event.key() in _ENDING_KEYS
         if event.key() == Qt.Key.Key_Escape:
-            text = self.textFromValue(self.value())
-            self.lineEdit().setText(f"{self.prefix()}{text}{self.suffix()}")
+            self._end_typing()
+            self.lineEdit().setText(
+                self.prefix() + self.textFromValue(self.value()) + self.suffix()
+            )
         elif ends and (refusal := self._refusal(self.lineEdit().text())):
             self._refuse(refusal)
             return
@@ -157,6 +163,12 @@ class NumberBox(QDoubleSpinBox):
             super().wheelEvent(event)
         else:
             event.ignore()
+
+    def _begin_typing(self, text: str) -> None:
+        self._typing = True
+
+    def _end_typing(self) -> None:
+        self._typing = False
 
 
 def option_box(
