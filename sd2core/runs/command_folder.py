@@ -96,12 +96,6 @@ class CommandFolder(RunFolder):
             return {}
 
     @property
-    def code(self) -> int | None:
-        """Exit code; None while the command runs, and where it was killed."""
-        code = self.facts.get("code")
-        return code if isinstance(code, int) else None
-
-    @property
     def taken(self) -> bool:
         """True while a process works in the folder or is about to."""
         if self.live:

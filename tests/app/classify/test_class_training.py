@@ -343,12 +343,12 @@ def test_a_real_command_is_stopped_as_by_ctrl_c(set_up, tmp_path, qtbot):
 
     def stepped() -> bool:
         seen.extend(event["event"] for event in lines.new())
-        return "step" in seen or not (folder.live or folder.code is None)
+        return "step" in seen or not (folder.live or folder.facts.get("code") is None)
 
     qtbot.waitUntil(stepped, timeout=60_000)
     folder.tell("stop")
-    qtbot.waitUntil(lambda: folder.code is not None, timeout=60_000)
-    assert folder.code == 130, last_output(folder.output)
+    qtbot.waitUntil(lambda: folder.facts.get("code") is not None, timeout=60_000)
+    assert folder.facts.get("code") == 130, last_output(folder.output)
     assert out.is_file()
     from sd2core.classify.files import describe_classifier
 
@@ -360,6 +360,6 @@ def test_a_command_that_is_refused_says_so(tmp_path, qtbot):
     folder = CommandFolder(tmp_path / "run")
     gone = str(tmp_path / "gone.zarr")
     folder.start(["info", gone], {"what": "train"})
-    qtbot.waitUntil(lambda: folder.code is not None, timeout=60_000)
-    assert folder.code == 1
+    qtbot.waitUntil(lambda: folder.facts.get("code") is not None, timeout=60_000)
+    assert folder.facts.get("code") == 1
     assert "gone.zarr" in last_output(folder.output)

@@ -220,7 +220,9 @@ def test_what_was_written_meanwhile_is_said(made, people, qtbot, tmp_path) -> No
     (people / "set.h5.go").touch()
     (folder,) = map(CommandFolder, (tmp_path / "exports").iterdir())
     # Its code is there a moment before its process has ended.
-    qtbot.waitUntil(lambda: folder.code is not None and not folder.live, timeout=20_000)
+    qtbot.waitUntil(
+        lambda: folder.facts.get("code") is not None and not folder.live, timeout=20_000
+    )
     said: list[str] = []
     second.noted.connect(said.append)
     second.look_for_runs()
