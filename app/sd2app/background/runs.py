@@ -87,9 +87,9 @@ class Runs(QObject, Generic[Run]):
         for path in self.candidates():
             try:
                 state, about = self.monitor.folders(path).state_and_about()
-            except (Sd2Error, OSError):
+                started_unix_s = float(about.get("started_unix_s", 0.0))
+            except (Sd2Error, OSError, TypeError, ValueError):
                 continue  # none, damaged, or deleted meanwhile
-            started_unix_s = float(about.get("started_unix_s", 0.0))
             known.append(KnownRun(path, self.name_of(path, about), started_unix_s, state))
         return sorted(known, key=lambda one: one.started_unix_s, reverse=True)
 
