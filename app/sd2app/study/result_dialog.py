@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from itertools import cycle
 
-from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
@@ -29,6 +29,7 @@ _COLOURS = ("real", "synthetic", "denoised", "before", "inertial", "warning", "m
 _ASIDE_PX = 8
 """Shift between learning curves, so that their bars do not cover each other."""
 _PAD = 1.15
+_HEAD = "each true class (a row) was taken for, %"
 
 
 class ConfusionView(Canvas):
@@ -80,12 +81,9 @@ class ConfusionView(Canvas):
         height, line = _CELL_PX[1], self.fontMetrics().height()
         centre = Qt.AlignmentFlag.AlignCenter
         painter.setPen(QColor(palette.muted))
-        painter.drawText(
-            QRectF(0, 0, left + width * len(self._classes), line),
-            Qt.AlignmentFlag.AlignLeft,
-            "each true class (a row) was taken for, %",
-        )
+        painter.drawText(QPointF(0, self.fontMetrics().ascent()), _HEAD)
         for number, name in enumerate(self._classes):
+            painter.setFont(self.font())
             painter.setPen(QColor(palette.muted))
             painter.drawText(QRectF(left + number * width, line, width, line), centre, name)
             room = QRectF(0, top + number * height, left - _GAP_PX, height)
@@ -105,12 +103,10 @@ class ConfusionView(Canvas):
         painter.setPen(QPen(QColor(palette.border), 1))
         painter.drawRect(box.adjusted(0.5, 0.5, -0.5, -0.5))
         painter.setPen(QColor(palette.text))
-        font = painter.font()
+        font = self.font()
         font.setBold(row == column)
         painter.setFont(font)
         painter.drawText(box, Qt.AlignmentFlag.AlignCenter, value.text())
-        font.setBold(False)
-        painter.setFont(font)
 
 
 class ClassResultDialog(Dialog):

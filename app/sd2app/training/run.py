@@ -163,10 +163,12 @@ class TrainingHistory(StepHistory):
     }
 
 
-class _Facts(NamedTuple):
-    config: TrainConfig | None
-    has_model: bool
-    has_checkpoint: bool
+class TrainingFacts(NamedTuple):
+    """What is on disk of a run."""
+
+    config: TrainConfig | None = None  # its settings; None until they can be read
+    has_model: bool = False  # there is one to use
+    has_checkpoint: bool = False
 
 
 class TrainingMonitor(RunMonitor[TrainingFolder]):
@@ -174,25 +176,15 @@ class TrainingMonitor(RunMonitor[TrainingFolder]):
 
     folders, histories = TrainingFolder, TrainingHistory
     history: TrainingHistory
-    facts = _Facts(None, False, False)
+    facts = TrainingFacts()
 
-    def inspect(self) -> _Facts:
+    def inspect(self) -> TrainingFacts:
         """Read the settings, and look which models are there."""
         folder, config = self.folder, self.facts.config
         if config is None and folder.exists:
             with suppress(Sd2Error):  # not written yet
                 config = read_config(folder.config)
-        return _Facts(config, folder.best.exists(), folder.last.exists())
-
-    @property
-    def config(self) -> TrainConfig | None:
-        """Its settings; None until they can be read."""
-        return self.facts.config
-
-    @property
-    def has_model(self) -> bool:
-        """True if there is a model to use."""
-        return self.facts.has_model
+        return TrainingFacts(config, folder.best.exists(), folder.last.exists())
 
     @property
     def resumable(self) -> bool:

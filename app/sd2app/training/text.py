@@ -91,9 +91,9 @@ def remedy_text(run: TrainingMonitor) -> str:
         if run.resumable:
             return f"{text} Resume goes on from the last checkpoint, with the same result."
         return f"{text} It had not come to its first checkpoint: start it again."
-    if run.phase == "failed" and run.has_model:
+    if run.phase == "failed" and run.facts.has_model:
         return "The best model up to then is kept."
-    if run.phase == "stopped" and run.has_model:
+    if run.phase == "stopped" and run.facts.has_model:
         return "The best model is kept. Resume goes on where it ended."
     return ""
 
@@ -113,7 +113,7 @@ def metric_rows(history: TrainingHistory) -> list[tuple[str, str]]:
 
 def about_text(run: TrainingMonitor) -> str:
     """Model and data of a run."""
-    history, config = run.history, run.config
+    history, config = run.history, run.facts.config
     parts = [model_name(history.model)] if history.model else []
     if history.parameters:
         parts.append(f"{history.parameters:,} parameters")
