@@ -146,33 +146,29 @@ class FitModel(QObject):
             self.request, self._landmarks = request, {}
             run.take_up()
             self._follow(FitRun(request.run, self))
-            self._set_state("running")
-            return True
-        self._follow(None)
-        self.request = request
-        self._set_state("stopped")
+        else:
+            self._follow(None)
+            self.request = request
+            self._set_state("stopped")
         return True
 
     def close(self) -> None:
         """End the process at once; what it has done is kept."""
-        if self._run is not None and self.busy:
-            self._run.kill()
-        elif self._run is not None:
-            self._run.close()
+        if self._run is not None:
+            (self._run.kill if self.busy else self._run.close)()
 
     # --- the process ----------------------------------------------------------------------
 
     def _begin(self, request: FitRequest) -> None:
         self.text = ""
+        self._follow(None)
         folder = CommandFolder(request.run)
         try:
             process = folder.start(request.arguments(), {"what": "fit"}, self._command, {})
         except Sd2Error as error:
-            self._follow(None)
             self.report_failure(str(error))
-            return
-        self._follow(FitRun(request.run, self, process=process))
-        self._set_state("running")
+        else:
+            self._follow(FitRun(request.run, self, process=process))
 
     def _follow(self, run: FitRun | None) -> None:
         if self._run is not None:
@@ -183,6 +179,7 @@ class FitModel(QObject):
             run.history.landmarks = self._landmarks  # goes on from a stopped one's
             run.changed.connect(self._tell)
             run.ended.connect(self._end)
+            self._set_state("running")
 
     def _tell(self) -> None:
         self.changed.emit()

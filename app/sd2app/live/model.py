@@ -180,20 +180,14 @@ class LiveModel(SteeredCommand):
                 self.level_db = event["level_db"]
                 self.received_unix_s = float(event["received_unix_s"])
                 self.counts = Counts.of(event)
-            case "frames" | "end":
-                self.counts = Counts.of(event)
-                self._count_pictures(event)
-            case "clocks":
-                self._count_pictures(event)
-            case "preview":
-                self._count_pictures(event)
-                if self.on_screen:
+            case "frames" | "end" | "clocks" | "preview" as kind:
+                self.pictures = int(event.get("pictures", self.pictures))
+                self.pictures_dropped = int(event.get("pictures_dropped", self.pictures_dropped))
+                self._is_linked = bool(event.get("linked", True))
+                if kind in ("frames", "end"):
+                    self.counts = Counts.of(event)
+                elif kind == "preview" and self.on_screen:
                     self._session.video.show_live(picture_in(event))
-
-    def _count_pictures(self, event: dict[str, Any]) -> None:
-        self.pictures = int(event.get("pictures", self.pictures))
-        self.pictures_dropped = int(event.get("pictures_dropped", self.pictures_dropped))
-        self._is_linked = bool(event.get("linked", True))
 
     def _end(self, code: int, error_text: str) -> None:
         if self.on_screen:
