@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from sd2core.cli.command_parser import command
 from sd2core.cli.output import progress_bar
@@ -13,6 +13,9 @@ from sd2core.options.kinds import SpanM
 from sd2core.options.records import ARGUMENT, OptionError, Place, changed_flags, given_flags
 from sd2core.options.shared import Axis, Channel, Json, ReplacesMaps
 from sd2core.radar_config import Clutter
+
+if TYPE_CHECKING:
+    from sd2core.io.radar import RadarCapture
 
 _AXIS = ("bins", "v_max_mps")
 _CHANNEL = ("receiver", "transmitter")
@@ -95,25 +98,28 @@ def _radar(options: Radar) -> None:
         _write_map(options, options.out)
 
 
-def _show_limits(options: Radar) -> None:
-    """Say what a capture's radar can tell apart, and what was assumed of it."""
-    from sd2core.cli.info.description import describe_capture, describe_radar, show
+def _found(options: Radar) -> tuple[Path, RadarCapture | None, float]:
+    """The file, its capture, None where it holds a finished map, and the offset of its clock."""
     from sd2core.io.radar import holds_map, load_capture
     from sd2core.recording.recording import is_recording, open_recording
 
     path, channel = options.capture, (options.receiver, options.transmitter)
-    recording = open_recording(path) if is_recording(path) else None
-    if recording is not None:
-        path = recording.radar or path
-    if holds_map(path):
+    if not is_recording(path):
+        return path, None if holds_map(path) else load_capture(path).channel(*channel), 0.0
+    recording = open_recording(path)
+    capture = None if recording.holds_radar_map else recording.load_capture(*channel)
+    return recording.radar or path, capture, recording.radar_offset_s
+
+
+def _show_limits(options: Radar) -> None:
+    """Say what a capture's radar can tell apart, and what was assumed of it."""
+    from sd2core.cli.info.description import describe_capture, describe_radar, show
+
+    path, capture, _ = _found(options)
+    if capture is None:
         options.refuse(_CHANNEL, f"and {path} holds a finished map", "for raw samples only")
         description = describe_radar(path)
     else:
-        capture = (
-            load_capture(path).channel(*channel)
-            if recording is None
-            else recording.load_capture(*channel)
-        )
         description = describe_capture(path, capture)
     show(description, as_json=options.json)
 
@@ -122,22 +128,11 @@ def _write_map(options: Radar, out: Path) -> None:
     from sd2core.cli.info.description import describe_map, limit_facts, show
     from sd2core.cli.reading import chosen_axis
     from sd2core.fmcw import doppler_map, limits
-    from sd2core.io.radar import holds_map, load_capture
-    from sd2core.recording.recording import is_recording, open_recording
 
-    channel, offset_s = (options.receiver, options.transmitter), 0.0
-    if is_recording(options.capture):
-        recording = open_recording(options.capture)
-        if recording.holds_radar_map:
-            assert recording.radar is not None
-            _write_recorded(recording.radar, recording.radar_offset_s, options, out)
-            return
-        capture, offset_s = recording.load_capture(*channel), recording.radar_offset_s
-    elif holds_map(options.capture):
-        _write_recorded(options.capture, 0.0, options, out)
+    path, capture, offset_s = _found(options)
+    if capture is None:
+        _write_recorded(path, offset_s, options, out)
         return
-    else:
-        capture = load_capture(options.capture).channel(*channel)
     with progress_bar("Processing") as progress:
         doppler = doppler_map(
             capture,
