@@ -44,15 +44,6 @@ class Counts:
         return self.made_before[step] + self.done[step] + self.failed[step] + self.waiting[step]
 
 
-@dataclass(frozen=True)
-class Failure:
-    """Failed task with its error (``found``, ``expected``, ``remedy``)."""
-
-    task: Task
-    error: dict[str, Any]
-    worker_died: bool = False
-
-
 class Stopped(Exception):
     """Raised by ``tick`` when the user asked for the end."""
 
@@ -62,9 +53,9 @@ class Driver:
 
     The pool (Dask) queues, distributes, and repeats what a lost worker had; here it is
     decided what is submitted next, and outcomes are counted. The pool is opened for the
-    first task that is to be done. ``on_failure`` and ``on_note`` receive every failure, and
-    every sentence for the user; ``tick`` is called several times a second and may raise
-    :class:`Stopped`.
+    first task that is to be done. ``on_failure`` receives every task that failed, its error
+    (``found``, ``expected``, ``remedy``) and whether its worker died; ``on_note`` every sentence
+    for the user; ``tick`` is called several times a second and may raise :class:`Stopped`.
     """
 
     def __init__(
@@ -72,7 +63,7 @@ class Driver:
         graph: TaskGraph,
         open_pool: Callable[[], Pool],
         *,
-        on_failure: Callable[[Failure], None],
+        on_failure: Callable[[Task, dict[str, Any], bool], None],
         on_note: Callable[[str], None],
         tick: Callable[[], None],
     ) -> None:
@@ -238,7 +229,7 @@ class Driver:
     def _fail(self, task: Task, error: dict[str, Any], worker_died: bool = False) -> None:
         self.counts.failed[task.step] += 1
         self.counts.waiting += Counter(self._graph.lost_with(task))
-        self._on_failure(Failure(task, error, worker_died))
+        self._on_failure(task, error, worker_died)
 
     def left_s(self) -> float | None:
         """Estimated seconds to the end; None while a step has not been timed."""

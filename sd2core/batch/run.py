@@ -8,11 +8,12 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack, suppress
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
-from sd2core.batch.driver import Driver, Failure, Stopped, event_of
+from sd2core.batch.driver import Driver, Stopped, event_of
 from sd2core.batch.estimate import pace_kind
 from sd2core.batch.exporting import dataset_path
 from sd2core.batch.folder import PROGRESS_FORMAT, PROGRESS_VERSION, BatchFolder
@@ -21,7 +22,7 @@ from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import plan_text
 from sd2core.batch.pool import Pool, local_pool, scheduler_pool
 from sd2core.batch.task_graph import TaskGraph
-from sd2core.batch.tasks import BEGUN
+from sd2core.batch.tasks import BEGUN, Task
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write, atomic_write_text
 from sd2core.files.paths import remove
@@ -138,7 +139,7 @@ class _Run:
                 self._driver = Driver(
                     self._graph,
                     lambda: stack.enter_context(pool),
-                    on_failure=lambda one: self._failed(one, failures),
+                    on_failure=partial(self._failed, failures),
                     on_note=self._note,
                     tick=self._tick,
                 )
@@ -218,12 +219,12 @@ class _Run:
         self._lines.say("note", text=text)
         self._log(text)
 
-    def _failed(self, failure: Failure, failures: Any) -> None:
-        about = event_of(failure.task, self._folder.path)
+    def _failed(self, failures: Any, task: Task, error: dict[str, Any], worker_died: bool) -> None:
+        about = event_of(task, self._folder.path)
         del about["out"]
-        about |= {"error": failure.error, "worker_died": failure.worker_died}
+        about |= {"error": error, "worker_died": worker_died}
         self._lines.say("failed", **about)
-        self._log(f"{about['recording']}: {about['step']}: {Sd2Error(**failure.error)}")
+        self._log(f"{about['recording']}: {about['step']}: {Sd2Error(**error)}")
         failures.write(json.dumps(about, ensure_ascii=False) + "\n")
 
     def _log(self, text: str) -> None:
