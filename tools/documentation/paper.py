@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from sd2core.accuracy.cache import this_machine
 from sd2core.classify.metrics import mean_recall, shares
-from sd2core.cli.output import progress_bar
 from sd2core.denoise.files import load_model
 from sd2core.denoise.metrics import VelocityError, peak_error, stands_out
 from sd2core.doppler import PRESETS, Synthesizer
@@ -34,14 +33,11 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.pairs.store import PairSet, Take, read_pairs
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
-from sd2core.simulate.campaign.making import make_campaign
-from sd2core.simulate.campaign.protocol import PAPER, Protocol
-from sd2core.simulate.campaign.takes import Campaign
 from sd2core.timebase import Timebase
 from tools.documentation.measured import write_page
 from tools.documentation.pages import filled, spread, spread_of, table
 from tools.documentation.places import BUILD, DOCS, IMAGES, REPOSITORY, SAMPLE
-from tools.documentation.runs import Job, epochs_in, evaluated, settings, train
+from tools.documentation.runs import Job, campaign_of, epochs_in, evaluated, settings, train
 
 FOLDER, STUDY = BUILD / "paper", BUILD / "classifier" / "to-and-fro"
 DROPOUT = 0.1
@@ -53,7 +49,6 @@ PRINTED = {"s4": (1.0126, 1.6329), "swin": (1.1640, 1.8734), "unet": (1.5835, 2.
 """The paper's Table 1: MAE and σ in m/s."""
 PIXELS_PER_INCH = 110
 SEED = 5
-RANDOM = replace(PAPER, order="random")
 CLASSES = ("horizontal", "vertical", "background")
 ADDED = {"radar only": "radar alone", "+ denoised": "+ denoised"}
 """The paper's training data, and ours in a study."""
@@ -98,7 +93,7 @@ def _link(match: re.Match[str]) -> str:
 def _pictures() -> dict[str, float]:
     """Figures 2, 4 and 7."""
     bodies = draw_bodies(IMAGES / "paper-mesh.png", IMAGES / "paper-range.png")
-    pairs = read_pairs(protocol_campaign(PAPER, SHOWN_MINUTES))
+    pairs = read_pairs(_campaign("to-and-fro", SHOWN_MINUTES))
     takes = {
         "Horizontal": _first(pairs, ("left-to-right", "right-to-left")),
         "Vertical": _first(pairs, ("up-to-down", "down-to-up")),
@@ -115,12 +110,10 @@ def _pictures() -> dict[str, float]:
     return bodies
 
 
-def protocol_campaign(protocol: Protocol, minutes: float) -> Path:
-    """A campaign of six people; what is there of it is not made again."""
-    path = FOLDER / "protocols" / f"{protocol.order}.zarr"
-    with progress_bar(f"Simulating {path.stem}", unit="take") as progress:
-        make_campaign(path, Campaign(SEED, protocol=protocol), minutes=minutes, progress=progress)
-    return path
+def _campaign(order: str, minutes: float) -> Path:
+    """A campaign of the paper's protocol; what is there of it is not made again."""
+    how = ("--protocol", "paper", "--order", order, "--seed", SEED)
+    return campaign_of(FOLDER / "protocols" / order, minutes, *how)
 
 
 def _first(pairs: PairSet, swipes: Sequence[str]) -> Take:
@@ -144,7 +137,7 @@ def _save_maps(name: str, rows: Sequence[MapRow], heading: str) -> None:
 
 def _denoisers() -> dict[str, Any]:
     """Figure 6 and Table 1."""
-    campaign = protocol_campaign(RANDOM, CAMPAIGN_MINUTES)
+    campaign = _campaign("random", CAMPAIGN_MINUTES)
     how = settings({"dropout": DROPOUT})
     runs, epochs = [], {}
     for name, title in TITLES.items():

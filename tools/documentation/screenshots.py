@@ -34,6 +34,7 @@ from sd2core.recording.recording import open_recording
 from sd2core.sensor import Beam, VirtualSensor, aimed_at
 from sd2core.simulate.two_people import two_people
 from tools.documentation.places import IMAGES, REPOSITORY, SAMPLE, SHARED
+from tools.documentation.runs import sd2
 from tools.documentation.windows import application, opened, save, settle, wait_for
 
 SIZES = (1280, 720), (1600, 1000), (2560, 1440)
@@ -215,11 +216,7 @@ def learning() -> None:
         export(sample)
         batch(sample)
         campaign = place / "campaign.zarr"
-        command = [sys.executable, "-m", "sd2app.command_line", "simulate", "campaign"]
-        command += ["--out", str(campaign), *_CAMPAIGN]
-        if subprocess.run(command, check=False).returncode != 0:
-            print("No pictures of trainings: there is nothing to learn from", file=sys.stderr)
-            return
+        sd2("simulate", "campaign", "--out", campaign, *_CAMPAIGN)
         training(campaign)
         classifier(sample, campaign)
 
