@@ -19,7 +19,7 @@ from sd2core import MeshSequence, Synthesizer, Timebase, VirtualSensor
 from sd2core.denoise.card import DENOISER_PARTS
 from sd2core.io.radar.mars import MarsPart, MarsStretch, mars_parts, read_mars
 from sd2core.mesh.vertex_parts import PARTS
-from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, SkeletonClip, puppet_of
+from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, puppet_of
 from sd2core.mocap.mars_pairs import (
     MarsChoices,
     body_doppler,
@@ -46,13 +46,6 @@ _POINT_ARRAYS = ("point_rows", "point_mps", "point_intensity")
 MARS = [SHARED / "paired" / name for name in ("mars_subject1", "mars_subject4")]
 
 
-def skeleton_cloud(clip: SkeletonClip) -> MeshSequence:
-    """The joints alone, as a cloud of points."""
-    return MeshSequence(
-        clip.joints_m.astype(np.float32), None, Timebase(clip.times_s), "joints of a skeleton"
-    )
-
-
 def changed(**options: object) -> MarsChoices:
     """The default with other options of synthesis."""
     return replace(DEFAULT, synthesis=replace(DEFAULT.synthesis, **options))
@@ -69,11 +62,12 @@ WAYS = {
 
 def cloud_maps(part: MarsPart) -> Maps:
     """Synthetic Doppler of the joints as a cloud of points."""
-    options = replace(DEFAULT.synthesis, visibility="none")
-    return [
-        Synthesizer(skeleton_cloud(skeleton_clip(stretch)), options).map(VirtualSensor()).values.T
-        for stretch in part.stretches
-    ]
+    options, maps = replace(DEFAULT.synthesis, visibility="none"), []
+    for clip in map(skeleton_clip, part.stretches):
+        joints_m = clip.joints_m.astype(np.float32)
+        cloud = MeshSequence(joints_m, None, Timebase(clip.times_s), "joints of a skeleton")
+        maps.append(Synthesizer(cloud, options).map(VirtualSensor()).values.T)
+    return maps
 
 
 def body_maps(driven: list[DrivenClip], choices: MarsChoices, place: RadarPlace) -> Maps:

@@ -55,12 +55,6 @@ def sd2(*arguments: object) -> None:
     run("sd2core.cli", *arguments)
 
 
-def printed(*arguments: object) -> str:
-    """Run a command, and return what it prints."""
-    command = [sys.executable, "-m", "sd2core.cli", *map(str, arguments)]
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
-
-
 def campaign_of(folder: Path, minutes: float, *options: object) -> Path:
     """A simulated campaign of six people; what is there of it is not made again."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -96,8 +90,9 @@ def train(folder: Path, jobs: Sequence[Job]) -> list[Path]:
 
 def evaluated(models: Sequence[Path], data: Path, *options: object) -> dict[str, Any]:
     """What ``sd2 eval`` says of some models, and of the filters that need no training."""
-    text = printed("eval", *models, "--data", data, "--json", *options)
-    return json.loads(text)
+    words = ("eval", *models, "--data", data, "--json", *options)
+    command = [sys.executable, "-m", "sd2core.cli", *map(str, words)]
+    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
 ERRORS = {

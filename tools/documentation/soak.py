@@ -9,7 +9,6 @@ raised anything.
 from __future__ import annotations
 
 import argparse
-import gc
 import json
 import os
 import shutil
@@ -81,7 +80,6 @@ class Meter(QObject):
             "threads": self._process.num_threads(),
             "most": self._most_threads,  # also while something was computed
             "descriptors": self._process.num_fds(),
-            "objects": len(gc.get_objects()),
             "windows": len(QApplication.topLevelWidgets()),
         }
         names = ("gap, ms", "95 %", "99 %", "largest")

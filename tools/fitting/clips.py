@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sd2core import MeshSequence, Sd2Error, Span, Timebase
 from sd2core.body.model import Body, Resolution, Skeleton
-from sd2core.body.rig import KeypointSpace, Rig
+from sd2core.body.rig import KeypointSpace
 from sd2core.body.rotations import Floats, applied
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.skinning import pose_vertices
@@ -238,7 +238,7 @@ def scene(clip: Clip, space: ShapeSpace, motions: Path | None = None) -> Scene:
     place = np.array([clip.across_m, clip.camera_m, clip.distance_m])
     if clip.action.kind == "captured":
         role: Role = "calibrate" if clip in TUNING else "measure"
-        transforms = captured_transforms(space, shape, clip.action, place, motions, role)
+        transforms = _captured(space, shape, clip.action, place, motions, role)
         return Scene(shape, times_s, transforms, skeleton, (), camera)
     scale = arm_length_m(skeleton) / arm_length_m(space.base_skeleton)
     motion, spans = perform(skeleton, clip.action, times_s, clip.seed, scale)
@@ -246,7 +246,7 @@ def scene(clip: Clip, space: ShapeSpace, motions: Path | None = None) -> Scene:
     return Scene(shape, times_s, transforms, skeleton, spans, camera)
 
 
-def captured_transforms(
+def _captured(
     space: ShapeSpace,
     shape: BodyShape,
     action: Action,
@@ -254,12 +254,7 @@ def captured_transforms(
     motions: Path | None,
     role: Role,
 ) -> Floats:
-    """Transforms (T, B, 3, 4) of a body's bones in the camera frame.
-
-    The middle of the way lies at ``place_m`` (3,): to the right, of the floor below the camera,
-    ahead. Raises Sd2Error without the recording, if it is for another use than ``role``, or if it
-    is shorter than the action.
-    """
+    """Transforms (T, B, 3, 4) of bones: the middle of the way, on the floor, is at ``place_m``."""
     if motions is None:
         raise Sd2Error(f"The motion {action.trial} is not at hand", "--motions MOTIONS", _REMEDY)
     path = motions / f"{action.trial}.npz"
@@ -272,8 +267,7 @@ def captured_transforms(
     frames = slice(start, start + round(action.length_s * RATE_HZ))
     if len(motion) < frames.stop:
         raise Sd2Error(f"{path} has {len(motion)} frames", f"{frames.stop} or more")
-    whole = space.skeleton(shape)
-    rig = Rig(whole, KeypointSpace(space).of(shape))
+    whole, rig = space.skeleton(shape), KeypointSpace(space).rig(shape)
     pose = motion.pose_on(whole, space.skeleton(motion.shape), frames)
     transforms = whole.transforms(rig.body_rotations(pose.turns), pose.translation_m)
     return _before_camera(whole, transforms, action.heading_deg, place_m)

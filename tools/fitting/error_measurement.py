@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from sd2core.body.landmark_files import load_track
-from sd2core.body.rig import KeypointSpace, Rig
+from sd2core.body.rig import KeypointSpace
 from sd2core.body.rotations import Floats, applied, product, to_vector, transposed
-from sd2core.body.shape import BodyShape, ShapeSpace
+from sd2core.body.shape import ShapeSpace
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
 from sd2core.simulate.campaign.fit_errors import FitErrors, GroupErrors
@@ -50,9 +50,9 @@ def measure_errors(truths: Sequence[Truth], fits: Path, progress: Progress = sil
     shapes = []
     for number, truth in enumerate(truths):
         progress(number, len(truths))
-        clip = clip_samples(truth, fits, space)
-        shapes.append(clip.shape_error)
-        for (group, _), sample in clip.samples.items():
+        of_clip, of_shape = _compared(truth, fits, space)
+        shapes.append(of_shape)
+        for (group, _), sample in of_clip.items():
             samples[group].append(sample)
     progress(len(truths), len(truths))
     apart = np.array(shapes)
@@ -71,15 +71,10 @@ def measure_errors(truths: Sequence[Truth], fits: Path, progress: Progress = sil
     )
 
 
-class ClipSamples(NamedTuple):
-    """Poses and errors of one clip."""
-
-    samples: dict[tuple[Group, str], Sample]
-    shape_error: Floats
-
-
-def clip_samples(truth: Truth, fits: Path, space: ShapeSpace) -> ClipSamples:
-    """Compare one clip's fit with its truth."""
+def _compared(
+    truth: Truth, fits: Path, space: ShapeSpace
+) -> tuple[dict[tuple[Group, str], Sample], Floats]:
+    """Poses and errors of one clip's fit, and the error of its shape."""
     landmarks = fits / f"{truth.name}.landmarks.npz"
     if not landmarks.exists():
         raise Sd2Error(
@@ -95,7 +90,7 @@ def clip_samples(truth: Truth, fits: Path, space: ShapeSpace) -> ClipSamples:
             f"all {len(known.times_s)} of the clip",
         )
     skeleton = space.skeleton(fit.shape)
-    rig = Rig(skeleton, KeypointSpace(space).of(fit.shape))
+    rig = KeypointSpace(space).rig(fit.shape)
     transforms = skeleton.transforms(rig.body_rotations(fit.turns), fit.translation_m)
     true = posture(known.skeleton, known.transforms)
     fitted = posture(skeleton, transforms, true.axes)
@@ -103,7 +98,7 @@ def clip_samples(truth: Truth, fits: Path, space: ShapeSpace) -> ClipSamples:
         (group, side): Sample(true.features(group, side), errors(fitted, true, group, side))
         for group, side in all_groups()
     }
-    return ClipSamples(samples, _shape_error(fit.shape, known.shape))
+    return samples, np.asarray(fit.shape.coefficients - known.shape.coefficients)
 
 
 def group_errors(samples: Sequence[Sample]) -> GroupErrors:
@@ -170,10 +165,6 @@ def _kernel(
             changes = np.mean(seen[_VELOCITY_LAGS], axis=0) / shown[_VELOCITY_LAGS].mean()
             best = (misfit, float(length), float(mixing), changes)
     return best[1:]
-
-
-def _shape_error(fitted: BodyShape, true: BodyShape) -> Floats:
-    return np.asarray(fitted.coefficients - true.coefficients)
 
 
 def errors(fitted: Posture, true: Posture, group: Group, side: str = "") -> Floats:
