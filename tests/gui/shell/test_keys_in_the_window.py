@@ -173,3 +173,20 @@ def test_typing_in_a_number_box_fires_no_action(window, qtbot) -> None:
     assert c.labels.marks
     QTest.keyClick(window, Qt.Key.Key_Escape)
     assert not c.labels.marks
+
+
+def test_what_is_waited_for_in_vain_leaves_nothing_behind(window, dialog, qtbot) -> None:
+    """Neither on the row nor in the list, which would end the program with it."""
+    rows = dialog.findChild(QTreeWidget)
+    capture(dialog)
+    press(Qt.Key.Key_Escape)
+    assert QApplication.focusWidget() is rows
+    capture(dialog)
+    rows.setCurrentItem(rows.topLevelItem(3))
+    qtbot.waitUntil(lambda: not dialog.findChildren(KeyCapture))
+    search(dialog, "next span")
+    capture(dialog)
+    press(Qt.Key.Key_F9)
+    assert "Side panel" in said(dialog)
+    dialog.close()
+    qtbot.waitUntil(lambda: not dialog.findChildren(KeyCapture))

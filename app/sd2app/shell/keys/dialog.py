@@ -43,6 +43,7 @@ class KeysDialog(Dialog):
         super().__init__("Keys", parent)
         self._keys = keys
         self._rows: list[KeyRow] = []
+        self._waiting: int | None = None  # row that waits for a key
         self._search = SearchLine("Search actions and keys", self)
         self._search.textChanged.connect(self._fill)
         self._list = entry_list("Keys", ("Menu", "What it does", "Keys"), 1, self)
@@ -78,6 +79,7 @@ class KeysDialog(Dialog):
     def _fill(self) -> None:
         """List what the search leaves; the row that was current stays so."""
         current, self._rows = self._row, self._keys.rows(self._search.text())
+        scrolled, self._waiting = self._list.verticalScrollBar().value(), None
         self._list.clear()
         for row in self._rows:
             item = QTreeWidgetItem(self._list, [row.menu, row.text, self._keys.keys_text(row)])
@@ -88,6 +90,8 @@ class KeysDialog(Dialog):
                 item.setToolTip(column, row.tip)
         at = self._rows.index(current) if current in self._rows else 0
         self._list.setCurrentIndex(self._list.model().index(at, 0))
+        if current in self._rows:
+            self._list.verticalScrollBar().setValue(scrolled)
         self._refresh()
 
     def _begin(self, besides: bool = False) -> None:
@@ -96,21 +100,24 @@ class KeysDialog(Dialog):
         row = self._row
         if row is None or row.mouse:
             return
-        field = KeyCapture(self)
-
-        def end() -> None:
-            self._list.setFocus()
-            field.hide()
-            field.deleteLater()
+        self._end_waiting()
+        field, self._waiting = KeyCapture(self), self._list.currentIndex().row()
 
         def take(key: str) -> None:
-            end()
+            self._end_waiting()
             self._attempt(lambda _: self._keys.change(row, key, besides=besides))
 
-        field.given_up.connect(end)
+        field.given_up.connect(self._end_waiting)
         field.captured.connect(take)
         self._list.setIndexWidget(self._list.currentIndex().siblingAtColumn(_KEYS), field)
         field.setFocus()
+
+    def _end_waiting(self) -> None:
+        if self._waiting is not None:
+            item, self._waiting = self._list.topLevelItem(self._waiting), None
+            self._list.setFocus()
+            if item is not None:
+                self._list.removeItemWidget(item, _KEYS)
 
     def _attempt(self, change: Callable[[KeyRow], None]) -> None:
         """Change the current row, or say why that is refused."""
@@ -122,6 +129,8 @@ class KeysDialog(Dialog):
             self._warning.setText(str(error))
 
     def _refresh(self) -> None:
+        if self._waiting != self._list.currentIndex().row():
+            self._end_waiting()
         row = self._row
         can = row is not None and not row.mouse
         for button in (self._change, self._clear):
