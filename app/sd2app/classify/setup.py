@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -92,6 +92,7 @@ class ClassSetup(RunSetup[DataSource]):
             values.set("delay_s", _DEFAULTS["delay_s"])
         people = settings.table(_PEOPLE)
         data = [DataSource(path, str(people.get(str(path), ""))) for path in settings.paths(_DATA)]
+        self._told: tuple[object, list[LabelledFacts]] = None, []
         super().__init__(settings, values, _DATA, data, parent)
 
     def look_into(self, source: DataSource) -> DataSource:
@@ -140,7 +141,7 @@ class ClassSetup(RunSetup[DataSource]):
             return problem
         if any(not one.facts for one in self.data):
             return "Reading the data…"
-        return why_not_together(self.data)
+        return why_not_together(self.data, self._together)
 
     @property
     def train_problem(self) -> str:
@@ -149,12 +150,18 @@ class ClassSetup(RunSetup[DataSource]):
             return self.problem
         if not self.maps:
             return "Choose maps to learn from."
-        return why_not_together(self.data, self.maps)
+        return why_not_together(self.data, self._together, self.maps)
 
     @property
     def division(self) -> Split | None:
         """Division of people in a training; None until the data is known and fits together."""
-        return None if self.problem else division_of(self.data)
+        return None if self.problem else division_of(self._together())
+
+    def _together(self) -> list[LabelledFacts]:
+        """Facts of all data, found once for the same data: folders and files are looked into."""
+        if self._told[0] is not self.data:
+            self._told = self.data, _told_apart(self.data)
+        return self._told[1]
 
     @property
     def step_s(self) -> float | None:
@@ -185,7 +192,7 @@ class ClassSetup(RunSetup[DataSource]):
         return tuple(LabelledSource(one.path, one.person) for one in self.data)
 
 
-def division_of(data: Sequence[DataSource]) -> Split | None:
+def division_of(facts: Sequence[LabelledFacts]) -> Split | None:
     """Division of people into training, validation and test; None where there are no people.
 
     Like ``sd2 classify train``: where there is nothing but data sets, they state it themselves.
@@ -194,7 +201,6 @@ def division_of(data: Sequence[DataSource]) -> Split | None:
     from sd2core.datasets.labelled import people_of
     from sd2core.train.data import split_subjects
 
-    facts = _told_apart(data)
     people = people_of(facts)
     if not people:
         return None
@@ -221,7 +227,11 @@ def _told_apart(data: Sequence[DataSource]) -> list[LabelledFacts]:
     ]
 
 
-def why_not_together(data: Sequence[DataSource], maps: Sequence[str] = ()) -> str:
+def why_not_together(
+    data: Sequence[DataSource],
+    together: Callable[[], Sequence[LabelledFacts]],
+    maps: Sequence[str] = (),
+) -> str:
     """Reason why these sources cannot be mixed with these maps; empty when they can."""
     for source in data:
         for name in maps:
@@ -239,7 +249,7 @@ def why_not_together(data: Sequence[DataSource], maps: Sequence[str] = ()) -> st
             + ". Choose data of one kind."
         )
     try:
-        division_of(data)
+        division_of(together())
     except Sd2Error as error:
         return str(error)
     return ""

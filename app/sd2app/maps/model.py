@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import hashlib
 import math
 import threading
 from collections import deque
@@ -42,6 +43,7 @@ from sd2core.doppler.synthesizer import FrameScattering, MapFrames, Synthesizer,
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import deep_signature
 from sd2core.maps import DopplerMap
+from sd2core.mesh.made_vertices import same_bodies
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.options.records import words_of
 from sd2core.options.synthesis import CHOSEN
@@ -220,7 +222,9 @@ class SynthesisModel(ReportingModel):
             self._stop()
         self._keep()
         options = replace(synthesizers.options, count=document.count)
-        self._synthesizers = synthesizers.among(mesh, options, self._files)
+        # What is dragged is of the same files at every step.
+        files = synthesizers.files if same_bodies(mesh, before) else self._files
+        self._synthesizers = synthesizers.among(mesh, options, files)
         self._partial.mark_stale()
         if options != synthesizers.options:
             self._forget_masks()
@@ -568,9 +572,10 @@ class SynthesisModel(ReportingModel):
 
     @property
     def _files(self) -> str:
-        """Signature of what the scene was read from: two meshes may be alike in some frames."""
+        """Hash of what tells files of the scene apart: two meshes may be alike in some frames."""
         recording = self._session.document.recording
-        return "" if recording is None else str(deep_signature(recording.scene_files))
+        files = [] if recording is None else deep_signature(recording.scene_files)
+        return hashlib.sha256(str(files).encode()).hexdigest()
 
     @property
     def _vertices(self) -> int:

@@ -52,10 +52,9 @@ class SynthesizerCache:
     """Makes a synthesizer per plan on demand, and keeps the newest.
 
     Those that count as many vertices share what is prepared, as far as they can.
-    ``options`` are those that no plan chooses, ``files`` the signature of those that the mesh was
-    read from. ``full`` is the synthesizer on the full mesh with
-    these options, for readouts of single vertices and for use without a plan; it shares what
-    ``like`` has prepared, as far as it can.
+    ``options`` are those that no plan chooses, ``files`` tells apart what the bodies were read
+    from. ``full`` is the synthesizer on the full mesh with these options, for readouts of single
+    vertices and for use without a plan; it shares what ``like`` has prepared, as far as it can.
     """
 
     def __init__(
@@ -67,7 +66,7 @@ class SynthesizerCache:
     ) -> None:
         self.mesh = mesh
         self.options = options
-        self._files = files
+        self.files = files
         self.full = Synthesizer(mesh, options, memory_budget_bytes=_BUDGET_BYTES, blocks_of=like)
         self.limbs = False  # True: maps are also split by the parts of the body
         self._made: OrderedDict[AccuracyPlan, Synthesizer] = OrderedDict()
@@ -89,7 +88,7 @@ class SynthesizerCache:
 
     def key(self, plan: AccuracyPlan | None, sensor: VirtualSensor) -> Hashable:
         """Key of all that a final map depends on."""
-        return self._files, self._scene, plan and _key(plan), self.limbs, sensor
+        return self.files, self._scene, plan and _key(plan), self.limbs, sensor
 
     @functools.cached_property
     def _scene(self) -> str:
