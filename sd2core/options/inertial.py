@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 from sd2core.options.kinds import NotNegative, Positive, Vector
-from sd2core.options.records import Group, OptionRecord, Place
+from sd2core.options.records import Group, OptionError, OptionRecord, Place
 
 
 class SensorErrors(OptionRecord):
@@ -38,3 +39,13 @@ class SensorErrors(OptionRecord):
     turn_rate_noise: Annotated[NotNegative | None, Place(("--gyr-noise",))] = None
     turn_rate_range_radps: Annotated[Positive | None, Place(("--gyr-range",))] = None
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        biases = (*(self.acceleration_bias_mps2 or ()), *(self.turn_rate_bias_radps or ()))
+        if self.seed < 0 or not all(map(math.isfinite, biases)):
+            found = f"The sensor has a bias of {', '.join(map(str, biases))} and " if biases else ""
+            raise OptionError(
+                f"{found or 'The sensor has '}a seed of {self.seed}",
+                "finite biases and a seed of 0 or more",
+            )

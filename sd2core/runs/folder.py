@@ -77,6 +77,11 @@ class RunFolder:
         return is_locked(self._lock)
 
     @property
+    def taken(self) -> bool:
+        """True while a process works in the folder, or is about to where that is known."""
+        return self.live
+
+    @property
     def process(self) -> ProcessId | None:
         """Process that works or worked in it; None where yesterday's version noted no start."""
         try:
@@ -125,7 +130,7 @@ class RunFolder:
     def state_and_about(self) -> tuple[State, dict[str, Any]]:
         """Current state, and all that the description says; raises as :meth:`state`."""
         about = self.about()
-        if about["state"] in LIVE and not self.live:
+        if about["state"] in LIVE and not self.taken:
             # It may have ended between the two looks.
             about = self.about()
             if about["state"] in LIVE:

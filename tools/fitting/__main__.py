@@ -117,8 +117,8 @@ def _people(options: People) -> None:
 def _clips(options: Clips) -> None:
     """Make videos of simulated people whose motion is known, to measure a fit against.
 
-    A clip is a folder with video.mp4, mesh.zarr, keypoints.npz and truth.json. Clips that are
-    there already are kept, so a run that was stopped goes on where it was.
+    A clip is a folder with video.mp4, mesh.zarr and truth.json. Clips that are there already are
+    kept, so a run that was stopped goes on where it was.
     """
     standard = CLIPS if options.motions is None else (*CLIPS, *REAL_MOTION)
     clips = [clip_named(name) for name in options.clips if options.clips != ("tuning",)]

@@ -85,11 +85,14 @@ class Runs(QObject, Generic[Run]):
         """Look for runs on disk, in the background; the newest first."""
         known = []
         for path in self.candidates():
+            folder = self.monitor.folders(path)
             try:
-                state, about = self.monitor.folders(path).state_and_about()
+                state, about = folder.state_and_about()
                 started_unix_s = float(about.get("started_unix_s", 0.0))
             except (Sd2Error, OSError, TypeError, ValueError):
-                continue  # none, damaged, or deleted meanwhile
+                if not folder.exists:
+                    continue  # none, or deleted meanwhile
+                state, about, started_unix_s = "died", {}, 0.0  # damaged: it can be deleted
             known.append(KnownRun(path, self.name_of(path, about), started_unix_s, state))
         return sorted(known, key=lambda one: one.started_unix_s, reverse=True)
 

@@ -203,7 +203,7 @@ class LabelsFeature(Feature):
                 "leave", "Labels", "Cancel", ("Esc",),
                 "Let go of what is dragged; else place no sensor, or align no more; else forget"
                 " what is being marked; else end the loop of a span; else select nothing",
-                lambda: next(self._to_cancel())(), lambda: any(self._to_cancel()),
+                lambda: next(self._to_cancel(), tuple)(), lambda: any(self._to_cancel()),
             ),
             Action(
                 "loop_span", "Labels", "Play selected span in a loop", ("O",),

@@ -21,13 +21,16 @@ from sd2core.io.radar.described import (
     is_describable,
     is_described,
     load_described,
+    write_described,
 )
 from sd2core.io.radar.growing import is_growing, load_growing
 from sd2core.io.radar.infineon import (
     INFINEON_FILES,
+    check_replaceable,
     find_recording,
     load_infineon,
     read_radar_config,
+    write_capture,
 )
 from sd2core.io.radar.judging import judged
 from sd2core.io.radar.kkt import RecordedMap, load_kkt
@@ -46,6 +49,22 @@ from sd2core.plausibility.radar import judge_map
 from sd2core.radar_config import RadarConfig
 from sd2core.radar_profiles import RADAR_PLUG_INS, RADARS, find_radar
 from sd2core.sensor import VelocityAxis
+
+__all__ = [
+    "SUPPORTED",
+    "RadarCapture",
+    "RecordedMap",
+    "check_replaceable",
+    "companions",
+    "holds_map",
+    "load_capture",
+    "load_recorded_map",
+    "named_radar",
+    "read_radar_config",
+    "without_companions",
+    "write_capture",
+    "write_described",
+]
 
 SUPPORTED = (
     "an Infineon recording: the folder with radar.npy, config.json and radar_timestamp.csv"

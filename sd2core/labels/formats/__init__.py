@@ -189,6 +189,8 @@ def read_label_file(
                 lambda program: program.read(path, timebase, observation), (Labels, LabelRows)
             )
         if isinstance(content, LabelRows):
+            for odd in content.odd:  # said of the file anyway
+                odd.found = odd.found.removeprefix(f"{path}, ")
             return assembled(content, clock).beside(timebase)
         return LabelReading(content).beside(timebase)
 

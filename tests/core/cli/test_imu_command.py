@@ -158,7 +158,7 @@ def test_a_file_of_something_else_is_not_replaced(sd2: Sd2, body: Path, tmp_path
         (("--at", "head", "--cutoff", "20"), "up to 13.5 Hz"),
         (("--at", "head", "--rate", "5"), "12 or more"),
         (("--at", "head", "--up", "0,0,0"), "Upwards is"),
-        (("--at", "head", "--seed", "-1"), "errors of the sensor"),
+        (("--at", "head", "--seed", "-1"), "a seed of -1"),
     ],
 )
 def test_what_cannot_be_is_refused_and_nothing_written(
