@@ -208,7 +208,7 @@ def learning_chart(result: ClassResult) -> Chart:
         Scale(shares[0] / _PAD, 100 * _PAD, log=True, values=tuple(shares), text="{:g} %".format),
         Scale(100 * least, 100 * max(min(math.ceil(10 * high) / 10, 1.0), least + 0.1)),
         f"share of the {result.kind} radar's data that is learnt from",
-        "frames found, mean over movements, %",
+        "mean recall of frames, %",
         curves,
         marks,
         scattered=True,
