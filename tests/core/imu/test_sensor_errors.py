@@ -61,6 +61,8 @@ def test_what_is_not_known_stays_so() -> None:
 def test_the_samples_say_which_errors_they_have() -> None:
     meta = with_errors(constant(4, 100.0), SensorErrors(acceleration_noise=0.5, seed=3)).meta
     assert json.loads(json.dumps(meta["errors"])) == {"acceleration_noise": 0.5, "seed": 3}
+    none = SensorErrors(acceleration_noise=0.0, turn_rate_bias_radps=(0.0, 0.0, 0.0), seed=3)
+    assert with_errors(ideal := constant(4, 100.0), none) is ideal
 
 
 @pytest.mark.parametrize(

@@ -42,6 +42,15 @@ def test_one_of_yesterday_is_followed(qtbot, tmp_path, code, state) -> None:
     run.close()
 
 
+def test_one_that_is_launched_is_under_way_before_it_has_its_folder(qtbot, tmp_path) -> None:
+    waits = (sys.executable, "-c", "import time; time.sleep(60)")
+    folder = CommandFolder(tmp_path / "one")
+    process = folder.start([], {}, command=waits)
+    assert (folder.live, folder.state()) == (False, "starting")
+    process.terminate(at_once=True)
+    qtbot.waitUntil(lambda: folder.state() == "died", timeout=20_000)
+
+
 def test_one_of_yesterday_starts_again_in_its_folder(qtbot, tmp_path) -> None:
     folder = of_yesterday(tmp_path / "one", 130)
     run = CommandRun(folder.path, process=folder.start(["--version"], {"what": "table"}))
