@@ -44,8 +44,8 @@ class SensorErrors(OptionRecord):
         super().__post_init__()
         biases = (*(self.acceleration_bias_mps2 or ()), *(self.turn_rate_bias_radps or ()))
         if self.seed < 0 or not all(map(math.isfinite, biases)):
-            found = f"The sensor has a bias of {', '.join(map(str, biases))} and " if biases else ""
+            bias = f" and a bias of {', '.join(map(str, biases))}" if biases else ""
             raise OptionError(
-                f"{found or 'The sensor has '}a seed of {self.seed}",
+                f"The sensor has a seed of {self.seed}{bias}",
                 "finite biases and a seed of 0 or more",
             )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -141,7 +141,7 @@ class ClassSetup(RunSetup[DataSource]):
             return problem
         if any(not one.facts for one in self.data):
             return "Reading the data…"
-        return why_not_together(self.data, self._together)
+        return self._why_not_together()
 
     @property
     def train_problem(self) -> str:
@@ -150,12 +150,35 @@ class ClassSetup(RunSetup[DataSource]):
             return self.problem
         if not self.maps:
             return "Choose maps to learn from."
-        return why_not_together(self.data, self._together, self.maps)
+        return self._why_not_together(self.maps)
 
     @property
     def division(self) -> Split | None:
         """Division of people in a training; None until the data is known and fits together."""
         return None if self.problem else division_of(self._together())
+
+    def _why_not_together(self, maps: Sequence[str] = ()) -> str:
+        """Reason why these sources cannot be mixed with these maps; empty when they can."""
+        for source in self.data:
+            for name in maps:
+                if not source.has(name):
+                    return f"{source.path.name} has no {name} maps: choose others, or leave it out."
+        grids = {one.grid for source in self.data for one in source.facts if one.grid is not None}
+        if len(grids) > 1:
+            return (
+                "These differ in their velocity axis or frame rate: "
+                + "; ".join(
+                    f"{grid.bins} bins up to ±{grid.v_max_mps:g} m/s at {grid.frame_rate_hz:.4g}"
+                    " frames/s"
+                    for grid in sorted(grids)
+                )
+                + ". Choose data of one kind."
+            )
+        try:
+            division_of(self._together())
+        except Sd2Error as error:
+            return str(error)
+        return ""
 
     def _together(self) -> list[LabelledFacts]:
         """Facts of all data, found once for the same data: folders and files are looked into."""
@@ -225,34 +248,6 @@ def _told_apart(data: Sequence[DataSource]) -> list[LabelledFacts]:
         else labelled_facts(one)
         for one in sources
     ]
-
-
-def why_not_together(
-    data: Sequence[DataSource],
-    together: Callable[[], Sequence[LabelledFacts]],
-    maps: Sequence[str] = (),
-) -> str:
-    """Reason why these sources cannot be mixed with these maps; empty when they can."""
-    for source in data:
-        for name in maps:
-            if not source.has(name):
-                return f"{source.path.name} has no {name} maps: choose others, or leave it out."
-    grids = {one.grid for source in data for one in source.facts if one.grid is not None}
-    if len(grids) > 1:
-        return (
-            "These differ in their velocity axis or frame rate: "
-            + "; ".join(
-                f"{grid.bins} bins up to ±{grid.v_max_mps:g} m/s at {grid.frame_rate_hz:.4g}"
-                " frames/s"
-                for grid in sorted(grids)
-            )
-            + ". Choose data of one kind."
-        )
-    try:
-        division_of(together())
-    except Sd2Error as error:
-        return str(error)
-    return ""
 
 
 def _what(facts: Sequence[LabelledFacts]) -> str:
