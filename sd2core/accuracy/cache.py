@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -95,8 +96,8 @@ def cached_measurement(
 ) -> Measurement | None:
     """Last measurement of this clip, or None if there is none that can be read.
 
-    It is ``stale`` if it was of another sensor place or other options, or on another
-    machine or version.
+    It is ``stale`` if it was of another sensor place or other options, of other vertices in the
+    frames that were measured, or on another machine or version.
 
     Parameters
     ----------
@@ -108,13 +109,14 @@ def cached_measurement(
         Family of the plans measured.
     """
     try:
-        measurement = _from_json(read_text(_place(mesh, family), "a measurement"))
+        measurement, vertices = _read(_place(mesh, family))
     except (ValueError, KeyError, TypeError, Sd2Error):
         # A cache: what cannot be read is measured again.
         return None
     same = (
         measurement.scene == scene_fingerprint(mesh, sensor, options, family)
         and measurement.machine == this_machine()
+        and vertices == _vertices_digest(mesh, measurement.frames)
     )
     return replace(measurement, stale=not same)
 
@@ -124,7 +126,8 @@ def store_measurement(mesh: MeshSequence, measurement: Measurement) -> None:
 
     A folder that cannot be written to is no error.
     """
-    content = {"format": _FORMAT, **asdict(measurement)}
+    vertices = _vertices_digest(mesh, measurement.frames)
+    content = {"format": _FORMAT, **asdict(measurement), "vertices": vertices}
     del content["stale"]
     keep_text(_place(mesh, measurement.family), json.dumps(content))
 
@@ -133,9 +136,23 @@ def _place(mesh: MeshSequence, family: Family) -> Path:
     return user_cache("ladder") / f"{family}-{clip_fingerprint(mesh)}.json"
 
 
-def _from_json(text: str) -> Measurement:
+def _vertices_digest(mesh: MeshSequence, frames: Sequence[int]) -> str:
+    """Hash of all bodies in the frames measured, and beside them, which tell velocities."""
+    digest = hashlib.sha256()
+    for body in mesh.bodies:
+        near = {frame + step for frame in frames for step in (-1, 0, 1)}
+        for frame in sorted(near.intersection(range(body.frame_count))):
+            digest.update(np.ascontiguousarray(body.frame(frame)).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _read(path: Path) -> tuple[Measurement, str]:
+    """A kept measurement, and the hash of the vertices that it is of."""
     from pydantic import TypeAdapter
 
-    if (stored_format := json.loads(text)["format"]) != _FORMAT:
-        raise ValueError(f"format {stored_format}")
-    return TypeAdapter(Measurement).validate_json(text, strict=True)
+    content = json.loads(read_text(path, "a measurement"))
+    if content["format"] != _FORMAT:
+        raise ValueError(f"format {content['format']}")
+    vertices = content.pop("vertices", "")
+    text = json.dumps(content)
+    return TypeAdapter(Measurement).validate_json(text, strict=True), vertices

@@ -98,6 +98,16 @@ def test_another_mesh_has_a_memory_of_its_own(mesh: MeshSequence) -> None:
     assert cached_measurement(replace(mesh, vertices=vertices), CAMERA, PAPER) is None
 
 
+def test_a_mesh_mended_in_a_measured_frame_makes_it_stale(mesh: MeshSequence) -> None:
+    """The frames by which a clip is known stay as they are."""
+    store_measurement(mesh, measured(mesh))
+    vertices = mesh.read(0, mesh.frame_count).copy()
+    vertices[2] += np.float32(0.1)
+    found = cached_measurement(replace(mesh, vertices=vertices), CAMERA, PAPER)
+    assert found is not None
+    assert found.stale
+
+
 @pytest.mark.parametrize("damage", ["", "{", "[]", '{"format": 99}'])
 def test_what_cannot_be_read_is_measured_again(
     mesh: MeshSequence, folder: Path, damage: str
