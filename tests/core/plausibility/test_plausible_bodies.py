@@ -61,6 +61,22 @@ def test_a_jump_below_any_running_speed_shows_as_a_change_of_velocity():
     assert "changes by 11 m/s within 0.0333 s (315 m/s²)" in finding.found
 
 
+def test_a_jump_after_a_gap_is_named_with_its_own_frame():
+    middle = walk()
+    middle[45:] += [0, 0.35, 0]
+    there = np.ones(60, bool)
+    there[10:22] = False
+    (finding,) = judge_motion(seen(middle, there=there))
+    assert "at frame 44, and too fast 2 times in all" in finding.found
+
+
+@pytest.mark.parametrize(("rate", "judged"), [(2.0, False), (8.0, True)])
+def test_who_turns_between_two_frames_of_a_slow_clock_has_not_jumped(rate, judged):
+    beside_m = 5.0 / rate * (np.arange(20) % 2)
+    middle = np.array([0, 0, 5.0]) + beside_m[:, None] * [1.0, 0, 0]
+    assert bool(judge_motion(seen(middle, rate))) is judged
+
+
 def test_what_lies_between_stretches_is_no_jump():
     middle = walk()
     middle[30:] += [3.0, 0, 0]

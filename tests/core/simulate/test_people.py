@@ -75,3 +75,27 @@ def test_a_still_deed_is_still() -> None:
     transforms = skeleton.transforms(*random_motion(rng, skeleton, 1.7, TIMES, deed))
     heads = (transforms[..., :3] @ skeleton.heads_m[..., None])[..., 0] + transforms[..., 3]
     assert np.abs(np.gradient(heads, 1.0 / 30.0, axis=0)).max() < 0.08
+
+
+def test_hands_below_the_chin_stay_outside_the_trunk() -> None:
+    """An upright elliptic column about the spine, whichever way the chest is turned."""
+    space = ShapeSpace()
+    deed = Deed("stand", (STYLES["strokes"], STYLES["strokes"]), False)
+    times_s = np.arange(90) / 30.0
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        shape = space.random(rng)
+        skeleton = space.skeleton(shape)
+        motion = random_motion(rng, skeleton, shape.stature_m, times_s, deed)
+        transforms, index = skeleton.transforms(*motion), skeleton.index
+        heads = (transforms[..., :3] @ skeleton.heads_m[..., None])[..., 0] + transforms[..., 3]
+        chest = transforms[:, index["spine01"], :, :3]
+        half_m = skeleton.heads_m[index["upperarm01.L"], 0]
+        for side in "LR":
+            upper_arm, wrist = (index[f"{name}.{side}"] for name in ("upperarm01", "wrist"))
+            reach_m = np.einsum("tji,tj->ti", chest, heads[:, wrist] - heads[:, upper_arm])
+            at_m = skeleton.heads_m[upper_arm] + reach_m
+            below = at_m[:, 1] > skeleton.heads_m[upper_arm, 1] + 0.1
+            from_spine_m = (at_m - skeleton.heads_m[index["spine02"]])[below]
+            across, ahead = from_spine_m[:, 0], from_spine_m[:, 2]
+            assert np.hypot(across / half_m, ahead / (0.85 * half_m)).min(initial=2.0) > 1.0
