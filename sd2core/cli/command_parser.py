@@ -126,12 +126,8 @@ def _keywords(option: Option) -> dict[str, Any]:
     """How argparse wants to know an option; in a section what is not typed is None."""
     from dataclasses import MISSING
 
-    place, required, words = option.place, option.default is MISSING, option.words
-    if "{radars}" in words:
-        from sd2core.radar_profiles import RADARS
-
-        words = words.replace("{radars}", ", ".join(RADARS))
-    about: dict[str, Any] = {"help": words.replace("%", "%%")}
+    place, required = option.place, option.default is MISSING
+    about: dict[str, Any] = {"help": option.words.replace("%", "%%")}
     if not place.argument:
         about["dest"] = option.dest
     default = None if option.section or required else option.default

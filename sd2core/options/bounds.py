@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from sd2core.numerics.limits import FARTHEST_M, MAX_BINS
 
 
-@dataclass(frozen=True)
-class Bounds:
+class Bounds(NamedTuple):
     """Bounds of a number, both included.
 
     Parameters
@@ -28,7 +26,7 @@ class Bounds:
     whole: bool = False
     above: bool = False
 
-    def __contains__(self, value: float) -> bool:
+    def __contains__(self, value: Any) -> bool:
         fits = self.low < value if self.above else self.low <= value
         return fits and value <= self.high and (not self.whole or int(value) == value)
 

@@ -154,8 +154,7 @@ class OptionRecord:
 _make_dataclass(OptionRecord)
 
 
-@dataclass(frozen=True)
-class Option:
+class Option(NamedTuple):
     """A field of a record, as what offers it wants to know it."""
 
     name: str

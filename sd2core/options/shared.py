@@ -276,8 +276,8 @@ class RadarChoice(OptionRecord):
     Parameters
     ----------
     radar : NAME|CONFIG.json
-        a radar by its name ({radars}; docs/radar-files.md), or that of a capture's config.json
-        (default: paper)
+        a radar by its name (paper, bgt60, iwr6843, iwr1443, a121, k-band, cw-5.8ghz, wifi-5ghz,
+        wifi-2.4ghz; docs/radar-files.md), or that of a capture's config.json (default: paper)
     """
 
     radar: Text = "paper"

@@ -24,6 +24,8 @@ from sd2core.fmcw import (
 from sd2core.io.radar import load_capture, named_radar
 from sd2core.io.radar.described import write_described
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.options.records import option_named
+from sd2core.options.shared import RadarChoice
 from sd2core.radar_config import PAPER_RADAR, RadarConfig
 from sd2core.radar_profiles import RADARS
 from sd2core.sensor import VelocityAxis, VirtualSensor
@@ -42,6 +44,10 @@ def plate(velocity_mps: float, range_m: float = 2.0, seconds: float = 0.7) -> Me
     vertices = corners + away_m[:, None, None] * np.array([0.0, 0.0, 1.0])
     faces = np.array([[0, 2, 1], [0, 3, 2]], np.int32)
     return MeshSequence(vertices.astype(np.float32), faces, Timebase(times_s))
+
+
+def test_the_help_of_the_option_names_all() -> None:
+    assert f"({', '.join(RADARS)}; " in option_named(RadarChoice, "radar").words
 
 
 @pytest.mark.one_in(5)
