@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -30,7 +31,10 @@ _WITHOUT_DISPLAY = "Draw the same window into a picture with --screenshot FILE.p
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one ``sd2`` command and return its exit code."""
     typed = sys.argv[1:] if arguments is None else arguments
-    return run(full_parser(typed), typed)
+    parser = full_parser(typed)
+    if arguments is None:  # a process of its own
+        gc.freeze()  # what is there by now stays: looking through it takes a tenth of a help
+    return run(parser, typed)
 
 
 def full_parser(typed: Sequence[str] = ()) -> argparse.ArgumentParser:
