@@ -7,17 +7,16 @@ import gc
 import os
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sd2app.displays import explain_missing, has_display, missing_libraries, silent_displays
-from sd2app.plain_imports import plain_imports
 from sd2core.cli import build_parser, run
 from sd2core.cli.command_names import COMMANDS
 from sd2core.cli.command_parser import Subcommands, add_command, in_a_list
 from sd2core.errors import Sd2Error
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from sd2app.window_options import Demo, Open
     from sd2core.cli.preparing import Doctor
 
@@ -128,6 +127,9 @@ def _demo(options: Demo) -> int:
 
 
 def _show(paths: Sequence[Path], screenshot: Path | None) -> int:
+    from sd2app.displays import explain_missing, has_display, missing_libraries, silent_displays
+    from sd2app.plain_imports import plain_imports
+
     if screenshot is not None:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
     elif not has_display(sys.platform, os.environ):

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 
 from sd2core.cli.command_parser import UsageError, record_of
 from sd2core.cli.output import discard_output
-from sd2core.cli.output_folders import output_folders
 from sd2core.errors import Sd2Error, of_the_system
 
 _STARTS_WITH_NEGATIVE_NUMBER = re.compile(r"-\.?\d")
@@ -27,6 +26,8 @@ def run(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> int:
     _take_any_output()
     try:
         options = parser.parse_args(attach_negative_values(arguments))
+        from sd2core.cli.output_folders import output_folders
+
         with output_folders(options):
             code = options.handler(record_of(options))
         _flush_output()
