@@ -85,7 +85,7 @@ def wanted(value: object, kind: type[Value], example: str) -> Value:
 
 
 def of_the_system(error: OSError) -> Sd2Error:
-    """The same error in words, with its file."""
+    """Error of the operating system in words, with its file."""
     if not error.strerror:
         return Sd2Error(str(error) or type(error).__name__)
     return Sd2Error(f"{error.filename}: {error.strerror}" if error.filename else error.strerror)

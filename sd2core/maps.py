@@ -106,7 +106,7 @@ class LimbMaps:
 
     @property
     def by_person(self) -> tuple[LimbMaps, ...]:
-        """Those of each person, without the name; of one alone these themselves."""
+        """Limb maps of each person, without the name; of one alone, these themselves."""
         result = []
         for number, person in enumerate(self.persons):
             rows = [row for row, one in enumerate(self.parts) if one.rpartition(OF)[0] == person]

@@ -41,7 +41,7 @@ class Action:
 
 @dataclass(frozen=True)
 class Drop:
-    """What can be done with files that are dropped on the window, in words and as a function."""
+    """Use of files that are dropped on the window, in words and as a function."""
 
     text: str
     run: Callable[[], object]
@@ -58,7 +58,7 @@ class Keys(Protocol):
 
 
 class Shell(Protocol):
-    """What the window offers its features: a parent for dialogs, messages, pages, files."""
+    """Services of the window for its features: a parent for dialogs, messages, pages, files."""
 
     @property
     def dialog_parent(self) -> QWidget:

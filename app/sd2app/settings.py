@@ -39,7 +39,7 @@ class Settings:
 
     @property
     def recent(self) -> list[tuple[Path, ...]]:
-        """What was opened together lately, the newest first."""
+        """Paths opened together lately, the newest first."""
         return [tuple(map(Path, str(paths).split("\n"))) for paths in self.paths("recent")]
 
     def add_recent(self, *paths: Path) -> None:

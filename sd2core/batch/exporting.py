@@ -87,7 +87,7 @@ def export_dataset(folder: BatchFolder, export: Exporting) -> None:
 
 
 def _settings_of(export: Exporting) -> dict[str, Any]:
-    """What a plan says of its data set; what is new in plans only where one says it."""
+    """Settings of a plan's data set; what is new in plans only where one says it."""
     unsaid = {*_NEW} - {*changed(export)}
     return {name: value for name, value in asdict(export).items() if name not in unsaid}
 

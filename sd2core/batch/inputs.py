@@ -72,7 +72,7 @@ class VideoInput:
 
 @dataclass(frozen=True)
 class Somebody:
-    """Whom a source of a data set is of: a person whom labels of a recording name, or everybody."""
+    """Person of a data set's source: one whom labels of a recording name, or everybody."""
 
     person: str = ""  # empty: everybody
     subject: str = ""  # empty: the recording's, as the plan says

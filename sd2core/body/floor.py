@@ -39,7 +39,7 @@ _UP = [[LANDMARK[f"{part}.{side}"] for side in "LR"] for part in ("shoulder", "a
 
 @dataclass(frozen=True, eq=False)
 class StandingFeet:
-    """Where a person's feet stand, in the camera frame, if the person were 1 m tall."""
+    """Places of a person's feet, in the camera frame, if the person were 1 m tall."""
 
     points: Floats  # (N, 3)
     down: Floats  # (3,) from shoulders to ankles, while they stand; of length 1

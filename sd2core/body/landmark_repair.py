@@ -247,7 +247,7 @@ def _around(
 
 @dataclass
 class _Counts:
-    """What was repaired."""
+    """Counts of repairs."""
 
     swapped: dict[str, NDArray[np.bool_]]  # frames of each part of the body
     missing: list[NDArray[np.bool_]] = field(default_factory=list)

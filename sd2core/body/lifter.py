@@ -154,7 +154,7 @@ class Lifter:
 
 
 def fit_law_terms(lifted_mps: Floats, speed_mps: Floats) -> Floats:
-    """What the law of a fit's deviations is made of, (T, 33, 2), not below what is left at rest."""
+    """Terms of the law of a fit's deviations, (T, 33, 2), not below what is left at rest."""
     return np.stack([lifted_mps + 0.01, speed_mps + 0.03], axis=-1)
 
 
@@ -190,7 +190,7 @@ def with_rates(out: Singles, size: float) -> Singles:
 
 
 def by_landmark(out: NDArray[Any]) -> NDArray[Any]:
-    """What outputs (T, OUTPUTS) say of the landmarks, in the order told there, (T, KINDS, 33)."""
+    """Outputs (T, OUTPUTS) by landmark, in the order told there, (T, KINDS, 33)."""
     return out[:, 2 : STANDING.start].reshape(len(out), KINDS, POINTS)
 
 

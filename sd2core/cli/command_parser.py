@@ -28,7 +28,7 @@ class UsageError(Sd2Error):
 
 
 class Subcommands(argparse._SubParsersAction):
-    """Where commands are added to a parser.
+    """Group of a parser to which commands are added.
 
     Of the commands only the one that is typed here gets its options; where nothing is, all do.
     """

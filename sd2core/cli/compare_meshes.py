@@ -59,7 +59,7 @@ class CompareMeshes(Sensor, MeshReading, Figure, Json):
 
     @property
     def labels(self) -> list[str]:
-        """What the meshes are called."""
+        """Names of the meshes."""
         if self.names is not None:
             return list(self.names)
         folders = [path.parent for path in self.meshes]

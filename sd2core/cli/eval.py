@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Judging(Figure, Json):
-    """Whom an evaluation judges, on which maps, and the picture of its result.
+    """People and maps of an evaluation, and the picture of its result.
 
     Parameters
     ----------

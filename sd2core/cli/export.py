@@ -36,7 +36,7 @@ _LINE_EVERY_S = 0.1
 
 
 class _Spans(SpanOptions):
-    """What becomes a segment.
+    """Choice of the spans that become segments.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class _Spans(SpanOptions):
 
 
 class _People(OptionRecord):
-    """Who is in the inputs.
+    """People of the inputs.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def _export(options: Export) -> int:
 
 
 def dataset_and_making(options: Export) -> tuple[Exporting, Making]:
-    """What a data set holds and how its maps are made; Sd2Error where that cannot be."""
+    """Content of a data set and the making of its maps; Sd2Error where they do not fit."""
     from sd2core.datasets.options import dataset_options
     from sd2core.datasets.recording_sources import Making
     from sd2core.datasets.simulating import Simulation

@@ -261,7 +261,7 @@ def _list(options: Fit) -> None:
 
 
 def _about(person: SeenPerson) -> dict[str, Any]:
-    """What the list says of somebody."""
+    """Facts about a person, for the list."""
     from sd2core.body.roi import MARGIN
 
     frame, roi = person.portrait

@@ -215,7 +215,7 @@ class _Takes:
 
 
 def _losses(recording: JointRecording) -> list[str]:
-    """What went wrong, in sentences."""
+    """Sentences on losses and faults."""
     losses = recording.listening.doubts(at_end=True)
     if missing := recording.listening.counts.missing:
         losses.append(f"Of the radar: {missing}.")
@@ -225,7 +225,7 @@ def _losses(recording: JointRecording) -> list[str]:
 
 
 class _Telling:
-    """What is printed."""
+    """Printer of the session's events."""
 
     def __init__(self, session: Session, consent: Consent, *, as_json: bool) -> None:
         self._session, self._consent, self._as_json = session, consent, as_json
@@ -283,7 +283,7 @@ class _Telling:
             tell(f"  {left}")
 
     def _lines(self, take: Take | None) -> list[str]:
-        """What a new phase is told by."""
+        """Lines that announce a new phase."""
         session, protocol = self._session, self._session.protocol
         if take is None:
             return ["That was the last take. a: again."] if session.phase == "pause" else []

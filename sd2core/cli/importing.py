@@ -86,7 +86,7 @@ class Import(Content, Json):
 
 
 class SensorPlace(Looking):
-    """Where the radar is put.
+    """Place of the radar.
 
     Parameters
     ----------

@@ -156,7 +156,7 @@ def follow(
 
 
 class Status:
-    """What is printed while listening."""
+    """Line of status while listening."""
 
     def __init__(
         self, listening: Listening, source: Source, *, as_json: bool, columns: bool

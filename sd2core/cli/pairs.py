@@ -35,7 +35,7 @@ class MadePairs(Axis, Limbs, Json):
 
 
 class Subjects(OptionRecord):
-    """Whom the recordings show.
+    """People of the recordings.
 
     Parameters
     ----------
@@ -363,7 +363,7 @@ def _mars(options: Mars) -> None:
 
 
 def _place_words(place: RadarPlace) -> str:
-    """Where the radar stands, and whether that was found."""
+    """Place of the radar in words, and if it was found."""
     right, down, forward = place.position_m
     words = (
         f"the radar {right:+.2f} m right, {down:+.2f} m down and {forward:+.2f} m before the"

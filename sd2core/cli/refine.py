@@ -69,7 +69,7 @@ def _refine(options: Refine) -> None:
 
 
 def _filled_by_video(options: Refine) -> Refine:
-    """What the video says of an estimator's file, where it is not typed."""
+    """Options that a video supplies for an estimator's file, where they are not typed."""
     from sd2core.io.mesh_models import is_estimate
     from sd2core.io.video import open_video
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Running(JsonAndProgress):
-    """Where a study runs, and what it prints.
+    """Folder of a study, and the form of its output.
 
     Parameters
     ----------

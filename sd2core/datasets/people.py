@@ -23,7 +23,7 @@ from sd2core.recording.recording import Recording, is_recording, open_recording
 
 
 def people_shown(paths: Sequence[Path]) -> list[str]:
-    """Whom each recording or map shows, see :func:`told_apart`."""
+    """Person of each recording or map, see :func:`told_apart`."""
     return told_apart(
         [open_recording(path).subject if is_recording(path) else "" for path in paths], paths
     )
@@ -144,7 +144,7 @@ class People:
         }
 
     def shown(self, person: str, kinds: Iterable[MapKind]) -> dict[str, Any]:
-        """Who is in the scene, and which kinds of maps show them all, for provenance."""
+        """People of the scene, and the kinds of maps that show them all, for provenance."""
         persons = self.in_scene if self.recording.mesh else ()
         scene = list(dict.fromkeys([*persons, *self.labels.persons]))
         if not person or len(scene) < 2:

@@ -255,7 +255,7 @@ class _PairStore:
         return sums.hexdigest()
 
     def _scene(self, take: TakeEntry) -> dict[str, Any]:
-        """Who is in the scene that all maps of a take show, for provenance."""
+        """People of the scene that all maps of a take show, for provenance."""
         scenes = self.facts.provenance.get("scenes", {})
         scene = scenes.get(take.name.rpartition("-")[0])
         return {"scene": scene, "everybody": self._kinds} if scene else {}

@@ -60,7 +60,7 @@ class KnownMovements:
         return cls(float(slowest), float(fastest), most, float(gain))
 
     def together(self, other: KnownMovements | None) -> KnownMovements:
-        """What a model knows that learnt from both, from these last."""
+        """Movements known to a model that learnt from both, from these last."""
         if other is None:
             return self
         return replace(
@@ -118,7 +118,7 @@ class KnownMovements:
         moving: NDArray[np.bool_],
         axis: VelocityAxis,
     ) -> KnownMovements:
-        """The same, with the trust that does best on maps that the network did not learn from.
+        """Copy with the trust that does best on maps that the network did not learn from.
 
         Peak, mean and cells (L1) count alike; what a segment is made worse by than the synthetic
         map counts twice (docs/decisions/0074).
@@ -181,7 +181,7 @@ class KnownMovements:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any] | None) -> KnownMovements | None:
-        """From the dictionary of its fields; models of before there were ranges have none."""
+        """Read from a model file; models of before there were ranges have none."""
         return None if content is None else cls(**{name: float(content[name]) for name in content})
 
 

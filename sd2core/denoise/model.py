@@ -136,7 +136,7 @@ class Corrected(Denoiser):
         return self.network.initial_state(batch)
 
     def ssm_parameters(self) -> Iterator[nn.Parameter]:
-        """Those of the network."""
+        """State-space parameters of the network."""
         return self.network.ssm_parameters()
 
 
@@ -163,7 +163,7 @@ class TwoNetworks(Denoiser):
         return self.whole(values)
 
     def ssm_parameters(self) -> Iterator[nn.Parameter]:
-        """Those of both."""
+        """State-space parameters of both networks."""
         return chain(self.whole.ssm_parameters(), self.forwards.ssm_parameters())
 
 

@@ -119,7 +119,7 @@ class Texture:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any] | None) -> Texture | None:
-        """From the dictionary of its fields; models of before there were textures have none."""
+        """Read from a model file; models of before there were textures have none."""
         return None if content is None else cls(**{name: float(content[name]) for name in content})
 
 

@@ -57,7 +57,7 @@ class Scatterers:
         return which, ONE if self.vertex_counts is None else MULTIPLICITY
 
     def arguments(self) -> tuple[Any, ...]:
-        """What kernels take: values as :class:`Paths` has places, empty where there are none."""
+        """Arguments of the kernels: values in the places of :class:`Paths`, empty without any."""
         normals, areas, vectors = self.normals, self.areas, self.area_vectors
         beam = beam_tables(None if self.path is None else self.path.sensor)
         axes = beam.axes[None] if self.path is None else self.path.axes
@@ -73,7 +73,7 @@ class Scatterers:
         )
 
     def rows(self, rows: slice) -> Scatterers:
-        """Those of some of the frames; nothing is copied."""
+        """View of some of the frames; nothing is copied."""
         return replace(
             self,
             normals=None if self.normals is None else self.normals[rows],
@@ -171,7 +171,7 @@ class Frames:
         return len(self.centre)
 
     def rows(self, rows: slice) -> Frames:
-        """Some of the frames; nothing is copied."""
+        """View of some of the frames; nothing is copied."""
         return Frames(
             self.positions,
             self.centre[rows],
@@ -216,7 +216,7 @@ class Counting:
         return (rate * (0.5 * self.bins / self.v_max_mps)).astype(precision)
 
     def arguments(self) -> tuple[int, int, float, np.float32]:
-        """What kernels take."""
+        """Arguments of the kernels."""
         reference_m = np.float32(self.reference_range_m)
         return self.bins, self.beyond, float(self.range_exponent), reference_m
 
@@ -249,7 +249,7 @@ class Counts:
         return cls(np.zeros((frames, parts, bins)), np.zeros(frames), np.zeros(frames))
 
     def rows(self, rows: slice) -> Counts:
-        """Some of the frames; writing to them writes to the whole."""
+        """View of some of the frames; writing to it writes to the whole."""
         return Counts(self.histogram[rows], self.visible[rows], self.beyond[rows])
 
 

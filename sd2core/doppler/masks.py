@@ -217,7 +217,7 @@ class VisibilityMasks:
         )
 
     def _places(self, index: int) -> list[tuple[Occlusion, Place]]:
-        """Where masks of a block were made, the newest first."""
+        """Places where masks of a block were made, the newest first."""
         options = self._prepared.options
         kind = options.depth_resolution, self._stride, self._prepared.spreads, options.axis
         return self._prepared.places.setdefault((*kind, self._wall, index), [])
@@ -495,7 +495,7 @@ class _View:
         return _View(points, self.places_m @ turn, wall.mirrored(self.origins_m), self.first)
 
     def rows(self, rows: slice) -> _View:
-        """Some of these frames."""
+        """View of some of these frames."""
         first = self.first + rows.start
         return _View(self.points[rows], self.places_m[rows], self.origins_m[rows], first)
 

@@ -123,7 +123,7 @@ class PreparedMesh:
 
     @property
     def stand(self) -> Hashable:
-        """The same for all that share its blocks and stand in the same place, and for no other."""
+        """Key that all with the same blocks in the same place share, and no other."""
         return self.number, *self.origin_m.tolist()
 
     @property
@@ -443,7 +443,7 @@ class PreparedMesh:
         return self.near_points(block, slice(None))[0]
 
     def _points(self, block: Block, rows: slice = slice(None)) -> NDArray[Any]:
-        """Those of a block with positions; a copy where they are a part of them."""
+        """Vertices of a block with positions; a copy where they are a part of them."""
         first, last = block.frames.centre[rows][[0, -1]].tolist()
         return np.ascontiguousarray(
             block.frames.positions[first : last + 1 : self.options.oversampling]

@@ -132,7 +132,7 @@ def smooth_time(
 
 
 class _Clock(NamedTuple):
-    """What the Gaussian on time depends on besides the map."""
+    """Clock of a map, on which the Gaussian on time depends."""
 
     times_s: NDArray[np.float64]
     first: int

@@ -521,7 +521,7 @@ class Synthesizer:
         parts: VertexParts | None,
         shares: bool,
     ) -> MapFrames:
-        """Those of this body alone, among the others, once it is counted."""
+        """Limb maps of this body alone, among the others, once it is counted."""
         options, times_s, (start, stop) = self.options, self.mesh.times_s, frames
         counts, totals, first, last = counted.counts, counted.totals, counted.start, counted.stop
 

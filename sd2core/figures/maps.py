@@ -228,7 +228,7 @@ def save_maps(figure: Figure, path: Path, rows: Sequence[MapRow], about: dict[st
 
 
 def _in_view(row: MapRow, start_s: float, end_s: float) -> MapRow:
-    """Its frames between two times of the figure: hours are not drawn for a second."""
+    """Part of a map between two times of the figure: hours are not drawn for a second."""
     start, stop = row.doppler.timebase.frames_between(start_s - row.offset_s, end_s - row.offset_s)
     return replace(row, doppler=row.doppler.between(start, max(stop, start + 2)))
 

@@ -207,7 +207,7 @@ class Body:
 
     @classmethod
     def at(cls, source: StripSource, frame: int, options: StripOptions) -> Body | None:
-        """Who is there at a frame of the strip's clock, None if nobody is."""
+        """Body at a frame of the strip's clock, None if nobody is there."""
         time_s = source.clock.time_of(frame)
         each = () if source.mesh is None else source.mesh.bodies
         shown = [(mesh, at) for mesh in each if (at := mesh.person_at(time_s)) is not None]

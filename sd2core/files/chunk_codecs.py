@@ -96,7 +96,7 @@ def check_deflated(chunk: Any, most_bytes: int) -> None:
 
 
 class _CheckedV2:
-    """What a codec of Zarr's version 2 has in common that looks at a chunk first."""
+    """Base of codecs of Zarr's version 2 that look at a chunk first."""
 
     _check: Any  # Of a chunk and the size that it may have.
 
@@ -124,7 +124,7 @@ class _CheckedZlib(_CheckedV2, Zlib):
 
 
 class _Checked:
-    """The same of version 3."""
+    """Base of codecs of version 3 that look at a chunk first."""
 
     _check: Any
 

@@ -60,7 +60,7 @@ class Damage:
 
 
 def lost_in_words(frames: int) -> str:
-    """What became of frames that were lost to damaged chunks."""
+    """Sentence on frames that were lost to damaged chunks."""
     return (
         f"{frames:,} frames are lost to damaged chunks and left out: copy their files again, or"
         " write them again. `sd2 info --verify` names the chunks."
@@ -158,7 +158,7 @@ class StoredArray:
     def _reason(
         self, archive: zipfile.ZipFile | None, place: tuple[int, ...], depth: Depth
     ) -> str | None:
-        """What is wrong with a chunk, in an archive or a folder; None: nothing."""
+        """Fault of a chunk in an archive or a folder; None without any."""
         key = f"{self._array.path}/{self._array.metadata.encode_chunk_key(place)}".lstrip("/")
         size = self._size(archive, key)
         if size is None or depth == "presence":

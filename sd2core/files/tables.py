@@ -24,7 +24,7 @@ def numbers_table(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def markdown_table(rows: Sequence[Sequence[str]], names: int = 1) -> list[str]:
-    """The same in Markdown; the first ``names`` columns are of words."""
+    """Rows as a Markdown table; the first ``names`` columns are of words."""
     rule = [*["---"] * names, *["---:"] * (len(rows[0]) - names)]
     head, *lines = (f"| {' | '.join(row)} |" for row in rows)
     return [head, f"|{'|'.join(rule)}|", *lines]

@@ -139,7 +139,7 @@ class WaveScene:
         return np.zeros((len(self.paths), chirps, self.config.samples_per_chirp), sampled)
 
     def sampled(self, total: NDArray[np.complex128]) -> BeatSignal:
-        """What the radar samples of a sum of phasors."""
+        """Samples that the radar takes of a sum of phasors."""
         return total.real if self.config.sampling == "real" else total
 
     def bursts(self, time_s: float) -> Iterator[tuple[tuple[NDArray[np.float64], ...], int]]:

@@ -158,7 +158,7 @@ def _read(body: Body) -> MeshSequence:
 
 
 def _file_of(body: Body) -> tuple[object, ...]:
-    """What a file is kept by; another signature is of another content."""
+    """Key of a file that is kept; another signature is of another content."""
     return body.path, body.faces, str(body.reading), str(signature(body.files))
 
 

@@ -101,7 +101,7 @@ class BodyModel:
         return posed
 
     def _corrections(self, turns: Floats) -> Floats:
-        """What the pose adds to the surface at rest, (n, V, 3)."""
+        """Corrections by pose to the surface at rest, (n, V, 3)."""
         features = (turns[:, 1:] - np.eye(3)).reshape(len(turns), -1).astype(np.float32)
         return np.asarray((features @ self.corrections_m).reshape(len(turns), -1, 3), np.float64)
 

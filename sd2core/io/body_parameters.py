@@ -152,5 +152,5 @@ def rotation_matrices(vectors: Floats) -> Floats:
 
 
 def first_of(entry: Mapping[Any, Any], names: tuple[str, ...]) -> Any:
-    """What an entry holds under the first of several names, or None."""
+    """Value of an entry under the first of several names, or None."""
     return next((entry[name] for name in names if entry.get(name) is not None), None)

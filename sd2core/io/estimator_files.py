@@ -66,7 +66,7 @@ def people_in(
 
 
 def _shared(content: Mapping[Any, Any]) -> Person:
-    """What holds for all people and frames."""
+    """Values that hold for all people and frames."""
     return {
         name: value
         for name, value in content.items()
@@ -98,7 +98,7 @@ def holds_bodies(path: Path) -> bool:
 
 
 def _content(path: Path) -> Person:
-    """What a file holds, by names; an array or a list by itself is one of vertices or frames."""
+    """Content of a file by names; an array or a list by itself is one of vertices or frames."""
     suffix = path.suffix.lower()
     content: Any
     if suffix in PICKLE_SUFFIXES:
@@ -119,7 +119,7 @@ def _content(path: Path) -> Person:
 
 
 def _plainly_keyed(content: Mapping[Any, Any]) -> Person:
-    """The same with Python's numbers as keys, where a tracker left NumPy's."""
+    """Dictionary with Python's numbers as keys, where a tracker left NumPy's."""
     return {k.item() if isinstance(k, np.generic) else k: v for k, v in content.items()}
 
 

@@ -29,7 +29,7 @@ def fitted_doubts(mesh: Path) -> tuple[str, ...]:
 
 
 def _content(mesh: Path) -> dict[str, Any]:
-    """What the fit wrote into a mesh; nothing if it is another one, or damaged."""
+    """Facts that the fit wrote into a mesh; none if it is another one, or damaged."""
     try:
         content = _read(mesh)
     except Exception:  # a damaged archive fails in many ways

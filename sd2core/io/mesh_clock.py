@@ -26,7 +26,7 @@ _OF_A_CALENDAR_S = 1e8
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """What a file says of when its frames are."""
+    """Times of a mesh file's frames, as far as it states them."""
 
     times_s: NDArray[np.float64] | None = None  # (T,)
     frames_per_s: float | None = None

@@ -127,7 +127,7 @@ def _geometry_of_obj(content: bytes) -> bytes:
 
 
 def _scene_of_glb(content: bytes) -> Any:
-    """What a GLB file says of its numbers."""
+    """Description of a GLB file's scene."""
     length = int.from_bytes(content[12:16], "little")
     return json.loads(content[20 : 20 + length])
 

@@ -346,7 +346,7 @@ class _DataUnpickler(_Machine):
 
 
 class _TorchUnpickler(_DataUnpickler):
-    """The same for torch files, whose numbers are other files of the archive, or come later."""
+    """Unpickler of torch files, whose numbers are other files of the archive, or come later."""
 
     def __init__(
         self, source: LimitedFile, archive: zipfile.ZipFile | None = None, folder: str = ""

@@ -53,7 +53,7 @@ class FileReader(Generic[Content]):
 
 @dataclass(frozen=True)
 class MeshHints:
-    """What the user says of a mesh file, as of :func:`~sd2core.io.mesh.load_mesh`."""
+    """Options of the user about a mesh file, see :func:`~sd2core.io.mesh.load_mesh`."""
 
     person: int | str | None = None
     image_size: tuple[int, int] | None = None

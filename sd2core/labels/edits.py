@@ -43,7 +43,7 @@ class Edit:
 
 
 class Edits(LabelledFrames):
-    """What can be done to the times of spans, given all labels and the frames of the recording."""
+    """Edits of the times of spans, given all labels and the frames of the recording."""
 
     def create(self, track: str, start_s: float, end_s: float, label: str) -> Edit:
         """Create a span between two times, clipped to the free time of the track.

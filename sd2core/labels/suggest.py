@@ -210,7 +210,7 @@ def _with_margins(
     last: NDArray[np.int64],
     options: SuggestOptions,
 ) -> list[tuple[int, int]]:
-    """The same runs of frames, wider, with a third of the quiet between neighbours kept."""
+    """Widen runs of frames; a third of the quiet between neighbours stays."""
     if not spans:
         return []
     times_s = timebase.times_s

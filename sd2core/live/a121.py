@@ -117,7 +117,7 @@ class A121Source(Source):
         return [f"The sensor was saturated in {self._saturated:,} frames: lower its gain."]
 
     def silence(self) -> str:
-        """What to check when nothing comes."""
+        """Advice for when nothing comes."""
         return "Nothing comes from the A121: is it plugged in, and does no other program use it?"
 
     def close(self) -> None:

@@ -41,7 +41,7 @@ in the picture grows and shrinks for other reasons than its distance."""
 
 
 class Seen(NamedTuple):
-    """What moves in a frame of the radar."""
+    """Movement in a frame of the radar."""
 
     time_s: float
     level_db: float  # strongest cell of range and velocity above the mean noise
@@ -50,7 +50,7 @@ class Seen(NamedTuple):
 
 
 class Moved(NamedTuple):
-    """What moves between two pictures."""
+    """Movement between two pictures."""
 
     time_s: float
     pixels: int
@@ -84,7 +84,7 @@ def chance_db(config: RadarConfig) -> float:
 
 
 def seen_in(frame: RadarCapture, time_s: float) -> Seen:
-    """What moves in a capture of one frame, at a time of this computer's clock."""
+    """Movement in a capture of one frame, at a time of this computer's clock."""
     from scipy.special import gammaincinv
 
     config = frame.config
@@ -111,7 +111,7 @@ def seen_in(frame: RadarCapture, time_s: float) -> Seen:
 def moved_between(
     before: NDArray[np.uint8], after: NDArray[np.uint8], time_s: float, passed_s: float
 ) -> Moved:
-    """What moves between two grey pictures (height, width).
+    """Movement between two grey pictures (height, width).
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def check_place(config: RadarConfig, seen: Sequence[Seen], moved: Sequence[Moved
 
 
 def found_place(findings: Sequence[Answer]) -> Place | None:
-    """Where a radar beside the camera is, as seen from what moves; None if one is not certain.
+    """Place of a radar beside the camera, found by what moves; None if it is not certain.
 
     The distance is the radar's, the direction that of the camera: 10° to the right in the picture
     is what a camera, and a radar, sees that is 10° to its left.

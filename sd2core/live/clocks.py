@@ -91,7 +91,7 @@ def fit_line(
 
 @dataclass(frozen=True)
 class Clocks:
-    """What is known of the clocks of a recording, ``clocks.json``.
+    """Facts about the clocks of a recording, ``clocks.json``.
 
     The time of an event is that of a frame's arrival less the source's delay.
     """

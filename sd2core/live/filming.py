@@ -64,7 +64,7 @@ class CameraChoice:
 
 @dataclass
 class Filmed:
-    """What a camera has given of a video so far."""
+    """Progress of a video that a camera is taking."""
 
     recorded: int = 0
     dropped: int = 0  # the encoder was too slow

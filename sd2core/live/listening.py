@@ -136,7 +136,7 @@ class Listening:
         return list(self._latencies_s)
 
     def doubts(self, *, at_end: bool) -> list[str]:
-        """What looks wrong with source and recording, in sentences."""
+        """Sentences on what looks wrong with source and recording."""
         doubts = self._source.doubts(at_end=at_end)
         if self._recording.times_put_back:
             doubts.append(

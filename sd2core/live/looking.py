@@ -26,7 +26,7 @@ _WAIT_S, _END_S = 0.05, 5.0
 
 @dataclass
 class Looked:
-    """What both have seen so far."""
+    """Movements that camera and radar have seen so far."""
 
     seen: list[Seen] = field(default_factory=list)
     moved: list[Moved] = field(default_factory=list)

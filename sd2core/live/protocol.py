@@ -57,7 +57,7 @@ class Take(NamedTuple):
 
 
 class Gesture(OptionRecord):
-    """One that all people make.
+    """Gesture that all people make.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Gesture(OptionRecord):
 
 
 class Protocol(OptionRecord):
-    """What is recorded, of whom, and how it is asked for.
+    """Protocol of a guided session: gestures, people, and how they are asked for.
 
     Parameters
     ----------

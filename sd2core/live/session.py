@@ -60,7 +60,7 @@ class Session:
         return self.phase in ("opening", "countdown", "prompt", "storing")
 
     def left_s(self, now_s: float) -> float | None:
-        """What is left of the phase; None where it waits for something else than time."""
+        """Time left of the phase; None where it waits for something else than time."""
         return max(self._until_s - now_s, 0.0) if math.isfinite(self._until_s) else None
 
     def advance(self, now_s: float) -> None:

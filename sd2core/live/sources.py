@@ -78,11 +78,11 @@ class Source(Protocol):
         """Words of a frame to be stored, see :meth:`GrowingHead.as_stored`."""
 
     def doubts(self, *, at_end: bool) -> list[str]:
-        """What looks wrong, in sentences; while listening, packets may still be on their way."""
+        """Sentences on what looks wrong; while listening, packets may still be on their way."""
         return []
 
     def silence(self) -> str:
-        """What to check when nothing comes; empty where that is no fault."""
+        """Advice for when nothing comes; empty where that is no fault."""
         return ""
 
     def close(self) -> None:
@@ -241,7 +241,7 @@ class Dca1000Source:
         return self._stored_as.as_stored(self._decoder.samples(frame.content))
 
     def doubts(self, *, at_end: bool) -> list[str]:
-        """What looks wrong with packets and rate."""
+        """Sentences on what looks wrong with packets and rate."""
         counts, doubts = self.assembler.counts, []
         if counts.invalid:
             doubts.append(
@@ -268,7 +268,7 @@ class Dca1000Source:
         return doubts
 
     def silence(self) -> str:
-        """What to check when nothing comes."""
+        """Advice for when nothing comes."""
         address = f"{self.address}:{self.port}"
         if self.assembler.counts.received:
             return (

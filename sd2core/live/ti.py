@@ -114,7 +114,7 @@ class TiSource(Dca1000Source):
                 self._card.reset_ar_device()
 
     def silence(self) -> str:
-        """What to check when nothing comes."""
+        """Advice for when nothing comes."""
         return (
             "The board was started, and nothing comes from the DCA1000: check the ribbon cable"
             " between both, and the card's switches (16 bits, as it is configured by software)."
@@ -153,7 +153,7 @@ def commands_of(setup: Path) -> list[str]:
 
 
 def _xwr() -> tuple[Any, Any]:
-    """Its parts for the card and for the board."""
+    """Parts of the package ``xwr`` for the card and for the board."""
     try:
         from xwr import capture, radar
     except ImportError as error:

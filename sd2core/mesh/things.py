@@ -126,7 +126,7 @@ class Thing:
 
     @property
     def name(self) -> str:
-        """What it is called: its shape, or the file's name."""
+        """Name: the shape, or that of the file."""
         return self.shape.replace("\\", "/").rpartition("/")[2]
 
     @property
@@ -209,7 +209,7 @@ class Surroundings:
     def by_way_of(
         self, wall: Wall, own: Surface | None = None, others: Sequence[Surface] = ()
     ) -> Surface:
-        """What can hide a body from the image of a sensor behind a wall, besides itself.
+        """Things that can hide a body from the image of a sensor behind a wall.
 
         Things and other bodies before the wall, and their images and the body's own: the sensor's
         image sees the latter as the sensor sees the former.

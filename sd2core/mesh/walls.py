@@ -78,7 +78,7 @@ class Wall:
 
     @property
     def name(self) -> str:
-        """What it is called: floor, ceiling, or its direction."""
+        """Name: floor, ceiling, or its direction."""
         for name, angles in DIRECTIONS.items():
             if angles == (self.azimuth_deg, self.elevation_deg):
                 return name if name in ("floor", "ceiling") else f"wall {name}"

@@ -225,7 +225,7 @@ def driven_clips(
 
 
 def seen_of(driven: DrivenClip, stretch: MarsStretch) -> Seen:
-    """What body and radar say of one stretch, to find the radar's place by."""
+    """Velocities of body and radar in one stretch, to find the radar's place by."""
     clip = driven.clip
     velocity_mps = np.full(stretch.frame_count, np.nan)
     velocity_mps[stretch.frames] = stretch.mean_velocity_mps()

@@ -27,7 +27,7 @@ _STARTS_M = ((0.0, 0.0), (0.2, 0.4), (-0.2, 0.4))
 
 @dataclass(frozen=True)
 class RadarPlace:
-    """Where a radar stands, and how its clock lies."""
+    """Place of a radar, and the offset of its clock."""
 
     position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)  # in the camera frame
     offset_s: float = 0.0

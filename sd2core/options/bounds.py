@@ -36,7 +36,7 @@ class Bounds(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What is allowed, as ``a whole number from 1 to 100``."""
+        """Bounds in words, as ``a whole number from 1 to 100``."""
         low, high = (f"{end:{',' if self.whole else 'g'}}" for end in (self.low, self.high))
         open_end = math.isinf(self.high)
         if math.isinf(self.low):

@@ -83,7 +83,7 @@ class NullBins(OptionRecord):
 
 
 class Exporting(Limbs, SegmentFrames, PeopleApart, NullBins):
-    """What a data set holds: section ``[export]`` of a plan, and options of ``sd2 export``.
+    """Content of a data set: section ``[export]`` of a plan, and options of ``sd2 export``.
 
     Parameters
     ----------

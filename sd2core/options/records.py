@@ -256,13 +256,13 @@ def _options_of(kind: Any) -> tuple[Option, ...]:
 
 
 def given(record: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Those of the named options that the command has and the user gave."""
+    """Values of the named options that the command has and the user gave."""
     values = {name: getattr(record, name, None) for name in names}
     return {name: value for name, value in values.items() if value is not None}
 
 
 def given_flags(record: OptionRecord, names: Iterable[str]) -> list[str]:
-    """Those of the named options that the user gave, as they are typed."""
+    """Flags of the named options that the user gave, as they are typed."""
     flags = {one.name: one.flags[0] for one in options_of(type(record))}
     return [flags[name] for name in given(record, names)]
 
@@ -401,7 +401,7 @@ def _declared(kind: type) -> dict[str, Group | None]:
 
 @cache
 def _documented(kind: Any) -> Mapping[str, tuple[str | None, str]]:
-    """What a value is called, and the words, of the fields that a docstring speaks of."""
+    """Name of the value and words of each field that a docstring describes."""
     _, _, text = cleandoc(kind.__doc__ or "").partition("Parameters\n----------\n")
     texts: dict[str, tuple[str | None, str]] = {}
     for block in re.split(r"\n(?=\S)", text.partition("\n\n")[0]):

@@ -38,7 +38,7 @@ class JsonAndProgress(Json):
 
 
 class Overwrite(OptionRecord):
-    """What becomes of outputs that exist: without the option they are refused.
+    """Treatment of outputs that exist: without the option they are refused.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Overwrite(OptionRecord):
 
 
 class Sensor(OptionRecord):
-    """Where the radar is.
+    """Place of the radar.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Sensor(OptionRecord):
 
 
 class Looking(OptionRecord):
-    """Where the radar looks, and how wide.
+    """Direction and beam of the radar.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class Looking(OptionRecord):
 
 
 class MeshReading(OptionRecord):
-    """What a mesh file may not say about itself.
+    """Facts that a mesh file may not state.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class MeshReading(OptionRecord):
 
 
 class MeshInput(MeshReading):
-    """What is looked at.
+    """Mesh that is looked at.
 
     Parameters
     ----------
@@ -135,11 +135,11 @@ class MeshInput(MeshReading):
 
 
 class MeshAndSensor(Looking, Sensor, MeshInput):
-    """What is looked at, and from where."""
+    """Mesh that is looked at, and the place of the sensor."""
 
 
 class ReplacesMaps(Overwrite):
-    """What ``out`` may replace: nothing but a Doppler map."""
+    """Output that replaces nothing but a Doppler map."""
 
 
 class MapOutput(ReplacesMaps):

@@ -105,7 +105,7 @@ class Take:
         return TakeKey(self.subject, self.name, self.placement)
 
     def part(self, frames: slice) -> Take:
-        """Some of its frames, with the times that they have."""
+        """Part of the take, with the times of its frames."""
         return replace(
             self,
             synthetic=self.synthetic[frames],

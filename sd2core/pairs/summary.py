@@ -68,7 +68,7 @@ class TakeEntry(BaseModel):
 
     @property
     def rows(self) -> slice:
-        """Its frames in all arrays."""
+        """Rows of its frames in all arrays."""
         return slice(self.start, self.stop)
 
 
@@ -151,7 +151,7 @@ class PairFacts(BaseModel):
 
 
 class StoreOfPeople(Protocol):
-    """What the names of people depend on where stores of pairs are used together."""
+    """Facts of a store on which people's names depend where stores are used together."""
 
     @property
     def path(self) -> Path:
@@ -163,7 +163,7 @@ class StoreOfPeople(Protocol):
 
     @property
     def known_people(self) -> str:
-        """As :attr:`PairFacts.known_people`."""
+        """People known from elsewhere, as :attr:`PairFacts.known_people`."""
 
 
 def names_together(stores: Sequence[StoreOfPeople]) -> list[dict[str, str]]:

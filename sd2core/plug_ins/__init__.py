@@ -76,7 +76,7 @@ class PlugIn(Generic[Kind]):
         return self._checked(made, self.group.kind)
 
     def use(self, act: Callable[[Kind], Any], expected: Any) -> Any:
-        """What a function makes of it, of the expected type; whatever fails names its package."""
+        """Apply a function to it; a failure, or a result of another type, names its package."""
         made = self.load()
         try:
             result = act(made)

@@ -67,7 +67,7 @@ class Divergence:
 
     @property
     def changes(self) -> list[str]:
-        """What was saved elsewhere and is not the same here, in words; empty without any."""
+        """Words for what was saved elsewhere and is not the same here; empty without any."""
         settings = [f"another {words}" for words in named(self._changed())]
         if self.theirs.labels == self.mine.labels:
             return settings

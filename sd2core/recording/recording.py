@@ -295,7 +295,7 @@ class Recording:
 
     @property
     def bodies_there(self) -> tuple[Body, ...]:
-        """Those of the other bodies whose meshes are where the recording says."""
+        """Other bodies whose meshes are where the recording says."""
         missing = self.missing()
         return tuple(
             one
@@ -505,7 +505,7 @@ class Recording:
             self.camera = fitted_camera(self.mesh)
 
     def learn_simulated(self) -> None:
-        """Be simulated where video or mesh lies in the folder of a recording that is."""
+        """Take over from the folder of video or mesh that the recording is simulated."""
         seen = self.video or self.mesh
         if self.simulated or seen is None or seen.parent == self.folder:
             return
@@ -697,7 +697,7 @@ def settings_of(document: Document, folder: Path) -> dict[str, Any]:
 
 
 def _with_paths(bodies: Iterable[Body], path_of: Callable[[Role, str], object]) -> tuple[Body, ...]:
-    """The same bodies with other paths of their files."""
+    """Copies of bodies with other paths of their files."""
     return tuple(
         replace(
             one,
@@ -711,7 +711,7 @@ def _with_paths(bodies: Iterable[Body], path_of: Callable[[Role, str], object]) 
 def _with_files(
     things: Iterable[Thing], path_of: Callable[[Role, str], object]
 ) -> tuple[Thing, ...]:
-    """The same things with other paths of their mesh files."""
+    """Copies of things with other paths of their mesh files."""
     return tuple(
         replace(one, shape=str(path_of(thing_role(number), one.shape))) if one.is_file else one
         for number, one in enumerate(things, start=1)

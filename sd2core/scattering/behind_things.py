@@ -36,7 +36,7 @@ class Hiding:
         faces: NDArray[np.int32],
         boxes_m: NDArray[np.float64] | None = None,
     ) -> Hiding:
-        """What does not move, by its vertices (W, 3), in boxes (K, 2, 3) or in one around it."""
+        """Still things, by their vertices (W, 3), in boxes (K, 2, 3) or in one around them."""
         if boxes_m is None:
             boxes_m = np.stack([vertices_m.min(axis=0), vertices_m.max(axis=0)])[None]
         origin_m = 0.5 * (boxes_m[:, 0].min(axis=0) + boxes_m[:, 1].max(axis=0))

@@ -43,7 +43,7 @@ _NEITHER = "\n"
 
 @dataclass(frozen=True, eq=False)
 class Movement:
-    """What a radar saw of a movement, or a simulated one would, and its input where known."""
+    """Map of a movement by a radar, real or simulated, and its input where known."""
 
     clip: Clip  # The radar's map, and the class of every frame.
     take: Take | None = None  # With the synthetic map.
@@ -183,7 +183,7 @@ def _of_recording(recording: Recording, subject: str, rate_hz: float | None) -> 
 
 
 def _of_dataset(path: Path) -> tuple[ClipSet, list[Take | None]]:
-    """What the radar saw, and a take with the synthetic map of each clip, where there is one."""
+    """Maps of the radar, and a take with the synthetic map of each clip, where there is one."""
     with open_dataset(path) as dataset:
         kind = next((one for one in dataset.header.kinds if one in ("real", "simulated")), None)
         if kind is None:
@@ -241,7 +241,7 @@ def _labelled(pairs: PairSet, plan: StudyPlan) -> PairSet:
 
 
 def _clips(pairs: PairSet, plan: StudyPlan) -> ClipSet:
-    """What the radar saw; labels have the classes of the plan, or the usual ones."""
+    """Maps of the radar; labels have the classes of the plan, or the usual ones."""
     names: Sequence[str] = gesture_classes(pairs.labels)
     if plan.classes:
         names = [plan.classes.get(label, _NEITHER) for label in pairs.labels]

@@ -133,7 +133,7 @@ class StudyPlan(Section):
 
     @property
     def wanted(self) -> tuple[Added, ...]:
-        """What is to be added."""
+        """Kinds of synthetic data to add."""
         if self.added is not None:
             return self.added
         return ADDED if self.video else OF_VIDEO

@@ -35,7 +35,7 @@ Describe = Callable[[Clip], Features]
 
 @dataclass(frozen=True)
 class Task:
-    """What is drawn of the data."""
+    """Fold, share of the real data, and seed of one training of each condition."""
 
     fold: Fold
     share: float

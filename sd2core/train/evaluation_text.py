@@ -25,7 +25,7 @@ def as_text(evaluation: Evaluation) -> str:
 
 
 def as_markdown(evaluation: Evaluation) -> str:
-    """The same in Markdown."""
+    """Result of an evaluation in Markdown."""
     return "\n".join(_lines(evaluation, markdown_table)) + "\n"
 
 

@@ -14,7 +14,7 @@ from sd2core.train.data import Order, Windows
 
 
 class Batch(NamedTuple):
-    """Where the segments of one batch are cut, and how much nearer each is."""
+    """Starts of the segments of one batch, and how much nearer each is."""
 
     start: torch.Tensor  # (segments,) int64
     gain: torch.Tensor  # (segments,) float32, of power

@@ -151,7 +151,7 @@ class BackgroundModel(QObject):
 
 
 class ReportingModel(BackgroundModel):
-    """One that tells why its work failed."""
+    """Model that tells why its work failed."""
 
     failed = Signal(str)
 
@@ -160,7 +160,7 @@ class ReportingModel(BackgroundModel):
 
 
 class ProblemModel(BackgroundModel):
-    """One that keeps why its work failed."""
+    """Model that keeps why its work failed."""
 
     changed = Signal()
     problem = ""  # why it failed; empty where it did not

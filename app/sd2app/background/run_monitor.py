@@ -43,7 +43,7 @@ F = TypeVar("F", bound=RunFolder)
 
 
 class History:
-    """What the lines of a run have told, at least how far it is.
+    """History of a run by its lines, at least how far it is.
 
     Damaged lines are left out.
     """
@@ -372,12 +372,12 @@ class CommandRun(RunMonitor[CommandFolder]):
 
     @property
     def out(self) -> Path:
-        """Where it puts what it makes."""
+        """Path of what it makes."""
         return Path(str(self.about.get("out", self.path)))
 
     @property
     def result(self) -> Path | None:
-        """What it made; None where there is nothing yet."""
+        """Result; None where there is nothing yet."""
         return self.out / self.result_name if self.facts else None
 
     def inspect(self) -> Any:

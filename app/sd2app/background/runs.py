@@ -97,7 +97,7 @@ class Runs(QObject, Generic[Run]):
         return sorted(known, key=lambda one: one.started_unix_s, reverse=True)
 
     def name_of(self, path: Path, about: Mapping[str, Any]) -> str:
-        """What a run is called in the list, by its folder and the description there."""
+        """Name of a run in the list, by its folder and the description there."""
         return path.name
 
     # --- what is known ----------------------------------------------------------------------

@@ -83,7 +83,7 @@ def estimate_headline(made: BatchEstimate) -> str:
 
 
 def estimate_facts(made: BatchEstimate) -> list[tuple[str, str]]:
-    """The same step by step."""
+    """Estimate step by step."""
     rows = [
         (STEP_WORDS.get(name, name), _step_text(step))
         for name, step in made.steps.items()

@@ -59,7 +59,7 @@ class ClassTraining(Runs[ClassRun]):
         return quoted(self.setup.train_arguments(Path(MODEL_NAME)))
 
     def name_of(self, path: Path, about: Mapping[str, Any]) -> str:
-        """What all of them are."""
+        """Name of such a run, the same for all."""
         return "Training"
 
     def train(self) -> None:

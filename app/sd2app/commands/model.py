@@ -81,7 +81,7 @@ class CommandForms(Runs[AnyCommandRun]):
         return tuple(one for one in every if one.name not in _OF_TERMINALS)
 
     def text(self, option: Option) -> str:
-        """What is typed for an option; empty: as by default. A switch that is on is ``yes``."""
+        """Text typed for an option; empty: as by default. A switch that is on is ``yes``."""
         return self._typed.get(option.dest, "")
 
     @property
@@ -92,7 +92,7 @@ class CommandForms(Runs[AnyCommandRun]):
 
     @property
     def wrong(self) -> str:
-        """What is wrong with what is typed, whatever is missing; empty where nothing is."""
+        """Fault of what is typed, whatever is missing; empty without any."""
         return _refusal(self._values)
 
     @property

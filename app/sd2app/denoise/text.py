@@ -29,7 +29,7 @@ def kind_words(card: ModelCard) -> str:
 
 
 def origin_words(card: ModelCard) -> str:
-    """What a model learned from; simulation is named as such."""
+    """Data that a model learned from, in words; simulation is named as such."""
     if card.trained_on == "simulated":
         return "simulated data only"
     return "real captures"

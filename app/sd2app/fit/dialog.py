@@ -286,7 +286,7 @@ class NewFromVideoDialog(Dialog):
         self._show_message()
 
     def _who(self) -> str:
-        """Who is fitted, in words."""
+        """People that are fitted, in words."""
         setup, choices = self.setup, self.setup.choices
         if setup.searched is not None:
             return f"looking for everybody, {100.0 * setup.searched:.0f} %"

@@ -73,7 +73,7 @@ class FitOnScreen(QObject):
 
     @property
     def under_way(self) -> str:
-        """Where the mesh of the video on screen is to come from; empty where none is made."""
+        """Sentence on the run that makes the mesh of the video on screen; empty without one."""
         if not (self._fit.busy and self.visible):
             return ""
         return "A body is being fitted to this video: its synthetic Doppler comes with it."
@@ -170,7 +170,7 @@ def make_recording(
 def _with_meshes(
     recording: Recording, given: dict[str, Any], bodies: tuple[Body, ...]
 ) -> Recording:
-    """The same recording with the meshes that it awaited; its subject stays."""
+    """Copy of a recording with the meshes that it awaited; its subject stays."""
     kept = {"subject": recording.subject} if recording.subject else {}
     return replace(recording, bodies=(*recording.bodies, *bodies), **given | kept)
 

@@ -80,7 +80,7 @@ class FitRequest:
         return self.folder / RUN_NAME
 
     def arguments(self) -> list[str]:
-        """The same as a command line, whose progress can be followed."""
+        """Command line of the request, whose progress can be followed."""
         # A mesh of this name in the folder is of a fit before.
         out = self.folder / self.mesh_name
         command = replace(self.command(out), overwrite=True, progress_json=True)
@@ -143,7 +143,7 @@ class FitRequest:
 
     @property
     def to_open(self) -> Path:
-        """What shows the video: the recording where there is one, or the file."""
+        """Path that shows the video: the recording where there is one, or the file."""
         return self.folder if (self.folder / FILE_NAME).exists() else self.video
 
     @property

@@ -36,7 +36,7 @@ _PATIENCE_S = 3.0
 
 
 class FitProgress(History):
-    """What the lines of one fit tell: its stages, its landmarks, and notes for the user.
+    """Progress of one fit by its lines: stages, landmarks, and notes for the user.
 
     What is done counts in the stage under way.
 

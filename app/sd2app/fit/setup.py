@@ -29,7 +29,7 @@ _SMALLEST_PERSON = 0.02
 
 @dataclass(frozen=True)
 class FitChoices:
-    """What the user chooses for the fit of a video."""
+    """Choices of the user for the fit of a video."""
 
     folder: Path | None = None  # the recording to be made
     stature_m: float | None = None  # None: estimated

@@ -66,7 +66,7 @@ class MeshPreview(VideoFrames):
 
     @property
     def notes(self) -> str:
-        """What was assumed or repaired, and found unlikely without a remedy."""
+        """Notes on what was assumed or repaired, or is unlikely and has no remedy."""
         return "" if self.mesh is None else "\n\n".join(notes_of(self.mesh))
 
     @property

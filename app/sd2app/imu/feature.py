@@ -65,7 +65,7 @@ class ImuFeature(Feature):
         return track
 
     def _fill_menu(self, menu: QMenu, time_s: float | None) -> None:
-        """What can be done with the sensors, and with the values at a time."""
+        """Fill the menu of the sensors, and of the values at a time."""
         model = self.model
         words = "" if time_s is None else "\t".join(reading_lines(model, time_s))
         copy = menu.addAction("Copy &value", lambda: QGuiApplication.clipboard().setText(words))

@@ -91,7 +91,7 @@ class ImuModel(ReportingModel):
 
     @property
     def file_words(self) -> str:
-        """What the samples of the file are, in words."""
+        """Words for the samples of the file."""
         simulated = self.measured is not None and self.measured.simulated
         return "simulated file" if simulated else "measured"
 
@@ -103,7 +103,7 @@ class ImuModel(ReportingModel):
 
     @property
     def shift_s(self) -> float:
-        """What is added to the real sensor's times to have them on the recording's clock."""
+        """Time added to the real sensor's, to have it on the recording's clock."""
         return 0.0 if self.measured is None else self.offset_s - float(self.measured.times_s[0])
 
     @property

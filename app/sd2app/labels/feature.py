@@ -290,7 +290,7 @@ class LabelsFeature(Feature):
         return self._some_selected() and self._has_tracks()
 
     def _to_cancel(self) -> Iterator[Callable[[], object]]:
-        """What there is to let go of; the first one is."""
+        """Things that can be let go of; the first one is."""
         if self.dragging.dragging:
             yield self.dragging.cancel_drag
         yield from (mode.end for mode in self._modes if mode.active)

@@ -82,7 +82,7 @@ def import_labels(shell: Shell, edits: LabelEdits, path: Path | None = None) -> 
 
 
 def _frame_source(recording: Recording) -> dict[str, Any]:
-    """Where commands find times of frames, by their option: in the saved recording, or a file."""
+    """Option by which commands find times of frames: the saved recording, or a file."""
     sources = {"video": recording.video, "mesh": recording.mesh}
     if recording.folder != UNTITLED:
         sources = {"recording": recording.folder}

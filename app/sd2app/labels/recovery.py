@@ -42,7 +42,7 @@ def _edits_text(offer: Recoverable) -> str:
 
 
 class LabelNotice(Notice):
-    """What the user has to decide about the labels; hidden when there is nothing."""
+    """Bar with a question about the labels; hidden when there is none."""
 
     def __init__(
         self, autosave: LabelAutosave, edits: LabelEdits, document: DocumentModel, shell: Shell

@@ -95,7 +95,7 @@ class LiveFeature(Feature):
         )  # fmt: skip
 
     def bars(self) -> Sequence[QWidget]:
-        """What comes in, and what can be done about it."""
+        """Bar of the radar that is listened to."""
         return (LiveBar(self),)
 
     @property
@@ -142,7 +142,7 @@ class LiveFeature(Feature):
 
 
 def title_text(live: LiveModel) -> str:
-    """What is going on, with the recording's name."""
+    """State of the recording under way, with its name."""
     assert live.request is not None
     name = live.request.folder.name
     match live.state:

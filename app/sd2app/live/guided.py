@@ -16,7 +16,7 @@ from sd2core.live.session import Phase
 
 @dataclass(frozen=True)
 class Step:
-    """What is to be done now."""
+    """Step of a session that is to be done now."""
 
     phase: Phase
     number: int  # of the take, from 1
@@ -87,7 +87,7 @@ def asks_consent(model: GuidedModel) -> bool:
 
 
 def headline(model: GuidedModel) -> str:
-    """What to do, in few words."""
+    """Headline: what to do, in few words."""
     step = model.step
     if model.state == "failed":
         return "The session has failed"
@@ -112,7 +112,7 @@ def count_text(model: GuidedModel) -> str:
 
 
 def detail(model: GuidedModel) -> str:
-    """What goes with the headline."""
+    """Line below the headline."""
     step = model.step
     if model.state == "failed":
         return model.text

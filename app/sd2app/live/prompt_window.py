@@ -275,7 +275,7 @@ class PromptWindow(QWidget):
 
 
 def _consent_area(text: QLabel, parent: QWidget) -> QScrollArea:
-    """Where a person reads what they agree to; the keys stay those of the window."""
+    """Area with the text that a person agrees to; the keys stay those of the window."""
     area = QScrollArea(parent)
     text.setWordWrap(True)
     text.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)

@@ -101,7 +101,7 @@ class ListenRequest:
 
     @property
     def problem(self) -> str:
-        """What is missing, or not there; empty where recording can begin."""
+        """Problem that keeps a recording from beginning; empty without any."""
         if self.protocol:
             if not self.camera:
                 return "Choose a camera: takes of a protocol are filmed."
@@ -115,7 +115,7 @@ class ListenRequest:
 
     @property
     def problem_of_radar(self) -> str:
-        """The same, of the radar alone."""
+        """Problem of the radar alone; empty without any."""
         if self.way == REPLAY:
             if self.replay is None:
                 return "Choose the capture that is replayed."
@@ -152,7 +152,7 @@ class ListenSetup(QObject):
 
     @property
     def chosen(self) -> ListenRequest:
-        """What is chosen so far."""
+        """Choices so far."""
         chosen = self._choices
         return ListenRequest(
             self._session if chosen["protocol"] else self._recording,

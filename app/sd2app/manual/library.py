@@ -42,7 +42,7 @@ def _tree(file: Path) -> ast.Module:
 
 
 def _definition(name: str) -> tuple[Definition, str]:
-    """What a name stands for, through whatever imports it; raises LookupError if there is none."""
+    """Definition of a name, through whatever imports it; raises LookupError without one."""
     module, _, thing = name.rpartition(".")
     place = _ROOT.joinpath(*module.split("."))
     tree = _tree(place / "__init__.py" if place.is_dir() else place.with_suffix(".py"))

@@ -65,7 +65,7 @@ class DifferenceView(HeatmapView):
         return self._table(), -full, full, unit
 
     def status(self) -> str:
-        """What was done to the maps before they are compared."""
+        """Words for what was done to the maps before they are compared."""
         return "both as strong altogether, relative to the radar's 0 dB"
 
     def _paint_corner(self, painter: QPainter, box: QRectF, left: float) -> float:

@@ -56,7 +56,7 @@ def export_map(
 
 
 class MapExportDialog(Dialog):
-    """What is written, a copy of the command, and a button that asks for the file."""
+    """Dialog that exports a map, with a copy of the command."""
 
     def __init__(self, title: str, name: str, line: Callable[[], str], parent: QWidget) -> None:
         super().__init__(title, parent)
@@ -259,7 +259,7 @@ class MapsFeature(Feature):
     def _fill_menu(
         self, view: HeatmapView, own: Sequence[QAction], menu: QMenu, place: QPointF
     ) -> None:
-        """What can be done with a map, and with the cell at a place of it."""
+        """Fill the menu of a map, and of the cell at a place of it."""
         reading, span, edits = view.reading_at(place), self._session.span, self._session.edits
         copy = menu.addAction("Copy &value")
         copy.setEnabled(reading is not None)

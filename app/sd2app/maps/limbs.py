@@ -45,7 +45,7 @@ class LimbsModel(ReportingModel):
 
     @property
     def all_parts(self) -> tuple[str, ...]:
-        """What can be shown alone: parts of the body, or of several people each and their parts."""
+        """Parts that can be shown alone: of the body, or of several people each and their parts."""
         persons = self.persons
         limbs = [f"{person}{OF}{part}" for person in persons for part in PARTS]
         return *persons, *(limbs or PARTS)

@@ -73,7 +73,7 @@ class SynthesizerCache:
         self._lock = threading.Lock()
 
     def among(self, mesh: MeshSequence, options: SynthesisOptions, files: str) -> SynthesizerCache:
-        """Those of the same mesh among other things and people, or with other options.
+        """Synthesizers of the same mesh among other things and people, or with other options.
 
         Whatever is the same is shared: of things and people that move, all but what they hide.
         """

@@ -38,7 +38,7 @@ class _Curve:
 
     @property
     def words(self) -> str:
-        """What it is, in the legend."""
+        """Name in the legend."""
         return part_words(self.part) if self.part else title_of(self.track).lower()
 
     @property

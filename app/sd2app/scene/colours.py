@@ -98,7 +98,7 @@ def range_limits(nearest_m: float, farthest_m: float) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Colouring:
-    """What the colour of a mesh means, and what is known of its vertices, (V,) each."""
+    """Meaning of a mesh's colour, and the values of its vertices, (V,) each."""
 
     mode: MeshColour = "velocity"
     v_max_mps: float = 2.0  # end of the velocity colours

@@ -29,7 +29,7 @@ _THIN_M = 0.05
 
 
 class InertialHand:
-    """What the pointer does to the inertial sensors; places are pixels of the view."""
+    """Hand on the inertial sensors; places are pixels of the view."""
 
     def __init__(self, scene: Scene, session: Session, model: ImuModel) -> None:
         self._scene, self._session, self._model = scene, session, model
@@ -103,7 +103,7 @@ _SEVERAL = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifi
 
 
 class LimbHand:
-    """What the pointer does to the parts of the bodies; places are pixels of the view."""
+    """Hand on the parts of the bodies; places are pixels of the view."""
 
     def __init__(
         self, scene: Scene, navigator: Navigator, surface: InertialHand, model: LimbsModel

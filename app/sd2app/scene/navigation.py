@@ -30,7 +30,7 @@ _ZOOM_PER_NOTCH = 0.88
 
 @dataclass(frozen=True)
 class Target:
-    """What the pointer is on: the sensor, a planned place, or a thing or other body."""
+    """Target of the pointer: the sensor, a planned place, or a thing or other body."""
 
     kind: Literal["sensor", "marker", "movable"]
     number: int = 0  # of the place, or of what can be moved: bodies after things
@@ -104,7 +104,7 @@ class Navigator:
         return held.number, triple(held.at_m + held.moved_m), triple(held.moved_m)
 
     def target_at(self, x_px: float, y_px: float) -> Target | None:
-        """What a pointer is on; nothing that is behind the first body."""
+        """Target at a place of the view; nothing that is behind the first body."""
         scene, pose = self._scene, self._scene.pose
         if self.sensor_at(x_px, y_px):
             return Target("sensor")

@@ -153,7 +153,7 @@ class Overlay(Canvas):
             self._paint_hint(painter, MARKER_HINT)
 
     def _words_of_held(self, number: int, moved_m: Sequence[float]) -> str:
-        """Where the foot of a dragged thing is, or by how much a body is moved from its file's."""
+        """Place of a dragged thing's foot, or the way of a body from its file's place, in words."""
         movables = self._scene.movables
         other = movables.person_of(number)
         if other is None:

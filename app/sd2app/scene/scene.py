@@ -372,7 +372,7 @@ class Scene:
         return values if fits else None
 
     def _near(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Those of some places, (n, 3), that are not far off."""
+        """Places, of (n, 3), that are not far off."""
         return places[np.linalg.norm(places - self.extent.centre_m, axis=1) < _FAR_OFF_M]
 
     def _set_extent(self, extent: Extent) -> None:

@@ -206,7 +206,7 @@ class SceneView(QWidget):
             self.navigator.press(*place, event.button(), event.modifiers())
 
     def _words_at(self, place: tuple[float, float], part: str | None) -> str:
-        """What is under the pointer, or what a click would place there, in words."""
+        """Words for what is under the pointer, or what a click would place there."""
         words = self.inertial_hand.words_at(*place)
         if words or self.inertial_hand.placing:
             return words

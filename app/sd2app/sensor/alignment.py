@@ -89,7 +89,7 @@ class AlignmentModel(ProblemModel):
 
 
 def result_text(model: AlignmentModel) -> str:
-    """What was found, in a sentence; empty where there is a problem."""
+    """Sentence on what was found; empty where there is a problem."""
     result = model.result
     if model.busy:
         return "Comparing…"

@@ -98,11 +98,11 @@ class SceneList(QWidget):
         """Raise Sd2Error if one cannot be in the scene of a mesh."""
 
     def name_of(self, one: Any) -> str:
-        """What one is called in the list."""
+        """Name of one in the list."""
         return str(one.name)
 
     def values(self, number: int, name: str) -> tuple[Any, ...]:
-        """What the boxes of a field show."""
+        """Values in the boxes of a field."""
         value = getattr(self.kept[number], name)
         return value if isinstance(value, tuple) else (value,)
 

@@ -105,11 +105,11 @@ class ThingsPage(SceneList):
         with_things(mesh, [one])
 
     def values(self, number: int, name: str) -> tuple[Any, ...]:
-        """What the boxes of a field show; of the size also where none is given."""
+        """Values in the boxes of a field; of the size also where none is given."""
         return self._size_of(number) if name == "size_m" else super().values(number, name)
 
     def name_of(self, one: Thing) -> str:
-        """What one is called in the list."""
+        """Name of one in the list."""
         recording = self._session.document.recording
         exists = recording is None or one in recording.things_there
         return one.name if exists else f"{one.name} (file missing)"

@@ -212,7 +212,7 @@ def load_content(recording: Recording, progress: Progress) -> Content:
 
 
 def offers_of(unlikely: Iterable[Exception]) -> tuple[OfferedCure, ...]:
-    """What can be read another way, of errors and findings."""
+    """Offers to read a mesh another way, of errors and findings."""
     known = [one for one in unlikely if isinstance(one, Sd2Error)]
     return tuple(OfferedCure(one.words, one.cure) for one in known if one.cure is not None)
 
@@ -223,7 +223,7 @@ def words_of(error: Exception) -> str:
 
 
 def notes_of(mesh: MeshSequence) -> list[str]:
-    """What was assumed about a mesh, or is unlikely and cannot be offered to be read otherwise."""
+    """Notes on what was assumed about a mesh, or is unlikely and has no offer."""
     offered = {str(one) for one in mesh.findings if one.cure is not None}
     return [note for note in mesh.notes if note not in offered]
 

@@ -154,7 +154,7 @@ class Layouts(QObject):
         self.panes_changed.emit()
 
     def kept(self, name: str, usual: T) -> T:
-        """What is kept for the layout under a name."""
+        """Value kept for the layout under a name."""
         return self._settings.stored(self._place(name), usual)
 
     def keep(self, name: str, value: bool | str) -> None:

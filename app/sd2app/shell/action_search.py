@@ -22,7 +22,7 @@ _SIZE_PX = 640, 480
 
 @dataclass(frozen=True)
 class MenuEntry:
-    """What can be done, and where else."""
+    """Action of the menus, and those that it stands in."""
 
     menus: tuple[str, ...]  # those that it stands in, the outermost first
     text: str

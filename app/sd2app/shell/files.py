@@ -342,7 +342,7 @@ class FilesFeature(Feature):
 
 
 class MeshOffer(Notice):
-    """What is unlikely about the mesh, and a button for what would put it right."""
+    """Bar on what is unlikely about the mesh, with a button that puts it right."""
 
     def __init__(self, document: DocumentModel, edits: Edits) -> None:
         tip = "Read the mesh again so; undo takes it back, File → Save keeps it"

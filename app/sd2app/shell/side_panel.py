@@ -113,7 +113,7 @@ class SidePanel(QFrame):
         return self._icons[self.names.index(name)]
 
     def _topic(self) -> str:
-        """What help is about: the page of a panel where that has help of its own."""
+        """Topic of the help: the page of a panel where that has help of its own."""
         panel = self._pages[self.shown]
         page = panel.page if isinstance(panel, Paged) else ""
         return page if page in HELP else self.shown

@@ -48,7 +48,7 @@ _TEXTS = {
 
 
 class StudySetupView(QWidget):
-    """What is studied, and how to begin."""
+    """Set-up of a study, and its start."""
 
     def __init__(self, feature: StudyFeature) -> None:
         super().__init__()

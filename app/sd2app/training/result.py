@@ -142,7 +142,7 @@ class ModelAdoption(QObject):
     # --- what it gains --------------------------------------------------------------------
 
     def _compared(self) -> tuple[object, ...]:
-        """What models are compared on: the map to be denoised, and the radar's."""
+        """Maps on which models are compared: the one to be denoised, and the radar's."""
         plain, radar = self._maps.synthetic, self._maps.real
         return plain.revision, radar.revision, radar.offset_s
 

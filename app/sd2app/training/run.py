@@ -164,7 +164,7 @@ class TrainingHistory(StepHistory):
 
 
 class TrainingFacts(NamedTuple):
-    """What is on disk of a run."""
+    """Facts about the files of a run."""
 
     config: TrainConfig | None = None  # its settings; None until they can be read
     has_model: bool = False  # there is one to use

@@ -20,7 +20,7 @@ _STEP = "tour/step"
 
 @dataclass(frozen=True)
 class Step:
-    """What is to be done, in words and as a question to the models.
+    """Step of the tour, in words and as a question to the models.
 
     ``targets`` are accessible names of what to point at, the first that is on screen.
     ``reached`` compares ``state`` as it was at the start of the step with what it is now.
@@ -37,7 +37,7 @@ class Step:
 
 
 class TourModel(QObject):
-    """Where the tour is; kept in the settings, so that it goes on where it was left.
+    """Place in the tour, kept in the settings, so that it goes on where it was left.
 
     ``can_show`` tells if the sample is open, ``open_sample`` opens it; without it the tour rests.
     """

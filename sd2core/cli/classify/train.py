@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Network(OptionRecord):
-    """What learns.
+    """The network to train.
 
     Parameters
     ----------

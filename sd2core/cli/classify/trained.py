@@ -42,7 +42,7 @@ class TrainedModel(OptionRecord):
 
     @property
     def classifier(self) -> Path:
-        """Its file."""
+        """File of the classifier."""
         from sd2core.classify.files import bundled_classifier
 
         return bundled_classifier() if self.model is None else self.model

@@ -20,7 +20,7 @@ _MAX_FRAMES = 100_000_000
 
 
 class FrameTimes(OptionRecord):
-    """Where the times of frames come from.
+    """Source of the times of frames.
 
     Parameters
     ----------

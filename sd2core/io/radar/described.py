@@ -280,7 +280,7 @@ def capture_of(path: Path, description: RadarDescription) -> RadarCapture:
 
 
 def _of_simulation(path: Path, description: RadarDescription) -> dict[str, Any]:
-    """What a simulated recording says of itself in a file beside it."""
+    """Facts of a simulated recording, in a file beside it."""
     beside = path.with_name(_META)
     if not (description.simulated and path.name == DATA_NAME and beside.is_file()):
         return {}

@@ -215,7 +215,7 @@ def load_growing(path: Path) -> RadarCapture:
 
 
 def _notes(entries: NDArray[Any], lost: int, dropped: int) -> list[str]:
-    """What is missing of a capture, and why, in words."""
+    """Sentences on missing parts of a capture, and why."""
     notes = []
     damaged = int(np.count_nonzero(entries["missing_bytes"]))
     sessions = len(np.unique(entries["session"]))

@@ -43,7 +43,7 @@ _SHUFFLED = 0.1
 
 
 class PointsDescription(BaseModel):
-    """What a table of points does not say itself, in the TOML beside it.
+    """Description of a table of points, in the TOML beside it.
 
     ``columns`` name the columns in order, ``-`` one that is not needed. With ``sign`` 1 a positive
     velocity is that of a point whose distance grows, with -1 of one that comes nearer.

@@ -41,7 +41,7 @@ _JSON = "the .mmwave.json of mmWave Studio"
 
 @dataclass(frozen=True)
 class TiSetup:
-    """What a configuration says of the samples of a capture."""
+    """Layout of a capture's samples by a configuration."""
 
     config: RadarConfig
     frames: int  # 0: without end

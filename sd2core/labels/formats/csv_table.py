@@ -168,7 +168,7 @@ def _table(path: Path, text: str, separator: str) -> tuple[list[str], list[tuple
 
 
 def _separator(path: Path, text: str) -> str:
-    """What stands between the columns: the one mark by which the heading names what is needed."""
+    """Separator of the columns: the one by which the heading names all that is needed."""
     csv.field_size_limit(max(csv.field_size_limit(), len(text)))
     first = next(line for line in text.splitlines() if line.strip())
     fitting = [mark for mark in ",;\t|" if _spoken_for(next(csv.reader([first], delimiter=mark)))]

@@ -100,7 +100,7 @@ class LabelRows:
 
 @dataclass(frozen=True)
 class LabelClock:
-    """What is known of a recording's time while labels are read for it."""
+    """Clock of a recording for which labels are read."""
 
     timebase: Timebase | None = None
     frames_per_s: float | None = None  # Rate of frames from 0 s on, where there is no timebase.
@@ -161,7 +161,7 @@ class LabelReading:
 
     @property
     def sentence(self) -> str:
-        """What was taken, and what was not."""
+        """Sentence on spans that were taken, and on those that were not."""
         spans, tracks = len(self.labels.spans), len(self.labels.tracks)
         parts = [f"{counted(spans, 'span')} on {counted(tracks, 'track')} taken", *self.remarks]
         if self.beyond:
@@ -175,7 +175,7 @@ class LabelReading:
         return ", ".join(parts) + "."
 
     def beside(self, timebase: Timebase | None) -> LabelReading:
-        """The same, with a remark on spans that reach beyond a recording; their times stay."""
+        """Copy with a remark on spans that reach beyond a recording; their times stay."""
         if timebase is None:
             return self
         spans_s = [(one.start_s, one.end_s) for one in self.labels.spans]

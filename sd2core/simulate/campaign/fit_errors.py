@@ -86,7 +86,7 @@ class ErrorFunction:
         return np.asarray(shared + self.constant + waves @ self.size)
 
     def scaled(self, factor: float) -> ErrorFunction:
-        """The same errors, so many times as large."""
+        """Errors so many times as large."""
         larger = {name: factor * getattr(self, name) for name in ("gain", "constant", "size")}
         return replace(self, **larger)
 
@@ -167,7 +167,7 @@ class Disturbance:
     functions: Mapping[tuple[Group, str], ErrorFunction]
 
     def scaled(self, factor: float) -> Disturbance:
-        """The same errors, so many times as large; at 0 the fit is the truth."""
+        """Errors so many times as large; at 0 the fit is the truth."""
         functions = {key: function.scaled(factor) for key, function in self.functions.items()}
         return Disturbance(factor * self.shape_error, functions)
 

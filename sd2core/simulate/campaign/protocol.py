@@ -15,7 +15,7 @@ two in turn, take by take."""
 
 @dataclass(frozen=True)
 class Protocol:
-    """What varies from take to take, and in which order swipes are made."""
+    """Protocol of a campaign: what varies between takes, and the order of swipes."""
 
     order: Order = "random"
     place: bool = True  # The person's and the camera's; otherwise the sensor is 2.2 m ahead.

@@ -85,7 +85,7 @@ class Setting:
     reflectors: tuple[Reflector, ...]
 
     def turned(self, rng: np.random.Generator) -> Setting:
-        """The same scene with the person turned anyhow."""
+        """Copy of the scene with the person turned anyhow."""
         return replace(self, heading_deg=float(rng.uniform(-180.0, 180.0)))
 
     def place(self, transforms: Floats) -> Floats:

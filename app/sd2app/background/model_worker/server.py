@@ -56,7 +56,7 @@ class Worker:
         return self._keep(self._live, self._newest(model).live())
 
     def call(self, number: int, method: str, *arguments: Any) -> Any:
-        """What a method of a model, or of a clip, returns."""
+        """Result of a method of a model, or of a clip."""
         return getattr(self._newest(number), method)(*arguments)
 
     def _keep(self, kept: dict[int, Any], one: Any) -> int:

@@ -149,7 +149,7 @@ class KeyBindings(QObject):
 
 
 def _stored(content: Mapping[str, Any], known: Mapping[str, object]) -> dict[str, tuple[str, ...]]:
-    """What was stored, as far as it can be understood; of two with one key the first has it."""
+    """Stored keys, as far as they can be understood; of two with one key the first has it."""
     chosen: dict[str, tuple[str, ...]] = {}
     taken: set[str] = set(_RESERVED)
     for action_id, keys in content.items():

@@ -25,7 +25,7 @@ class KeyRow:
 
 
 class KeyList:
-    """What has keys; they are changed through :class:`KeyBindings`."""
+    """Actions and their keys, which are changed through :class:`KeyBindings`."""
 
     def __init__(
         self,

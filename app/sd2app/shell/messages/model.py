@@ -38,7 +38,7 @@ class MessagesModel(QObject):
 
     @property
     def text(self) -> str:
-        """What is to be read now; empty if nothing is."""
+        """Text to be read now; empty without any."""
         return "\n".join(self.lines)
 
     def warn(self, text: str) -> None:

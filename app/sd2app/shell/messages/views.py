@@ -17,7 +17,7 @@ _NOTHING = "Nothing was said yet."
 
 
 class MessageNotice(Notice):
-    """What is to be read now, for a while: failures for longer, and not while nobody is there."""
+    """Message on screen for a while: failures for longer, and not while nobody is there."""
 
     def __init__(self, messages: MessagesModel) -> None:
         super().__init__("Message", close=messages.dismiss)
