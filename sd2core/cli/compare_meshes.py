@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from sd2core.cli.command_parser import command
 from sd2core.cli.output import counted, print_json, print_rows, progress_bar
+from sd2core.errors import Sd2Error
 from sd2core.options.kinds import Words
 from sd2core.options.records import ARGUMENTS, OptionError
 from sd2core.options.shared import Figure, Json, MeshReading, Sensor
@@ -155,11 +157,11 @@ def _load(path: Path, options: CompareMeshes) -> MeshSequence:
     if is_recording(path):
         mesh = open_recording(path).load_mesh()
         return mesh.body(options.person) if mesh.others else mesh
-    hints: dict[str, Any] = mesh_reading(options).options() | {"faces": options.faces}
-    if is_estimate(path):
-        return load_mesh(path, **hints)
-    mesh = load_mesh(path)
-    general = {name: hints[name] for name in ("frames_per_s", "scale", "faces") if hints.get(name)}
-    if general and own_resolution(mesh) is None:
-        return load_mesh(path, **general)
-    return mesh
+    given = {"faces": options.faces, **mesh_reading(options).options()}
+    told: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    if not is_estimate(path):
+        with suppress(Sd2Error):  # of a size, say, that is only right as it is told
+            mesh = load_mesh(path)
+            if not told or own_resolution(mesh) is not None:
+                return mesh
+    return load_mesh(path, **told)

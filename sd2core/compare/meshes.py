@@ -70,7 +70,7 @@ class Comparison:
     """Frames that count, shape (T,): those in which every mesh has a person."""
     maps: tuple[DopplerMap, ...]
     differences: tuple[Difference, ...]  # of every mesh, the reference included
-    notes: tuple[str, ...]  # interpolated, carried over or omitted parts, as sentences
+    notes: tuple[str, ...]  # the meshes' own; interpolated, carried over or omitted parts
 
     def as_dict(self) -> dict[str, Any]:
         """Everything but the curves and maps, for JSON."""
@@ -140,9 +140,10 @@ def compare_meshes(
         raise Sd2Error(f"reference is {reference}", f"0 to {len(meshes) - 1}")
     sensor = sensor or VirtualSensor()
     times_s = common_times(meshes, reference)
-    notes: list[str] = []
+    pairs = list(zip(meshes, labels, strict=True))
+    notes = [f"{label}: {note}" for mesh, label in pairs for note in mesh.notes]
     placed = []
-    for mesh, label in zip(meshes, labels, strict=True):
+    for mesh, label in pairs:
         moved, interpolated = resample_mesh(mesh, times_s)
         if interpolated:
             notes.append(f"{label}: interpolated to the frame times of {labels[reference]}.")

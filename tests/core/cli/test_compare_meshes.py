@@ -60,6 +60,34 @@ def test_a_mesh_that_does_not_say_its_rate(
 
 
 @pytest.mark.parametrize(
+    ("change", "options"),
+    [
+        (1000.0, ("--scale", "0.001")),
+        (np.array([1.0, -1.0, -1.0]), ("--turn", "x180")),
+        (1.0, ("--distance-m", "-0.5")),
+    ],
+)
+def test_what_a_mesh_does_not_say_holds_for_the_one_that_is_not_ours(
+    sd2: Sd2,
+    pair: tuple[Path, Path],
+    tmp_path: Path,
+    change: float | np.ndarray,
+    options: tuple[str, str],
+) -> None:
+    """Unit, axes and place are as told, and what the file itself leaves open is said."""
+    with np.load(pair[0]) as data:
+        vertices, faces = data["vertices"], data["faces"]
+    if options[0] == "--distance-m":
+        vertices = vertices + np.array([0.0, 0.0, 0.5])
+    np.savez(tmp_path / "other.npz", vertices=vertices * change, faces=faces[::-1])
+    found = json.loads(
+        sd2("compare-meshes", pair[0], tmp_path / "other.npz", *options, "--json").out
+    )
+    assert max(found["meshes"][1]["joint_distance_m"]) < 1e-4
+    assert any(note.startswith("other: The file holds no times") for note in found["notes"])
+
+
+@pytest.mark.parametrize(
     ("arguments", "found"),
     [
         (("--names", "one"), "1 name for 2 meshes"),
