@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sd2core.cli.command_parser import command
 from sd2core.cli.output import print_facts, print_json, progress_bar
 from sd2core.options.shared import Json, MeshInput, Overwrite
+
+if TYPE_CHECKING:
+    from sd2core.mesh.sequence import MeshSequence
 
 
 class Refine(MeshInput, Overwrite, Json):
@@ -18,7 +22,7 @@ class Refine(MeshInput, Overwrite, Json):
     out : FILE
         the mesh to write (.zarr or .npz)
     video : FILE
-        the video that it was made from, for its size and its frames per second
+        the video that it was made from, for its size, and its times where the mesh has none
     """
 
     out: Path
@@ -40,10 +44,9 @@ def _refine(options: Refine) -> None:
     import numpy as np
 
     from sd2core.body.mesh_refining import refined
-    from sd2core.cli.reading import mesh_and_its_sensor
     from sd2core.io.mesh import save_mesh
 
-    mesh, _ = mesh_and_its_sensor(_filled_by_video(options))
+    mesh = _read(options)
     with progress_bar("Finding the jitter") as progress:
         smooth = refined(mesh.body(), progress)
     with progress_bar("Writing the mesh") as progress:
@@ -68,18 +71,21 @@ def _refine(options: Refine) -> None:
         print(f"note: {note}")
 
 
-def _filled_by_video(options: Refine) -> Refine:
-    """Options that a video supplies for an estimator's file, where they are not typed."""
+def _read(options: Refine) -> MeshSequence:
+    """Mesh with size and times of the video, where neither its file nor an option has them."""
+    from sd2core.cli.reading import mesh_and_its_sensor
+    from sd2core.io.mesh import NO_TIMES
     from sd2core.io.mesh_models import is_estimate
     from sd2core.io.video import open_video
 
     if options.video is None:
-        return options
+        return mesh_and_its_sensor(options)[0]
     with open_video(options.video) as video:
-        size, rate = (video.width, video.height), video.timebase.frames_per_s
-    estimate = options.mesh.exists() and is_estimate(options.mesh)
-    return replace(
-        options,
-        fps=options.fps or rate,
-        image_size=options.image_size or (size if estimate else None),
-    )
+        size, clock = (video.width, video.height), video.timebase
+    if options.image_size is None and options.mesh.exists() and is_estimate(options.mesh):
+        options = replace(options, image_size=size)
+    mesh, _ = mesh_and_its_sensor(options)
+    if NO_TIMES not in mesh.notes:
+        return mesh
+    mesh, _ = mesh_and_its_sensor(replace(options, fps=clock.frames_per_s))
+    return replace(mesh, timebase=clock) if len(clock) == mesh.frame_count else mesh

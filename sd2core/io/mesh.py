@@ -45,6 +45,12 @@ _KNOWN = (
     "or the output of an estimator (.pkl, .npz, .npy, .pt, .json)"
 )
 
+NO_TIMES = (
+    "The file holds no times: 30 frames/s are assumed. Pass --fps with the video's rate, every"
+    " velocity is proportional to it."
+)
+"""Note on a mesh whose frame rate was assumed."""
+
 
 def load_mesh(
     path: Path | str,
@@ -304,10 +310,7 @@ def _times(raw: RawMesh, frames_per_s: float | None, source: str) -> NDArray[np.
     rate = frames_per_s or raw.frames_per_s
     if rate is None:
         rate = 30.0
-        raw.notes.append(
-            "The file holds no times: 30 frames/s are assumed. Pass --fps with the video's rate, "
-            "every velocity is proportional to it."
-        )
+        raw.notes.append(NO_TIMES)
     elif not (np.isfinite(rate) and rate > 0):
         raise Sd2Error(f"{source}: the frame rate is {rate}", "a positive number of frames per s")
     numbers = np.arange(count) if raw.frame_numbers is None else raw.frame_numbers

@@ -9,6 +9,7 @@ import joblib
 import numpy as np
 import pytest
 from cli_outcome import Sd2
+from numbered_videos import write_video
 
 from sd2core.files.resources import resource_path
 from sd2core.io.mesh import load_mesh
@@ -59,3 +60,17 @@ def test_the_video_says_size_and_rate(sd2: Sd2, tmp_path: Path) -> None:
     assert outcome.code == 0, outcome.err
     assert "weak-perspective camera" in outcome.out
     assert load_mesh(out).frame(0)[:, 2].mean() > 1.0
+
+
+def test_the_video_times_only_a_mesh_that_has_no_times(sd2: Sd2, tmp_path: Path) -> None:
+    """Of uneven frames each stays at its own time, the file's before the video's."""
+    times_ms = np.cumsum(np.random.default_rng(1).choice([33, 71], 40))
+    video = write_video(tmp_path / "uneven.mkv", 40, times_ms=times_ms.tolist())
+    given, out = jittering(tmp_path / "given.npz", 40), tmp_path / "smooth.npz"
+    vertices, own_s = np.load(given)["vertices"], np.arange(40) / 25.0
+    of_the_video_s = (times_ms - times_ms[0]) / 1000.0
+    for content, times_s in (({"times_s": own_s}, own_s), ({}, of_the_video_s)):
+        np.savez(given, vertices=vertices, **content)
+        outcome = sd2("refine", given, "--video", video, "--out", out, "--overwrite")
+        assert outcome.code == 0, outcome.err
+        assert load_mesh(out).times_s == pytest.approx(times_s)
