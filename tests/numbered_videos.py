@@ -42,6 +42,7 @@ def write_video(
     rotation: int | None = None,
     pixels: str = "yuv420p",
     container_options: dict[str, str] | None = None,
+    aspect: Fraction | None = None,
 ) -> Path:
     """Encode numbered frames, evenly at ``rate`` or at ``times_ms``."""
     with av.open(str(path), "w", options=container_options or {}) as container:
@@ -50,6 +51,8 @@ def write_video(
         stream.pix_fmt = pixels
         if times_ms is not None:
             stream.codec_context.time_base = Fraction(1, 1000)
+        if aspect is not None:
+            stream.codec_context.sample_aspect_ratio = aspect
         if rotation is not None:
             stream.set_display_rotation(rotation)
         for number in range(frames):

@@ -128,12 +128,20 @@ class VideoReader:
             raise
         self._turned = Upright.of(first)
         self._notes.extend(self._turned.notes)
-        self._size = (first.width, first.height)
+        # Of an absurd ratio nothing is believed.
+        aspect = self._stream.sample_aspect_ratio or 1
+        stretch = float(aspect) if 0.1 < aspect < 10 else 1.0
+        self._size = (round(first.width * stretch), first.height)
         self.width, self.height = self._size[:: -1 if self._turned.swaps else 1]
-        aspect = self._stream.sample_aspect_ratio
-        if aspect and aspect != 1:
+        if self._size[0] != first.width:
             self._notes.append(
-                f"Pixels are not square (ratio {aspect}); the picture is shown as stored."
+                f"Pixels are not square (ratio {aspect}): the picture is stretched to"
+                f" {self.width} × {self.height}, as players show it."
+            )
+        if first.interlaced_frame:
+            self._notes.append(
+                "The picture is interlaced: its lines are of two moments, and what moves is torn."
+                " 'ffmpeg -i FILE -vf bwdif copy.mp4' makes a picture of each."
             )
 
     @property

@@ -3,6 +3,7 @@ from __future__ import annotations
 import random
 import struct
 import threading
+from fractions import Fraction
 from pathlib import Path
 
 import av
@@ -355,6 +356,27 @@ def test_pictures_are_turned_and_mirrored(tmp_path: Path, rows: tuple[int, int, 
         assert image.shape == (reader.height, reader.width, 3) == expected.shape
         assert np.abs(image.astype(int) - expected).mean() < 12
         assert ["mirrored" in note for note in reader.notes] == [True] * (a * d - b * c < 0)
+
+
+@pytest.mark.parametrize(("rotation", "shown"), [(None, (64, 171)), (90, (171, 64))])
+def test_pixels_that_are_not_square_are_stretched(
+    tmp_path: Path, rotation: int | None, shown: tuple[int, int]
+) -> None:
+    """A body is measured in a picture; one squeezed by a camera would be a slim one."""
+    path = tmp_path / "v.mp4"
+    write_video(path, 3, options={"crf": "1"}, rotation=rotation, aspect=Fraction(4, 3))
+    with open_video(path) as reader:
+        image = reader.read(2)
+        assert (reader.height, reader.width) == image.shape[:2] == shown
+        assert number_in(np.rot90(image, 0 if rotation is None else -1)) == 2
+        assert any(f"stretched to {shown[1]} × {shown[0]}" in note for note in reader.notes)
+
+
+def test_an_interlaced_picture_says_so(tmp_path: Path) -> None:
+    options = {"flags": "+ilme+ildct"}
+    write_video(tmp_path / "v.mpg", 3, codec="mpeg2video", rate=25, options=options)
+    with open_video(tmp_path / "v.mpg") as reader:
+        assert any("interlaced" in note for note in reader.notes)
 
 
 def test_colours_are_red_green_blue(tmp_path: Path) -> None:
