@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 from sd2core.body.camera import camera_of
 from sd2core.body.fit_video import (
@@ -24,13 +26,13 @@ from sd2core.body.landmark_models import landmark_models
 from sd2core.body.landmarks import find_landmarks
 from sd2core.body.people import SeenPerson, chosen_people, find_people
 from sd2core.body.solve import one_thread
-from sd2core.files.atomic import atomic_write_text
+from sd2core.files.atomic import atomic_write_json
 from sd2core.io.video import open_video
 from sd2core.options.fitting import meshes_of
 from sd2core.progress import Progress, silent
 
-_STATURE = "stature.txt"
-"""File in the folder of a fit: what the floor told of the person's height, in metres."""
+_RUN = "people.json"
+"""File in the folder of a fit: of which run it is, and what the floor told of the height."""
 
 
 def people_to_fit(
@@ -95,7 +97,8 @@ def fit_people(
     partials = [each.with_name(each.name + PARTIAL) for each in outs]
     for each in outs:
         check_fit_output(each)
-    stopped = not restart and any(each.exists() for each in partials)
+    run = _run_of(path, people, choices)
+    stopped = not restart and any(_told(each, run) for each in partials)
     for mesh, partial in zip(outs, partials, strict=True):
         if not (stopped and mesh.exists()):
             partial.mkdir(exist_ok=True)  # what is left to do
@@ -111,6 +114,7 @@ def fit_people(
             choices,
             models,
             restart,
+            run,
         )
     )
     for row in left:
@@ -128,6 +132,28 @@ def fit_people(
         yield people[row], outs[row], chosen[row], made
 
 
+def is_stopped(path: Path, out: Path, people: Sequence[SeenPerson], choices: FitChoices) -> bool:
+    """True where :func:`fit_people` was stopped with the same video, people and choices."""
+    outs = meshes_of(out, [each.number for each in people])
+    run = _run_of(path, people, choices)
+    return any(_told(each.with_name(each.name + PARTIAL), run) for each in outs)
+
+
+def _run_of(path: Path, people: Sequence[SeenPerson], choices: FitChoices) -> str:
+    """What two runs have in common that give the same meshes."""
+    about = path.stat()
+    numbers = [each.number for each in people]
+    return json.dumps([path.name, about.st_size, about.st_mtime_ns, numbers, asdict(choices)])
+
+
+def _told(partial: Path, run: str) -> dict[str, Any]:
+    """What the folder of a fit holds of a run; empty where it is of none, or another."""
+    with suppress(OSError, ValueError):
+        told: dict[str, Any] = json.loads((partial / _RUN).read_text())
+        return told if told.get("run") == run else {}
+    return {}
+
+
 def _for_the_rest(report: FitReport) -> FitReport:
     """Report of a fit that has begun, whose landmarks are there already."""
 
@@ -143,10 +169,11 @@ def _with_statures(
     choices: FitChoices,
     models: Path | None,
     restart: bool,
+    run: str,
 ) -> dict[int, FitChoices]:
     """Choices of each of several people, with the stature that the common floor tells.
 
-    Landmarks and statures are kept in the folders of the fits.
+    Landmarks and statures are kept in the folders of the fits; statures only for the same run.
     """
     feet, known = {}, {}
     with open_video(path) as video:
@@ -166,8 +193,8 @@ def _with_statures(
                     workspace=partial / LANDMARKS,
                 )
                 feet[row] = standing_feet(track, camera)
-            with suppress(OSError, ValueError):
-                known[row] = float((partial / _STATURE).read_text())
+            if told := _told(partial, run):
+                known[row] = told["stature_m"]
     first_m = choices.stature_m if 0 in people else None
     statures_m = dict(zip(feet, statures_on_one_floor(list(feet.values()), first_m), strict=True))
     chosen = {}
@@ -177,6 +204,5 @@ def _with_statures(
             chosen[row] = choices
         else:
             chosen[row] = replace(choices, stature_m=stature_m, stature_by_floor=True)
-        if stature_m is not None:
-            atomic_write_text(partial / _STATURE, str(stature_m))
+        atomic_write_json(partial / _RUN, {"run": run, "stature_m": stature_m})
     return chosen

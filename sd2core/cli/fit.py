@@ -189,8 +189,7 @@ def _tell_end(options: Fit, meshes: list[tuple[Path, FittedVideo]], seconds: flo
 
 def _fit_people(options: Fit) -> None:
     """Fit everybody, or some."""
-    from sd2core.body.fit_people import fit_people, people_to_fit
-    from sd2core.body.fit_video import PARTIAL
+    from sd2core.body.fit_people import fit_people, is_stopped, people_to_fit
 
     assert options.out is not None
     choices, begun_s = _choices(options), time.perf_counter()
@@ -201,9 +200,9 @@ def _fit_people(options: Fit) -> None:
         people = people_to_fit(options.video, wanted, choices, report, options.models)
         numbers = [each.number for each in people]
         outs = meshes_of(options.out, numbers)
-        stopped = any(mesh.with_name(mesh.name + PARTIAL).exists() for mesh in outs)
+        continues = not options.restart and is_stopped(options.video, options.out, people, choices)
         for mesh in outs:
-            refuse_existing(mesh, options.overwrite or (stopped and not options.restart))
+            refuse_existing(mesh, options.overwrite or continues)
 
         def report_of(number: int) -> FitReport:
             return (

@@ -10,8 +10,12 @@ import pytest
 from cli_outcome import Sd2
 from filmed_people import crossing, film, swiping
 
+from sd2core.body.fit_people import fit_people, people_to_fit
+from sd2core.body.fit_video import FitChoices, FitReport
 from sd2core.body.landmark_models import LandmarkModels
+from sd2core.io.fitted import fitted_camera
 from sd2core.io.mesh import load_mesh
+from sd2core.progress import silent
 
 
 @pytest.fixture(scope="module")
@@ -91,10 +95,24 @@ def test_who_is_alone_is_fitted_as_without_a_list(sd2: Sd2, tmp_path: Path) -> N
 def test_a_stopped_run_makes_what_is_left(video: Path, sd2: Sd2, tmp_path: Path) -> None:
     words = ["fit", video, "--people", "all", "--resolution", "low"]
     words += ["--landmark-model", "full", "--out", tmp_path / "two.npz"]
-    assert sd2(*words, "--people", "2").code == 0  # one alone has the name that was given
-    (tmp_path / "two.npz").rename(tmp_path / "two-1.npz")
-    (tmp_path / "two-2.npz.partial").mkdir()
+    choices = FitChoices(resolution="low", landmark_model="full")
+    report = FitReport(lambda _: silent, lambda *_: None, lambda *_: None)
+    people = people_to_fit(video, (), choices, report)
+
+    def stop_after_one() -> None:
+        next(fit_people(video, tmp_path / "two.npz", people, choices, lambda _: report))
+
+    def camera_of(person: int) -> str:
+        camera = fitted_camera(tmp_path / f"two-{person}.npz")
+        return "" if camera is None else camera.source
+
+    stop_after_one()
+    other = (*words, "--field-of-view", "70")
+    assert "two-1.npz exists" in sd2(*other).err  # by another camera it is not done
+    assert sd2(*other, "--overwrite").code == 0
+    assert [camera_of(1), camera_of(2)] == ["user", "user"]
+    stop_after_one()
     written = (tmp_path / "two-1.npz").stat().st_mtime_ns
     assert sd2(*words).code == 0
-    assert (tmp_path / "two-2.npz").exists()
+    assert [camera_of(1), camera_of(2)] == ["default", "default"]
     assert (tmp_path / "two-1.npz").stat().st_mtime_ns == written
