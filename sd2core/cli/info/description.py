@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from sd2core.files.recording_json import CameraEntry
     from sd2core.imu.signals import InertialSignals
     from sd2core.io.radar.capture import RadarCapture
     from sd2core.io.radar.kkt import RecordedMap
@@ -80,7 +81,7 @@ def describe_recording(recording: Recording, parts: list[Description]) -> Descri
     facts = {
         "title": recording.title + (" (simulated)" if recording.simulated else ""),
         "person": recording.subject,
-        "camera": _camera(recording),
+        "camera": _camera(recording.camera),
         "sensor": recording.sensor.words,
         "things": "; ".join(thing.words for thing in recording.things),
         "other people": "; ".join(body.words for body in recording.bodies),
@@ -143,6 +144,10 @@ def describe_video(path: Path, video: VideoReader) -> Description:
 
 def describe_mesh(path: Path, mesh: MeshSequence) -> Description:
     """Describe a mesh by its first frame; a long one is not read whole."""
+    from sd2core.io.fitted import fit_of, fitted_camera
+
+    fit = fit_of(path)
+    found, stature_m = fit.get("notes"), fit.get("stature_m")
     first = mesh.frame(0)
     low, high = first.min(axis=0).tolist(), first.max(axis=0).tolist()
     face_count = 0 if mesh.faces is None else len(mesh.faces)
@@ -155,8 +160,10 @@ def describe_mesh(path: Path, mesh: MeshSequence) -> Description:
         "frames_without_person": _absent(mesh.present),
         "first_frame_min_m": low,
         "first_frame_max_m": high,
-        "notes": list(mesh.notes),
+        "notes": [*mesh.notes, *map(str, found if isinstance(found, list) else ())],
     }
+    if fit:
+        data["fit"] = fit
     if mesh.uncertainty is not None:
         data["limbs"] = list(mesh.uncertainty.limbs)
     facts = {
@@ -169,8 +176,12 @@ def describe_mesh(path: Path, mesh: MeshSequence) -> Description:
             f"{axis} {a:.2f} to {b:.2f}" for axis, a, b in zip("xyz", low, high, strict=True)
         )
         + " m",
+        "camera": _camera(fitted_camera(path)),
+        "stature": f"{stature_m:g} m ({fit.get('stature_source')})"
+        if isinstance(stature_m, float | int)
+        else "",
     }
-    return Description(f"Mesh {path}", data, facts, mesh.notes)
+    return Description(f"Mesh {path}", data, facts, tuple(data["notes"]))
 
 
 def describe_radar(path: Path) -> Description:
@@ -413,8 +424,7 @@ def limit_facts(config: RadarConfig) -> dict[str, str]:
     }
 
 
-def _camera(recording: Recording) -> str:
-    camera = recording.camera
+def _camera(camera: CameraEntry | None) -> str:
     if camera is None:
         return ""
     size = f" at {camera.width} x {camera.height}" if camera.width and camera.height else ""

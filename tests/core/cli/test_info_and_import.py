@@ -25,6 +25,22 @@ def test_a_mesh(sd2: Sd2, plate: Path) -> None:
     assert data["first_frame_max_m"] == pytest.approx([0.1, 0.1, 3.0])
 
 
+@pytest.mark.parametrize("notes", [["Left empty: 3 frames."], None])
+def test_a_fitted_body_says_what_was_found_and_assumed(
+    sd2: Sd2, plate: Path, notes: list[str] | None
+) -> None:
+    """A word of the fit that is damaged is passed over."""
+    camera = {"focal_px": 612.5, "width": 640, "height": 480, "source": "default"}
+    fit = {"camera": camera, "stature_m": 1.72, "stature_source": "default", "notes": notes}
+    with np.load(plate) as arrays:
+        np.savez(plate, **arrays, fit=np.array(json.dumps(fit)))
+    out = sd2("info", plate).out
+    assert "focal length 612 pixels at 640 x 480 (default)" in out
+    assert "stature      1.72 m (default)" in out
+    assert ("note: Left empty" in out) == bool(notes)
+    assert json.loads(sd2("info", plate, "--json").out)["fit"] == fit
+
+
 def test_a_mesh_is_read_as_told(sd2: Sd2, plate: Path) -> None:
     data = json.loads(sd2("info", plate, "--scale", "0.5", "--fps", "10", "--json").out)
     assert data["frames_per_s"] == pytest.approx(10)
