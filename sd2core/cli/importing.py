@@ -303,6 +303,7 @@ def _set(options: Set) -> None:
     from sd2core.cli.reading import mesh_reading, refuse_unused_mesh_options
     from sd2core.files.paths import plain_path
     from sd2core.files.resources import is_bundled
+    from sd2core.io.mesh_models import is_estimate
     from sd2core.labels.field_edits import rename_persons
     from sd2core.mesh.bodies import renamed
     from sd2core.recording.recording import open_recording
@@ -333,9 +334,13 @@ def _set(options: Set) -> None:
     reading = mesh_reading(options).options()
     recording.mesh_reading = before.model_copy(update=reading)
     _refuse_unused_channel(recording, options)
-    if options.video is not None or options.mesh is not None:
-        recording.camera = None
+    if given(options, ("video", "mesh", "focal_px")):
+        # Where an estimator's mesh lies depends on the focal length that it assumed.
+        told = options.video or options.focal_px or (options.mesh and is_estimate(options.mesh))
+        known, recording.camera = recording.camera, None
         recording.learn_camera()
+        if recording.camera is None and not told:
+            recording.camera = known
     if options.radar is not None and options.radar_offset_s is None:
         recording.learn_offset()
     if options.body_model is not None:

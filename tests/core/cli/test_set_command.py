@@ -11,7 +11,9 @@ import pytest
 from cli_outcome import Sd2
 from swinging_recordings import recording
 
+from sd2core.files.recording_json import CameraEntry
 from sd2core.files.resources import resource_path
+from sd2core.io.mesh import save_mesh
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.pairs.store import read_pairs
 from sd2core.placements.body_extent import BodyExtent
@@ -64,6 +66,19 @@ def test_another_mesh_comes_with_its_own_reading(sd2: Sd2, one: Recording, tmp_p
     found = open_recording(one.folder)
     assert found.mesh == other
     assert found.mesh_reading.frames_per_s is None
+
+
+def test_the_camera_is_the_videos_until_another_is_told(
+    sd2: Sd2, one: Recording, tmp_path: Path
+) -> None:
+    """A mesh that knows of no camera leaves the one that is known; a focal length replaces it."""
+    one.camera = CameraEntry(focal_px=900.0, source="user")
+    one.save()
+    save_mesh(one.load_mesh(), tmp_path / "other.npz")
+    assert sd2("set", one.folder, "--mesh", tmp_path / "other.npz").code == 0
+    assert open_recording(one.folder).focal_px(640, 480) == 900
+    assert sd2("set", one.folder, "--focal-px", "700").code == 0
+    assert open_recording(one.folder).focal_px(640, 480) == 700
 
 
 def test_a_part_can_be_taken_out(sd2: Sd2, one: Recording) -> None:
