@@ -116,8 +116,9 @@ class Fit(Overwrite, Fitting, JsonAndProgress):
             raise OptionError(
                 "--person-frame is given without --person-box", "the rectangle in that frame"
             )
-        if self.people and self.person_box is not None:
-            raise OptionError("--people is given with --person-box", "one of them")
+        for name, value in (("--person-box", self.person_box), ("--landmarks", self.landmarks)):
+            if self.people and value is not None:
+                raise OptionError(f"--people is given with {name}", "one of them")
         if self.out is None and self.people != LIST:
             raise OptionError("--out is not given", "the mesh to write")
 

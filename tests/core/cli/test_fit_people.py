@@ -41,6 +41,7 @@ def test_a_list_needs_no_output(video: Path, sd2: Sd2) -> None:
         (["--people", "all"], "--out is not given"),
         (["--people", "everyone", "--out", "x.zarr"], "none of all, list"),
         (["--people", "1", "--person-box", "1,1,9,9", "--out", "x.zarr"], "--person-box"),
+        (["--people", "1", "--landmarks", "l.npz", "--out", "x.zarr"], "--landmarks"),
     ],
 )
 def test_what_cannot_be_is_refused(words: list[str], message: str, sd2: Sd2) -> None:
