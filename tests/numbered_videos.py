@@ -43,9 +43,11 @@ def write_video(
     pixels: str = "yuv420p",
     container_options: dict[str, str] | None = None,
     aspect: Fraction | None = None,
+    metadata: dict[str, str] | None = None,
 ) -> Path:
     """Encode numbered frames, evenly at ``rate`` or at ``times_ms``."""
     with av.open(str(path), "w", options=container_options or {}) as container:
+        container.metadata.update(metadata or {})
         stream = container.add_stream(codec, rate=rate, options=options or {})
         stream.width, stream.height = size
         stream.pix_fmt = pixels

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -138,6 +140,15 @@ class VideoReader:
                 f"Pixels are not square (ratio {aspect}): the picture is stretched to"
                 f" {self.width} × {self.height}, as players show it."
             )
+        with suppress(ValueError):  # as Android's cameras write it
+            taken = float(self.metadata.get("com.android.capture.fps", ""))
+            shown = self.timebase.frames_per_s
+            if 0 < taken < math.inf and not 0.67 < taken / shown < 1.5:
+                self._notes.append(
+                    f"The camera took {taken:g} frames/s and the file shows {shown:.4g}: all is"
+                    f" {shown / taken:.3g} times as fast as it was, velocities too."
+                    f" 'ffmpeg -itsscale {shown / taken:.6g} -i FILE -c copy copy.mp4' mends it."
+                )
         if first.interlaced_frame:
             self._notes.append(
                 "The picture is interlaced: its lines are of two moments, and what moves is torn."

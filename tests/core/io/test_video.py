@@ -372,6 +372,21 @@ def test_pixels_that_are_not_square_are_stretched(
         assert any(f"stretched to {shown[1]} × {shown[0]}" in note for note in reader.notes)
 
 
+@pytest.mark.parametrize(
+    ("taken", "times"), [("240.0", "0.125"), ("1", "30"), ("29.97", ""), ("-", "")]
+)
+def test_slow_motion_and_time_lapse_say_so(tmp_path: Path, taken: str, times: str) -> None:
+    """Else a newcomer's velocities would be wrong by that factor."""
+    write_video(
+        tmp_path / "v.mp4",
+        4,
+        metadata={"com.android.capture.fps": taken},
+        container_options={"movflags": "use_metadata_tags"},
+    )
+    with open_video(tmp_path / "v.mp4") as reader:
+        assert [f"{times} times as fast" in note for note in reader.notes] == [True] * bool(times)
+
+
 def test_an_interlaced_picture_says_so(tmp_path: Path) -> None:
     options = {"flags": "+ilme+ildct"}
     write_video(tmp_path / "v.mpg", 3, codec="mpeg2video", rate=25, options=options)
