@@ -230,7 +230,10 @@ def _place_in_front(raw: RawMesh, entry: dict[Any, Any], path: Path, hints: Mesh
         return
     centres = np.nanmean(vertices[:: max(len(vertices) // 16, 1)], axis=1)  # (n, 3)
     shift_m = _shift(entry, len(vertices), path)
-    if shift_m is None and np.nanmax(np.linalg.norm(centres, axis=1)) > AT_ROOT_M:
+    # A hand before a sensor is near it, and wholly in front.
+    if shift_m is None and (
+        np.nanmax(np.linalg.norm(centres, axis=1)) > AT_ROOT_M or np.nanmin(vertices[..., 2]) > 0
+    ):
         return
     if shift_m is not None:
         sampled = shift_m[:: max(len(vertices) // 16, 1)]

@@ -187,6 +187,14 @@ def test_a_root_centred_mesh_says_what_it_lacks(tmp_path: Path) -> None:
     assert not any("Give its distance" in n for n in mesh.notes)
 
 
+def test_a_hand_close_to_the_camera_is_where_its_file_says(tmp_path: Path) -> None:
+    hand = 0.1 * smpl_like(4, (0.0, 0.0, 3.5))
+    (tmp_path / "hand.pkl").write_bytes(pickle.dumps({"verts": hand}))
+    mesh = load_mesh(tmp_path / "hand.pkl")
+    assert not any("centred" in note for note in mesh.notes)
+    np.testing.assert_array_equal(mesh.read(0, 4), hand)
+
+
 def test_an_impossible_camera_is_named(tmp_path: Path) -> None:
     person = vibe(4)
     person["pred_cam"][2, 0] = -0.1
