@@ -65,13 +65,14 @@ class BodyPoints:
 
 def judge_size(extent_m: float) -> Sd2Error | None:
     """Finding on the largest measure of a body; one beyond ``LARGEST_BODY_M`` is to be refused."""
-    if extent_m < _SMALLEST_BODY_M:
+    if _SMALLEST_BODY_M <= extent_m <= _LIKELY_BODY_M[1]:
+        return None
+    if extent_m <= LARGEST_BODY_M:
+        shown = f"{extent_m:.3g} m" if extent_m > 1 else f"{extent_m * 1000:.3g} mm"
         return Sd2Error(
-            f"The mesh measures {extent_m * 1000:.3g} mm",
+            f"The mesh measures {shown}",
             remedy="When that is not its size in metres, pass --scale with the factor",
         )
-    if extent_m <= LARGEST_BODY_M:
-        return None
     keeping = "(or --scale 1 when the size is right)"
     guess, cure = f"Pass --scale with the factor to metres {keeping}", None
     for factor, unit in ((0.01, "centimetres"), (0.001, "millimetres")):

@@ -144,4 +144,5 @@ def test_sizes_name_their_unit():
     assert judge_size(1.7) is None
     assert judge_size(1700.0).cure.value == 0.001
     assert judge_size(170.0).cure.value == 0.01
-    assert "--scale" in judge_size(0.0017).remedy
+    for wrong_unit_m in (0.0017, 1.7 / 0.3048):  # feet
+        assert "--scale" in judge_size(wrong_unit_m).remedy
