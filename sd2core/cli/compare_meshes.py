@@ -131,8 +131,7 @@ def _print(comparison: Comparison) -> None:
         is_reference = number == comparison.reference
         cells = [one.label, "reference" if is_reference else f"{100 * one.distance_m.mean():.1f}"]
         for group in ("hands", "elbows", "torso"):
-            velocity = one.group(one.velocity_rms_mps, group)
-            same = one.group(one.correlation, group)
+            velocity, same = one.error_mps(group), comparison.group_correlation(number, group)
             cells.append("" if is_reference else f"{velocity:.3f} ({same:.2f})")
         cells.append(f"{one.jitter_mps3.mean():.0f}")
         cells.append("" if is_reference else f"{one.map_l1:.3f}")

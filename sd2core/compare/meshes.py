@@ -46,10 +46,9 @@ class Difference:
     """Of this mesh by itself: RMS third difference, see :func:`sd2core.compare.measures.jitter`."""
     map_l1: float  # relative difference of the smoothed Doppler maps
 
-    def group(self, values: Floats, name: str) -> float:
-        """Mean of one of the arrays over a group of :data:`GROUPS` (RMS of velocities)."""
-        chosen = values[rows_of(GROUPS[name])]
-        return rms(chosen) if values is self.velocity_rms_mps else float(np.mean(chosen))
+    def error_mps(self, group: str) -> float:
+        """RMS difference of the velocities over a group of :data:`GROUPS`."""
+        return rms(self.velocity_rms_mps[rows_of(GROUPS[group])])
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +70,17 @@ class Comparison:
     maps: tuple[DopplerMap, ...]
     differences: tuple[Difference, ...]  # of every mesh, the reference included
     notes: tuple[str, ...]  # the meshes' own; interpolated, carried over or omitted parts
+
+    def group_correlation(self, number: int, group: str) -> float:
+        """Correlation of a mesh's velocities with the reference's, over all joints of a group.
+
+        A joint that rests counts little beside one that moves.
+        """
+        rows = rows_of(GROUPS[group])
+        one, reference = (
+            self.velocity_mps[each][self.measured][:, rows] for each in (number, self.reference)
+        )
+        return correlation(one, reference)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything but the curves and maps, for JSON."""

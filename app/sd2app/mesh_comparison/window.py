@@ -96,7 +96,7 @@ class ComparisonWindow(QWidget):
         if difference is None:
             return ""
         distance_cm = 100 * difference.distance_m.mean()
-        error = difference.group(difference.velocity_rms_mps, "hands")
+        error = difference.error_mps("hands")
         return (
             f"Joints {distance_cm:.1f} cm apart · hands' velocity off by {error:.2f} m/s ·"
             f" Doppler maps differ by {difference.map_l1:.2f} (relative L1)"

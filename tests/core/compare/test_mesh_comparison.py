@@ -72,6 +72,19 @@ def test_an_approach_is_a_difference_of_velocity(mesh: MeshSequence) -> None:
     assert found.differences[1].map_l1 > 0.1
 
 
+def test_a_hand_at_rest_does_not_spoil_the_correlation_of_both(mesh: MeshSequence) -> None:
+    """The left one sways by a millimetre, the other way in the second mesh."""
+    sway_m = 1e-3 * np.sin(8.0 * TIMES)[:, None, None] * np.array([0.0, 0.0, 1.0])
+    vertices = np.asarray(mesh.vertices)
+    left = vertices[..., :1] > vertices[0, :, 0].mean() + 0.1
+    pair = [changed(mesh, vertices + sign * left * sway_m) for sign in (1, -1)]
+    found = compare_meshes(pair, ["a", "b"])
+    still, waves = rows_of(("hand.L", "hand.R"))
+    assert found.differences[1].correlation[still] < -0.9
+    assert found.differences[1].correlation[waves] > 0.9
+    assert found.group_correlation(1, "hands") > 0.9
+
+
 def test_the_maps_of_half_the_motion_differ(mesh: MeshSequence) -> None:
     vertices = np.asarray(mesh.vertices)
     half = 0.5 * (vertices + vertices.mean(axis=0))
