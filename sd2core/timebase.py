@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -25,6 +26,9 @@ class Timebase:
     ----------
     times_s : array_like, shape (T,)
         Strictly increasing times in seconds, at least one.
+    first_number : int, optional
+        Number of the first frame in files and on screen: negative where frames lie before those
+        of the video, which are numbered from 0.
 
     Raises
     ------
@@ -42,8 +46,9 @@ class Timebase:
     """
 
     times_s: NDArray[np.float64]
+    first_number: int = 0
 
-    def __init__(self, times_s: ArrayLike) -> None:
+    def __init__(self, times_s: ArrayLike, first_number: int = 0) -> None:
         times = np.array(times_s, dtype=np.float64)  # (T,)
         if times.ndim != 1 or times.size == 0:
             raise Sd2Error(
@@ -61,6 +66,7 @@ class Timebase:
             )
         times.flags.writeable = False
         object.__setattr__(self, "times_s", times)
+        object.__setattr__(self, "first_number", first_number)
 
     @classmethod
     def regular(cls, frames: int, frames_per_s: float, start_s: float = 0.0) -> Timebase:
@@ -146,4 +152,25 @@ class Timebase:
 
     def shifted(self, offset_s: float) -> Timebase:
         """Timebase with all frames ``offset_s`` later."""
-        return Timebase(self.times_s + offset_s)
+        return Timebase(self.times_s + offset_s, self.first_number)
+
+
+def common_clock(clocks: Sequence[Timebase]) -> Timebase:
+    """Frames of the first clock, which keep their numbers, and of others that reach beyond it.
+
+    A clock that does not touch the ones before it is left out: no user wants to
+    play through the gap.
+    """
+    times_s, first_number = clocks[0].times_s, clocks[0].first_number
+    start_s, end_s = clocks[0].start_s, clocks[0].end_s
+    for clock in clocks[1:]:
+        if clock.end_s < start_s or clock.start_s > end_s:
+            continue
+        # Less than half a frame beyond an end is rounding, not another frame.
+        slack_s = 0.5 * min(clock.frame_duration_s, clocks[0].frame_duration_s)
+        before = clock.times_s[clock.times_s < min(start_s - slack_s, times_s[0])]
+        after = clock.times_s[clock.times_s > max(end_s - slack_s, times_s[-1])]
+        times_s = np.concatenate([before, times_s, after])
+        first_number -= len(before)
+        start_s, end_s = min(start_s, clock.start_s), max(end_s, clock.end_s)
+    return Timebase(times_s, first_number)

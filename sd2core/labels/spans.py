@@ -108,7 +108,10 @@ class Span:
         first, stop = (
             (0, 0) if timebase is None else timebase.frames_between(self.start_s, self.end_s)
         )
-        return ShownFrames(first, stop - 1, stop - first) if stop > first else None
+        if timebase is None or stop <= first:
+            return None
+        number = first + timebase.first_number
+        return ShownFrames(number, number + stop - first - 1, stop - first)
 
     def words(self) -> str:
         """Name of the span in a sentence."""

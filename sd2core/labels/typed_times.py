@@ -69,6 +69,7 @@ def seconds_of(text: str) -> float | None:
 
 
 def _known(frame: int, timebase: Timebase) -> int:
-    if frame >= len(timebase):
-        raise Sd2Error(f"Frame {frame} was typed", f"a frame from 0 to {len(timebase) - 1}")
-    return frame
+    last = timebase.first_number + len(timebase) - 1
+    if frame > last:
+        raise Sd2Error(f"Frame {frame} was typed", f"a frame from 0 to {last}")
+    return frame - timebase.first_number

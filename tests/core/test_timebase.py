@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2core.errors import Sd2Error
-from sd2core.timebase import Timebase
+from sd2core.timebase import Timebase, common_clock
 
 steps = st.lists(st.floats(1e-3, 10.0), min_size=1, max_size=60)
 starts = st.floats(-1e4, 1e4)
@@ -117,3 +117,42 @@ def test_a_time_a_rounding_early_is_that_of_its_frame() -> None:
     times = Timebase.regular(90, 30.0)
     early_s = times.times_s - 1e-10
     assert [times.frame_at(float(time_s)) for time_s in early_s] == list(range(90))
+
+
+def clock(start_s, frames, rate=30.0):
+    return Timebase.regular(frames, rate, start_s)
+
+
+def test_parts_of_equal_length_keep_the_first_clock():
+    first = clock(0.0, 90)
+    np.testing.assert_array_equal(
+        common_clock([first, clock(0.001, 90), clock(0.0, 30, 10.0)]).times_s, first.times_s
+    )
+
+
+def test_what_reaches_beyond_is_added():
+    both = common_clock([clock(0.0, 30), clock(-0.5, 60)])
+    assert both.start_s == -0.5
+    assert abs(both.end_s - 1.5) < 0.02
+    assert np.isin(clock(0.0, 30).times_s, both.times_s).all()
+
+
+def test_a_part_far_away_is_left_out():
+    assert common_clock([clock(0.0, 30), clock(-99_999.0, 30)]).duration_s < 1.1
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(-2, 2), st.integers(1, 60), st.sampled_from([10.0, 25.0, 30.0])),
+        min_size=1,
+        max_size=4,
+    )
+)
+def test_it_is_a_clock_and_holds_the_first(parts):
+    clocks = [clock(*part) for part in parts]
+    joined = common_clock(clocks)
+    assert np.isin(clocks[0].times_s, joined.times_s).all()
+    assert joined.start_s <= clocks[0].start_s
+    assert joined.end_s >= clocks[0].end_s - clocks[0].frame_duration_s
+    kept = [joined.frame_at(time_s) + joined.first_number for time_s in clocks[0].times_s]
+    assert kept == list(range(len(clocks[0])))

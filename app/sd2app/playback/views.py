@@ -66,9 +66,10 @@ class TransportBar(QWidget):
 
     def _refresh(self) -> None:
         playback = self._playback
-        last = len(playback.timebase) - 1
+        number = playback.timebase.first_number
+        last = number + len(playback.timebase) - 1
         self._time.setText(clock_text(playback.time_s))
-        self._frame.setText(f"frame {playback.frame} / {last}")
+        self._frame.setText(f"frame {number + playback.frame} / {last}")
         self._speed.setText(f"{playback.speed:g}×")
 
     def _show_stretch(self) -> None:

@@ -20,7 +20,7 @@ from sd2core.plausibility.spans import judge_spans
 from sd2core.progress import Progress
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.recording.relinking import role_words
-from sd2core.timebase import Timebase
+from sd2core.timebase import Timebase, common_clock
 
 if TYPE_CHECKING:
     from sd2core.io.radar.capture import RadarCapture
@@ -249,26 +249,6 @@ def clock_of(
     if radar is not None:
         clocks.append(radar.timebase.shifted(recording.radar_offset_s))
     return common_clock(clocks)
-
-
-def common_clock(clocks: Sequence[Timebase]) -> Timebase:
-    """Frames of the first clock, and of the others where they reach beyond it.
-
-    A clock that does not touch the ones before it is left out: no user wants to
-    play through the gap.
-    """
-    times_s = clocks[0].times_s
-    start_s, end_s = clocks[0].start_s, clocks[0].end_s
-    for clock in clocks[1:]:
-        if clock.end_s < start_s or clock.start_s > end_s:
-            continue
-        # Less than half a frame beyond an end is rounding, not another frame.
-        slack_s = 0.5 * min(clock.frame_duration_s, clocks[0].frame_duration_s)
-        before = clock.times_s[clock.times_s < start_s - slack_s]
-        after = clock.times_s[clock.times_s > end_s - slack_s]
-        times_s = np.concatenate([before[before < times_s[0]], times_s, after[after > times_s[-1]]])
-        start_s, end_s = min(start_s, clock.start_s), max(end_s, clock.end_s)
-    return Timebase(times_s)
 
 
 def reference_of(values: np.ndarray, bins: Iterable[int] = ()) -> float:

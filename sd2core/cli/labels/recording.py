@@ -11,7 +11,6 @@ from sd2core.cli.output import counted, print_json, progress_bar
 from sd2core.cli.recording_maps import MapName, maps_of, parsed_maps, usual_maps
 from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import SUFFIXES as FIGURES
-from sd2core.options.kinds import NotNegative
 from sd2core.options.records import ARGUMENT, OptionRecord, Place
 from sd2core.options.shared import Json, Overwrite
 
@@ -58,8 +57,8 @@ class DrawnLabels(LabelledRecording, Overwrite):
     """
 
     out: Annotated[Path, Place(endings=FIGURES)]
-    from_s: NotNegative | None = None
-    to_s: NotNegative | None = None
+    from_s: float | None = None
+    to_s: float | None = None
 
 
 class Cut(LabelledRecording, Json):
@@ -97,20 +96,22 @@ def _figure(options: DrawnLabels) -> None:
     from sd2core.figures.maps import Levels, MapRow, draw_maps, save_maps
     from sd2core.recording.recording import open_recording
     from sd2core.sensor import VelocityAxis
+    from sd2core.timebase import common_clock
 
     recording = open_recording(options.recording)
     clock = recording_clock(recording)
     labels = labels_at(options.labels or options.recording, clock)
-    names = _maps(options, recording)
+    maps = maps_of(recording, _maps(options, recording), axis=VelocityAxis())
     rows = [
         MapRow(doppler, _title(name, doppler), _strongest(doppler))
-        for name, doppler in maps_of(recording, names, axis=VelocityAxis()).items()
+        for name, doppler in maps.items()
     ]
+    shown = common_clock([clock, *(doppler.timebase for doppler in maps.values())])
     figure = draw_maps(
         rows,
         Levels(),
-        start_s=clock.start_s if options.from_s is None else options.from_s,
-        end_s=clock.end_s if options.to_s is None else options.to_s,
+        start_s=shown.start_s if options.from_s is None else options.from_s,
+        end_s=shown.end_s if options.to_s is None else options.to_s,
         labels=labels,
         heading=recording.title + (" (simulated)" if recording.simulated else ""),
     )
@@ -213,6 +214,7 @@ def _cut(options: Cut) -> None:
 def _source(options: Cut, recording: Recording, clock: Timebase) -> CutSource:
     from sd2core.cutouts.source import PARTS, CutSource
     from sd2core.sensor import VelocityAxis
+    from sd2core.timebase import common_clock
 
     parts = options.parts.replace(" ", "").split(",")
     if not {*parts} <= {*PARTS}:
@@ -222,14 +224,14 @@ def _source(options: Cut, recording: Recording, clock: Timebase) -> CutSource:
     if recording.mesh is not None and ("mesh" in parts or "maps" in parts):
         with progress_bar("Reading the mesh") as progress:
             mesh = recording.load_mesh(progress)
+    maps = maps_of(recording, names if "maps" in parts else (), mesh, VelocityAxis())
+    clocks = [clock, *(one.timebase for one in (mesh, *maps.values()) if one is not None)]
     return CutSource(
         recording.title,
         recording.simulated,
-        clock,
+        common_clock(clocks),
         recording.video if "video" in parts else None,
         mesh if "mesh" in parts else None,
-        {str(name): one for name, one in maps_of(recording, names, mesh, VelocityAxis()).items()}
-        if "maps" in parts
-        else {},
+        {str(name): one for name, one in maps.items()},
         recording.sensor.position_m,
     )

@@ -312,7 +312,7 @@ def _events(lanes: Sequence[Lane], timebase: Timebase, *, frames: bool) -> list[
             ):
                 event = [time_s, lane.name, span.label, "", comment]
                 if frames:
-                    event.append(timebase.frame_at(time_s))
+                    event.append(timebase.frame_at(time_s) + timebase.first_number)
                 keyed.append(((time_s, side, span.id), event))
     return [event for _, event in sorted(keyed, key=lambda one: one[0])]
 

@@ -116,18 +116,20 @@ class LabelClock:
 
     def of_frames(self, first: int, end: int) -> tuple[float, float]:
         """Times of a half-open range of frames."""
-        known = math.inf if self.timebase is None else len(self.timebase)
-        if not first < end <= known:
+        base = self.timebase
+        least = 0 if base is None else base.first_number
+        known = math.inf if base is None else len(base) + least
+        if not least <= first < end <= known:
             counted_from = "frames, counted from 0"
-            if self.timebase is not None:
+            if base is not None:
                 counted_from = f"frames of the {known} of the recording, counted from 0"
             raise Sd2Error(
                 f"a span from frame {first} up to frame {end}, exclusive",
                 counted_from,
                 "Check that the file is of this recording",
             )
-        if self.timebase is not None:
-            return float(self.timebase.edges_s[first]), float(self.timebase.edges_s[end])
+        if base is not None:
+            return float(base.edges_s[first - least]), float(base.edges_s[end - least])
         assert self.frames_per_s is not None
         return first / self.frames_per_s, end / self.frames_per_s
 
@@ -142,7 +144,7 @@ class LabelClock:
         if not self.timebase.covers(at_s):
             return at_s, at_s + self.timebase.frame_duration_s
         frame = self.timebase.frame_at(at_s)
-        return self.of_frames(frame, frame + 1)
+        return float(self.timebase.edges_s[frame]), float(self.timebase.edges_s[frame + 1])
 
     @property
     def knows_frames(self) -> bool:

@@ -3,55 +3,15 @@ from __future__ import annotations
 import h5py
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from sd2app.session.content import common_clock, load_content, recording_of
+from sd2app.session.content import load_content, recording_of
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
 from sd2core.io.radar import companions
 from sd2core.io.radar.described import RadarDescription, write_description
 from sd2core.sensor import VelocityAxis
-from sd2core.timebase import Timebase
 from tests.core.io.radar.acconeer_files import write_a121
 from tests.core.io.radar.dca1000_files import TiRecording, write_ti
-
-
-def clock(start_s, frames, rate=30.0):
-    return Timebase.regular(frames, rate, start_s)
-
-
-def test_parts_of_equal_length_keep_the_first_clock():
-    first = clock(0.0, 90)
-    np.testing.assert_array_equal(
-        common_clock([first, clock(0.001, 90), clock(0.0, 30, 10.0)]).times_s, first.times_s
-    )
-
-
-def test_what_reaches_beyond_is_added():
-    both = common_clock([clock(0.0, 30), clock(-0.5, 60)])
-    assert both.start_s == -0.5
-    assert abs(both.end_s - 1.5) < 0.02
-    assert np.isin(clock(0.0, 30).times_s, both.times_s).all()
-
-
-def test_a_part_far_away_is_left_out():
-    assert common_clock([clock(0.0, 30), clock(-99_999.0, 30)]).duration_s < 1.1
-
-
-@given(
-    st.lists(
-        st.tuples(st.floats(-2, 2), st.integers(1, 60), st.sampled_from([10.0, 25.0, 30.0])),
-        min_size=1,
-        max_size=4,
-    )
-)
-def test_it_is_a_clock_and_holds_the_first(parts):
-    clocks = [clock(*part) for part in parts]
-    joined = common_clock(clocks)
-    assert np.isin(clocks[0].times_s, joined.times_s).all()
-    assert joined.start_s <= clocks[0].start_s
-    assert joined.end_s >= clocks[0].end_s - clocks[0].frame_duration_s
 
 
 def test_a_model_is_no_part_of_a_recording_and_says_where_it_belongs(tmp_path):

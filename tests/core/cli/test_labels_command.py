@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import importlib
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from cli_outcome import Sd2
 
+from sd2core.io.radar.infineon import write_capture
 from sd2core.labels import files
 from sd2core.labels.formats import FORMATS, read_labels
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.maps import DopplerMap
-from sd2core.recording.recording import Recording
+from sd2core.radar_config import PAPER_RADAR
+from sd2core.recording.recording import Recording, open_recording
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
@@ -353,6 +356,29 @@ def test_spans_are_cut_out(sd2: Sd2, moving_recording: Path, tmp_path: Path) -> 
     refused = sd2("labels", "cut", moving_recording, "--out", out, "--labels", unlabelled)
     assert "none.json has no labelled spans" in refused.err
     assert "sd2 open" in refused.err
+
+
+def test_what_only_the_radar_saw_is_cut_out_and_drawn(
+    sd2: Sd2, moving_recording: Path, tmp_path: Path
+) -> None:
+    """It began two seconds before the mesh, whose frames keep their numbers."""
+    radar = replace(PAPER_RADAR, frame_repetition_s=0.1)
+    samples = np.random.default_rng(1).integers(2000, 2100, (60, 1, 64, 32)).astype(np.uint16)
+    folder = tmp_path / "radar"
+    write_capture(folder, samples, radar, np.arange(60) / 10.0, simulated=True)
+    recording = open_recording(moving_recording)
+    recording.radar, recording.radar_offset_s = folder, -2.0
+    recording.save()
+    written(moving_recording / "labels.json", (-1.5, -0.5, "early"), (0.5, 1.0, "wave"))
+    out = tmp_path / "cuts"
+    sd2("labels", "cut", moving_recording, "--out", out)
+    firsts = [cells(line)[0] for line in (out / "index.csv").read_text().splitlines()[1:]]
+    assert [line.split(",")[5:8] for line in firsts] == [["-15", "-6", "10"], ["10", "19", "10"]]
+    (early,) = out.glob("*early_1")
+    assert len(DopplerMap.load(early / "radar.npz").timebase) == 10
+    figure = "labels", "figure", moving_recording, "--out", tmp_path / "a.svg", "--maps", "radar"
+    sd2(*figure, "--from-s", "-1.5", "--to-s", "0")
+    assert ">early<" in (tmp_path / "a.svg").read_text("utf-8")
 
 
 @pytest.mark.parametrize(

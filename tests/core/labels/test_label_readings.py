@@ -20,9 +20,11 @@ from sd2core.labels.formats import (
     write_labels,
 )
 from sd2core.labels.spans import Labels, Span
-from sd2core.timebase import Timebase
+from sd2core.labels.typed_times import typed_end, typed_start
+from sd2core.timebase import Timebase, common_clock
 
 BASE = Timebase.regular(100, 10.0)  # 0 to 10 s
+EARLIER = common_clock([BASE, Timebase.regular(99, 20.0, -2.0)])  # a radar began 2 s before
 few = settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
@@ -308,7 +310,7 @@ def task(file: str, regions: list[object], **more: object) -> dict[str, object]:
     return {"id": 7, "data": {"video": f"/data/upload/1/{file}"}, "annotations": [annotation]}
 
 
-@pytest.mark.parametrize("base", [BASE, None])
+@pytest.mark.parametrize("base", [BASE, EARLIER, None])
 def test_timelines_count_frames_from_1_to_the_last_one_within(
     tmp_path: Path, base: Timebase | None
 ) -> None:
@@ -344,6 +346,22 @@ def test_our_own_json_is_ours_whatever_its_labels_are_called(tmp_path: Path) -> 
     labels = Labels(spans=(Span(1, "Gestures", 0, 1, "annotations"),))
     write_labels(tmp_path / "a.json", labels, BASE)
     assert read_labels(tmp_path / "a.json") == labels
+
+
+@pytest.mark.parametrize(("name", "frame"), [("csv", "13,24,12"), ("sd2", '"first": 13')])
+def test_frames_are_the_videos_where_a_radar_began_before(
+    tmp_path: Path, name: str, frame: str
+) -> None:
+    """What another program finds at a frame of the video is there."""
+    labels = Labels(spans=(Span(1, "Gestures", 1.3, 2.5, "wave"),))
+    texts = []
+    for number, base in enumerate((BASE, EARLIER)):
+        write_labels(path := tmp_path / f"{number}.{name}", labels, base, name)
+        texts.append(path.read_text("utf-8"))
+    assert frame in texts[0]
+    assert texts[0] == texts[1]
+    assert typed_start("f13", EARLIER) == 1.3
+    assert typed_end("f24", EARLIER) == 2.5
 
 
 def test_formats_that_are_only_read_are_not_written(tmp_path: Path) -> None:
