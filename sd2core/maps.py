@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -30,6 +30,9 @@ FORMAT_VERSION = 1
 
 OF = ": "
 """Between the name of a person and a part, in a scene of several."""
+
+_SHARES = "visible_share", "beyond_share"
+"""Of a provenance: lists of a number per frame."""
 
 _NOTHING, _MUTED = "#e9ebee", "#5a6370"
 """Colours of what is not known."""
@@ -319,12 +322,10 @@ class DopplerMap:
         """
         assert self.limbs is not None
         limbs = self.limbs.by_person[self.limbs.persons.index(person)]
-        shares = ("visible_share", "beyond_share")  # of everybody
-        meta = {name: value for name, value in self.meta.items() if name not in shares}
         return replace(
             self,
             values=limbs.values.sum(axis=0),
-            meta=meta | {"person": person},
+            meta=without_shares(self.meta) | {"person": person},  # they are of everybody
             uncertainty=None,
             limbs=limbs,
         )
@@ -428,6 +429,7 @@ class DopplerMap:
             self,
             values=self.values[:, start:stop],
             timebase=Timebase(self.times_s[start:stop]),
+            meta=_between(self.meta, start, stop),
             present=None if self.present is None else self.present[start:stop],
             uncertainty=None if known is None else known.between(start, stop),
             limbs=None if self.limbs is None else self.limbs.between(start, stop),
@@ -633,6 +635,21 @@ def peak_velocity_mps(
     _check(energies, axis)
     peak = axis.centres_mps[energies.argmax(axis=1)]
     return np.where(energies.max(axis=1) > floor, peak, np.nan)
+
+
+def without_shares(meta: Mapping[str, Any]) -> dict[str, Any]:
+    """Provenance less its shares, a number per frame, also of the map that was denoised."""
+    kept = {name: value for name, value in meta.items() if name not in _SHARES}
+    source = meta.get("input")
+    return kept | ({"input": without_shares(source)} if isinstance(source, dict) else {})
+
+
+def _between(meta: Mapping[str, Any], start: int, stop: int) -> dict[str, Any]:
+    """Provenance of some of the frames."""
+    cut = {name: meta[name][start:stop] for name in _SHARES if isinstance(meta.get(name), list)}
+    source = meta.get("input")
+    made_of = {"input": _between(source, start, stop)} if isinstance(source, dict) else {}
+    return {**meta, **cut, **made_of}
 
 
 def joined(maps: Sequence[DopplerMap]) -> DopplerMap:

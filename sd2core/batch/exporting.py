@@ -21,7 +21,7 @@ from sd2core.files.keys import key_of
 from sd2core.files.limits import open_regular
 from sd2core.files.paths import remove
 from sd2core.files.texts import parse_json, read_json, whole_lines
-from sd2core.maps import DopplerMap, MapKind, joined
+from sd2core.maps import DopplerMap, MapKind, joined, without_shares
 from sd2core.options.exporting import Exporting
 from sd2core.options.records import changed
 from sd2core.progress import Progress
@@ -224,9 +224,9 @@ def _stretch_of(
             stretch = DopplerMap.load(folder.path / row[kind])
             maps.append(stretch.between(low - row["start"], high - row["start"]))
     whole = joined(maps)
-    # One number per frame: of the first stretch only, and of no use to who learns.
-    left_out = ["visible_share", "beyond_share", *(["body_error_l1"] if len(maps) > 1 else [])]
-    kept = {k: v for k, v in whole.meta.items() if k not in left_out}
+    kept = without_shares(whole.meta)  # of the first stretch only, and of no use to who learns
+    if len(maps) > 1:
+        kept.pop("body_error_l1", None)
     return replace(whole, meta=kept)
 
 

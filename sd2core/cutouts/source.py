@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from sd2core.errors import Sd2Error
 from sd2core.labels.spans import Span
-from sd2core.maps import DopplerMap
+from sd2core.maps import DopplerMap, without_shares
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
 from sd2core.version import __version__
@@ -91,7 +91,11 @@ class CutSource:
                 "video": video and {"name": video.name, "bytes": video.stat().st_size},
                 "mesh": None if mesh is None else mesh.source,
                 "maps": {
-                    name: {"kind": one.kind, "unit": one.unit, "provenance": one.meta}
+                    name: {
+                        "kind": one.kind,
+                        "unit": one.unit,
+                        "provenance": without_shares(one.meta),
+                    }
                     for name, one in self.maps.items()
                 },
             },

@@ -44,7 +44,9 @@ def source(video) -> CutSource:
     vertices = np.arange(40 * 4 * 3, dtype=np.float32).reshape(40, 4, 3)
     mesh = MeshSequence(vertices, np.array([[0, 1, 2]], np.int32), CLOCK)
     values = np.arange(8 * 40, dtype=np.float32).reshape(8, 40)
-    doppler = DopplerMap(values, VelocityAxis(8, 2.0), CLOCK, "synthetic", unit="share")
+    shares = {"visible_share": [k / 100 for k in range(40)], "beyond_share": [0.0] * 40}
+    meta = {"source": "walk.npz", **shares, "input": shares}
+    doppler = DopplerMap(values, VelocityAxis(8, 2.0), CLOCK, "synthetic", unit="share", meta=meta)
     return CutSource("walk", True, CLOCK, video, mesh, {"synthetic": doppler}, (0.0, 0.0, 0.0))
 
 
@@ -66,6 +68,8 @@ def test_the_very_frames_with_0_s_at_the_first(source, tmp_path) -> None:
     np.testing.assert_array_equal(doppler.values, source.maps["synthetic"].values[:, 5:15])
     assert doppler.unit == "share"
     assert doppler.meta["cut_out"]["label"] == "wave"
+    for about in (doppler.meta, doppler.meta["input"]):
+        assert about["visible_share"] == [k / 100 for k in range(5, 15)]
     for part in (mesh, doppler):
         np.testing.assert_allclose(part.timebase.times_s, TIMES_S[5:15] - TIMES_S[5], atol=1e-9)
     said = json.loads((path / "span.json").read_text("utf-8"))
@@ -73,6 +77,8 @@ def test_the_very_frames_with_0_s_at_the_first(source, tmp_path) -> None:
     assert said["zero_s"] == WAVE.start_s
     assert said["files"] == ["video.mp4", "mesh.zarr", "synthetic.npz"]
     assert said["simulated"] is True
+    # A number per frame of the whole recording would make the file too long to be read again.
+    assert said["sources"]["maps"]["synthetic"]["provenance"] == {"source": "walk.npz", "input": {}}
 
 
 def test_the_mesh_is_of_whom_the_span_names(source, tmp_path) -> None:
