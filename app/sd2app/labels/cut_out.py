@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ from sd2app.background.quoting import quoted
 from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.manual.help import with_help
+from sd2app.maps.model import SynthesisModel
 from sd2app.session.content import folder_for_command
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
@@ -26,6 +28,7 @@ from sd2core.cli.labels.recording import Cut as CutCommand
 from sd2core.cutouts.cutting import Cut, cut_out, plan_cuts
 from sd2core.cutouts.source import CutSource, Part
 from sd2core.labels.spans import Labels, Span
+from sd2core.maps import DopplerMap
 from sd2core.options.records import words_of
 
 _ABOUT = (
@@ -54,18 +57,17 @@ class CutOutModel(ReportingModel):
     asked = Signal(int, str)  # number of occupied folders, one of them; answer: go_on or give_up
     noted = Signal(str)
 
-    def __init__(self, session: Session, parent: QObject) -> None:
+    def __init__(self, session: Session, synthesis: SynthesisModel, parent: QObject) -> None:
         super().__init__(parent)
-        self._session = session
+        self._session, self._synthesis = session, synthesis
         self._plan: _Plan | None = None
         self._runner = ListedRunner("cut", session.jobs, self, self._receive, self._fail)
 
     def source(self, parts: Iterable[Part] = ("video", "mesh", "maps")) -> CutSource | None:
         """Return the parts of the recording, without maps that are still computed."""
-        content, maps = self._session.document.content, self._session.maps
+        content = self._session.document.content
         if content is None:
             return None
-        files = {"synthetic": maps.synthetic, "denoised": maps.denoised, "radar": maps.real}
         recording = content.recording
         whole = CutSource(
             recording.title,
@@ -73,14 +75,27 @@ class CutOutModel(ReportingModel):
             content.timebase,
             recording.video if content.video is not None else None,
             content.mesh,
-            {
-                name: track.map.shifted(track.offset_s)
-                for name, track in files.items()
-                if track.map is not None and track.covered is None
-            },
+            self._maps(),
             recording.sensor.position_m,
         )
         return whole.only(parts)
+
+    def _maps(self) -> dict[str, DopplerMap]:
+        """Maps that are there to their end, with their provenance."""
+        maps = self._session.maps
+        tracks = {"synthetic": maps.synthetic, "denoised": maps.denoised, "radar": maps.real}
+        made = {
+            name: track.map.shifted(track.offset_s)
+            for name, track in tracks.items()
+            if track.map is not None and track.covered is None
+        }
+        if not self._synthesis.complete:
+            return {name: one for name, one in made.items() if name == "radar"}
+        about = self._synthesis.whole_map().meta
+        kept = {name: about[name] for name in about if name in ("sensor", "simulated")}
+        denoised = {"input": about} | kept
+        more = {"synthetic": about, "denoised": denoised, "radar": {}}
+        return {name: replace(one, meta=one.meta | more[name]) for name, one in made.items()}
 
     def line(self, labels: tuple[str, ...], parts: Sequence[Part]) -> str:
         """Command for a terminal that cuts spans of the saved recording out, by their labels."""

@@ -26,6 +26,7 @@ from sd2app.labels.recovery import LabelNotice, recover
 from sd2app.labels.span_buttons import SpanButtons
 from sd2app.labels.timeline import LabelArea, LabelTimeline, TargetLine
 from sd2app.labels.tracks import LabelTracks, offer_tracks
+from sd2app.maps.model import SynthesisModel
 from sd2app.maps.track_mouse import TimePlot
 from sd2app.session.session import Session
 from sd2app.widgets.layouts import pane
@@ -43,6 +44,7 @@ class LabelsFeature(Feature):
         self,
         session: Session,
         shell: Shell,
+        synthesis: SynthesisModel,
         recovery: Path,
         accept: Callable[[str], object],
         parent: QObject,
@@ -56,7 +58,7 @@ class LabelsFeature(Feature):
         self.tracks = LabelTracks(shell, self.edits)
         self.loop = SpanLoop(labels, session.playback, parent)
         self.over_maps, self.over_all = map_overlay(labels), strip_overlay(labels)
-        self.cut_out = CutOutModel(session, parent)
+        self.cut_out = CutOutModel(session, synthesis, parent)
         self.cut_out.asked.connect(
             lambda *others: ask_about_others(shell.dialog_parent, self.cut_out, *others)
         )

@@ -77,6 +77,7 @@ class Features:
         self.labels = labels = LabelsFeature(
             session,
             shell,
+            maps.synthesis,
             parts.recovery or recovery_folder(),
             lambda label: self.suggestions.model.accept(label),
             parent,

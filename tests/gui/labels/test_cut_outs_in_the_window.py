@@ -16,6 +16,7 @@ from window_models import models_of
 from sd2app.command_line import main
 from sd2app.labels.cut_out import CutOutDialog
 from sd2core.io.video import open_video
+from sd2core.maps import DopplerMap
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -58,6 +59,15 @@ def test_all_spans_with_all_that_there_is(window, qtbot, cuts) -> None:
         assert len(clip) == 18
         # The brightness is the frame number.
         assert float(clip.read(0).mean()) == pytest.approx(40 + 3 * 6, abs=4)
+
+
+def test_a_map_that_is_cut_out_says_how_it_was_made(window, qtbot, cuts) -> None:
+    cut(window, qtbot, "back (1)", "video", "mesh")
+    (made,) = cuts.glob("*_back_*/synthetic.npz")
+    part, whole = DopplerMap.load(made), models_of(window).synthesis.whole_map()
+    assert part.of_simulated
+    assert part.meta["plan"]["text"] == whole.meta["plan"]["text"]
+    assert part.meta["visible_share"] == whole.meta["visible_share"][30:]
 
 
 def test_one_label_and_some_parts_then_something_else(window, qtbot, cuts) -> None:
