@@ -255,6 +255,16 @@ def test_search_filters_and_escape_leaves(labelled) -> None:
     assert QApplication.focusWidget() is not search
 
 
+def test_what_a_filter_hides_is_not_selected_in_the_table(labelled) -> None:
+    press(labelled, "F", CONTROL)
+    QTest.keyClicks(QApplication.focusWidget(), "bac")
+    table(labelled).setFocus()
+    press(labelled, "A", CONTROL)
+    assert [span.label for span in models_of(labelled).labels.selected] == ["back"]
+    press(labelled, "Delete")
+    assert [label for label, *_ in spans(labelled)] == ["there"]
+
+
 def test_statistics_are_counted_and_copied(labelled) -> None:
     buttons = {one.text(): one for one in labelled.findChild(LabelsPanel).findChildren(QToolButton)}
     QTest.mouseClick(buttons["Statistics"], LEFT)
