@@ -34,6 +34,7 @@ from sd2app.maps.quality import (
     refine,
 )
 from sd2app.maps.readout import FrameReader, Readout
+from sd2app.session.content import UNTITLED, folder_for_command
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
 from sd2core.cli.synth import Synth
@@ -42,11 +43,13 @@ from sd2core.doppler.options import PRESETS
 from sd2core.doppler.synthesizer import FrameScattering, MapFrames, Synthesizer, Visibility
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import deep_signature
+from sd2core.io.mesh_models import is_estimate
 from sd2core.maps import DopplerMap
 from sd2core.mesh.made_vertices import same_bodies
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.options.records import words_of
 from sd2core.options.synthesis import CHOSEN
+from sd2core.recording.recording import Recording
 from sd2core.sensor import Vector, VirtualSensor
 
 if TYPE_CHECKING:
@@ -54,6 +57,21 @@ if TYPE_CHECKING:
 
 _REST_MS = 300
 """Pause of a drag that counts as rest."""
+
+
+def _source(recording: Recording) -> dict[str, Any]:
+    """Where a command finds the mesh, and how it reads it, as :class:`Synth` calls it.
+
+    Raises Sd2Error where only a recording could say what is around it.
+    """
+    if recording.folder != UNTITLED or recording.things or recording.bodies or recording.walls:
+        return {"mesh": folder_for_command(recording)}
+    assert recording.mesh is not None
+    read = recording.mesh_options()
+    read.pop("simulated", None)
+    if not is_estimate(recording.mesh):  # the command refuses what would change nothing
+        read.pop("focal_px", None)
+    return {"mesh": recording.mesh, "fps": read.pop("frames_per_s", None), **read}
 
 
 class SynthesisModel(ReportingModel):
@@ -272,10 +290,11 @@ class SynthesisModel(ReportingModel):
             if getattr(used, name, None) != getattr(usual, name, None):
                 chosen[name] = getattr(used, name)
         return Synth(
-            mesh=recording.folder if content.saved else recording.mesh,
+            **_source(recording),
             out=out,
             sensor=self._sensor.position_m,
             limbs=synthesizers.limbs and self.split,
+            uncertainty=self._track.uncertainty is not None,
             **chosen,
         )
 

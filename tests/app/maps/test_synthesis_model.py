@@ -26,8 +26,11 @@ from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.accuracy.trial import synthesizer_for
 from sd2core.doppler.options import PRESETS
 from sd2core.doppler.synthesizer import Synthesizer
+from sd2core.errors import Sd2Error
+from sd2core.files.recording_json import MeshReading
+from sd2core.files.resources import resource_path
 from sd2core.io.mesh import load_mesh
-from sd2core.maps import DopplerMap
+from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.mesh.things import Thing
 from sd2core.mesh.walls import Wall
 from sd2core.sensor import Beam, VirtualSensor
@@ -507,6 +510,34 @@ def test_the_copied_command_makes_the_map_on_screen(
     everything = Synthesizer(scene.load_mesh(), plan.options(PRESETS["paper"]))
     full = everything.map(context.sensor.sensor).values
     assert np.array_equal(full, made.values) == (not plan.left_out)
+
+
+def test_of_a_file_alone_the_copied_command_says_how_it_is_read(
+    context, qtbot, ball, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    reading = MeshReading(frames_per_s=12.0, scale=0.8, turn="z90")
+    context.document.open([ball], {"mesh_reading": reading})
+    wait_until_done(context, qtbot)
+    _, *words = shlex.split(context.synthesis.line("map.npz"))
+    assert run(words) == 0
+    made, shown = DopplerMap.load(Path("map.npz")), context.synthetic.map
+    np.testing.assert_array_equal(made.times_s, shown.times_s)
+    np.testing.assert_array_equal(made.values, shown.values)
+    context.document.assign({"walls": (Wall.named("right", 1.0, 3.0),)})
+    with pytest.raises(Sd2Error, match=r"never saved"):
+        context.synthesis.line("map.npz")
+
+
+def test_the_copied_command_for_the_sample_says_that_it_is_simulated(context, qtbot):
+    """And how well the values are known, where the map on screen does."""
+    context.document.open([resource_path("swipes.sd2")])
+    qtbot.waitUntil(lambda: context.synthetic.map is not None, timeout=60_000)
+    command = context.synthesis.command(Path("map.npz"))
+    assert command.mesh == resource_path("swipes.sd2")
+    values = context.synthetic.map.values
+    context.synthetic.set_uncertainty(CellUncertainty(values, values))
+    assert context.synthesis.command(Path("map.npz")).uncertainty
 
 
 def test_the_library_chooses_for_a_small_scene(qapp, qtbot, ball, compiled_kernels):
