@@ -7,7 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from sd2core.cli.command_parser import Subcommands, add_command, add_declared, command_group
-from sd2core.cli.labels.reading import LabelFile, check_label_output, print_lost, read_named, write
+from sd2core.cli.labels.reading import (
+    LabelFile,
+    check_label_output,
+    media_of,
+    print_lost,
+    read_named,
+    write,
+)
 from sd2core.cli.output import counted, print_json, print_rows
 from sd2core.options.records import Place
 from sd2core.options.shared import Json, Overwrite
@@ -127,7 +134,8 @@ def _convert(options: Convert) -> None:
     """
     digest = check_label_output(options.out)
     labels, clock = read_named(options)
-    lost = write(options.out, labels, clock, options.to, over=digest)
+    media = media_of(options, options.file)
+    lost = write(options.out, labels, clock, options.to, media=media, over=digest)
     if options.json:
         print_json({"path": str(options.out), "spans": len(labels.spans), "not_kept": lost})
         return

@@ -173,6 +173,16 @@ def clock_of(options: FrameTimes, *sources: Path) -> Timebase | None:
     return None
 
 
+def media_of(options: FrameTimes, source: Path) -> Path | None:
+    """Return the video that labels are of, where it or its recording is named."""
+    from sd2core.recording.recording import is_recording, open_recording
+
+    folder = options.recording or source
+    if options.video is not None or not is_recording(folder):
+        return options.video
+    return open_recording(folder).video
+
+
 def with_rate(options: FrameTimes, timebase: Timebase | None, *labels: Labels) -> Timebase | None:
     """Return the same frame times, or those of ``--fps`` for as long as the labels."""
     from sd2core.timebase import Timebase
@@ -226,6 +236,7 @@ def write(
     timebase: Timebase | None,
     file_format: str | None = None,
     *,
+    media: Path | None = None,
     over: str | None = None,
 ) -> list[str]:
     """Write labels by the file's suffix; return the losses as sentences.
@@ -240,6 +251,8 @@ def write(
         Times of frames; None suffices for a ``labels.json``, Sd2Error for other formats.
     file_format : str, optional
         Name of the format; by default by the suffix.
+    media : Path, optional
+        The video, for formats that link to it.
     over : str, optional
         Digest of the file that they replace, where they were made of it: Sd2Error if it was saved
         meanwhile.
@@ -255,10 +268,10 @@ def write(
             "Run the command again",
         )
     if file_format is None and path.suffix.lower() == ".json":
-        files.write_labels(path, labels, timebase=timebase)
+        files.write_labels(path, labels, timebase=timebase, video=media)
         return []
     clock = needed(timebase, str(path))
-    return [str(loss) for loss in write_labels(path, labels, clock, file_format)]
+    return [str(loss) for loss in write_labels(path, labels, clock, file_format, media=media)]
 
 
 def print_lost(lost: list[str]) -> None:

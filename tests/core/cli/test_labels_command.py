@@ -12,6 +12,7 @@ import pytest
 from cli_outcome import Sd2
 
 from sd2core.io.radar.infineon import write_capture
+from sd2core.io.video_writing import write_video
 from sd2core.labels import files
 from sd2core.labels.formats import FORMATS, read_labels
 from sd2core.labels.label_set import Label, LabelSet
@@ -356,6 +357,23 @@ def test_spans_are_cut_out(sd2: Sd2, moving_recording: Path, tmp_path: Path) -> 
     refused = sd2("labels", "cut", moving_recording, "--out", out, "--labels", unlabelled)
     assert "none.json has no labelled spans" in refused.err
     assert "sd2 open" in refused.err
+
+
+@pytest.mark.parametrize("named", ["--video", "--recording", "as the file"])
+def test_converted_labels_link_to_the_video(
+    sd2: Sd2, anna: Path, tmp_path: Path, named: str
+) -> None:
+    """ELAN and BORIS open it with them, as with what the window exports."""
+    video, folder = tmp_path / "walk.mp4", tmp_path / "walk.sd2"
+    write_video(video, (np.full((48, 64, 3), 5 * k, np.uint8) for k in range(40)), 5, (64, 48))
+    folder.mkdir()
+    Recording.create(folder, video=video)
+    written(folder / "labels.json", (1.0, 2.0, "wave"))
+    source = {"--video": video, "--recording": folder}.get(named)
+    words = [folder] if source is None else [anna, named, source]
+    for out in ("a.eaf", "a.boris", "a.json"):
+        sd2("labels", "convert", *words, "--out", tmp_path / out)
+        assert "walk.mp4" in (tmp_path / out).read_text("utf-8")
 
 
 def test_what_only_the_radar_saw_is_cut_out_and_drawn(
