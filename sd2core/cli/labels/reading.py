@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -212,22 +213,29 @@ def needed(timebase: Timebase | None, why: str) -> Timebase:
 
 
 def recording_clock(recording: Recording) -> Timebase:
-    """Return the frame times of a recording: the video's, else the mesh's, else the radar's."""
-    missing = recording.missing()
+    """Return the frame times of a recording: the video's, else the mesh's, and the radar's beyond.
+
+    A radar that cannot be read adds none to those of the others.
+    """
+    from sd2core.timebase import common_clock
+
+    missing, clocks = recording.missing(), []
     if recording.video is not None and "video" not in missing:
-        with recording.open_video() as video:
-            return video.timebase
-    if recording.mesh is not None and "mesh" not in missing:
-        return recording.load_mesh().timebase
+        clocks.append(_video_clock(recording.video))
+    elif recording.mesh is not None and "mesh" not in missing:
+        clocks.append(recording.load_mesh().timebase)
     if recording.radar is not None and "radar" not in missing:
-        radar = recording.load_radar_map() if recording.holds_radar_map else None
-        clock = recording.load_capture().timebase if radar is None else radar.timebase
-        return clock.shifted(recording.radar_offset_s)
-    raise Sd2Error(
-        f"{recording.folder} has no video, mesh or radar capture at hand",
-        "one of them, for the times of frames",
-        "Give the frame rate with --fps",
-    )
+        with suppress(*([Sd2Error] if clocks else [])):
+            radar = recording.load_radar_map() if recording.holds_radar_map else None
+            clock = recording.load_capture().timebase if radar is None else radar.timebase
+            clocks.append(clock.shifted(recording.radar_offset_s))
+    if not clocks:
+        raise Sd2Error(
+            f"{recording.folder} has no video, mesh or radar capture at hand",
+            "one of them, for the times of frames",
+            "Give the frame rate with --fps",
+        )
+    return common_clock(clocks)
 
 
 def write(

@@ -394,6 +394,12 @@ def test_what_only_the_radar_saw_is_cut_out_and_drawn(
     assert [line.split(",")[5:8] for line in firsts] == [["-15", "-6", "10"], ["10", "19", "10"]]
     (early,) = out.glob("*early_1")
     assert len(DopplerMap.load(early / "radar.npz").timebase) == 10
+    shown = json.loads(sd2("labels", "show", moving_recording, "--json").out)["spans"]
+    assert [one["frames"]["first"] for one in shown] == [-15, 10]
+    without = written(tmp_path / "late.json", (0.5, 1.0, "wave"))
+    agreed = json.loads(sd2("labels", "agree", moving_recording, without, "--json").out)
+    assert agreed["frames"] == 40 + 20 + 20  # of the mesh, and of the radar before and after
+    assert agreed["overall"]["observed"] == pytest.approx(1 - 10 / 80)
     figure = "labels", "figure", moving_recording, "--out", tmp_path / "a.svg", "--maps", "radar"
     sd2(*figure, "--from-s", "-1.5", "--to-s", "0")
     assert ">early<" in (tmp_path / "a.svg").read_text("utf-8")
