@@ -40,7 +40,8 @@ class Subjects(OptionRecord):
     Parameters
     ----------
     subjects : LIST
-        subject of each recording, separated by commas (default: each shows another person)
+        subject of each recording, separated by commas (default: whom a recording names, or else
+        each shows another person)
     """
 
     subjects: Words | None = None

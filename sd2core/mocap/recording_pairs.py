@@ -69,7 +69,8 @@ def make_recording_pairs(
     synthesis : SynthesisOptions
         Of the input; axis and nulled bins are the target's, too. By default the paper's.
     subjects : sequence of str, optional
-        People in the recordings; by default a different one in each, named like it.
+        People in the recordings; by default whom each names, or else another in each, named like
+        it.
     limbs : bool
         The input is also split by the parts of the body.
     progress : Progress
@@ -134,7 +135,7 @@ def make_recording_pairs(
 def named_recordings(
     recordings: Sequence[Path], subjects: Sequence[str] | None = None
 ) -> list[tuple[Recording, str]]:
-    """Open recordings, each with its person: by default another in each, named like it.
+    """Open recordings, each with its person: by default whom it names, or another, named like it.
 
     Raises Sd2Error if two are called alike or are one, or there is not one person for each.
     """
@@ -151,7 +152,8 @@ def named_recordings(
             f"{len(subjects)} people are named for {len(folders)} recordings",
             "one for each, in their order",
         )
-    return list(zip(opened, folders if subjects is None else subjects, strict=True))
+    said = [one.subject or name for one, name in zip(opened, folders, strict=True)]
+    return list(zip(opened, said if subjects is None else subjects, strict=True))
 
 
 def check_there(recordings: Sequence[Recording], roles: Sequence[Literal["mesh", "radar"]]) -> None:

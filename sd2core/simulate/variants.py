@@ -93,7 +93,8 @@ def vary_recordings(
         Store of the pairs; what it holds is not made again.
     options : VariantOptions
     subjects : sequence of str, optional
-        People in the recordings; by default a different one in each, named like it.
+        People in the recordings; by default whom each names, or else another in each, named like
+        it.
     progress : Progress
         Counts recordings.
 

@@ -70,6 +70,18 @@ def test_long_recordings_are_cut_and_several_are_several_people(tmp_path, monkey
     assert len({take.key for take in read_pairs(tmp_path / "one.zarr").takes}) == 6
 
 
+def test_recordings_of_one_person_are_of_one_subject(tmp_path: Path) -> None:
+    """Else the person would be in the training and in the test."""
+    folders = []
+    for name, subject in (("a1", "anna"), ("a2", "anna"), ("other", "")):
+        one = recording(tmp_path / f"{name}.sd2")
+        one.subject = subject
+        one.save()
+        folders.append(one.folder)
+    made = make_recording_pairs(folders, tmp_path / "pairs.zarr")
+    assert made.subjects == {"anna": (2, 240), "other": (1, 120)}
+
+
 def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
     whole = recording(tmp_path / "a.sd2").folder
     with pytest.raises(Sd2Error, match="no radar capture"):
