@@ -128,7 +128,17 @@ def subject_of(recordings: Recordings, path: Path, name: str) -> str:
     own = PurePath(name)
     if recordings.subjects == "folder":
         return own.parent.as_posix() if own.parent.name else path.parent.name
-    return own.with_suffix("").as_posix()
+    return _named_in(path) or own.with_suffix("").as_posix()
+
+
+def _named_in(path: Path) -> str:
+    """Return whom a recording names; nobody where it cannot be read, as its inspection tells."""
+    from sd2core.recording.recording import is_recording, open_recording
+
+    try:
+        return open_recording(path).subject if is_recording(path) else ""
+    except Sd2Error:
+        return ""
 
 
 # -- Looking at a recording, once ---------------------------------------------------------------

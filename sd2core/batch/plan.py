@@ -48,8 +48,8 @@ class Recordings(Section):
     """Recordings (``.sd2``), videos and meshes, by name or by pattern, relative to the plan's
     folder; ``**`` is any number of folders."""
     subjects: Literal["recording", "folder"] = "recording"
-    """Subject of a recording that ``subject_of`` does not name: one per recording, or one per
-    folder."""
+    """Subject of a recording that ``subject_of`` does not name: whom it names itself, or else one
+    per recording; or one per folder."""
     subject_of: Mapping[Text, Text] = Field(default_factory=dict)
     """Pattern of a file's name, or of the end of its path, to a subject; the first that fits
     holds."""

@@ -45,6 +45,20 @@ def test_what_lies_in_a_recording_belongs_to_it(tmp_path: Path) -> None:
     assert [named["anna/m1.npz"], named["ben/m1.npz"]] == ["dora", "eve"]
 
 
+def test_recordings_are_of_whom_they_name(tmp_path: Path) -> None:
+    """Else a person of several would be in the training and in the test."""
+    (mesh,) = save_spheres(tmp_path / "meshes", 1, frames=4)
+    for name, subject in (("a1", "anna"), ("a2", "anna"), ("b", "")):
+        one = Recording.create(tmp_path / f"{name}.sd2", mesh=mesh)
+        one.subject = subject
+        one.save()
+    damaged = tmp_path / "c.sd2"
+    damaged.mkdir()
+    (damaged / "recording.json").write_text("{")
+    found = find_origins(Recordings(files=(str(tmp_path / "*.sd2"),)), tmp_path / "out")
+    assert [one.subject for one in found] == ["anna", "anna", "b", "c"]
+
+
 def test_contents_are_hashed_again_only_where_a_file_changed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
