@@ -23,7 +23,6 @@ from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
 from sd2core.pairs.rows import agreed
 from sd2core.pairs.store import PairWriter, Take
-from sd2core.pairs.summary import TakeKey
 from sd2core.progress import Progress, part_of, silent
 from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import Recording, open_recording
@@ -79,7 +78,8 @@ def make_recording_pairs(
     ------
     Sd2Error
         If a recording lacks mesh or radar, two are called alike, there is not one person for each,
-        or frame rates or kinds of radar differ.
+        frame rates or kinds of radar differ, or the store holds takes that were made of something
+        else.
     """
     named = named_recordings(recordings, subjects)
     opened = [recording for recording, _ in named]
@@ -123,7 +123,7 @@ def make_recording_pairs(
         takes, without_s = _takes(recording, subject, synthetic, radar, labels)
         left_out_s += without_s
         for take in takes:
-            if TakeKey(take.subject, take.name, 0) not in writer.done:
+            if not writer.holds(take):
                 writer.append(take)
         count, frames = by_subject.get(subject, (0, 0))
         by_subject[subject] = (

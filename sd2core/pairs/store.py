@@ -231,13 +231,28 @@ class PairWriter:
         self._arrays = {name: growing(self._group, self._path, name) for name in names}
         takes = read_takes(self._path, provenance)
         drop_torn_line(self._path / INDEX_NAME)
-        self._done = {take.key for take in takes}
+        self._done = {take.key: take.rows for take in takes}
         self._frames = max((take.stop for take in takes), default=0)
 
     @property
     def done(self) -> Set[TakeKey]:
         """Keys of the takes written so far."""
-        return self._done
+        return self._done.keys()
+
+    def holds(self, take: Take) -> bool:
+        """True if a take is there; Sd2Error if the one that is there was made of something else."""
+        rows = self._done.get(take.key)
+        if rows is None:
+            return False
+        for name in _ARRAYS:
+            stored = array_in(self._group, self._path, name, "frames")[rows]
+            if not np.array_equal(stored, getattr(take, name)):
+                raise Sd2Error(
+                    f"{self._path} holds the take {take.title} already, made of something else",
+                    "the same mesh, radar, clocks and labels as before",
+                    "Make the pairs anew, under another name",
+                )
+        return True
 
     def append(self, take: Take) -> None:
         """Add one take.
@@ -277,7 +292,7 @@ class PairWriter:
         x, y, z = (float(value) for value in take.sensor_position_m)
         entry = TakeEntry(**take.key._asdict(), start=start, stop=stop, sensor_position_m=(x, y, z))
         append_lines(self._path / INDEX_NAME, [json.dumps(entry.model_dump()) + "\n"])
-        self._done.add(take.key)
+        self._done[take.key] = entry.rows
         self._frames = stop
 
 

@@ -82,6 +82,19 @@ def test_recordings_of_one_person_are_of_one_subject(tmp_path: Path) -> None:
     assert made.subjects == {"anna": (2, 240), "other": (1, 120)}
 
 
+@pytest.mark.parametrize("changed", ["clock", "labels"])
+def test_pairs_of_what_has_changed_since_are_refused(tmp_path: Path, changed: str) -> None:
+    one = recording(tmp_path / "anna.sd2")
+    make_recording_pairs([one.folder], tmp_path / "pairs.zarr")
+    if changed == "clock":
+        one.radar_offset_s += 0.2
+    else:
+        one.spans = []
+    one.save()
+    with pytest.raises(Sd2Error, match="anna-000 already, made of something else"):
+        make_recording_pairs([one.folder], tmp_path / "pairs.zarr")
+
+
 def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
     whole = recording(tmp_path / "a.sd2").folder
     with pytest.raises(Sd2Error, match="no radar capture"):
