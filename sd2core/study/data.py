@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -10,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sd2core.body.parts import splits_everybody
 from sd2core.classify.data import (
     UNKNOWN,
     Clip,
@@ -24,10 +27,11 @@ from sd2core.datasets.clips import clips_of_dataset
 from sd2core.datasets.labelled import clips_of_radar_file, labels_given, unfolded
 from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.datasets.reading import open_dataset
-from sd2core.datasets.recording_sources import radar_map
+from sd2core.datasets.recording_sources import Making, radar_map, recording_sources
 from sd2core.denoise.resample_to_model import SAME_RATE
 from sd2core.doppler import PRESETS
 from sd2core.errors import Sd2Error
+from sd2core.files.paths import make_folder
 from sd2core.io.kinds import kind_of
 from sd2core.io.radar import holds_map
 from sd2core.mocap.recording_pairs import make_recording_pairs
@@ -166,11 +170,22 @@ def _sources(plan: StudyPlan) -> tuple[list[Path], list[ClipSet], list[Take | No
             )
         takes += [None] * (sum(len(each.clips) for each in sets) - len(takes))
     if with_mesh:
-        made = Path(plan.out) / "pairs.zarr"
-        paths, names = zip(*with_mesh, strict=True)
-        make_recording_pairs(paths, made, PRESETS["paper"], subjects=names, limbs=True)
-        stores.append(made)
+        stores.append(_made_pairs(Path(plan.out), *zip(*with_mesh, strict=True)))
     return stores, sets, takes
+
+
+def _made_pairs(out: Path, paths: Sequence[Path], names: Sequence[str]) -> Path:
+    """Pairs of recordings, made anew where these are others or have changed."""
+    sources = recording_sources(paths, names, Making(("synthetic", "simulated", "real")))
+    content = json.dumps([[*one.key, one.fingerprint()] for one in sources])
+    made = out / f"pairs-{hashlib.blake2b(content.encode(), digest_size=8).hexdigest()}.zarr"
+    if not made.exists():
+        make_folder(out)
+        begun = made.with_name(f"begun-{made.name}")
+        limbs = all(splits_everybody(open_recording(path).load_mesh()) for path in paths)
+        make_recording_pairs(paths, begun, PRESETS["paper"], subjects=names, limbs=limbs)
+        begun.rename(made)
+    return made
 
 
 def _of_recording(recording: Recording, subject: str, rate_hz: float | None) -> ClipSet:

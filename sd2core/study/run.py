@@ -14,8 +14,10 @@ import numpy as np
 
 from sd2core.batch.pool import study_client
 from sd2core.denoise.card import DENOISER_PARTS
+from sd2core.denoise.files import find_model
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
+from sd2core.files.digests import cached_digest
 from sd2core.files.paths import make_folder
 from sd2core.files.texts import read_json
 from sd2core.progress import Progress, silent
@@ -186,6 +188,8 @@ def _run_path(folder: Path, plan: StudyPlan, digest: str, task: Task) -> Path:
     )
     denoised = any(one not in ("radar", "simulated", "synthetic") for one in plan.wanted)
     used["denoiser"] = plan.denoiser.model_dump(mode="json") if denoised else None
+    if denoised and plan.denoiser.file is not None:
+        used["model"] = cached_digest(find_model(plan.denoiser.file))
     used["all"] = task.share == max(plan.shares)
     return folder / "runs" / f"{_hash(digest, used, asdict(task))}.json"
 

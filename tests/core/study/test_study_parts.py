@@ -11,12 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_pairs import AXIS, write_pairs
 from study_results import some_results
+from swinging_recordings import recording
 
 from sd2core.classify.data import Clip
 from sd2core.cli import build_parser, run
 from sd2core.errors import Sd2Error
 from sd2core.maps import mean_velocity_mps
 from sd2core.pairs.labelling import TakeLabel, label_pairs
+from sd2core.recording.recording import open_recording
 from sd2core.sensor import VelocityAxis
 from sd2core.study.certainty import adjusted, gain_of
 from sd2core.study.data import StudyData, study_data_of
@@ -42,6 +44,19 @@ def plan_of(store: Path, **more: object) -> StudyPlan:
 @pytest.fixture(scope="module")
 def data(store: Path) -> StudyData:
     return study_data_of(plan_of(store))
+
+
+def test_recordings_are_read_as_they_are_now(tmp_path: Path) -> None:
+    folders = [recording(tmp_path / f"{name}.sd2").folder for name in ("anna", "ben")]
+    plan = plan_of(tmp_path / "unused").model_copy(update={"data": tuple(map(str, folders))})
+    (first, _) = study_data_of(plan).real
+    one = open_recording(folders[0])
+    one.spans = [one.spans[0].model_copy(update={"end_s": 2.5})]
+    one.save()
+    more = tuple(map(str, [*folders, recording(tmp_path / "carla.sd2").folder]))
+    longer, *others = study_data_of(plan.model_copy(update={"data": more})).real
+    assert np.count_nonzero(longer.clip.label) == np.count_nonzero(first.clip.label) + 15
+    assert [one.clip.subject for one in others] == ["ben", "carla"]
 
 
 def test_everybody_is_judged_beside_everybody_else() -> None:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from shutil import copyfile
 
 import pytest
 from small_pairs import write_pairs
 
 from sd2core.cli import build_parser, run
+from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL, find_model
 from sd2core.errors import Sd2Error
 from sd2core.pairs.labelling import TakeLabel, label_pairs
 from sd2core.study import run as study_run
 from sd2core.study import trial
-from sd2core.study.plan import Learner, read_study
+from sd2core.study.plan import Denoiser, Learner, read_study
 from sd2core.study.report import findings_of, untried, write_report
 from sd2core.study.run import run_study
 from sd2core.study.trial import REAL
@@ -75,6 +77,19 @@ def test_a_study_is_whole_and_goes_on(plan: Path, in_this_process: list[int]) ->
     other = chosen.model_copy(update={"speeds": (0.8,)})
     run_study(other)
     assert len(in_this_process) == 7 + 6
+
+
+def test_runs_are_of_the_denoiser_that_its_file_holds(
+    plan: Path, in_this_process: list[int], tmp_path: Path
+) -> None:
+    file = tmp_path / "own.safetensors"
+    chosen = read_study(plan).model_copy(
+        update={"shares": (1.0,), "added": ("denoised",), "denoiser": Denoiser(file=str(file))}
+    )
+    for model, made in ((MAP_MODEL, 6), (LIMBS_MODEL, 12), (MAP_MODEL, 12)):
+        copyfile(find_model(model), file)
+        run_study(chosen)
+        assert len(in_this_process) == made
 
 
 def test_a_study_that_cannot_be_is_no_study_that_was_stopped(
