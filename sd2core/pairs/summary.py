@@ -30,6 +30,7 @@ FORMAT = "sd2-pairs"
 VERSION = 1
 INDEX_NAME = "takes.jsonl"
 _MADE_OF_MARS = "sd2 pairs mars"
+_CAMPAIGN = "sd2 simulate campaign"
 REMAKE = "Make the pairs again with `sd2 simulate campaign` or `sd2 pairs`"
 
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -112,8 +113,18 @@ class PairFacts(BaseModel):
 
     @property
     def known_people(self) -> str:
-        """Recordings whose people are the same in all stores that are made of them, or nothing."""
-        return "MARS" if self.provenance.get("made_by") == _MADE_OF_MARS else ""
+        """What its people are the same in, in all stores that are made of it; or nothing.
+
+        People of recordings are called as users say; a campaign's are drawn by its seed.
+        """
+        made_by = self.provenance.get("made_by")
+        if made_by == _CAMPAIGN:
+            return f"campaign {self.provenance.get('seed')}"
+        made_of = self.provenance.get("recordings", self.provenance.get("sources", []))
+        if any(str(one).endswith(".sd2") for one in made_of):
+            return "recordings"
+        of_mars = made_by == _MADE_OF_MARS or "variant" in self.provenance
+        return "MARS" if of_mars else ""
 
     @property
     def placements(self) -> int:
@@ -170,17 +181,17 @@ def names_together(stores: Sequence[StoreOfPeople]) -> list[dict[str, str]]:
     """Names of the people of each store among all of them, by their names in it.
 
     People of the same name in different stores are different ones, called ``STORE:NAME``, but for
-    stores of the same recordings (MARS).
+    stores of the same recordings or movements, see :attr:`PairFacts.known_people`.
     """
     origins = [one.known_people or number for number, one in enumerate(stores)]
     people = {(at, name) for at, one in zip(origins, stores, strict=True) for name in one.subjects}
     count = Counter(name for _, name in people)
     return [
         {
-            name: name if count[name] == 1 else f"{one.known_people or one.path.stem}:{name}"
+            name: name if count[name] == 1 else f"{stores[origins.index(at)].path.stem}:{name}"
             for name in one.subjects
         }
-        for one in stores
+        for at, one in zip(origins, stores, strict=True)
     ]
 
 

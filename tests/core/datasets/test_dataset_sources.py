@@ -231,14 +231,39 @@ def test_stores_of_the_same_recordings_have_the_same_people(tmp_path: Path) -> N
     ]
     other = write_pairs(tmp_path / "own.zarr", ("4", "anna"))
     stores = [pair_facts(path) for path in (*mars, other)]
-    same = {"1": "1", "4": "MARS:4"}
+    same = {"1": "1", "4": "plain:4"}
     assert names_together(stores) == [same, same, {"4": "own:4", "anna": "anna"}]
-    people = {"1", "MARS:4", "own:4", "anna"}
+    people = {"1", "plain:4", "own:4", "anna"}
     assert set(read_mixed([*mars, other]).subjects) == people
     assert set(people_of([labelled_facts(LabelledSource(one.path)) for one in stores])) == people
     keys = [one.key for one in gather([*mars, other], Making(kinds=("synthetic",)))]
     assert {key.subject for key in keys} == people
     assert len(set(keys)) == len(keys)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "alike"),
+    [
+        ({"recordings": ["a.sd2"]}, {"variant": "mirrored", "sources": ["a.sd2"]}, True),
+        ({"made_by": "sd2 pairs mars"}, {"variant": "shapes", "sources": ["mars_subject1"]}, True),
+        ({"made_by": "sd2 pairs mars"}, {"recordings": ["a.sd2"]}, False),
+        *(
+            ({"made_by": "sd2 simulate campaign", "seed": 1},
+             {"made_by": "sd2 simulate campaign", "seed": seed}, seed == 1)
+            for seed in (1, 2)
+        ),
+    ],
+)  # fmt: skip
+def test_movements_and_their_variants_are_of_the_same_people(
+    first: dict[str, object], second: dict[str, object], alike: bool, tmp_path: Path
+) -> None:
+    facts = pair_facts(write_pairs(tmp_path / "a.zarr", ("s01",)))
+    stores = [
+        facts.model_copy(update={"path": Path(f"{name}.zarr"), "provenance": made})
+        for name, made in (("a", first), ("b", second))
+    ]
+    one, other = names_together(stores)
+    assert (one == other) is alike
 
 
 def test_a_map_is_labelled_by_a_file(tmp_path: Path) -> None:
