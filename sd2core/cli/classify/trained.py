@@ -97,7 +97,8 @@ def _eval(options: Evaluate) -> None:
     clips = _judged(known, classifier.card, options)
     score = judge(classifier, clips, known)
     subjects = list(dict.fromkeys(clip.subject for clip in clips))
-    learnt = set(classifier.card.about.get("split", {}).get("training", ())) & set(subjects)
+    split = classifier.card.about.get("split", {})
+    learnt = {*split.get("training", ()), *split.get("validation", ())} & set(subjects)
     data = {
         "model": str(options.classifier),
         "maps": list(known.kinds),
@@ -124,6 +125,8 @@ def _eval(options: Evaluate) -> None:
 
 
 def _judged(known: ClipSet, card: ClassifierCard, options: Evaluate) -> tuple[Clip, ...]:
+    from sd2core.classify.data import seen_first
+
     kept = card.about.get("split", {}).get("test") or ()
     if options.subjects is not None:
         names = named_subjects(options.subjects, known.subjects)
@@ -136,7 +139,7 @@ def _judged(known: ClipSet, card: ClassifierCard, options: Evaluate) -> tuple[Cl
             f"There is nothing of {', '.join(missing)}", f"some of {', '.join(known.subjects)}"
         )
     clips = known.of(names)
-    return clips if options.placements == "all" else tuple(c for c in clips if c.placement == 0)
+    return clips if options.placements == "all" else tuple(filter(seen_first(clips), clips))
 
 
 def _say(score: Score, known: ClipSet, subjects: list[str], learnt: list[str]) -> None:
@@ -144,7 +147,10 @@ def _say(score: Score, known: ClipSet, subjects: list[str], learnt: list[str]) -
 
     print(f"Evaluated on {' and '.join(known.kinds)} maps of {', '.join(subjects)}")
     if learnt:
-        print(f"It was trained on {', '.join(learnt)}: this does not show how it does for others.")
+        names = ", ".join(learnt)
+        print(
+            f"It was trained on, or chosen by, {names}: this does not show how it does for others."
+        )
     for what, matrix in (("frames", score.frames), ("gestures", score.gestures)):
         rows = [(what, *(f"taken for {name}" for name in score.classes), "in all")]
         for name, row, counts in zip(score.classes, shares(matrix), matrix, strict=True):

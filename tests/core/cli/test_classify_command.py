@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 import pytest
@@ -110,8 +111,23 @@ def test_a_classifier_is_trained_described_and_judged(
     assert np.sum(told["gestures"]) == 6
     assert plot.read_bytes().startswith(b"\x89PNG")
     everybody = sd2("classify", "eval", store, "--model", model, "--subjects", "all")
-    assert "was trained on s0, s1" in everybody.out
+    assert "was trained on, or chosen by, s0, s1, s2:" in everybody.out
     assert "taken for horizontal" in everybody.out
+
+
+def test_who_was_seen_from_other_places_alone_is_judged_from_the_first(
+    sd2: Sd2, store: Path, model: Path, tmp_path: Path
+) -> None:
+    """As a batch's grid of places has them, without the recording's own."""
+    elsewhere = tmp_path / "elsewhere.zarr"
+    copytree(store, elsewhere)
+    index = elsewhere / "takes.jsonl"
+    index.write_text(index.read_text().replace('"placement": 0', '"placement": 2'))
+    judged, same = (
+        json.loads(sd2("classify", "eval", one, "--model", model, "--json").out)
+        for one in (elsewhere, store)
+    )
+    assert judged == same
 
 
 def test_progress_is_told_to_other_programs(sd2: Sd2, store: Path, tmp_path: Path) -> None:
