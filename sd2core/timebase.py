@@ -174,3 +174,9 @@ def common_clock(clocks: Sequence[Timebase]) -> Timebase:
         first_number -= len(before)
         start_s, end_s = min(start_s, clock.start_s), max(end_s, clock.end_s)
     return Timebase(times_s, first_number)
+
+
+def frames_that_begin(times_s: NDArray[np.float64], start_s: float, end_s: float) -> slice:
+    """Frames that begin during ``[start_s, end_s)``: those that a label holds for."""
+    first, stop = np.searchsorted(times_s, np.array([start_s, end_s]) - _TOLERANCE_S).tolist()
+    return slice(first, stop)

@@ -19,7 +19,7 @@ from sd2core.maps import DopplerMap, MapKind
 from sd2core.pairs.rows import UNKNOWN as UNKNOWN
 from sd2core.pairs.store import PairSet
 from sd2core.sensor import VelocityAxis
-from sd2core.timebase import Timebase
+from sd2core.timebase import Timebase, frames_that_begin
 
 BELOW_LOUDEST_DB = (20.0, 45.0)
 """Mean power of the noise in a bin, under that of the clip's loudest cell.
@@ -178,7 +178,7 @@ def clips_of_map(
 ) -> ClipSet:
     """Return the clips of one labelled map, such as a recording's or a radar file's.
 
-    A frame has the class of the label that it stands in (``gesture_class`` of the label
+    A frame has the class of the label in which it begins (``gesture_class`` of the label
     set); frames without a label are background. Labels without a class, and frames on
     which two labels of different classes stand, are unknown: neither learnt from nor
     judged. Gaps and stretches without a person part a map into several clips.
@@ -230,7 +230,7 @@ def frame_labels(timebase: Timebase, labels: Labels) -> tuple[NDArray[np.int8], 
     for span in spans:
         name = names[span.label]
         number = classes.index(name) if name else UNKNOWN
-        frames = slice(*timebase.frames_between(span.start_s, span.end_s))
+        frames = frames_that_begin(timebase.times_s, span.start_s, span.end_s)
         clash = taken[frames] & (label[frames] != number)
         label[frames] = np.where(clash, UNKNOWN, number)
         taken[frames] = True

@@ -21,6 +21,7 @@ from sd2core.denoise.resample_to_model import clips, interpolated, is_regular
 from sd2core.errors import Sd2Error
 from sd2core.options.exporting import Exporting, SpanOptions
 from sd2core.pairs.segments import cut, segment_starts
+from sd2core.timebase import frames_that_begin
 
 _BLOCK = 256
 """Segments that are in memory at a time, besides the maps of the source."""
@@ -92,8 +93,8 @@ def _clips_of_spans(
         for number in range(int(np.searchsorted(ends_s, span.start_s)), len(whole)):
             if whole[number].times_s[0] >= span.end_s:
                 break
-            first, last = np.searchsorted(whole[number].times_s, span[:2])
-            parts.append((int(last - first), number))
+            held = frames_that_begin(whole[number].times_s, span.start_s, span.end_s)
+            parts.append((held.stop - held.start, number))
         frames, number = max(parts, default=(0, 0))
         if not frames or frames / frame_rate_hz < options.shortest_s - 1e-9:
             why = "shorter than asked for" if frames else "without a frame that shows the person"
@@ -101,7 +102,7 @@ def _clips_of_spans(
             continue
         clip = whole[number]
         wide_s = span.start_s - options.margin_s, span.end_s + options.margin_s
-        own_s = clip.times_s[slice(*np.searchsorted(clip.times_s, wide_s))]
+        own_s = clip.times_s[frames_that_begin(clip.times_s, *wide_s)]
         if options.length == "resampled":
             own_s = np.linspace(own_s[0], own_s[-1], length)
         elif len(own_s) > length:
@@ -307,8 +308,9 @@ def _label(
     if clip.span is None:
         return own
     # Another span may lie over it.
-    inside = (clip.times_s >= clip.span.start_s) & (clip.times_s < clip.span.end_s)
-    return np.where(inside, clip.span.label, own)
+    own = own.copy()
+    own[frames_that_begin(clip.times_s, clip.span.start_s, clip.span.end_s)] = clip.span.label
+    return own
 
 
 def _known(times_s: NDArray[np.float64], known: NDArray[np.bool_], clip: Clip) -> NDArray[np.bool_]:

@@ -18,6 +18,7 @@ from sd2core.files.stores import open_group
 from sd2core.files.texts import read_text
 from sd2core.pairs.rows import agreed
 from sd2core.pairs.store import PairSet, open_takes
+from sd2core.timebase import frames_that_begin
 
 _NEEDED = ("subject", "take", "label")
 _USED = (*_NEEDED, "start_s", "end_s")
@@ -141,7 +142,7 @@ def _numbers(
     for number, row in enumerate(rows):
         if _is(subject, row.subject) and _is(name, row.take):
             used.add(number)
-            inside = (times_s >= row.start_s) & (times_s < row.end_s)
+            inside = frames_that_begin(times_s, row.start_s, row.end_s)
             for person in [row.person] if row.person else persons:
                 each[person][inside] = labels.index(row.label)
     return agreed([*each.values()])

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import small_pairs
 from classifiers import AXIS, NULLED, RATE_HZ, doppler, energies
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from labelled_clips import clip_set
 
@@ -23,7 +24,9 @@ from sd2core.classify.data import (
 from sd2core.classify.splitting import dealt, split_clips
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import Label, LabelSet
+from sd2core.labels.per_frame import label_per_frame
 from sd2core.labels.spans import Labels, LabelTrack, Span
+from sd2core.pairs.labelling import TakeLabel, labelled
 from sd2core.pairs.store import PairSet, Take
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
@@ -101,6 +104,25 @@ def test_frames_have_the_class_of_their_label() -> None:
     )
     assert classes == ("background", "horizontal", "wave")
     np.testing.assert_array_equal(found, [0, 2, 2, 0, 0, 1, 1, 0, UNKNOWN, 0])
+
+
+@given(start=st.integers(0, 15), count=st.integers(0, 40), shift=st.floats(-1.0, 1.0))
+def test_a_label_has_the_same_frames_wherever_one_learns_from_it(
+    start: int, count: int, shift: float
+) -> None:
+    """From a recording, in a data set or in pairs; written with six digits, and between frames."""
+    clock = Timebase.regular(60, 30.0)
+    middle_s = (start + max(count // 2, 1) + shift) / 30.0
+    edges_s = [round(one, 6) for one in (start / 30.0, middle_s, (start + count + 2) / 30.0)]
+    assume(edges_s == sorted(set(edges_s)))
+    given_labels = labels(("wave", *edges_s[:2]), ("left-to-right", *edges_s[1:]))
+    found, _ = frame_labels(clock, given_labels)
+    names = ("background", "left-to-right", "wave")
+    np.testing.assert_array_equal(found, label_per_frame(given_labels, names, clock.times_s))
+    rows = [TakeLabel("*", "*", one.label, one.start_s, one.end_s) for one in given_labels.spans]
+    known = replace(pairs(), labels=names, takes=(small_pairs.take("s", "t", 60, 0),))
+    np.testing.assert_array_equal(found, labelled(known, rows).takes[0].label)
+    np.testing.assert_array_equal(np.flatnonzero(found), np.arange(start, start + count + 2))
 
 
 def test_frames_on_which_classes_disagree_are_unknown() -> None:
