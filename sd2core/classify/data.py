@@ -208,7 +208,7 @@ def clips_of_map(
         if not matching.is_regular(times_s, rate_hz):
             even_s = matching.even_times(times_s, rate_hz)
             energies = matching.interpolated(energies, times_s, even_s)
-            own = own[np.abs(times_s[:, None] - even_s).argmin(axis=0)]
+            own = own[np.searchsorted((times_s[1:] + times_s[:-1]) / 2.0, even_s)]  # the nearest
         clips.append(Clip(subject, movement, doppler.kind, np.array(energies), own))
     return ClipSet(
         doppler.axis,

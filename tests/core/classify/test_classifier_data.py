@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -26,6 +27,7 @@ from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.per_frame import label_per_frame
 from sd2core.labels.spans import Labels, LabelTrack, Span
+from sd2core.maps import DopplerMap
 from sd2core.pairs.labelling import TakeLabel, labelled
 from sd2core.pairs.store import PairSet, Take
 from sd2core.sensor import VelocityAxis
@@ -131,6 +133,18 @@ def test_frames_on_which_classes_disagree_are_unknown() -> None:
         clock, labels(("wave", 0.0, 0.3), ("left-to-right", 0.2, 0.4), ("wave", 0.1, 0.2))
     )
     np.testing.assert_array_equal(found, [2, 2, UNKNOWN, 1, 0, 0])
+
+
+def test_a_long_map_at_another_rate_takes_little_memory() -> None:
+    clock = Timebase.regular(6000, 28.6)
+    whole = DopplerMap(np.ones((AXIS.bins, 6000), np.float32), AXIS, clock, "real")
+    tracemalloc.start()
+    made = clips_of_map(
+        whole, labels(("wave", 1.0, 2.0)), subject="anna", movement="walk", frame_rate_hz=30.0
+    )
+    assert tracemalloc.get_traced_memory()[1] < 50e6
+    tracemalloc.stop()
+    assert np.flatnonzero(made.clips[0].label).tolist() == list(range(30, 61))
 
 
 def test_suggestions_are_no_labels() -> None:
