@@ -202,7 +202,8 @@ def _judged(
     known = data.known
     own = [one.clip for one in real]
     scores_of = learnt(learner, known, own, added, plan.added_weight, seed, describe)
-    late_s = 0.0 if learner.model == "ridge" else learner.delay_s
+    # Half of the window comes after the frame.
+    late_s = 0.5 * learner.window_s if learner.model == "ridge" else learner.delay_s
     background = known.classes.index(BACKGROUND) if BACKGROUND in known.classes else None
     scores: dict[str, Score] = {}
     for one in judged:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from shutil import copyfile
 
+import numpy as np
 import pytest
 from small_pairs import write_pairs
 
@@ -88,8 +89,11 @@ def test_runs_are_of_the_denoiser_that_its_file_holds(
     )
     for model, made in ((MAP_MODEL, 6), (LIMBS_MODEL, 12), (MAP_MODEL, 12)):
         copyfile(find_model(model), file)
-        run_study(chosen)
+        results = run_study(chosen)
         assert len(in_this_process) == made
+    late_s = np.concatenate([one.scores[REAL].latencies_s for one in results.runs])
+    # What comes after the frame is looked at: half of a window of 0.4 s.
+    assert late_s.min() == pytest.approx(0.2 + 1 / 30)
 
 
 def test_a_study_that_cannot_be_is_no_study_that_was_stopped(
