@@ -34,6 +34,7 @@ from sd2core.imu.mounting import mounted
 from sd2core.imu.signals import InertialSignals
 from sd2core.imu.virtual import imu_at_frames
 from sd2core.io.stored_vertices import damaged_frames
+from sd2core.labels.label_set import GESTURES
 from sd2core.labels.per_frame import BACKGROUND, label_per_frame, plain_name
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
@@ -387,6 +388,7 @@ def _fingerprint(recording: Recording, key: SourceKey, person: str, making: Maki
         ],
         [asdict(one) for one in recording.walls],
     ]
+    labels = recording.labelled
     content = {
         "sensor": recording.sensor.as_dict(),
         "place": place,
@@ -395,8 +397,9 @@ def _fingerprint(recording: Recording, key: SourceKey, person: str, making: Maki
         "mesh_reading": recording.mesh_reading.model_dump(mode="json"),
         "spans": [
             (span.track, span.start_s, span.end_s, span.label, *filter(None, [span.person]))
-            for span in recording.labelled.decided
+            for span in labels.decided
         ],
+        **({} if labels.label_set == GESTURES else {"classes": labels_and_classes(labels)[1]}),
         "synthesis": asdict(making.synthesis),
         "tolerance": making.tolerance,
         "simulation": None if making.simulation is None else making.simulation.as_json(),

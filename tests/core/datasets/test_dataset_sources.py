@@ -348,6 +348,13 @@ def test_another_content_of_the_same_size_is_noticed(tmp_path: Path) -> None:
         assert fingerprint() != first
         file.write_bytes(content)
         assert fingerprint() == first
+    spans = one.labelled.spans
+    classes = []
+    for name in ("", "to and fro"):
+        known = LabelSet("Own", (Label("swing", "#0072b2", gesture_class=name),))
+        write_labels(one.folder / "labels.json", Labels((LabelTrack("Gestures"),), spans, known))
+        classes.append(fingerprint())
+    assert len({first, *classes}) == 3
 
 
 def test_takes_stay_the_same_when_their_store_grows(tmp_path: Path) -> None:
