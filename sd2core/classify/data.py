@@ -27,6 +27,7 @@ BELOW_LOUDEST_DB = (20.0, 45.0)
 A K60168A's recordings of gestures have it at 23 to 27 dB, a simulated radar by its link
 budget at 36 dB (a person at 2.2 m), and synthetic maps and a campaign's targets have none.
 """
+_MOST_CLASSES = np.iinfo(np.int8).max
 _MAX_LOOKS = 8.0
 """Noise of one look is exponential; of several, whose powers are averaged, less uneven."""
 
@@ -280,8 +281,15 @@ def _class_of(label: str, label_set: LabelSet) -> str:
 
 
 def in_order(names: Iterable[str]) -> tuple[str, ...]:
-    """Sort names of classes, each once: the background first."""
-    return tuple(sorted(set(names), key=lambda name: (name != BACKGROUND, name)))
+    """Sort names of classes, each once: the background first. Sd2Error for too many."""
+    each = set(names)
+    if len(each) > _MOST_CLASSES:
+        raise Sd2Error(
+            f"The labels are of {len(each)} classes",
+            f"up to {_MOST_CLASSES}",
+            "Give labels that one thing is meant by the same class, in the label set",
+        )
+    return tuple(sorted(each, key=lambda name: (name != BACKGROUND, name)))
 
 
 def _check_denoiser(pairs: PairSet, denoiser: TrainedDenoiser | None) -> None:

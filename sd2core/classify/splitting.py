@@ -63,6 +63,8 @@ def split_clips(
         If a subject is unknown or named twice, nobody is left to learn from, or of one subject no
         class has two movements.
     """
+    if not known.clips:
+        raise Sd2Error("The maps show nobody at any time", "frames with a person")
     split = split_subjects(known.subjects, validation, test)
     parts = {name: known.of(getattr(split, name)) for name in ("training", "validation", "test")}
     if split.by_take:

@@ -261,6 +261,9 @@ def scenes_of(recordings: Iterable[Recording]) -> dict[str, Any]:
 def label_names(recordings: Iterable[Recording]) -> tuple[str, ...]:
     """Return all names of labels in recordings, the background first."""
     used = {plain_name(span.label) for one in recordings for span in one.labelled.decided}
+    most = np.iinfo(np.int8).max
+    if len(used) >= most:
+        raise Sd2Error(f"The recordings have {len(used)} labels", f"fewer than {most}")
     return (BACKGROUND, *sorted(used - {BACKGROUND}))
 
 

@@ -135,6 +135,12 @@ def test_frames_on_which_classes_disagree_are_unknown() -> None:
     np.testing.assert_array_equal(found, [2, 2, UNKNOWN, 1, 0, 0])
 
 
+def test_more_classes_than_frames_can_name_are_refused() -> None:
+    many = labels(*((f"l{number}", 0.1 * number, 0.1 * number + 0.05) for number in range(130)))
+    with pytest.raises(Sd2Error, match="131 classes"):
+        frame_labels(Timebase.regular(400, 30.0), many)
+
+
 def test_a_long_map_at_another_rate_takes_little_memory() -> None:
     clock = Timebase.regular(6000, 28.6)
     whole = DopplerMap(np.ones((AXIS.bins, 6000), np.float32), AXIS, clock, "real")
