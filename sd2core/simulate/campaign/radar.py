@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from sd2core.body.rotations import Floats
 from sd2core.fmcw.chain import FrameChain, ProcessingOptions
@@ -91,6 +92,8 @@ def radar_at(frames_per_s: float, bins: int, radar: RadarConfig = PAPER_RADAR) -
     return replace(radar, frame_repetition_s=1.0 / frames_per_s, chirps_per_frame=chirps, name=name)
 
 
+# On several threads sums have other last digits, of which samples of a radar make whole steps.
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def radar_target(
     mesh: MeshSequence,
     config: RadarConfig,
