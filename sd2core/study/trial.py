@@ -317,5 +317,6 @@ def learnt(
     )
     if learner.steps is not None:
         options = replace(options, steps=learner.steps)
-    made = train(clips, (), known, options, weights=weights if added else None)
+    # Weights even where nothing is added: clips are drawn alike, by their frames.
+    made = train(clips, (), known, options, weights=weights)
     return lambda clip: made.classifier.probabilities_of(clip.energies)

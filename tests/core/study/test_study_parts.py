@@ -23,8 +23,9 @@ from sd2core.sensor import VelocityAxis
 from sd2core.study.certainty import adjusted, gain_of
 from sd2core.study.data import StudyData, study_data_of
 from sd2core.study.folds import folds_of, groups_of, share_of
-from sd2core.study.plan import StudyPlan, read_study, study_text
+from sd2core.study.plan import Learner, StudyPlan, read_study, study_text
 from sd2core.study.report import write_report
+from sd2core.study.trial import learnt
 from sd2core.study.windows import Ridge, at_speed, window_features
 from tests.damaged_files import lose
 
@@ -186,6 +187,17 @@ def test_features_do_not_depend_on_the_gain_and_tell_movements_apart() -> None:
         assert (ridge.scores(shown(clip)).argmax(axis=1) == clip.label).mean() > 0.9
     empty = window_features(np.zeros((20, AXIS.bins), np.float32), AXIS, 30.0, 1.0)
     assert np.isfinite(empty).all()
+
+
+def test_what_weighs_nothing_changes_nothing(data: StudyData) -> None:
+    """Clips are drawn by their frames, whether others are added or not."""
+    clips = [one.clip.until(20 + 15 * n) for n, one in enumerate(data.real[:4])]
+    learner = Learner(model="lstm", width=8, delay_s=0.0, steps=4)
+    alone, beside = (
+        learnt(learner, data.known, clips, added, 1e-12, 0, lambda clip: clip.energies)
+        for added in ((), [one.clip for one in data.real[4:6]])
+    )
+    np.testing.assert_array_equal(alone(clips[0]), beside(clips[0]))
 
 
 @given(st.floats(0.5, 2.0))
