@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sd2core.classify.confusion_figure import confusion_figure
 from sd2core.classify.metrics import Score, mean_recall, shares
+from sd2core.denoise.files import describe_model, find_model
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.figure_files import save_figure
 from sd2core.files.stores import lost_in_words
@@ -22,6 +23,7 @@ from sd2core.study.certainty import Gain, adjusted, gain_of
 from sd2core.study.plan import OF_VIDEO
 from sd2core.study.run import Results
 from sd2core.study.trial import REAL
+from sd2core.train.evaluation import learnt_from
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -245,6 +247,16 @@ def _folds_in_words(results: Results) -> str:
     text += "." if by_person else ", the parts dealt anew."
     if plan.learns_denoisers and filmed:
         text += " The denoiser of a fold learns from those same data alone."
+    if plan.denoiser.file is not None and any(
+        "denoised" in one or "texture" in one for one in plan.wanted
+    ):
+        card = describe_model(find_model(plan.denoiser.file))
+        taught = {*learnt_from(card, "training", "validation")} & {*results.takes}
+        if taught:
+            text += (
+                f" The denoiser has learnt from, or was chosen by, people called"
+                f" {', '.join(sorted(taught))}: what it adds may know who is judged."
+            )
     if results.lost_frames:
         text += f" {lost_in_words(results.lost_frames)}"
     if results.others:

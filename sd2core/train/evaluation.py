@@ -276,7 +276,7 @@ def _report(name: str, card: ModelCard, estimate: Energies, truth: _Truth) -> Re
 def _filters(
     models: Sequence[TrainedDenoiser], pairs: PairSet, judged: Sequence[str]
 ) -> list[tuple[str, TrainedDenoiser]]:
-    learnt = _learnt(models[0].card, "training") if models else []
+    learnt = learnt_from(models[0].card, "training") if models else []
     fitted_on = [name for name in pairs.subjects if name in learnt and name not in judged]
     fitted_on = fitted_on or [name for name in pairs.subjects if name not in judged]
     takes = pairs.of(fitted_on or judged).placements(first_only=True).takes
@@ -332,13 +332,15 @@ def _judged_subjects(
 ) -> tuple[str, ...]:
     if subjects is not None:
         return pairs.of(subjects).subjects
-    unseen = _learnt(models[0].card, "test") if models else []
+    unseen = learnt_from(models[0].card, "test") if models else []
     return tuple(name for name in pairs.subjects if name in unseen) or pairs.subjects
 
 
-def _learnt(card: ModelCard, part: str) -> list[str]:
+def learnt_from(card: ModelCard, *parts: str) -> list[str]:
+    """People of some parts of a model's data: ``training``, ``validation``, ``test``."""
     subjects, provenance = card.about.get("subjects"), card.about.get("provenance")
-    names = list(subjects.get(part, ())) if isinstance(subjects, Mapping) else []
+    known = subjects if isinstance(subjects, Mapping) else {}
+    names = [name for part in parts for name in known.get(part, ())]
     if isinstance(provenance, Mapping) and provenance.get("made_by") == "sd2 pairs mars":
         # Older models name persons with their parts, "1-test".
         names = list(dict.fromkeys(name.partition("-")[0] for name in names))
@@ -350,7 +352,7 @@ def _notes(
 ) -> tuple[str, ...]:
     notes = []
     for model in models:
-        seen = {*_learnt(model.card, "training"), *_learnt(model.card, "validation")}
+        seen = learnt_from(model.card, "training", "validation")
         known = [name for name in judged if name in seen]
         if known:
             notes.append(

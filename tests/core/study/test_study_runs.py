@@ -11,7 +11,7 @@ import pytest
 from small_pairs import write_pairs
 
 from sd2core.cli import build_parser, run
-from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL, find_model
+from sd2core.denoise.files import LIMBS_MODEL, MAP_MODEL, find_model, load_model, save_model
 from sd2core.errors import Sd2Error
 from sd2core.pairs.labelling import TakeLabel, label_pairs
 from sd2core.study import run as study_run
@@ -91,6 +91,16 @@ def test_runs_are_of_the_denoiser_that_its_file_holds(
         copyfile(find_model(model), file)
         results = run_study(chosen)
         assert len(in_this_process) == made
+    write_report(results, tmp_path)
+    assert "has learnt from" not in (tmp_path / "study.md").read_text()
+    trained = load_model(file)
+    trained.card.about["subjects"] = {"training": ["s1", "x"], "validation": ["s2"]}
+    save_model(file, trained)
+    write_report(results, tmp_path)
+    assert (
+        "has learnt from, or was chosen by, people called s1, s2:"
+        in (tmp_path / "study.md").read_text()
+    )
     late_s = np.concatenate([one.scores[REAL].latencies_s for one in results.runs])
     # What comes after the frame is looked at: half of a window of 0.4 s.
     assert late_s.min() == pytest.approx(0.2 + 1 / 30)
