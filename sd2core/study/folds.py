@@ -41,11 +41,11 @@ def folds_of(
     least = 3 if filmed else 2
     if len(groups) < least:
         raise Sd2Error(
-            f"The study has {len(groups)} people: {', '.join(groups)}",
+            f"The study keeps {len(groups)} apart: {', '.join(groups)}",
             "three or more: one is judged, one is filmed only, of the others there is a radar"
             if filmed
             else "two or more: one is judged, the others are learnt from",
-            'Keep movements of the same people apart: folds = "files"',
+            'Give more people, or more movements of the same people with folds = "files"',
         )
     if not filmed:
         pairs = [(one, NOBODY) for one in groups]

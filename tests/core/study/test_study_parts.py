@@ -74,7 +74,7 @@ def test_everybody_is_judged_beside_everybody_else() -> None:
     assert [(one.judged, one.video, one.real) for one in alone] == [
         ("p", "", ("q",)), ("q", "", ("p",)),
     ]  # fmt: skip
-    with pytest.raises(Sd2Error, match="2 people"):
+    with pytest.raises(Sd2Error, match="keeps 2 apart"):
         folds_of(["p", "q"], filmed=True)
 
 
