@@ -294,6 +294,9 @@ def untried(results: Results) -> list[str]:
         more.append("other speeds")
     if few := [who for who, count in results.takes.items() if count < _FEW]:
         more.append(f"more movements of {', '.join(few)}: over so few, intervals are too narrow")
+    if 1 < len(results.takes) < _FEW:
+        count = len(results.takes)
+        more.append(f"more people: over {count}, intervals over people are far too narrow")
     if not plan.placements and not plan.video:
         more.append("other places of the sensor, bodies of other shape, mirrored movements")
     return [*left, *missing, *more]

@@ -135,6 +135,7 @@ def test_the_page_says_what_was_found_and_what_was_not_tried(
     assert (Path(chosen.out) / "curve.png").stat().st_size > 10_000
     findings = findings_of(results)
     assert [one.added for one in findings] == ["synthetic", "radar"] * 2
+    assert any("over 3, intervals over people" in one for one in untried(results))
     assert any("mirrored" in one for one in untried(results))
 
 
