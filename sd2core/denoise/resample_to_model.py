@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
+from sd2core.plausibility.clock import ROUNDING_S
 from sd2core.progress import Progress
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
@@ -57,7 +58,7 @@ _UNEVEN = 0.5
 """Share of a frame duration by which frames may be early or late."""
 
 _BREAK_FRAMES = 5.0
-"""Number of missing frames after which a new clip begins."""
+"""Frame durations from one frame to the next, beyond which a new clip begins."""
 
 
 def can_resample(from_hz: float, to_hz: float) -> bool:
@@ -144,7 +145,7 @@ def clips(
     ``frame_rate_hz`` is that of the model.
     """
     longest_s = _BREAK_FRAMES * max(Timebase(times_s).frame_duration_s, 1 / frame_rate_hz)
-    breaks = np.flatnonzero(np.diff(times_s) > longest_s) + 1
+    breaks = np.flatnonzero(np.diff(times_s) > longest_s + ROUNDING_S) + 1
     pieces: list[tuple[int, int]] = []
     for start, stop in runs(present):
         edges = [start, *breaks[(breaks > start) & (breaks < stop)].tolist(), stop]

@@ -152,8 +152,8 @@ def imu_signals(
     ----------
     path : RigidPath
         Every run of frames on end is differentiated by itself, nothing across a gap: frames
-        without the body, or more than five missing ones. Frames that come unevenly are brought to
-        an even rate by the same spline first.
+        without the body, or more than five frame durations between two. Frames that come unevenly
+        are brought to an even rate by the same spline first.
     times_s : array_like, shape (N,)
         Times of the samples on the clock of the path.
     cutoff_hz : float, optional

@@ -20,6 +20,7 @@ from sd2core.labels.spans import Span
 from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
 from sd2core.options.suggesting import SuggestOptions
+from sd2core.plausibility.clock import ROUNDING_S
 from sd2core.timebase import Timebase
 
 TRACK = "Suggestions"
@@ -162,7 +163,7 @@ def stretches(
     presence = Presence.of(present, len(timebase))
     longest_s = max(_PAUSE_FRAMES * timebase.frame_duration_s, _PAUSE_S)
     begins = presence.first == np.arange(len(timebase))
-    begins[1:] |= np.diff(timebase.times_s) > longest_s
+    begins[1:] |= np.diff(timebase.times_s) > longest_s + ROUNDING_S
     starts = np.flatnonzero(begins)
     stretch = np.cumsum(begins) - 1
     return starts[stretch], np.append(starts[1:], len(timebase))[stretch] - 1

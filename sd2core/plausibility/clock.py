@@ -25,6 +25,8 @@ UNITS_S = {
 _RECOGNISED_FRAMES_PER_S = (1.0, 1000.0)
 """Rates by which a unit is known: as far apart as units are, so that no more than one fits."""
 _GAP_STEPS, _GAP_S = 4.0, 0.25
+ROUNDING_S = 1e-5
+"""A few steps of times that are written with six digits are off by less."""
 _WHOLE_RATES = (24_000.0, 30_000.0, 60_000.0, 120_000.0)
 """Numerators of the rates of television, such as 30000/1001."""
 
@@ -83,7 +85,7 @@ def gaps_between(times_s: NDArray[np.float64]) -> NDArray[np.bool_]:
     """True, (T - 1,), where so much time lies between two frames that others were lost."""
     steps_s = np.diff(times_s)
     usual_s = float(np.median(steps_s)) if len(steps_s) else 0.0
-    return np.asarray(steps_s > max(_GAP_STEPS * usual_s, _GAP_S))
+    return np.asarray(steps_s > max(_GAP_STEPS * usual_s, _GAP_S) + ROUNDING_S)
 
 
 def judge_clock(

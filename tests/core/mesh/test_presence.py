@@ -5,7 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sd2core.denoise.resample_to_model import clips
 from sd2core.errors import Sd2Error
+from sd2core.labels.suggest import stretches
 from sd2core.mesh.presence import Presence, gaps_in_words, runs
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.plausibility.clock import gaps_between
@@ -81,3 +83,24 @@ def test_the_mask_is_the_mesh_s_own() -> None:
 def test_a_mask_that_does_not_fit_is_refused(bad: list[object]) -> None:
     with pytest.raises(Sd2Error, match="present is of type"):
         mesh(present=bad)
+
+
+@pytest.mark.parametrize("rate_hz", [8, 10, 15, 20, 24, 25, 30000 / 1001, 30, 60])
+@pytest.mark.parametrize("digits", [6, 17])
+def test_as_many_lost_frames_are_a_gap_wherever_they_lie(rate_hz: float, digits: int) -> None:
+    frames = 200
+    times_s = np.round(3.0 + np.arange(frames) / rate_hz, digits)
+    everywhere = np.ones(frames, bool)
+    for lost in range(1, 17):
+        found = set()
+        for at in range(5, frames - 25, 7):
+            kept_s = np.delete(times_s, np.arange(at, at + lost))
+            present = everywhere[: len(kept_s)]
+            found.add(
+                (
+                    int(gaps_between(kept_s).sum()),
+                    len(clips(kept_s, present, rate_hz)),
+                    len(np.unique(stretches(Timebase(kept_s), present)[0])),
+                )
+            )
+        assert len(found) == 1, lost
