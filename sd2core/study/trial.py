@@ -181,11 +181,11 @@ def _added(
     return [*made, *(_played(one, known, speed) for speed in plan.speeds for one in made)]
 
 
-def _played(clip: Clip, known: Any, speed: float) -> Clip:
+def _played(clip: Clip, known: ClipSet, speed: float) -> Clip:
     frames = np.arange(0.0, len(clip) - 0.5, speed).astype(int)
-    return replace(
-        clip, energies=at_speed(clip.energies, known.axis, speed), label=clip.label[frames]
-    )
+    energies = at_speed(clip.energies, known.axis, speed)
+    energies[:, list(known.null_bins)] = 0.0  # slower, what was beside them comes in
+    return replace(clip, energies=energies, label=clip.label[frames])
 
 
 def _judged(
