@@ -24,8 +24,8 @@ from sd2core.study.certainty import adjusted, gain_of
 from sd2core.study.data import StudyData, study_data_of
 from sd2core.study.folds import folds_of, groups_of, share_of
 from sd2core.study.plan import Learner, StudyPlan, read_study, study_text
-from sd2core.study.report import write_report
-from sd2core.study.trial import learnt
+from sd2core.study.report import conclusion, findings_of, untried, write_report
+from sd2core.study.trial import _played, learnt
 from sd2core.study.windows import Ridge, at_speed, window_features
 from tests.damaged_files import lose
 
@@ -215,6 +215,14 @@ def test_a_map_played_faster_has_its_velocities_and_times_scaled(speed: float) -
     np.testing.assert_array_equal(at_speed(values, axis, 1.0), values)
 
 
+@pytest.mark.parametrize("speed", [0.5, 0.8, 2.0])
+def test_emptied_bins_stay_empty_at_any_speed(data: StudyData, speed: float) -> None:
+    known = replace(data.known, null_bins=(3, 4))
+    played = _played(data.real[0].clip, known, speed)
+    assert played.energies[:, [2, 5]].all()
+    assert not played.energies[:, [3, 4]].any()
+
+
 def test_nothing_gained_is_nothing_certain() -> None:
     rng = np.random.default_rng(3)
     chance = {who: rng.normal(0.0, 0.1, 20) for who in "abc"}
@@ -235,6 +243,23 @@ def test_people_who_differ_make_it_uncertain_for_others() -> None:
     found = gain_of(apart)
     assert found.over_takes[0] > 0
     assert found.over_people[0] < 0 < found.over_people[1]
+
+
+def test_of_few_people_it_is_said_that_they_tell_little(tmp_path: Path) -> None:
+    two = some_results(tmp_path)
+    again = "also counting that people differ"
+    assert f"{again}, as far as 2 tell." in conclusion(two, findings_of(two))
+    assert any("more people" in one for one in untried(two))
+    runs = [
+        replace(run, takes={name: {take.replace("ben/t", f"{who}/t"): score
+                                   for take, score in own.items()}
+                            for name, own in run.takes.items()})
+        for run in two.runs for who in ("ben", "cleo", "dan", "eva")
+    ]  # fmt: skip
+    takes = [take for run in runs for take in run.takes["real"]]
+    five = replace(two, runs=tuple(runs), subject_of={one: one[:-3] for one in takes})
+    assert f"{again}." in conclusion(five, findings_of(five))
+    assert not any("more people" in one for one in untried(five))
 
 
 def test_many_takes_of_one_person_count_no_more() -> None:
