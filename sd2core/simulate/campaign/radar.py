@@ -191,7 +191,7 @@ def _looks(scene: MeshScene, frame: int, phases: NDArray[np.complex64]) -> Sampl
     # Phases go to the shorter of the two.
     right = phases[:, None, rows] * fast.astype(np.complex64)  # (looks, samples, facets)
     right = right.reshape(-1, len(rows))
-    if config.sampling == "complex":
+    if config.sampling != "real":
         signal = slow.astype(np.complex64) @ right.T
     else:
         # Re(a b) is the product of conj(a) and b as pairs of real numbers.
@@ -250,7 +250,7 @@ def _received(
     signals: Samples, config: RadarConfig, link: LinkBudget | None, rng: np.random.Generator
 ) -> tuple[Samples, float]:
     """Samples relative to the converter's half range, with noise and rounded; that range."""
-    kind: Any = np.complex64 if config.sampling == "complex" else np.float32
+    kind: Any = np.float32 if config.sampling == "real" else np.complex64
     signals = signals.astype(kind)
     if link is None:
         return signals, 1.0

@@ -14,7 +14,7 @@ from sd2core.fmcw.options import Reflector
 from sd2core.fmcw.scene import MeshScene
 from sd2core.fmcw.sums import Echoes, nufft
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.radar_config import CLUTTER, PAPER_RADAR, Clutter, RadarConfig
+from sd2core.radar_config import CLUTTER, PAPER_RADAR, Clutter, RadarConfig, Sampling
 from sd2core.sensor import VelocityAxis, VirtualSensor
 from sd2core.simulate.campaign import radar
 from sd2core.simulate.campaign.radar import LinkBudget, TargetOptions, radar_target
@@ -64,8 +64,9 @@ def test_what_approaches_is_positive(approach_mps: float, options: TargetOptions
 
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("approach_mps", [0.9, -0.6])
-def test_i_and_q_show_what_real_samples_do(approach_mps: float) -> None:
-    both = replace(PAPER_RADAR, sampling="complex")
+@pytest.mark.parametrize("sampling", ["complex", "complex with image band"])
+def test_i_and_q_show_what_real_samples_do(approach_mps: float, sampling: Sampling) -> None:
+    both = replace(PAPER_RADAR, sampling=sampling)
     mesh = plate(approach_mps, 2.2)
     real, quadrature = (target(mesh, QUIET, config)[2] for config in (PAPER_RADAR, both))
     np.testing.assert_allclose(quadrature.sum(), real.sum(), rtol=0.1)
