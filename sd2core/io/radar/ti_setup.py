@@ -116,8 +116,22 @@ class _Chirp(_Part):
     chirpStartIdx: int
     chirpEndIdx: int
     profileId: int
+    startFreqVar_MHz: float = 0.0
+    freqSlopeVar_KHz_usec: float = 0.0
     idleTimeVar_usec: float = 0.0
+    adcStartTimeVar_usec: float = 0.0
     txEnable: Mask
+
+    @property
+    def kind(self) -> tuple[float, ...]:
+        """All but its numbers and transmitters; in a .cfg in units of its own."""
+        return (
+            self.profileId,
+            self.startFreqVar_MHz,
+            self.freqSlopeVar_KHz_usec,
+            self.idleTimeVar_usec,
+            self.adcStartTimeVar_usec,
+        )
 
 
 class _Code(_Part):
@@ -210,7 +224,7 @@ def _of_cfg(path: Path) -> TiSetup:
         bits=_whole(adc[0]),
         output=_whole(adc[1]),
         profiles=[_sent(_Profile, one, (0, 1, 2, 3, 4, 7, 9, 10)) for one in profiles],
-        chirps=[_sent(_Chirp, one, (0, 1, 2, 5, 7)) for one in chirps],
+        chirps=[_sent(_Chirp, one, range(8)) for one in chirps],
         frame=_sent(_Frame, frame, range(5)),
         swapped=swapped,
         interleaved=interleaved,
@@ -423,8 +437,10 @@ def _turns(chirps: list[_Chirp], first: int, last: int) -> list[_Chirp]:
         if not fitting:
             raise Sd2Error(f"Chirp {number} of a loop is not configured", "every chirp of it")
         turns.append(fitting[-1])
-    if len({(one.profileId, one.idleTimeVar_usec) for one in turns}) > 1:
-        raise Sd2Error("Chirps of a loop differ in profile or idle time", "chirps of one kind")
+    if len({one.kind for one in turns}) > 1:
+        raise Sd2Error(
+            "Chirps of a loop differ in profile, frequency, slope or times", "chirps of one kind"
+        )
     return turns
 
 

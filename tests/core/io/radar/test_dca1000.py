@@ -337,6 +337,21 @@ MISMATCHES: dict[str, tuple[Callable[[Path], object], str]] = {
         ),
         r"walk\.cfg: Chirps of a loop are sent by the transmitters 0x3, 0x1",
     ),
+    **{
+        f"another {what}": (
+            _cfg(
+                chirpCfg0=f"chirpCfg 0 0 0 0 0 0 0 1\nchirpCfg 1 1 0 {varied} 1",
+                frameCfg="frameCfg 0 1 8 3 20 1 0",
+            ),
+            r"walk\.cfg: Chirps of a loop differ in profile, frequency, slope or times",
+        )
+        for what, varied in {
+            "frequency": "0.1 0 0 0",
+            "slope": "0 1 0 0",
+            "idle time": "0 0 5 0",
+            "start of samples": "0 0 0 1",
+        }.items()
+    },
     "a frame too short": (
         _cfg(frameCfg="frameCfg 0 0 16 3 0.5 1 0"),
         r"walk\.cfg: 16 chirps of 5e-05 s do not fit into a frame",
