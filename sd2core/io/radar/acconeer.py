@@ -223,6 +223,8 @@ def _read(file: h5py.File, path: Path) -> RadarCapture:
             f"Frames have one sweep: {joined} are taken as one, their sweeps {1e3 * frame_s:.3g} ms"
             " apart."
         )
+        if left := shape[0] % joined:
+            notes.append(f"The last {left} frames of one sweep fill no other, and are left out.")
         sweep_s, frame_s = frame_s, joined * frame_s
         shape = (len(frames) // joined, 1, joined, len(ranges_m))
         timebase = Timebase(timebase.times_s[::joined][: shape[0]])

@@ -195,6 +195,7 @@ def test_frames_of_one_sweep_are_joined(tmp_path: Path) -> None:
     assert capture.config.chirp_repetition_s == pytest.approx(0.005)
     np.testing.assert_allclose(capture.timebase.times_s, [0.0, 0.16])
     assert any("32 are taken as one, their sweeps 5 ms" in note for note in capture.notes)
+    assert any("The last 6 frames" in note for note in capture.notes)
     off = np.abs(doppler_map(capture).peak_velocity_mps() - 0.2)
     assert off.max() < 0.51 * capture.config.velocity_resolution_mps
 
