@@ -86,6 +86,11 @@ def speed_unit_mps(path: Path, title: str) -> float:
     return _SPEEDS_MPS.get(unit or last, 1.0)
 
 
+def is_in_decibels(title: str) -> bool:
+    """True if a title names them likewise."""
+    return re.findall(r"[a-z]+", title.lower())[1:][-1:] in (["db"], ["dbm"])
+
+
 TEXT_SUFFIXES = (".csv", ".tsv")
 SUFFIXES = (*TEXT_SUFFIXES, ".npy", MATLAB_SUFFIX)
 EXPECTED = "a table of points with the columns frame and doppler"

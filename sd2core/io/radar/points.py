@@ -28,6 +28,7 @@ from sd2core.io.radar.point_tables import (
     SUFFIXES,
     Table,
     TextTable,
+    is_in_decibels,
     named_columns,
     open_table,
     speed_unit_mps,
@@ -163,6 +164,9 @@ def read_points(path: Path, description: PointsDescription | None = None) -> Rad
         raise Sd2Error(f"{path}: the velocity of row {row + 1} is no number", "a finite number")
     titles = {name: table.names[place] for name, place in places.items() if table.names}
     numbers["doppler"] *= speed_unit_mps(path, titles.get("doppler", ""))
+    if is_in_decibels(titles.get("intensity", "")):
+        with np.errstate(over="ignore"):
+            numbers["intensity"] = 10.0 ** (0.1 * numbers["intensity"])
     unit_s = time_unit_s(titles.get("time", ""))
     return _sorted(path, numbers, columns, unit_s, guessed)
 

@@ -75,6 +75,16 @@ def test_columns_go_by_many_names(tmp_path: Path, titles: tuple[str, ...], separ
     assert is_the_walk(write_csv(tmp_path / "a.csv", walk(), titles, separator))
 
 
+@pytest.mark.parametrize("title", ["SNR [dB]", "power_dBm"])
+def test_levels_in_decibels_are_powers(tmp_path: Path, title: str) -> None:
+    table = walk()
+    table[:, 5] = 10.0 * np.log10(table[:, 5]) - 40.0
+    written = write_csv(tmp_path / "level.csv", table, (*NAMES[:5], title))
+    plain = load_recorded_map(write_csv(tmp_path / "a.csv", walk())).doppler
+    found = load_recorded_map(written).doppler
+    np.testing.assert_allclose(1e4 * found.values, plain.values, rtol=1e-3)
+
+
 def test_arrays_with_names_are_read_alike(tmp_path: Path) -> None:
     table = walk()
     fields = np.zeros(len(table), [(name, "<f4") for name in NAMES])
