@@ -28,6 +28,8 @@ from sd2core.study.plan import StudyPlan
 from sd2core.study.trial import Run, Task, all_tasks, drawn, run_task
 
 VERSION = 2
+_RUN_VERSION = 2
+"""Of what a run says, on which no denoiser depends."""
 
 
 class StudyFolder(RunFolder):
@@ -190,7 +192,7 @@ def _run_path(folder: Path, plan: StudyPlan, digest: str, task: Task) -> Path:
     used["denoiser"] = plan.denoiser.model_dump(mode="json") if denoised else None
     if denoised and plan.denoiser.file is not None:
         used["model"] = cached_digest(find_model(plan.denoiser.file))
-    used["all"] = task.share == max(plan.shares)
+    used["all"], used["version"] = task.share == max(plan.shares), _RUN_VERSION
     return folder / "runs" / f"{_hash(digest, used, asdict(task))}.json"
 
 

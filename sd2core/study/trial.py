@@ -23,7 +23,7 @@ from sd2core.study.data import Movement, StudyData, study_data_of
 from sd2core.study.denoisers import added_map, denoiser_in
 from sd2core.study.folds import Fold, folds_of, groups_of, share_of
 from sd2core.study.plan import Learner, StudyPlan
-from sd2core.study.windows import Features, Ridge, at_speed, window_features
+from sd2core.study.windows import Features, Ridge, at_speed, half_window, window_features
 
 REAL = "real"
 """Condition of nothing added."""
@@ -202,13 +202,13 @@ def _judged(
     known = data.known
     own = [one.clip for one in real]
     scores_of = learnt(learner, known, own, added, plan.added_weight, seed, describe)
-    # Half of the window comes after the frame.
-    late_s = 0.5 * learner.window_s if learner.model == "ridge" else learner.delay_s
+    late_s, rate_hz = learner.delay_s, known.frame_rate_hz
+    if learner.model == "ridge":  # The window around a frame ends after it.
+        late_s = (half_window(rate_hz, learner.window_s) - 1) / rate_hz
     background = known.classes.index(BACKGROUND) if BACKGROUND in known.classes else None
     scores: dict[str, Score] = {}
     for one in judged:
         answers = scores_of(one.clip).argmax(axis=1)
-        rate_hz = known.frame_rate_hz
         this = score([one.clip.label], [answers], known.classes, rate_hz, background, late_s)
         scores[one.title] = scores[one.title] + this if one.title in scores else this
     return scores

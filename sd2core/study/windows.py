@@ -60,7 +60,7 @@ def window_features(
     square = share @ (axis.centres_mps / rate) ** 2
     spread = np.sqrt(np.maximum(square - mean**2, 0.0))
     series = np.column_stack([mean, spread, np.abs(mean), peak, share])
-    half = max(1, round(0.5 * window_s * frame_rate_hz))
+    half = half_window(frame_rate_hz, window_s)
     lags = [max(1, round(lag_s * frame_rate_hz)) for lag_s in _LAGS_S]
     frames = len(series)
     # Windows that are cut stand alone, the others are described together.
@@ -71,6 +71,11 @@ def window_features(
     cut = range(max(frames - half + 1, half), frames)
     windows += [series[None, frame - half :] for frame in cut]
     return np.concatenate([_described(one, half, lags) for one in windows])
+
+
+def half_window(frame_rate_hz: float, window_s: float) -> int:
+    """Count the frames of a window from the one on that it is around."""
+    return max(1, round(0.5 * window_s * frame_rate_hz))
 
 
 def _described(windows: Features, half: int, lags: Sequence[int]) -> Features:

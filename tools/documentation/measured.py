@@ -31,7 +31,7 @@ OLD = {
     "paper.md": _HOURS,
     "denoiser.md": _HOURS,
     "classifier.md": _SAME,
-    "studies.md": "hours of training; since then only slower maps keep emptied bins empty",
+    "studies.md": "hours of training; how late ridge regression is was put right in it",
     "real-pairs.md": _EVEN,
     "real-gestures.md": _EVEN,
 }

@@ -25,7 +25,7 @@ from sd2core.study.data import StudyData, study_data_of
 from sd2core.study.folds import folds_of, groups_of, share_of
 from sd2core.study.plan import Learner, StudyPlan, read_study, study_text
 from sd2core.study.report import conclusion, findings_of, untried, write_report
-from sd2core.study.trial import _played, learnt
+from sd2core.study.trial import _judged, _played, describing, learnt
 from sd2core.study.windows import Ridge, at_speed, window_features
 from tests.damaged_files import lose
 
@@ -213,6 +213,21 @@ def test_a_map_played_faster_has_its_velocities_and_times_scaled(speed: float) -
     inside = np.abs(wanted) < 1.2
     np.testing.assert_allclose(found[inside], wanted[inside], atol=0.08)
     np.testing.assert_array_equal(at_speed(values, axis, 1.0), values)
+
+
+def test_ridge_regression_is_as_late_as_it_looks_ahead(store: Path, data: StudyData) -> None:
+    learner, clip, frame = Learner(window_s=1.0), data.real[0].clip, 60
+    describe = describing(learner, data.known)
+    ahead = 14  # Frames at 30 frames/s.
+    for changed in (frame + ahead, frame + ahead + 1):
+        energies = clip.energies.copy()
+        energies[changed] = energies[changed, ::-1]
+        same = np.array_equal(describe(replace(clip, energies=energies))[frame],
+                              describe(clip)[frame])  # fmt: skip
+        assert same == (changed > frame + ahead)
+    told = _judged(learner, plan_of(store), data, data.real, [], data.real, 0, describe)
+    soonest_s = min(min(one.latencies_s, default=np.inf) for one in told.values())
+    assert soonest_s == pytest.approx((ahead + 1) / 30.0)
 
 
 @pytest.mark.parametrize("speed", [0.5, 0.8, 2.0])
