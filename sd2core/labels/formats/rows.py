@@ -12,6 +12,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from sd2core.errors import Sd2Error
 from sd2core.files.tables import counted
 from sd2core.labels.formats.losses import DEFAULT_TRACK
@@ -34,6 +36,7 @@ UNNAMED = "unnamed"
 """Label of a span for which the file has none, and name of a track without one."""
 
 _MAX_LISTED = 5
+_MILLISECOND_S = 1e-3
 
 
 @dataclass(frozen=True)
@@ -145,6 +148,17 @@ class LabelClock:
             return at_s, at_s + self.timebase.frame_duration_s
         frame = self.timebase.frame_at(at_s)
         return float(self.timebase.edges_s[frame]), float(self.timebase.edges_s[frame + 1])
+
+    def on_frame(self, time_s: float) -> float:
+        """Edge of a frame that a time, in whole milliseconds as files have it, stands for."""
+        if self.timebase is None:
+            return time_s
+        edges_s = self.timebase.edges_s
+        after = int(np.searchsorted(edges_s, time_s))
+        near_s = min(
+            edges_s[max(after - 1, 0) : after + 1], key=lambda edge_s: abs(edge_s - time_s)
+        )
+        return float(near_s) if abs(near_s - time_s) < _MILLISECOND_S else time_s
 
     @property
     def knows_frames(self) -> bool:
@@ -276,13 +290,15 @@ def _check_clock(rows: Iterable[Row], clock: LabelClock) -> None:
 
 
 def _timed(row: Row, clock: LabelClock) -> Row:
-    """A row with times, where it has frames or no duration."""
+    """A row with times, where it has frames or no duration, and on frames, where it was rounded."""
     if row.frames is not None:
         start_s, end_s = clock.of_frames(*row.frames)
     elif row.start_s == row.end_s:
         start_s, end_s = clock.of_mark(row.start_s)
     else:
-        return row
+        start_s, end_s = clock.on_frame(row.start_s), clock.on_frame(row.end_s)
+        if not start_s < end_s:
+            return row
     return replace(row, start_s=start_s, end_s=end_s)
 
 

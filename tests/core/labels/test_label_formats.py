@@ -6,6 +6,7 @@ import csv
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from any_labels import any_labels, finite_times_s, milliseconds_s
 from hypothesis import HealthCheck, given, settings
@@ -48,6 +49,22 @@ def to_a_nanosecond(back: Labels, labels: Labels) -> Labels:
         assert span.end_s == pytest.approx(end_s, rel=0, abs=1e-9)
         spans.append(replace(span, start_s=start_s, end_s=end_s))
     return Labels(back.tracks, tuple(spans), back.label_set)
+
+
+@by_format
+@pytest.mark.parametrize("rate_hz", [24.0, 25.0, 30000 / 1001, 30.0, 1000.0])
+@pytest.mark.parametrize("start_s", [0.0, 0.0123])
+def test_beside_its_recording_a_span_is_on_the_frames_that_it_was_on(
+    folder: Path, name: str, rate_hz: float, start_s: float
+) -> None:
+    clock = Timebase.regular(200, rate_hz, start_s)
+    edges_s = clock.edges_s.tolist()
+    spans = [Span(k + 1, "t", edges_s[4 * k], edges_s[4 * k + 3], "x") for k in range(50)]
+    path = folder / f"on-frames.{name}"
+    write_labels(path, Labels((LabelTrack("t"),), tuple(spans)), clock, name)
+    back = read_labels(path, clock, name)
+    found, there = ([(one.start_s, one.end_s) for one in some] for some in (back.spans, spans))
+    np.testing.assert_allclose(found, there, rtol=0, atol=1e-6)
 
 
 def crowded(spans: list[Span]) -> bool:

@@ -238,8 +238,8 @@ def test_slots_without_a_time_divide_evenly(tmp_path: Path, between: int, others
 
 
 def test_slots_may_have_parts_of_milliseconds(tmp_path: Path) -> None:
-    found = reading(tmp_path / "a.eaf", eaf({"a": "1000.5", "b": "2000.0"}, [("a", "b")]))
-    assert [(one.start_s, one.end_s) for one in found.labels.spans] == [(1.0005, 2.0)]
+    found = reading(tmp_path / "a.eaf", eaf({"a": "1010.5", "b": "2000.0"}, [("a", "b")]))
+    assert [(one.start_s, one.end_s) for one in found.labels.spans] == [(1.0105, 2.0)]
 
 
 def test_slots_that_cannot_be_placed_leave_their_annotations_out(tmp_path: Path) -> None:
