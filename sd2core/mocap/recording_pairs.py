@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.parts import synthetic_map
+from sd2core.denoise.resample_to_model import clips
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import check_distinct
@@ -20,7 +21,7 @@ from sd2core.fmcw.processing import doppler_map
 from sd2core.io.stored_vertices import damaged_frames
 from sd2core.labels.per_frame import BACKGROUND, label_per_frame, plain_name
 from sd2core.maps import DopplerMap
-from sd2core.mesh.presence import Presence, runs
+from sd2core.mesh.presence import Presence
 from sd2core.pairs.rows import agreed
 from sd2core.pairs.store import PairWriter, Take
 from sd2core.progress import Progress, part_of, silent
@@ -221,7 +222,7 @@ def _takes(
     rate_hz = synthetic.timebase.frames_per_s
     takes: list[Take] = []
     kept = 0
-    for start, stop in take_frames(seen, rate_hz):
+    for start, stop in take_frames(times_s, seen, rate_hz):
         kept += stop - start
         takes.append(
             Take(
@@ -238,12 +239,14 @@ def _takes(
     return takes, float((len(times_s) - kept) / rate_hz)
 
 
-def take_frames(seen: NDArray[np.bool_], rate_hz: float) -> Iterator[tuple[int, int]]:
+def take_frames(
+    times_s: NDArray[np.float64], seen: NDArray[np.bool_], rate_hz: float
+) -> Iterator[tuple[int, int]]:
     """Frames ``(start, stop)`` of takes: stretches that are seen, long ones cut equally.
 
-    Those shorter than a second are left out.
+    Those shorter than a second are left out. None reaches over a gap in time.
     """
-    for begun, ended in runs(seen):
+    for begun, ended in clips(times_s, seen, rate_hz):
         # Of equal length, so that none is a rest.
         parts = max(1, math.ceil((ended - begun) / (rate_hz * TAKE_S)))
         edges = np.linspace(begun, ended, parts + 1).round().astype(int)

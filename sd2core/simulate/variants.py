@@ -125,7 +125,8 @@ def _of_recording(
     recording: Recording, names: tuple[str, ...], subject: str, mesh: MeshSequence
 ) -> Iterator[_Movement]:
     labels = [*names, ""]  # the last is that of UNKNOWN
-    stretches = take_frames(mesh.presence.present, mesh.timebase.frames_per_s)
+    seen, rate_hz = mesh.presence.present, mesh.timebase.frames_per_s
+    stretches = take_frames(mesh.times_s, seen, rate_hz)
     for number, (start, stop) in enumerate(stretches):
         yield _Movement(
             TakeKey(subject, f"{recording.folder.stem}-{number:03d}", 0),

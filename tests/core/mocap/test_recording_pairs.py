@@ -19,11 +19,13 @@ from sd2core.datasets.sources import pair_sources
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
+from sd2core.io.mesh import save_mesh
 from sd2core.mocap.recording_pairs import make_recording_pairs
 from sd2core.pairs.rows import UNKNOWN
 from sd2core.pairs.store import read_pairs
 from sd2core.progress import silent
 from sd2core.radar_config import CLUTTER
+from sd2core.timebase import Timebase
 from sd2core.train.data import read_mixed
 
 
@@ -93,6 +95,15 @@ def test_pairs_of_what_has_changed_since_are_refused(tmp_path: Path, changed: st
     one.save()
     with pytest.raises(Sd2Error, match="anna-000 already, made of something else"):
         make_recording_pairs([one.folder], tmp_path / "pairs.zarr")
+
+
+def test_no_take_reaches_over_lost_frames(tmp_path: Path) -> None:
+    one = recording(tmp_path / "anna.sd2", radar_frames=180)
+    mesh = one.load_mesh()
+    later_s = mesh.times_s + np.where(np.arange(120) < 50, 0.0, 2.0)
+    save_mesh(replace(mesh, timebase=Timebase(later_s)), one.folder / "mesh.npz")
+    make_recording_pairs([one.folder], tmp_path / "pairs.zarr")
+    assert [len(take.times_s) for take in read_pairs(tmp_path / "pairs.zarr").takes] == [50, 70]
 
 
 def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
