@@ -254,8 +254,9 @@ def _draw_difference(
     limit = high - low
     level = np.where(known, values, np.nan)
     shown = _draw(axes, first, level, table, -limit, limit)
-    name = f"{_short(first.title)} − {_short(second.title).lower()}"
-    _title(axes, name, "each relative to its own 0 dB")
+    other = _short(second.title).lower()
+    name = f"{_short(first.title)} − {other}"
+    _title(axes, name, f"both as strong altogether, relative to the 0 dB of {other}")
     bar = figure.colorbar(shown, ax=axes, pad=0.01, aspect=12, fraction=0.05)
     bar.set_label(f"difference ({levels.unit})", fontsize=8)
     bar.ax.tick_params(labelsize=7)

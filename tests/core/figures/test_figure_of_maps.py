@@ -79,6 +79,8 @@ def test_the_figure_shows_the_sign_and_carries_provenance(tmp_path):
     figure = draw_maps(rows, Levels(), start_s=0.0, end_s=2.0, difference=(0, 1))
     titles = [axes.get_title("left") for axes in figure.axes if axes.get_title("left")]
     assert titles == ["Denoised · a model", "Real", "Denoised − real"]
+    how = figure.axes[2].get_title("right")
+    assert how == "both as strong altogether, relative to the 0 dB of real"
     save_maps(figure, tmp_path / "maps.png", rows, {"recording": "walk"})
     with Image.open(tmp_path / "maps.png") as picture:
         told = json.loads(picture.info["Description"])
