@@ -186,8 +186,9 @@ def draw_maps(
     bar.set_label(f"level ({levels.unit})", fontsize=8)
     bar.ax.tick_params(labelsize=7)
     if difference is not None:
-        first, second = _in_view(rows[difference[0]], start_s, end_s), rows[difference[1]]
-        _draw_difference(figure, maps_axes[-1], first, second, levels)
+        first, second = (rows[number] for number in difference)
+        shown = _in_view(first, start_s, end_s)
+        _draw_difference(figure, maps_axes[-1], first, second, levels, shown)
     if labels is not None and lanes:
         in_per_s = 0.8 * _WIDTH_IN / (end_s - start_s)
         _draw_lanes(all_axes[-1], lanes, labels, start_s, end_s, in_per_s)
@@ -244,16 +245,18 @@ def _draw(
 
 
 def _draw_difference(
-    figure: Figure, axes: Axes, first: MapRow, second: MapRow, levels: Levels
+    figure: Figure, axes: Axes, first: MapRow, second: MapRow, levels: Levels, seen: MapRow
 ) -> None:
+    """Draw the difference of whole maps, whatever is seen of the first."""
     from matplotlib.colors import LinearSegmentedColormap
 
     values, known = difference_of(first, second, levels)
+    begin = int(np.searchsorted(first.doppler.times_s, seen.doppler.times_s[0]))
     table = LinearSegmentedColormap.from_list("difference", _DIFFERENCE, N=255)
     low, high = levels.ends
     limit = high - low
-    level = np.where(known, values, np.nan)
-    shown = _draw(axes, first, level, table, -limit, limit)
+    level = np.where(known, values, np.nan)[:, begin : begin + len(seen.doppler.times_s)]
+    shown = _draw(axes, seen, level, table, -limit, limit)
     other = _short(second.title).lower()
     name = f"{_short(first.title)} − {other}"
     _title(axes, name, f"both as strong altogether, relative to the 0 dB of {other}")

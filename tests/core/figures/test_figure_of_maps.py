@@ -69,6 +69,19 @@ def test_where_one_says_nothing_there_is_no_difference():
         difference_of(one, row_of(np.ones((5, 3))), Levels())
 
 
+def test_a_part_of_the_difference_is_that_of_the_whole():
+    """Of the first second alone, the first map would be as strong as the other."""
+    half = np.full((4, 10), 1e-3)
+    rows = [row_of(np.hstack([half, half])), row_of(np.hstack([half, 100 * half]))]
+    whole, part = (
+        draw_maps(rows, Levels(low_db=-60.0), start_s=0.0, end_s=end_s, difference=(0, 1))
+        for end_s in (2.0, 0.5)
+    )
+    drawn = [one.axes[2].collections[0].get_array() for one in (whole, part)]
+    np.testing.assert_array_equal(drawn[1], drawn[0][:, : drawn[1].shape[1]])
+    assert drawn[1].min() > 15.0
+
+
 @pytest.mark.slow
 def test_the_figure_shows_the_sign_and_carries_provenance(tmp_path):
     loud, quiet = np.full((8, 10), 1.0), np.full((8, 10), 0.01)
