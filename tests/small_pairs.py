@@ -66,6 +66,7 @@ def write_pairs(
     placements: int = 1,
     limbs: bool = False,
     made_by: str = "a test",
+    **provenance: object,
 ) -> Path:
     writer = PairWriter(
         path,
@@ -74,7 +75,7 @@ def write_pairs(
         null_bins=null_bins,
         frame_rate_hz=rate_hz,
         labels=labels,
-        provenance={"made_by": made_by},
+        provenance={"made_by": made_by, **provenance},
         parts=PARTS if limbs else (),
     )
     seed = 0

@@ -223,6 +223,18 @@ def test_people_of_two_stores_are_different_people(tmp_path: Path) -> None:
     assert [one.key.subject for one in sources] == ["a:s1", "a", "b:s1", "b"]
 
 
+def test_of_recordings_a_person_is_one_in_all_stores(tmp_path: Path) -> None:
+    """On Monday, on Friday, and in variants: no one validates what they were learnt from."""
+    made = {"monday": {"recordings": ["take1"]}, "friday": {"recordings": ["take2"]},
+            "varied": {"sources": ["take1", "take2"]}}  # fmt: skip
+    paths = [write_pairs(tmp_path / f"{name}.zarr", ("anna", "ben"), **sources)
+             for name, sources in made.items()]  # fmt: skip
+    assert read_mixed(paths).subjects == ("anna", "ben")
+    mars = write_pairs(tmp_path / "mars.zarr", ("1",), made_by="sd2 pairs mars")
+    varied = write_pairs(tmp_path / "mars-varied.zarr", ("1",), sources=["mars_subject1"])
+    assert read_mixed([mars, varied]).subjects == ("1",)
+
+
 def test_stores_of_the_same_recordings_have_the_same_people(tmp_path: Path) -> None:
     """Else one person would be in the training and in the test."""
     mars = [
