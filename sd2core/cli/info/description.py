@@ -301,6 +301,7 @@ def describe_capture(path: Path, capture: RadarCapture) -> Description:
 
 def describe_map(path: Path, doppler: DopplerMap) -> Description:
     """Describe a Doppler map."""
+    from sd2core.io.radar.point_maps import OF_POINTS
     from sd2core.plausibility.radar import judge_map
 
     data = {
@@ -333,9 +334,8 @@ def describe_map(path: Path, doppler: DopplerMap) -> Description:
         "limbs": _limbs(doppler.limbs),
         **_synthesis_facts(doppler.meta),
     }
-    unlikely = judge_map(
-        doppler.values, doppler.timebase.times_s, doppler.present, measured=doppler.kind == "real"
-    )
+    noisy = doppler.kind == "real" and doppler.meta.get("format") != OF_POINTS
+    unlikely = judge_map(doppler.values, doppler.timebase.times_s, doppler.present, measured=noisy)
     notes = (*doppler.meta.get("notes", ()), *map(str, unlikely))
     simulated = " (of a simulated recording)" if doppler.of_simulated else ""
     return Description(f"Doppler map {path}{simulated}", data, facts, notes)

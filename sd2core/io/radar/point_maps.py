@@ -21,6 +21,8 @@ from sd2core.plausibility.clock import probable_unit
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
+OF_POINTS = "table of points"
+"""Format in the provenance of such maps: without points a frame of theirs is empty."""
 USUAL_FRAME_S = 0.1
 """Between frames of most published sets; no file of theirs says it exactly."""
 _CLEAR = 0.25
@@ -106,7 +108,7 @@ def load_points_map(path: Path, axis: VelocityAxis | None = None) -> RecordedMap
         unit="points" if points.intensity is None else "intensity of points",
         meta={
             "source": path.name,
-            "format": "table of points",
+            "format": OF_POINTS,
             "columns": list(points.columns),
             "velocity_step_mps": step_mps,
             "notes": notes,

@@ -233,6 +233,11 @@ def test_a_table_of_points_is_a_map_on_the_axis_asked_for(sd2: Sd2, tmp_path: Pa
     path, out = write_csv(tmp_path / "points.csv", walk()), tmp_path / "map.npz"
     assert sd2("radar", path, "--out", out, "--v-max", 4, "--bins", 16).code == 0
     assert DopplerMap.load(out).axis == VelocityAxis(16, 4.0)
+    table = walk()
+    # Nobody was detected in every fifth frame.
+    sparse = write_csv(tmp_path / "sparse.csv", table[table[:, 0] % 5 > 0])
+    for command in (("radar", sparse, "--out", out, "--overwrite"), ("info", out)):
+        assert "nothing but zeros" not in sd2(*command).out
     outcome = sd2("radar", path, "--out", out, "--overwrite", "--clutter", "mean")
     assert outcome.code == 1
     assert "--clutter is given" in outcome.err
