@@ -31,6 +31,9 @@ PIECE = 2048
 _KEPT = ("sensor", "simulated")
 """What the provenance of a denoised map has from the synthetic one."""
 
+_LEVELS = ("weight", "range_exponent", "velocity", "velocity_sigma_bins", "time_sigma_s")
+"""Options of a synthetic map that its levels and widths depend on."""
+
 _FAINT = 0.1
 """A map's strongest cell, in mean energies learnt from, below which it is said to be faint. Of the
 sample farther away, bundled models keep half of their usual share at 0.15, a twentieth at 0.03."""
@@ -261,6 +264,11 @@ class TrainedDenoiser:
                 f"bins {', '.join(map(str, emptied))} were emptied, as in the maps that the model"
                 " learnt from"
             )
+        if otherwise := self._counted_otherwise(doppler):
+            notes.append(
+                f"unlike what the model learnt from, the map has {', '.join(otherwise)}: its levels"
+                " or widths are others"
+            )
         if resampled:
             notes.append(
                 f"frames at {doppler.timebase.frames_per_s:.4g}/s were interpolated to the model's"
@@ -280,6 +288,20 @@ class TrainedDenoiser:
         if notes:
             meta["notes"] = notes
         return meta
+
+    def _counted_otherwise(self, doppler: DopplerMap) -> list[str]:
+        """Options of a map that none had which the model learnt from, as far as both tell them."""
+        pairs, own = self.card.about.get("provenance"), doppler.meta.get("options")
+        if not (isinstance(pairs, dict) and isinstance(own, dict)):
+            return []
+        mixed = pairs.get("mixed", [pairs])
+        stores = [one.get("synthesis") for one in mixed if isinstance(one, dict)]
+        learnt = [one for one in stores if isinstance(one, dict) and {*_LEVELS} <= one.keys()]
+        return [
+            f"{name} {own[name]} in place of {learnt[0][name]}"
+            for name in _LEVELS
+            if name in own and learnt and own[name] not in [one[name] for one in learnt]
+        ]
 
 
 class LiveDenoiser:

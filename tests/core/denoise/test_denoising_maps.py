@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from sd2core.denoise.files import load_model, save_model
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.model import Denoiser
 from sd2core.denoise.registry import build
+from sd2core.doppler import PRESETS
 from sd2core.errors import Sd2Error
 from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.progress import Cancelled
@@ -246,6 +247,17 @@ def test_what_is_far_fainter_than_what_was_learnt_is_said(peak: float, said: boo
     notes = denoised.meta.get("notes", [])
     assert len(notes) == said
     assert all("0.05 times the mean energy" in note for note in notes)
+
+
+def test_a_map_that_is_counted_otherwise_than_what_was_learnt_is_said() -> None:
+    usual = asdict(PRESETS["paper"])
+    model = trained("gru", about={"provenance": {"mixed": [{"synthesis": usual}, {}]}})
+    notes = {}
+    for name, options in {"usual": usual, "other": usual | {"weight": "area"}}.items():
+        doppler = synthetic_map(energies(60), meta={"options": options})
+        notes[name] = model.denoise(doppler).meta.get("notes", [])
+    assert notes["usual"] == []
+    assert "weight area in place of count" in notes["other"][0]
 
 
 class TestFrameRates:
