@@ -85,10 +85,12 @@ def describe_pairs(path: Path, pairs: PairSet) -> Description:
         "velocity": axis_in_words(pairs.axis),
         "nulled bins": bins_in_words(pairs.axis, pairs.null_bins),
     }
+    # Where MARS' radar detected nothing there is nothing.
+    noisy = pairs.kind == "real" and pairs.provenance.get("made_by") != "sd2 pairs mars"
     notes = tuple(
         f"Take {take.title}: {finding}"
         for take in pairs.takes
-        for values, measured in ((take.synthetic, False), (take.radar, pairs.kind == "real"))
+        for values, measured in ((take.synthetic, False), (take.radar, noisy))
         for finding in judge_map(values.T, take.times_s, measured=measured)
     )
     if pairs.lost_frames:

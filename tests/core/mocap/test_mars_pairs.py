@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mars_files import approaching, write_part
 
+from sd2core.cli.info.learning_data import describe_pairs
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.mars import MarsStretch, read_mars
 from sd2core.mocap.driving import KINECT_MARKERS, puppet_of
@@ -112,6 +113,7 @@ def test_input_and_target_show_the_same_motion(
     np.testing.assert_allclose(_mean_mps(take.radar), speed_mps, atol=0.01)
     # The radar saw nothing in the frame that is left out; the body was there.
     assert np.flatnonzero(take.radar.sum(axis=1) == 0).tolist() == [10]
+    assert not any("lost" in note for note in describe_pairs(Path("mars.zarr"), pairs).notes)
     assert (take.synthetic.sum(axis=1) > 0).all()
 
 
