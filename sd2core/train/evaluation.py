@@ -277,7 +277,7 @@ def _filters(
     models: Sequence[TrainedDenoiser], pairs: PairSet, judged: Sequence[str]
 ) -> list[tuple[str, TrainedDenoiser]]:
     learnt = learnt_from(models[0].card, "training") if models else []
-    fitted_on = [name for name in pairs.subjects if name in learnt and name not in judged]
+    fitted_on = [name for name in pairs.subjects if _is_in(learnt, name) and name not in judged]
     fitted_on = fitted_on or [name for name in pairs.subjects if name not in judged]
     takes = pairs.of(fitted_on or judged).placements(first_only=True).takes
     takes = takes or pairs.of(fitted_on or judged).takes
@@ -332,8 +332,23 @@ def _judged_subjects(
 ) -> tuple[str, ...]:
     if subjects is not None:
         return pairs.of(subjects).subjects
-    unseen = learnt_from(models[0].card, "test") if models else []
-    return tuple(name for name in pairs.subjects if name in unseen) or pairs.subjects
+    if not models:
+        return pairs.subjects
+    unseen, seen = learnt_from(models[0].card, "test"), _seen(models[0].card)
+    kept_out = [name for name in pairs.subjects if name in unseen]
+    kept_out = kept_out or [
+        name for name in pairs.subjects if _is_in(unseen, name) and not _is_in(seen, name)
+    ]
+    return tuple(kept_out) or pairs.subjects
+
+
+def _is_in(learnt: Iterable[str], name: str) -> bool:
+    """True if a person is among those of a training, which calls some ``STORE:NAME``."""
+    return any(name in (one, one.partition(":")[2]) for one in learnt)
+
+
+def _seen(card: ModelCard) -> list[str]:
+    return learnt_from(card, "training", "validation")
 
 
 def learnt_from(card: ModelCard, *parts: str) -> list[str]:
@@ -352,8 +367,8 @@ def _notes(
 ) -> tuple[str, ...]:
     notes = []
     for model in models:
-        seen = learnt_from(model.card, "training", "validation")
-        known = [name for name in judged if name in seen]
+        seen = _seen(model.card)
+        known = [name for name in judged if _is_in(seen, name)]
         if known:
             notes.append(
                 f"{_title(model.card)} has learnt from, or was chosen by, subjects called"

@@ -153,6 +153,17 @@ def test_who_is_judged() -> None:
     assert any("learnt from simulated radar" in note for note in real.notes)
 
 
+def test_who_was_learnt_from_among_others_is_known_again() -> None:
+    """Trainings on several stores call a person ``STORE:NAME``, a store alone does not."""
+    pairs = lines(1)
+    learnt = {"training": ["a:s1", "b:s1"], "validation": ["b:s2"], "test": ["b:s3"]}
+    several = model(pairs, subjects=learnt)
+    apart = evaluate([several], pairs)
+    assert (apart.subjects, apart.notes) == (("s3",), ())
+    (note,) = evaluate([several], pairs, ("s1", "s3")).notes
+    assert "has learnt from, or was chosen by, subjects called s1" in note
+
+
 def test_only_what_the_own_sensor_saw(tmp_path: Path) -> None:
     pairs = read_pairs(write_pairs(tmp_path / "p.zarr", placements=3))
     one = model(pairs)
