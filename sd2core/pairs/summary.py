@@ -195,6 +195,19 @@ def names_together(stores: Sequence[StoreOfPeople]) -> list[dict[str, str]]:
     ]
 
 
+def is_among(name: str, people: Iterable[str]) -> bool:
+    """Tell if a person is among those of a training, which calls some ``STORE:NAME``."""
+    return any(name in (one, one.partition(":")[2]) for one in people)
+
+
+def kept_out(people: Sequence[str], test: Iterable[str], seen: Iterable[str]) -> tuple[str, ...]:
+    """Return those whom a training kept for its test and has not seen, or else everybody."""
+    test, seen = [*test], [*seen]
+    exact = [name for name in people if name in test]
+    alike = [name for name in people if is_among(name, test) and not is_among(name, seen)]
+    return tuple(exact or alike or people)
+
+
 def is_pair_store(path: Path) -> bool:
     """Tell if a folder looks like pairs, from one small file."""
     return bool(read_attributes(Path(path)).get("format") == FORMAT)

@@ -27,6 +27,7 @@ from sd2core.denoise.scaling import Compression, Scaling
 from sd2core.errors import Sd2Error
 from sd2core.maps import mean_velocity_mps, peak_velocity_mps
 from sd2core.pairs.store import PairSet
+from sd2core.pairs.summary import is_among, kept_out
 from sd2core.progress import Progress, silent
 
 Energies = NDArray[np.float32]
@@ -277,7 +278,7 @@ def _filters(
     models: Sequence[TrainedDenoiser], pairs: PairSet, judged: Sequence[str]
 ) -> list[tuple[str, TrainedDenoiser]]:
     learnt = learnt_from(models[0].card, "training") if models else []
-    fitted_on = [name for name in pairs.subjects if _is_in(learnt, name) and name not in judged]
+    fitted_on = [name for name in pairs.subjects if is_among(name, learnt) and name not in judged]
     fitted_on = fitted_on or [name for name in pairs.subjects if name not in judged]
     takes = pairs.of(fitted_on or judged).placements(first_only=True).takes
     takes = takes or pairs.of(fitted_on or judged).takes
@@ -334,17 +335,8 @@ def _judged_subjects(
         return pairs.of(subjects).subjects
     if not models:
         return pairs.subjects
-    unseen, seen = learnt_from(models[0].card, "test"), _seen(models[0].card)
-    kept_out = [name for name in pairs.subjects if name in unseen]
-    kept_out = kept_out or [
-        name for name in pairs.subjects if _is_in(unseen, name) and not _is_in(seen, name)
-    ]
-    return tuple(kept_out) or pairs.subjects
-
-
-def _is_in(learnt: Iterable[str], name: str) -> bool:
-    """True if a person is among those of a training, which calls some ``STORE:NAME``."""
-    return any(name in (one, one.partition(":")[2]) for one in learnt)
+    card = models[0].card
+    return kept_out(pairs.subjects, learnt_from(card, "test"), _seen(card))
 
 
 def _seen(card: ModelCard) -> list[str]:
@@ -368,7 +360,7 @@ def _notes(
     notes = []
     for model in models:
         seen = _seen(model.card)
-        known = [name for name in judged if _is_in(seen, name)]
+        known = [name for name in judged if is_among(name, seen)]
         if known:
             notes.append(
                 f"{_title(model.card)} has learnt from, or was chosen by, subjects called"

@@ -90,6 +90,7 @@ def _eval(options: Evaluate) -> None:
     from sd2core.classify.files import load_classifier
     from sd2core.classify.live import judge
     from sd2core.files.figure_files import save_figure
+    from sd2core.pairs.summary import is_among
 
     classifier = load_classifier(options.classifier)
     maps = parsed_maps(options.maps)
@@ -97,20 +98,19 @@ def _eval(options: Evaluate) -> None:
     clips = _judged(known, classifier.card, options)
     score = judge(classifier, clips, known)
     subjects = list(dict.fromkeys(clip.subject for clip in clips))
-    split = classifier.card.about.get("split", {})
-    learnt = {*split.get("training", ()), *split.get("validation", ())} & set(subjects)
+    learnt = sorted(name for name in subjects if is_among(name, _seen(classifier.card)))
     data = {
         "model": str(options.classifier),
         "maps": list(known.kinds),
         "subjects": subjects,
-        "learnt_from": sorted(learnt),
+        "learnt_from": learnt,
         **score.to_json(),
         **score.summary(),
     }
     if options.json:
         print_json(data)
     else:
-        _say(score, known, subjects, sorted(learnt))
+        _say(score, known, subjects, learnt)
     if options.figure is not None:
         from sd2core.classify.confusion_figure import confusion_figure
         from sd2core.classify.metrics import shares
@@ -126,13 +126,14 @@ def _eval(options: Evaluate) -> None:
 
 def _judged(known: ClipSet, card: ClassifierCard, options: Evaluate) -> tuple[Clip, ...]:
     from sd2core.classify.data import seen_first
+    from sd2core.pairs.summary import kept_out
 
-    kept = card.about.get("split", {}).get("test") or ()
     if options.subjects is not None:
         names = named_subjects(options.subjects, known.subjects)
     else:
         # Data of other people than the training's are judged whole.
-        names = tuple(name for name in kept if name in known.subjects) or known.subjects
+        kept = card.about.get("split", {}).get("test") or ()
+        names = kept_out(known.subjects, kept, _seen(card))
     missing = [name for name in names if name not in known.subjects]
     if missing:
         raise Sd2Error(
@@ -142,14 +143,20 @@ def _judged(known: ClipSet, card: ClassifierCard, options: Evaluate) -> tuple[Cl
     return clips if options.placements == "all" else tuple(filter(seen_first(clips), clips))
 
 
+def _seen(card: ClassifierCard) -> list[str]:
+    """People whom a classifier learnt from, or whose validation its best step was chosen by."""
+    split, chosen = card.about.get("split", {}), "steps" in card.about.get("training", {})
+    return [*split.get("training", ()), *(split.get("validation", ()) if chosen else ())]
+
+
 def _say(score: Score, known: ClipSet, subjects: list[str], learnt: list[str]) -> None:
     from sd2core.classify.metrics import shares
 
     print(f"Evaluated on {' and '.join(known.kinds)} maps of {', '.join(subjects)}")
     if learnt:
-        names = ", ".join(learnt)
         print(
-            f"It was trained on, or chosen by, {names}: this does not show how it does for others."
+            f"It was trained on, or chosen by, {', '.join(learnt)}: this does not show how it does"
+            " for others."
         )
     for what, matrix in (("frames", score.frames), ("gestures", score.gestures)):
         rows = [(what, *(f"taken for {name}" for name in score.classes), "in all")]

@@ -10,7 +10,7 @@ from test_pairs import HEADER, take
 from sd2core.errors import Sd2Error
 from sd2core.pairs.segments import segment_starts
 from sd2core.pairs.store import PairWriter, read_pairs
-from sd2core.pairs.summary import pair_facts
+from sd2core.pairs.summary import is_among, kept_out, pair_facts
 
 
 @pytest.fixture
@@ -61,3 +61,14 @@ def test_a_store_without_a_take_is_refused(tmp_path) -> None:
     PairWriter(tmp_path / "pairs.zarr", **HEADER)
     with pytest.raises(Sd2Error, match="no take yet"):
         pair_facts(tmp_path / "pairs.zarr")
+
+
+def test_whom_a_training_kept_out_is_judged_by_whatever_name() -> None:
+    people = ("s1", "s2", "s3")
+    assert kept_out(people, ["s3"], ["s1", "s2"]) == ("s3",)
+    assert kept_out(people, ["b:s3"], ["a:s1", "b:s2"]) == ("s3",)
+    # Which of both stores it is, nobody knows.
+    assert kept_out(people, ["b:s3"], ["a:s3", "b:s2"]) == people
+    assert kept_out(people, [], ["ann"]) == people
+    assert is_among("s1", ["a:s1"])
+    assert not is_among("b:s1", ["a:s1"])
