@@ -225,13 +225,15 @@ def test_people_of_two_stores_are_different_people(tmp_path: Path) -> None:
 
 def test_of_recordings_a_person_is_one_in_all_stores(tmp_path: Path) -> None:
     """On Monday, on Friday, and in variants: no one validates what they were learnt from."""
-    made = {"monday": {"recordings": ["take1"]}, "friday": {"recordings": ["take2"]},
-            "varied": {"sources": ["take1", "take2"]}}  # fmt: skip
+    made = {"monday": {"recordings": ["take1.sd2"]}, "friday": {"recordings": ["take2.sd2"]},
+            "varied": {"sources": ["take1.sd2", "take2.sd2"]}}  # fmt: skip
     paths = [write_pairs(tmp_path / f"{name}.zarr", ("anna", "ben"), **sources)
              for name, sources in made.items()]  # fmt: skip
     assert read_mixed(paths).subjects == ("anna", "ben")
     mars = write_pairs(tmp_path / "mars.zarr", ("1",), made_by="sd2 pairs mars")
-    varied = write_pairs(tmp_path / "mars-varied.zarr", ("1",), sources=["mars_subject1"])
+    varied = write_pairs(
+        tmp_path / "mars-varied.zarr", ("1",), sources=["mars_subject1"], variant={}
+    )
     assert read_mixed([mars, varied]).subjects == ("1",)
 
 
