@@ -195,8 +195,9 @@ def apply_to_stretches(
     total, resampled = len(energies), False
     for start, stop in stretches(doppler, frame_rate_hz):
 
-        def own(values: Energies, start: int = start) -> Energies:
-            return work(values, lambda frames, _: progress(start + frames, total))
+        def own(values: Energies, start: int = start, size: int = stop - start) -> Energies:
+            # At the model's rate there are more frames, or fewer, than in the map.
+            return work(values, lambda done, of: progress(start + size * done // of, total))
 
         values, times_s = energies[start:stop], doppler.times_s[start:stop]
         if is_regular(times_s, frame_rate_hz):

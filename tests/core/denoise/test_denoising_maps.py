@@ -364,11 +364,12 @@ def test_the_input_is_left_alone() -> None:
     np.testing.assert_array_equal(values, before)
 
 
+@pytest.mark.parametrize("rate_hz", [15.0, 30.0, 60.0])
 @pytest.mark.parametrize("name", ["gru", "unet"])
-def test_it_reports_and_stops(name: str, short_chunks: None) -> None:
+def test_it_reports_and_stops(name: str, rate_hz: float, short_chunks: None) -> None:
     seen: list[tuple[int, int]] = []
     trained(name).denoise(
-        synthetic_map(energies(200)), lambda done, total: seen.append((done, total))
+        synthetic_map(energies(200), rate_hz), lambda done, total: seen.append((done, total))
     )
     assert seen == sorted(seen)
     assert seen[-1] == (200, 200)
