@@ -31,6 +31,7 @@ _REACH_S = 0.12
 """A picture is covered where the head was so long before and after, too."""
 _CRF, _PRESET = 19, "fast"
 _SAME_S = 1e-4
+_SAME_SHAPE = 0.02
 
 
 def hide_person(folder: Path, how: Literal["blur", "drop"], progress: Progress = silent) -> bool:
@@ -72,13 +73,10 @@ def hide_person(folder: Path, how: Literal["blur", "drop"], progress: Progress =
 
 def _cover(recording: Recording, progress: Progress) -> bool:
     """Put a video with its head covered in the place of the original, once it is whole."""
-    from sd2core.body.camera import camera_of
-
     with recording.open_video() as video:
         if video.metadata.get("comment") == HEADS_COVERED:
             return False
-        camera, _ = camera_of(video, recording.focal_px(video.width, video.height))
-        mesh = recording.load_mesh()
+        mesh, camera = _as_fitted(recording, video)
         size = (video.width // 2 * 2, video.height // 2 * 2)
         covered = _covered(video, mesh, head_circles(mesh, camera), size, progress)
         clock = video.timebase
@@ -93,6 +91,28 @@ def _cover(recording: Recording, progress: Progress) -> bool:
                 raise Sd2Error(f"{part} has other times than {video.path}", "the same times")
     recording.save()
     return True
+
+
+def _as_fitted(recording: Recording, video: VideoReader) -> tuple[MeshSequence, PinholeCamera]:
+    """The body where it lies on the person, whatever the recording says of it or of its camera."""
+    from sd2core.body.camera import PinholeCamera, camera_of
+    from sd2core.io.fitted import fitted_camera
+    from sd2core.io.mesh import load_mesh
+
+    assert recording.mesh is not None
+    width, height = video.width, video.height
+    known = fitted_camera(recording.mesh)
+    if known is None:
+        return recording.load_mesh(), camera_of(video, recording.focal_px(width, height))[0]
+    shape = (known.width or width) / (known.height or height)
+    if abs(shape * height / width - 1.0) > _SAME_SHAPE:
+        raise Sd2Error(
+            f"{recording.mesh} was fitted to pictures of {known.width} × {known.height} pixels,"
+            f" those of {video.path} are of {width} × {height}",
+            "a body that was fitted to this video",
+            "Fit it again",
+        )
+    return load_mesh(recording.mesh), PinholeCamera(width, height, known.focal_for(width, height))
 
 
 def head_circles(mesh: MeshSequence, camera: PinholeCamera) -> NDArray[np.float64]:

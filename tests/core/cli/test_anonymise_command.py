@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import zarr
 from cli_outcome import Sd2
 
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.limbs import LIMBS, vertex_limbs
 from sd2core.body.model import Body
 from sd2core.errors import Sd2Error
-from sd2core.files.recording_json import CameraEntry
+from sd2core.files.recording_json import CameraEntry, MeshReading
 from sd2core.io.mesh import save_mesh
 from sd2core.io.video import VideoReader, open_video
 from sd2core.io.video_writing import write_video
@@ -73,6 +74,27 @@ def recording(tmp_path: Path) -> Recording:
 def _pictures(folder: Path) -> tuple[np.ndarray, np.ndarray]:
     with open_video(folder / "video.mp4") as video:
         return np.array(list(video.frames()), float), video.timebase.times_s
+
+
+def test_the_head_is_covered_where_it_was_fitted(recording: Recording) -> None:
+    """What is said later, of the camera or of how the mesh is read, moves nobody in the video."""
+    camera = {"focal_px": 120.0, "width": 192, "height": 144, "source": "default"}
+    fit = zarr.open_group(str(recording.mesh), mode="r+")
+    fit.attrs["fit"] = {"camera": camera}
+    recording.camera = CameraEntry(focal_px=60.0)
+    recording.mesh_reading = MeshReading(distance_m=2.0, frames_per_s=5.0)
+    recording.save()
+    assert hide_person(recording.folder, "blur")
+    after, _ = _pictures(recording.folder)
+    for frame, head in enumerate(_heads_px(_walking())[: NOBODY.start]):
+        assert after[frame][tuple(head.T)].std(axis=0).max() < 4
+
+
+def test_a_body_of_other_pictures_covers_nothing(recording: Recording) -> None:
+    camera = {"focal_px": 120.0, "width": 144, "height": 144, "source": "default"}
+    zarr.open_group(str(recording.mesh), mode="r+").attrs["fit"] = {"camera": camera}
+    with pytest.raises(Sd2Error, match="fitted to pictures of 144 × 144"):
+        hide_person(recording.folder, "blur")
 
 
 def test_the_head_loses_its_detail_and_nothing_else_changes(recording: Recording) -> None:
