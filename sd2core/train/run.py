@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,7 +30,7 @@ from sd2core.runs.progress import ProgressWriter
 from sd2core.train.checkpoint import Checkpoint, Position, read_checkpoint
 from sd2core.train.data import Order, TrainingData, prepare, read_mixed
 from sd2core.train.denoiser_loop import DenoiserLoop
-from sd2core.train.evaluation import check_fits
+from sd2core.train.evaluation import check_fits, learnt_from
 from sd2core.train.folder import TrainingFolder
 from sd2core.train.learner import Learner
 from sd2core.train.loop import Outcome
@@ -119,7 +119,8 @@ def carry_out(
         known = KnownMovements.of(learnt_pairs, data.pairs.axis)
         if model is not None and known is not None:
             known = known.together(model.card.known)
-        facts = _Facts(config, data, scaling, command, machine, known)
+        before = () if model is None else learnt_from(model.card, "training", "validation")
+        facts = _Facts(config, data, scaling, command, machine, known, before)
         validator = Validator.of(
             data.validation, scaling, data.pairs.axis, data.pairs.null_bins
         ).on(device)
@@ -253,6 +254,7 @@ class _Facts:
     command: str
     machine: dict[str, Any]
     known: KnownMovements | None
+    before: Sequence[str]  # People whom the model that it goes on from has learnt from.
 
     def save(
         self, path: Path, network: Denoiser, best: Validation, live: Validation | None, epoch: int
@@ -301,7 +303,7 @@ class _Facts:
                 },
                 "limits": self._limits(),
                 "subjects": {
-                    "training": list(split.training),
+                    "training": list(dict.fromkeys([*split.training, *self.before])),
                     "validation": list(split.validation),
                     "test": list(split.test),
                 },

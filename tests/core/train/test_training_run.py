@@ -34,6 +34,7 @@ from sd2core.runs import pace
 from sd2core.runs.control import write_control
 from sd2core.runs.progress import Event, ProgressTail, effective, last_of, read_events
 from sd2core.train.config import config_text
+from sd2core.train.evaluation import learnt_from
 from sd2core.train.folder import TrainingFolder
 from sd2core.train.start import Ending, begin, go_on
 from sd2core.train.validate import Validation, Validator
@@ -117,6 +118,8 @@ class TestGoingOn:
         assert (after.model, after.options) == (before.model, before.options)
         assert after.scaling.input == before.scaling.input
         assert after.about["start"] == learnt.name
+        # Who chose the first model is no stranger to the second.
+        assert learnt_from(after, "training") == learnt_from(before, "training", "validation")
         assert ending.validation_rmse == pytest.approx(
             before.about["metrics"]["validation_rmse"], rel=1e-3
         )
