@@ -186,9 +186,14 @@ def names_together(stores: Sequence[StoreOfPeople]) -> list[dict[str, str]]:
     origins = [one.known_people or number for number, one in enumerate(stores)]
     people = {(at, name) for at, one in zip(origins, stores, strict=True) for name in one.subjects}
     count = Counter(name for _, name in people)
+    alike = Counter(one.path.stem for one in stores)
+    called = [
+        one.path.stem if alike[one.path.stem] == 1 else f"{one.path.parent.name} {one.path.stem}"
+        for one in stores
+    ]
     return [
         {
-            name: name if count[name] == 1 else f"{stores[origins.index(at)].path.stem}:{name}"
+            name: name if count[name] == 1 else f"{called[origins.index(at)]}:{name}"
             for name in one.subjects
         }
         for at, one in zip(origins, stores, strict=True)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sd2core.denoise.metrics import stands_out
 from sd2core.errors import Sd2Error
+from sd2core.files.paths import check_distinct
 from sd2core.maps import peak_velocity_mps
 from sd2core.options.training import DataConfig
 from sd2core.pairs.rows import UNKNOWN
@@ -98,12 +99,14 @@ class TrainingData:
 
 
 def read_mixed(paths: Sequence[Path]) -> PairSet:
-    """Read one or several stores of pairs as one.
+    """Read one or several stores of pairs as one, each once.
 
     People are called as :func:`~sd2core.pairs.summary.names_together` says. Labels are those of all
     stores. What holds anything simulated is called simulated. Raises Sd2Error if axes, frame rates
-    or null bins differ.
+    or null bins differ, or two are links to one.
     """
+    paths = list(dict.fromkeys(paths))
+    check_distinct(paths)
     sets = [read_pairs(path) for path in paths]
     first = sets[0]
     if len(sets) == 1:

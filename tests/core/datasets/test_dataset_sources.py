@@ -237,6 +237,17 @@ def test_of_recordings_a_person_is_one_in_all_stores(tmp_path: Path) -> None:
     assert read_mixed([mars, varied]).subjects == ("1",)
 
 
+def test_stores_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+    paths = []
+    for folder in ("first", "second"):
+        (tmp_path / folder).mkdir()
+        paths.append(write_pairs(tmp_path / folder / "pairs.zarr", ("s1",), takes=1))
+    mixed = read_mixed([*paths, paths[0]])
+    assert mixed.subjects == ("first pairs:s1", "second pairs:s1")
+    assert len(mixed.takes) == 2
+    assert {one.key.subject for one in gather(paths, Making(("synthetic",)))} == {*mixed.subjects}
+
+
 def test_stores_of_the_same_recordings_have_the_same_people(tmp_path: Path) -> None:
     """Else one person would be in the training and in the test."""
     mars = [
