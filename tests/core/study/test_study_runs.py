@@ -102,8 +102,8 @@ def test_runs_are_of_the_denoiser_that_its_file_holds(
         in (tmp_path / "study.md").read_text()
     )
     late_s = np.concatenate([one.scores[REAL].latencies_s for one in results.runs])
-    # What comes after the frame is looked at: half of a window of 0.4 s.
-    assert late_s.min() == pytest.approx(0.2 + 1 / 30)
+    # A window of 0.4 s ends with the sixth frame from the one on that is answered for.
+    assert late_s.min() == pytest.approx(6 / 30)
 
 
 def test_a_study_that_cannot_be_is_no_study_that_was_stopped(
