@@ -116,12 +116,23 @@ class VideoView(Canvas):
             overlay.changed,
             *fit_signals,
         )
+        self._beyond = False  # the clock is before the first frame, or after the last one
+        session.playback.frame_changed.connect(self._follow_clock)
+        session.document.changed.connect(self._follow_clock)
+
+    def _follow_clock(self) -> None:
+        playback, reader = self._session.playback, self._session.video.reader
+        now_s = playback.timebase.time_of(playback.frame)
+        beyond = reader is not None and not reader.timebase.covers(now_s)
+        if beyond != self._beyond:
+            self._beyond = beyond
+            self.update()
 
     def paint(self, painter: QPainter) -> None:
         """Paint the picture, or why there is none."""
         colours, video = self._session.display.palette, self._session.video
         painter.fillRect(self.rect(), QColor(colours.well))
-        if video.picture is None:
+        if video.picture is None or self._beyond:
             painter.setPen(QColor(colours.muted))
             painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._absence())
             return
@@ -139,6 +150,8 @@ class VideoView(Canvas):
         recording = self._session.document.recording
         if recording is None:
             return ""
+        if self._beyond:
+            return "No video at this time"
         if self._session.video.reader is not None:
             return "Reading the first frame…"
         if recording.video is None:

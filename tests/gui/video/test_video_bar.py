@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import pytest
+from kept_window import opened
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QSlider, QToolButton
 from window_models import models_of
 
-from sd2app.video.view import VideoBar
+from sd2app.video.view import VideoBar, VideoView
+from sd2core.recording.recording import open_recording
 
 
 def buttons(window):
@@ -62,3 +65,20 @@ def test_the_video_shows_the_mesh_as_strongly_as_asked(window, qtbot):
 def test_without_a_mesh_there_is_nothing_to_choose(empty_window):
     slider, mesh, dots = buttons(empty_window)
     assert not any(widget.isEnabled() for widget in (slider, mesh, dots))
+
+
+def test_beyond_the_video_its_first_frame_is_not_shown(empty_window, qtbot, recording_copy):
+    """The radar began a second before; the scene says likewise that there is no mesh."""
+    recording = open_recording(recording_copy)
+    recording.radar_offset_s = -1.0
+    recording.save()
+    opened(empty_window, qtbot, recording_copy)
+    c, view = models_of(empty_window), empty_window.findChild(VideoView)
+
+    def corner():
+        return view.grab().toImage().pixelColor(view.width() // 2, view.height() // 3).name()
+
+    for time_s in (-0.5, 0.0, 1.9, -0.1):
+        c.playback.seek(time_s)
+        qtbot.waitUntil(lambda: c.video.shown_frame == max(c.playback.frame - 30, 0))
+        assert (corner() == QColor(c.display.palette.well).name()) == (time_s < 0)
