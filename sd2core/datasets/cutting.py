@@ -105,19 +105,21 @@ def _clips_of_spans(
         own_s = clip.times_s[frames_that_begin(clip.times_s, *wide_s)]
         if options.length == "resampled":
             own_s = np.linspace(own_s[0], own_s[-1], length)
-        elif len(own_s) > length:
-            raise Sd2Error(
-                f"The span {outline.labels[span.label]} at {span.start_s:.3f} s has"
-                f" {len(own_s)} frames with its margins, the segments {length}",
-                "spans that fit into a segment",
-                f"Choose segments of {len(own_s)} frames, or spans that are resampled",
-            )
         resampled = clip.resampled or options.length == "resampled"
         # Interpolation needs the frames around.
         around = int(resampled)
         start = max(int(np.searchsorted(times_s, own_s[0])) - around, clip.start)
         stop = min(int(np.searchsorted(times_s, own_s[-1], "right")) + around, clip.stop)
         pieces.append(Clip(start, stop, own_s, resampled, np.zeros(1, np.int64), span))
+    sizes = ((len(one.times_s), one.span) for one in pieces if one.span is not None)
+    frames, longest = max(sizes, default=(0, None))
+    if longest is not None and frames > length:
+        raise Sd2Error(
+            f"The span {outline.labels[longest.label]} at {longest.start_s:.3f} s has"
+            f" {frames} frames with its margins, the segments {length}",
+            "spans that fit into a segment",
+            f"Choose segments of {frames} frames, or spans that are resampled",
+        )
     return pieces, left_out
 
 
