@@ -49,6 +49,7 @@ from sd2core.mesh.made_vertices import same_bodies
 from sd2core.numerics.compiled import kernels_ready
 from sd2core.options.records import words_of
 from sd2core.options.synthesis import CHOSEN
+from sd2core.radar_profiles import BEAMS
 from sd2core.recording.recording import Recording
 from sd2core.sensor import Vector, VirtualSensor
 
@@ -72,6 +73,18 @@ def _source(recording: Recording) -> dict[str, Any]:
     if not is_estimate(recording.mesh):  # the command refuses what would change nothing
         read.pop("focal_px", None)
     return {"mesh": recording.mesh, "fps": read.pop("frames_per_s", None), **read}
+
+
+def _looking(sensor: VirtualSensor) -> dict[str, Any]:
+    """Direction and beam for a command; without a beam no direction counts.
+
+    A table without a name has no words: the command takes the recording's.
+    """
+    if (beam := sensor.beam) is None:
+        return {}
+    named = next((name for name, one in BEAMS.items() if one == beam), None)
+    widths = None if beam.cuts else f"{beam.azimuth_width_deg},{beam.elevation_width_deg}"
+    return {"aim": f"{sensor.azimuth_deg},{sensor.elevation_deg}", "beam": named or widths}
 
 
 class SynthesisModel(ReportingModel):
@@ -293,6 +306,7 @@ class SynthesisModel(ReportingModel):
             **_source(recording),
             out=out,
             sensor=self._sensor.position_m,
+            **_looking(self._sensor),
             limbs=synthesizers.limbs and self.split,
             uncertainty=self._track.uncertainty is not None,
             **chosen,

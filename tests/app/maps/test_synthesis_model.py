@@ -500,7 +500,8 @@ def test_the_copied_command_makes_the_map_on_screen(
     scene.save()
     open_ball(context, qtbot, scene.folder)
     wait_until_done(context, qtbot)
-    context.edits.place_sensor(replace(scene.sensor, position_m=(-0.2, 0.1, 0.0)))
+    moved = replace(scene.sensor, position_m=(-0.2, 0.1, 0.0), azimuth_deg=-8.0)
+    context.edits.place_sensor(replace(moved, beam=Beam(50.0, 30.0)))  # not saved
     wait_until_done(context, qtbot)
     monkeypatch.chdir(tmp_path)
     program, *words = shlex.split(context.synthesis.line("map.npz"))
