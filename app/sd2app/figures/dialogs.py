@@ -93,7 +93,10 @@ class MapFigureDialog(FigureDialog):
     USUAL_PX = 900, 720
 
     def _more(self) -> tuple[QWidget, ...]:
-        tip = "These maps as a command for a terminal: with all labels, at the usual levels"
+        tip = (
+            "These maps as a command for a terminal: with all labels, at the usual levels and"
+            " accuracy"
+        )
         return (copy_button(lambda: self._model.line, self, tip),)
 
     def _choices(self) -> QLayout:

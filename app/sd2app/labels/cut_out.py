@@ -228,7 +228,10 @@ class CutOutDialog(Dialog):
         buttons, self._go = accepting(self, "Export…")
         parts = side_by_side(*self._parts.values(), spacing_px=16)
         form = form_of(("Spans", self._which), ("Parts", parts))
-        tip = "The same as a command for a terminal, which chooses spans by their labels"
+        tip = (
+            "As a command for a terminal, which chooses spans by their labels, and counts maps at"
+            " its usual accuracy"
+        )
         self._copy = copy_button(
             lambda: model.line(self._group.labels or (), self.parts), self, tip
         )
