@@ -96,9 +96,11 @@ def judge_place(body: BodyPoints) -> list[Sd2Error]:
     far_m = float(np.linalg.norm(points_m.mean(axis=1), axis=1).max())
     extent_m = np.median(body.extent_m[present], axis=0)
     low, high = _LYING_M
-    if depth_m <= 0:
-        return [_behind(depth_m, bool((points_m[..., 2] < 0).all()), far_m < AT_ROOT_M)]
-    if low <= extent_m[2] <= high and extent_m[2] > _LYING_SHARE * extent_m[:2].max():
+    wholly_behind = bool((points_m[..., 2] < 0).all())
+    lies = low <= extent_m[2] <= high and extent_m[2] > _LYING_SHARE * extent_m[:2].max()
+    if depth_m <= 0 and (wholly_behind or not lies):
+        return [_behind(depth_m, wholly_behind, far_m < AT_ROOT_M)]
+    if lies:
         return [
             Sd2Error(
                 f"The body is {extent_m[2]:.2f} m long along the line of sight and"

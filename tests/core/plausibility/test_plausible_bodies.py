@@ -98,6 +98,7 @@ def test_vertices_in_another_order_are_parts_that_are_too_fast():
     [
         ((0, 0, -3), POSE, "x180"),
         ((0, 0, 3), POSE[:, [0, 2, 1]], "x90"),
+        ((0, 1.4, -0.2), (POSE - POSE.mean(axis=0))[:, [0, 2, 1]], "x90"),
         ((0, 0, 0.0), POSE - POSE.mean(axis=0) - [0, 0, 0.01], None),
     ],
 )
