@@ -212,7 +212,8 @@ def fit_doubts(motion: FittedMotion) -> tuple[str, ...]:
         doubts.append(
             f"This fit is not to be believed: the body is {100.0 * motion.residual_m:.1f} cm from"
             f" the landmarks on average, and good ones stay below {100.0 * _DOUBTFUL_M:.0f} cm."
-            " Give the camera's focal length and the person's height where they are guessed."
+            " Give the camera's focal length and the person's height where they are guessed, and"
+            " turn a video that is not upright."
         )
     return tuple(doubts)
 
