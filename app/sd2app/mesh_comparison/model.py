@@ -78,9 +78,10 @@ class ComparisonModel(ProblemModel):
     def line(self) -> str:
         """Command for a terminal that compares the two meshes."""
         recording = self._session.document.recording
-        own = recording.mesh if recording and recording.mesh else Path("mesh.zarr")
+        # The recording knows how its mesh is read.
+        own = recording and (recording.mesh if recording.folder == UNTITLED else recording.folder)
         options = CompareMeshes(
-            meshes=(own, self._other),
+            meshes=(own or Path("mesh.zarr"), self._other),
             names=self.labels,
             reference=self.labels[self.reference],
             sensor=self._session.sensor.sensor.position_m,

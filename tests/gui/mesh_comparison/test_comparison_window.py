@@ -21,7 +21,7 @@ from sd2core.body.model import Body
 from sd2core.body.rotations import about
 from sd2core.io.mesh import save_mesh
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.recording.recording import Recording
+from sd2core.recording.recording import MeshReading, Recording
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 from tools.build_sample.swipes import posed
@@ -55,7 +55,10 @@ def meshes(waving, tmp_path) -> tuple[Path, Path]:
 @pytest.fixture
 def compared(empty_window, meshes, qtbot):
     """The window of the comparison, everything worked out."""
-    own, other = meshes
+    return compare(empty_window, *meshes, qtbot)
+
+
+def compare(empty_window, own: Path, other: Path, qtbot) -> ComparisonWindow:
     with qtbot.waitSignal(models_of(empty_window).document.opened, timeout=20_000):
         empty_window.open_paths([own])
     qtbot.waitUntil(lambda: empty_window.settled, timeout=20_000)
@@ -97,6 +100,18 @@ def test_the_command_compares_the_same_meshes(compared, meshes, qtbot):
     command = copied_record()
     assert command.meshes == meshes
     assert (command.labels, command.reference) == (["own.npz", "aside.npz"], "own.npz")
+
+
+def test_the_command_reads_the_mesh_as_the_recording_does(
+    empty_window, waving, meshes, tmp_path, qtbot
+):
+    np.savez(tmp_path / "mm.npz", vertices=1000 * waving.vertices, faces=waving.faces, fps=30)
+    walk = Recording.create(
+        tmp_path / "walk.sd2", mesh=tmp_path / "mm.npz", mesh_reading=MeshReading(scale=0.001)
+    )
+    window = compare(empty_window, walk.folder, meshes[1], qtbot)
+    qtbot.mouseClick(button_of(window, "Copy command"), Qt.MouseButton.LeftButton)
+    assert copied_record().meshes == (walk.folder, meshes[1])
 
 
 def test_a_click_in_the_table_shows_that_joint(compared, qtbot):
