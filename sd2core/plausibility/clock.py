@@ -27,6 +27,7 @@ _RECOGNISED_FRAMES_PER_S = (1.0, 1000.0)
 _GAP_STEPS, _GAP_S = 4.0, 0.25
 ROUNDING_S = 1e-5
 """A few steps of times that are written with six digits are off by less."""
+_SAME_RATE = 5e-4
 _WHOLE_RATES = (24_000.0, 30_000.0, 60_000.0, 120_000.0)
 """Numerators of the rates of television, such as 30000/1001."""
 
@@ -79,6 +80,19 @@ def judge_rate(step_s: float, *, of_a_mesh: bool = False) -> list[Sd2Error]:
     expected = f"{slowest:g} to {fastest:,g} frames/s"
     return [Sd2Error(f"The frames are {step_s:.4g} s apart, {rate:.3g} frames/s", expected, cause,
                     cure)]  # fmt: skip
+
+
+def judge_assumed_rate(assumed: float, of_video: float) -> Sd2Error | None:
+    """Finding on a mesh without times whose video has other frames per second than were assumed."""
+    if abs(of_video / assumed - 1.0) < _SAME_RATE:
+        return None
+    shown = float(f"{of_video:.5g}")
+    return Sd2Error(
+        f"The mesh has no times of its own and is read at {assumed:.4g} frames/s",
+        f"the rate of its video, {shown:g} frames/s",
+        "Every velocity is proportional to it",
+        Cure("frames_per_s", shown, f"Read it at {shown:g} frames/s", f"--fps {shown:g}"),
+    )
 
 
 def gaps_between(times_s: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -49,6 +49,7 @@ from sd2core.mesh.bodies import Body, persons_of
 from sd2core.mesh.things import Thing
 from sd2core.mesh.walls import Wall
 from sd2core.placements.placements import Placements, placements_from_dict
+from sd2core.plausibility.clock import judge_assumed_rate
 from sd2core.progress import Progress, silent
 from sd2core.recording.divergence import WORDS, Divergence, State, digests_of
 from sd2core.recording.relinking import (
@@ -534,8 +535,17 @@ class Recording:
         Things and other bodies of the scene go along with it.
         """
         from sd2core.io.bodies import load_scene
+        from sd2core.io.mesh import NO_TIMES
 
-        return load_scene(self._present("mesh"), **self.mesh_options(), progress=progress)
+        mesh = load_scene(self._present("mesh"), **self.mesh_options(), progress=progress)
+        if NO_TIMES not in mesh.notes or self.video is None or not self.video.exists():
+            return mesh
+        with suppress(Sd2Error), self.open_video() as video:  # a damaged one is told by itself
+            rate = video.timebase.frames_per_s
+            if finding := judge_assumed_rate(mesh.timebase.frames_per_s, rate):
+                findings, notes = (*mesh.findings, finding), (*mesh.notes, str(finding))
+                return replace(mesh, findings=findings, notes=notes)
+        return mesh
 
     @property
     def scene_files(self) -> list[Path]:

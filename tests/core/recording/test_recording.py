@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numbered_videos import write_video
 
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import is_absolute, located_path, stored_path
@@ -717,3 +718,17 @@ def test_a_wall_that_cannot_be_is_named_with_its_file(tmp_path: Path) -> None:
         (made.folder / FILE_NAME).write_text(json.dumps(content | {"walls": walls}))
         with pytest.raises(Sd2Error, match=FILE_NAME):
             open_recording(made.folder)
+
+
+@pytest.mark.parametrize(("rate", "offered"), [(25, [25.0]), (30, [])])
+def test_a_mesh_without_times_is_offered_the_rate_of_its_video(
+    tmp_path: Path, rate: int, offered: list[float]
+) -> None:
+    video = write_video(tmp_path / "v.mp4", 5, rate=rate)
+    still = np.random.default_rng(0).uniform(1.0, 2.0, (8, 3))
+    np.savez(tmp_path / "m.npz", vertices=np.tile(still, (5, 1, 1)))
+    made = Recording(tmp_path / "walk.sd2", video=video, mesh=tmp_path / "m.npz")
+    findings = made.load_mesh().findings
+    assert [one.cure.value for one in findings if one.cure is not None] == offered
+    made.mesh_reading = MeshReading(frames_per_s=rate)
+    assert made.load_mesh().findings == ()
