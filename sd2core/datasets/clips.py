@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.classify.data import Clip, ClipSet, in_order
+from sd2core.classify.data import UNKNOWN, Clip, ClipSet, in_order
 from sd2core.datasets.reading import Dataset
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
@@ -21,7 +21,8 @@ def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
     """Return the clips of one kind of maps in a data set.
 
     Segments of a source that overlap or touch become one clip again, so that a frame
-    counts once and a classifier that remembers sees whole movements.
+    counts once and a classifier that remembers sees whole movements. Labels without a class are
+    unknown.
     """
     header = dataset.header
     if header.spans is not None and header.spans.length == "resampled":
@@ -32,9 +33,10 @@ def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
         )
     if kind not in header.kinds:
         raise Sd2Error(f"{dataset.path} holds no {kind} maps", f"one of {', '.join(header.kinds)}")
-    names = [header.classes.get(label, label) for label in header.labels]
-    classes = in_order(names)
-    table = np.array([classes.index(name) for name in names], np.int8)
+    classes = in_order(header.classes.values())
+    # Labels that have no class are not learnt from.
+    numbers = {label: classes.index(name) for label, name in header.classes.items()}
+    table = np.array([numbers.get(label, UNKNOWN) for label in header.labels], np.int8)
     rows = np.flatnonzero(dataset["available"][:][:, KINDS.index(kind)])
     if not len(rows):
         raise Sd2Error(

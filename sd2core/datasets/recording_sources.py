@@ -148,7 +148,7 @@ def recording_sources(
 
 
 def labels_and_classes(labels: Labels) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Return names of all labels, background first, and their classes."""
+    """Return names of all labels, background first, and their classes: as classifiers have them."""
     known = [one.name for one in labels.label_set.labels]
     used = sorted({span.label for span in labels.decided} - {*known})
     names = tuple(dict.fromkeys([BACKGROUND, *map(plain_name, [*known, *used])]))
@@ -157,7 +157,7 @@ def labels_and_classes(labels: Labels) -> tuple[tuple[str, ...], dict[str, str]]
         for one in labels.label_set.labels
         if one.gesture_class
     }
-    return names, classes | {BACKGROUND: BACKGROUND}
+    return names, classes | {plain_name(one): plain_name(one) for one in (BACKGROUND, *used)}
 
 
 def radar_map(

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sd2core.classify.data import gesture_classes
 from sd2core.datasets.kept_maps import denoised
 from sd2core.datasets.people import people_shown
 from sd2core.datasets.recording_sources import Making, labels_and_classes, recording_sources
@@ -33,7 +34,6 @@ from sd2core.files.tables import counted
 from sd2core.io.kinds import kind_of
 from sd2core.io.radar import holds_map, load_recorded_map
 from sd2core.labels.formats import read_label_file
-from sd2core.labels.label_set import GESTURES
 from sd2core.labels.per_frame import label_per_frame
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
@@ -318,14 +318,14 @@ class _PairStore:
             maps["denoised"] = denoised(maps["synthetic"], self._model, self._texture)
         if self._radar in self._kinds:
             maps[self._radar] = as_map("radar", self._radar, "power")
-        known = {one.name: one.gesture_class for one in GESTURES.labels}
+        labels = self.facts.labels
         return Source(
             *key,
             sensor,
             {kind: replace(maps[kind], present=present) for kind in self._kinds},
             label,
             self.facts.labels,
-            {name: known[name] for name in self.facts.labels if known.get(name)},
+            dict(zip(labels, gesture_classes(labels), strict=True)),
             None,
             {
                 "pairs": self.path.name,

@@ -17,7 +17,9 @@ from sd2core.accuracy.places import PlacedPlan
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.accuracy.trial import synthesizer_for
 from sd2core.body.parts import synthetic_map
+from sd2core.classify.data import clips_of_map
 from sd2core.datasets.card import describe_dataset, limits
+from sd2core.datasets.clips import clips_of_dataset
 from sd2core.datasets.forecast import Counting
 from sd2core.datasets.labelled import labelled_facts, people_of
 from sd2core.datasets.labelled_source import LabelledSource
@@ -145,8 +147,31 @@ def test_suggestions_are_no_labels_and_classes_come_from_the_label_set(tmp_path:
     one.save()
     (source,) = made(one.folder, making=Making(kinds=("synthetic",)))
     assert source.labels == ("background", "swing", "pause")
-    assert source.classes == {"swing": "vertical", "background": "background"}
+    own = {"swing": "vertical", "background": "background", "pause": "pause"}
+    assert source.classes == own
     assert np.bincount(source.label).tolist() == [90, 15, 15]
+
+
+def test_a_classifier_learns_the_same_from_a_recording_and_from_its_data_set(
+    tmp_path: Path,
+) -> None:
+    """Also a label that its set does not have, and not one that the set gives no class."""
+    one = recording(tmp_path / "anna.sd2", radar=False)
+    names = ("swing", "talk", "pause")
+    spans = [Span(n, "Gestures", float(n), n + 0.5, name) for n, name in enumerate(names, start=1)]
+    known = LabelSet(
+        "Own", (Label("swing", "#0072b2", gesture_class="up"), Label("talk", "#d55e00"))
+    )
+    one.labels = Labels((LabelTrack("Gestures"),), tuple(spans), known)
+    one.save()
+    making, options = Making(kinds=("synthetic",)), Exporting(kinds=("synthetic",))
+    write_dataset(tmp_path / "set.zarr", gather([one.folder], making), options)
+    (shown,) = made(one.folder, making=making)
+    alone = clips_of_map(shown.maps["synthetic"], one.labels, subject="anna", movement="anna")
+    with open_dataset(tmp_path / "set.zarr") as dataset:
+        whole = clips_of_dataset(dataset, "synthetic")
+    assert whole.classes == alone.classes == ("background", "pause", "up")
+    np.testing.assert_array_equal(whole.clips[0].label, alone.clips[0].label)
 
 
 def test_a_recording_that_is_shown_without_a_denoiser_has_no_denoised_map(tmp_path: Path) -> None:
