@@ -27,7 +27,12 @@ from sd2core.datasets.clips import clips_of_dataset
 from sd2core.datasets.labelled import clips_of_radar_file, labels_given, unfolded
 from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.datasets.reading import open_dataset
-from sd2core.datasets.recording_sources import Making, radar_map, recording_sources
+from sd2core.datasets.recording_sources import (
+    Making,
+    labels_and_classes,
+    radar_map,
+    recording_sources,
+)
 from sd2core.denoise.resample_to_model import SAME_RATE
 from sd2core.doppler import PRESETS
 from sd2core.errors import Sd2Error
@@ -106,13 +111,13 @@ def study_data_of(plan: StudyPlan) -> StudyData:
 @lru_cache(maxsize=1)
 def _study_data_of(plan_text: str) -> StudyData:
     plan = StudyPlan.model_validate_json(plan_text)
-    stores, sets, takes = _sources(plan)
+    stores, sets, takes, own = _sources(plan)
     names = {name for one in sets for name in one.classes}
     pairs = None
     if stores:
         pairs = _labelled(read_mixed(stores), plan)
         names |= {*pairs.labels}
-        sets.append(_clips(pairs, plan))
+        sets.append(_clips(pairs, plan, own))
         takes += pairs.takes
     if strange := [label for label in plan.classes if label not in names]:
         raise Sd2Error(
@@ -129,7 +134,7 @@ def _study_data_of(plan_text: str) -> StudyData:
     others: list[Movement] = []
     people = {one.clip.subject for one in moves}
     for path in plan.video:
-        for one in _filmed(Path(path), plan, seen):
+        for one in _filmed(Path(path), plan, seen, own):
             (filmed if one.clip.subject in people else others).append(one)
     return StudyData(
         replace(seen, clips=()),
@@ -140,12 +145,18 @@ def _study_data_of(plan_text: str) -> StudyData:
     )
 
 
-def _sources(plan: StudyPlan) -> tuple[list[Path], list[ClipSet], list[Take | None]]:
-    """Stores of pairs, sets of what a radar saw, and a take for each of their clips or none."""
+def _sources(
+    plan: StudyPlan,
+) -> tuple[list[Path], list[ClipSet], list[Take | None], dict[str, str]]:
+    """Stores of pairs, sets of what a radar saw, and a take for each of their clips or none.
+
+    And the class of every label of the recordings of which pairs are made, which hold no classes.
+    """
     stores: list[Path] = []
     sets: list[ClipSet] = []
     takes: list[Take | None] = []
     with_mesh: list[tuple[Path, str]] = []
+    own: dict[str, str] = {}
     for one in unfolded([LabelledSource.parsed(text) for text in plan.data]):
         rate_hz = sets[0].frame_rate_hz if sets else None
         kind = kind_of(one.path)
@@ -161,6 +172,8 @@ def _sources(plan: StudyPlan) -> tuple[list[Path], list[ClipSet], list[Take | No
             recording = open_recording(one.path)
             if recording.mesh is not None and not recording.holds_radar_map:
                 with_mesh.append((one.path, one.subject))
+                names, classes = labels_and_classes(recording.labelled)
+                own |= {name: classes.get(name, _NEITHER) for name in names}
             else:
                 sets.append(_of_recording(recording, one.subject, rate_hz))
         else:
@@ -171,7 +184,7 @@ def _sources(plan: StudyPlan) -> tuple[list[Path], list[ClipSet], list[Take | No
         takes += [None] * (sum(len(each.clips) for each in sets) - len(takes))
     if with_mesh:
         stores.append(_made_pairs(Path(plan.out), *zip(*with_mesh, strict=True)))
-    return stores, sets, takes
+    return stores, sets, takes, own
 
 
 def _made_pairs(out: Path, paths: Sequence[Path], names: Sequence[str]) -> Path:
@@ -227,7 +240,9 @@ def _take(shown: Clip, seen: Clip, rate_hz: float) -> Take:
     )  # fmt: skip
 
 
-def _filmed(path: Path, plan: StudyPlan, seen: ClipSet) -> list[Movement]:
+def _filmed(
+    path: Path, plan: StudyPlan, seen: ClipSet, classes: Mapping[str, str]
+) -> list[Movement]:
     """Movements of pairs or a data set of which there is only video."""
     if kind_of(path) == "dataset":
         made, inputs = _of_dataset(path)
@@ -236,7 +251,7 @@ def _filmed(path: Path, plan: StudyPlan, seen: ClipSet) -> list[Movement]:
         rows = [] if plan.labels is None else read_take_labels(Path(plan.labels))
         own = [row for row in rows if any(_is_of(row, one) for one in pairs.takes)]
         pairs = labelled(pairs, own) if own else pairs
-        made, inputs = _clips(pairs, plan), list(pairs.takes)
+        made, inputs = _clips(pairs, plan, classes), list(pairs.takes)
     _check_alike(path, made, seen)
     return [
         Movement(clip, take)
@@ -255,9 +270,10 @@ def _labelled(pairs: PairSet, plan: StudyPlan) -> PairSet:
     return labelled(pairs, read_take_labels(Path(plan.labels)))
 
 
-def _clips(pairs: PairSet, plan: StudyPlan) -> ClipSet:
-    """Maps of the radar; labels have the classes of the plan, or the usual ones."""
-    names: Sequence[str] = gesture_classes(pairs.labels)
+def _clips(pairs: PairSet, plan: StudyPlan, own: Mapping[str, str]) -> ClipSet:
+    """Maps of the radar; labels have the classes of the plan, their ``own``, or the usual ones."""
+    usual = zip(pairs.labels, gesture_classes(pairs.labels), strict=True)
+    names: Sequence[str] = [own.get(label, name) for label, name in usual]
     if plan.classes:
         names = [plan.classes.get(label, _NEITHER) for label in pairs.labels]
     return clips_of_pairs(pairs, pairs.kind, names=names)

@@ -16,6 +16,8 @@ from swinging_recordings import recording
 from sd2core.classify.data import Clip
 from sd2core.cli import build_parser, run
 from sd2core.errors import Sd2Error
+from sd2core.labels.label_set import Label, LabelSet
+from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.maps import mean_velocity_mps
 from sd2core.pairs.labelling import TakeLabel, label_pairs
 from sd2core.recording.recording import open_recording
@@ -58,6 +60,20 @@ def test_recordings_are_read_as_they_are_now(tmp_path: Path) -> None:
     longer, *others = study_data_of(plan.model_copy(update={"data": more})).real
     assert np.count_nonzero(longer.clip.label) == np.count_nonzero(first.clip.label) + 15
     assert [one.clip.subject for one in others] == ["ben", "carla"]
+
+
+def test_recordings_have_the_classes_of_their_label_sets(tmp_path: Path) -> None:
+    """As for `sd2 classify`: pairs, which are made of them, hold labels alone."""
+    for name in ("anna", "ben"):
+        one = recording(tmp_path / f"{name}.sd2")
+        spans = (Span(1, "Gestures", 1.0, 2.0, "swing"), Span(2, "Gestures", 3.0, 3.5, "talk"))
+        known = LabelSet("Own", (Label("swing", "#0072b2", "", "up"), Label("talk", "#d55e00")))
+        one.labels = Labels((LabelTrack("Gestures"),), spans, known)
+        one.save()
+    folders = tuple(str(tmp_path / f"{name}.sd2") for name in ("anna", "ben"))
+    data = study_data_of(plan_of(tmp_path / "unused").model_copy(update={"data": folders}))
+    assert data.known.classes == ("background", "up")
+    assert np.bincount(data.real[0].clip.label + 1).tolist() == [15, 75, 30]
 
 
 def test_everybody_is_judged_beside_everybody_else() -> None:
