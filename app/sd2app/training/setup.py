@@ -184,8 +184,8 @@ class TrainingSetupModel(RunSetup[Store]):
     @property
     def division(self) -> Split | None:
         """Division of people into training and held-out parts; None until the pairs are known."""
-        people = self._people()
-        return split_subjects([name for name, _, _ in people]) if people else None
+        people = dict.fromkeys(name for name, _, _ in self._people())  # several stores may have one
+        return split_subjects(list(people)) if people else None
 
     def _people(self) -> list[tuple[str, PairFacts, str]]:
         """All people as the library names them, with store and name in it."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import signal
 import sys
 from pathlib import Path
+from shutil import copytree
 
 import pytest
 from training_pairs import write_pairs
@@ -267,10 +269,21 @@ def test_a_run_deleted_by_somebody_else_is_put_away(made, qtbot) -> None:
     qtbot.waitUntil(lambda: model.run is None, timeout=5_000)
 
 
-def test_stores_are_learnt_from_as_the_library_does(made, qtbot, pairs, tmp_path) -> None:
+@pytest.mark.parametrize("same_people", [False, True])
+def test_stores_are_learnt_from_as_the_library_does(
+    made, qtbot, pairs, tmp_path, same_people
+) -> None:
     """Who is learnt from, and how many segments that gives, is what the library finds."""
-    model = made()
     write_pairs(tmp_path / "more.zarr", subjects=3, frames=200)
+    first = tmp_path / "first.zarr"
+    copytree(pairs, first)
+    for store in (first, tmp_path / "more.zarr") if same_people else ():
+        header = (store / "zarr.json").read_text()
+        made_by = '"provenance": {"made_by": "sd2 pairs mars"}'
+        (store / "zarr.json").write_text(re.sub(r'"provenance": \{[^}]*\}', made_by, header))
+    model = made()
+    model.setup.remove(model.setup.data[0].path)
+    model.setup.add(first)
     model.setup.add(tmp_path / "more.zarr" / "zarr.json")
     qtbot.waitUntil(lambda: not model.setup.problem)
     config = model.setup.config
