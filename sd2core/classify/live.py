@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.data import UNKNOWN, Clip, ClipSet
-from sd2core.classify.features import SILENCE, Heard
+from sd2core.classify.features import SILENCE
 from sd2core.classify.metrics import Score, score
 from sd2core.classify.models import Classifier, State
 from sd2core.denoise import resample_to_model as matching
@@ -23,14 +22,6 @@ CHUNK = 512
 """Frames of a long map that are computed at once; the state carries over."""
 
 Probabilities = NDArray[np.float32]
-
-
-class Memory(NamedTuple):
-    """Immutable state between frames."""
-
-    heard: Heard
-    network: State
-    owed: int = 0  # frames of which the answer is not known yet
 
 
 class TrainedClassifier:
@@ -82,93 +73,57 @@ class TrainedClassifier:
         self, energies: NDArray[np.float32], progress: Progress = silent
     ) -> Probabilities:
         """Compute one clip at the model's frame rate, (frames, bins) → (frames, classes)."""
-        probabilities = np.empty((len(energies), len(self.classes)), np.float32)
-        memory = self.initial_memory()
-        known = 0
+        session, found = self.live(), []
         for start in range(0, len(energies), CHUNK):
             progress(start, len(energies))
-            answers, memory = self.advance(energies[start : start + CHUNK], memory)
-            probabilities[known : known + len(answers)] = answers
-            known += len(answers)
-        probabilities[known:] = self.finish(memory)
-        return probabilities
+            found.append(session.advance(energies[start : start + CHUNK]))
+        return np.concatenate([*found, session.finish()])
 
     def live(self) -> LiveClasses:
         """Session for the frames of one stretch, all with a person."""
         return LiveClasses(self)
-
-    def initial_memory(self) -> Memory:
-        """Return the state before the first frame of a clip."""
-        with torch.no_grad():
-            return Memory(SILENCE, self.network.initial_state(1))
-
-    def step(
-        self, frame: NDArray[np.float32], memory: Memory, present: bool = True
-    ) -> tuple[Probabilities, Memory]:
-        """Process the next frame; return the answers it completes and the next state.
-
-        Parameters
-        ----------
-        frame : float32 array, shape (bins,)
-            At the model's frame rate.
-        memory : Memory
-            Of the frame before, or :meth:`initial_memory`.
-        present : bool
-            False where there is no person: that is background, and a new clip begins.
-
-        Returns
-        -------
-        float32 array, shape (answers, classes), and Memory
-            Answers as :meth:`probabilities` gives them, to the earliest frames that had
-            none. They are one row per step once the card's delay has passed, and all that
-            are owed when the person has gone.
-        """
-        if not present:
-            answers = np.concatenate([self.finish(memory), self.card.no_person()[None]])
-            return answers, self.initial_memory()
-        return self.advance(np.asarray(frame)[None], memory)
-
-    def advance(
-        self, energies: NDArray[np.float32], memory: Memory
-    ) -> tuple[Probabilities, Memory]:
-        """Process several frames at once, (frames, bins) → (answers, classes)."""
-        if not len(energies):
-            return np.zeros((0, len(self.classes)), np.float32), memory
-        shown, heard = self.card.features.of(energies, memory.heard)
-        answers, state = self._ask(shown, memory)
-        owed = memory.owed + len(shown) - len(answers)
-        return answers, Memory(heard, state, owed)
-
-    def finish(self, memory: Memory) -> Probabilities:
-        """Return the outstanding answers, as if silence followed: (owed, classes)."""
-        if not memory.owed:
-            return np.zeros((0, len(self.classes)), np.float32)
-        silence = np.zeros((self.card.delay_frames, self.card.features.size), np.float32)
-        return self._ask(silence, memory)[0]
-
-    def _ask(self, shown: NDArray[np.float32], memory: Memory) -> tuple[Probabilities, State]:
-        """Run the network; answers before the first frame of a clip are dropped."""
-        with torch.no_grad():
-            answer, state = self.network.chunk(torch.from_numpy(shown)[None], memory.network)
-            probabilities: Probabilities = torch.softmax(answer[0], dim=-1).numpy()
-        return probabilities[max(self.card.delay_frames - memory.owed, 0) :], state
 
 
 class LiveClasses:
     """Session that takes the frames of one stretch, all with a person, as they come."""
 
     def __init__(self, classifier: TrainedClassifier) -> None:
-        self._classifier = classifier
-        self._memory = classifier.initial_memory()
+        self._network, self._card = classifier.network, classifier.card
+        self._heard = SILENCE
+        with torch.no_grad():
+            self._state: State = self._network.initial_state(1)
+        self._owed = 0  # Frames of which the answer is not known yet.
 
     def advance(self, energies: NDArray[np.float32]) -> Probabilities:
-        """Process the next frames, (frames, bins) → (answers, classes)."""
-        answers, self._memory = self._classifier.advance(energies, self._memory)
+        """Process the next frames, (frames, bins) → (answers, classes).
+
+        Answers are to the earliest frames that had none: one per frame once the card's delay has
+        passed.
+        """
+        if not len(energies):
+            return self._none
+        shown, self._heard = self._card.features.of(energies, self._heard)
+        answers, self._state = self._ask(shown)
+        self._owed += len(shown) - len(answers)
         return answers
 
     def finish(self) -> Probabilities:
         """Return the outstanding answers, as if silence followed; the session stays usable."""
-        return self._classifier.finish(self._memory)
+        if not self._owed:
+            return self._none
+        silence = np.zeros((self._card.delay_frames, self._card.features.size), np.float32)
+        return self._ask(silence)[0]
+
+    @property
+    def _none(self) -> Probabilities:
+        return np.zeros((0, len(self._card.classes)), np.float32)
+
+    def _ask(self, shown: NDArray[np.float32]) -> tuple[Probabilities, State]:
+        """Run the network; answers before the first frame of a clip are dropped."""
+        with torch.no_grad():
+            answer, state = self._network.chunk(torch.from_numpy(shown)[None], self._state)
+            probabilities: Probabilities = torch.softmax(answer[0], dim=-1).numpy()
+        return probabilities[max(self._card.delay_frames - self._owed, 0) :], state
 
 
 def judge(classifier: TrainedClassifier, clips: Sequence[Clip], known: ClipSet) -> Score:

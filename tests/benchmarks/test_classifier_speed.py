@@ -12,7 +12,7 @@ from timing import spent_s
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.defaults import MODELS
 from sd2core.classify.features import Features
-from sd2core.classify.live import TrainedClassifier
+from sd2core.classify.live import LiveClasses, TrainedClassifier
 from sd2core.classify.models import build
 from sd2core.sensor import VelocityAxis
 
@@ -37,12 +37,13 @@ def test_a_clip_at_once_and_frame_by_frame(
         model = classifier(name)
         model.probabilities_of(values)
         map_s = spent_s(partial(model.probabilities_of, values), 5)
-        memory = model.advance(values, model.initial_memory())[1]
+        session = model.live()
+        session.advance(values)
 
-        def live(model: TrainedClassifier = model, memory: object = memory) -> None:
-            _, after = model.step(values[0], memory)
+        def live(session: LiveClasses = session) -> None:
+            session.advance(values[:1])
             # The window also asks what is owed, if nothing moves from now on.
-            model.finish(after)
+            session.finish()
 
         rows.append((name, map_s, spent_s(live, 100)))
     benchmark.pedantic(classifier("lstm").probabilities_of, (values,), rounds=3)

@@ -25,14 +25,12 @@ def test_frame_by_frame_equals_the_whole_map(model: str, kind: str, delay: int) 
     trained = classifier(model, kind, delay_frames=delay)
     values = energies(130)
     whole = trained.probabilities(doppler(values))
-    memory, found = trained.initial_memory(), []
-    for frame in values:
-        answer, memory = trained.step(frame, memory)
-        found.append(answer)
+    session = trained.live()
+    found = [session.advance(frame[None]) for frame in values]
     # After `delay` frames every one brings one answer.
     assert [len(one) for one in found] == [0] * delay + [1] * (130 - delay)
-    found.append(trained.finish(memory))
-    assert trained.finish(trained.initial_memory()).shape == (0, len(CLASSES))
+    found.append(session.finish())
+    assert trained.live().finish().shape == (0, len(CLASSES))
     np.testing.assert_allclose(np.concatenate(found), whole, atol=SAME)
     np.testing.assert_allclose(whole.sum(axis=1), 1.0, atol=1e-5)
     assert whole.dtype == np.float32
@@ -49,11 +47,10 @@ def test_frame_by_frame_equals_the_whole_map(model: str, kind: str, delay: int) 
 def test_pieces_of_any_length_equal_the_whole(model: str, sizes: list[int], delay: int) -> None:
     trained = classifier(model, delay_frames=delay)
     values = energies(max(sum(sizes), 1))
-    memory, found = trained.initial_memory(), []
+    session, found = trained.live(), []
     for start, size in zip(np.cumsum([0, *sizes]), [*sizes, len(values)], strict=False):
-        answer, memory = trained.advance(values[start : start + size], memory)
-        found.append(answer)
-    found.append(trained.finish(memory))
+        found.append(session.advance(values[start : start + size]))
+    found.append(session.finish())
     np.testing.assert_allclose(np.concatenate(found), trained.probabilities_of(values), atol=SAME)
 
 
@@ -61,8 +58,8 @@ def test_pieces_of_any_length_equal_the_whole(model: str, sizes: list[int], dela
 def test_a_long_map_is_worked_out_in_pieces_that_do_not_show(model: str) -> None:
     trained = classifier(model, delay_frames=12)
     values = energies(CHUNK + 70)
-    whole, memory = trained.advance(values, trained.initial_memory())
-    whole = np.concatenate([whole, trained.finish(memory)])
+    session = trained.live()
+    whole = np.concatenate([session.advance(values), session.finish()])
     np.testing.assert_allclose(trained.probabilities(doppler(values)), whole, atol=SAME)
 
 
@@ -108,12 +105,12 @@ def test_without_a_person_it_is_background_and_begins_anew(model: str, delay: in
     np.testing.assert_array_equal(found[60:70], np.tile([1.0, 0.0, 0.0], (10, 1)))
     np.testing.assert_allclose(found[:60], trained.probabilities_of(values[:60]), atol=SAME)
     np.testing.assert_allclose(found[70:], trained.probabilities_of(values[70:]), atol=SAME)
-    memory, stepped = trained.initial_memory(), []
-    for frame, there in zip(values, present, strict=True):
-        answer, memory = trained.step(frame, memory, bool(there))
-        stepped.append(answer)
-    stepped.append(trained.finish(memory))
-    np.testing.assert_allclose(np.concatenate(stepped), found, atol=SAME)
+    for part in (slice(60), slice(70, None)):
+        session = trained.live()
+        stepped = [session.advance(frame[None]) for frame in values[part]]
+        np.testing.assert_allclose(
+            np.concatenate([*stepped, session.finish()]), found[part], atol=SAME
+        )
 
 
 def test_gain_changes_nothing() -> None:
