@@ -62,9 +62,6 @@ class A121Source(Source):
         If the tool or the sensor is not there, or the session is none.
     """
 
-    about = ""
-    delay_s = 0.0
-
     def __init__(self, place: str = "", session: Path | None = None) -> None:
         chosen = {"groups": [{"1": _SESSION}]} if session is None else read_json(session)
         self._saturated = 0

@@ -85,8 +85,6 @@ class TestSource(Source):
     """Frames of a small radar in front of a reflector that sways, and of one that appears."""
 
     __test__ = False
-    about = ""
-    delay_s = 0.0
 
     def __init__(self, rate_hz: float = TEST_RATE_HZ) -> None:
         radar = replace(RADARS["bgt60"], frame_repetition_s=1.0 / rate_hz, name="Test radar")

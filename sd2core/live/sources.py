@@ -58,15 +58,8 @@ Take = Callable[[Frame], None]
 class Source(Protocol):
     """Source of frames; a class of one inherits what it need not say otherwise."""
 
-    @property
-    def about(self) -> str:
-        """Radar and place that frames come from, in words."""
-        return "A radar"
-
-    @property
-    def delay_s(self) -> float:
-        """Time from the middle of a burst of chirps to when its frame has arrived."""
-        return 0.0
+    about: str = "A radar"  # and the place that frames come from, in words
+    delay_s: float = 0.0  # from the middle of a burst of chirps to when its frame has arrived
 
     def head(self, start_unix_s: float) -> GrowingHead:
         """Description of the frames; ``start_unix_s`` is the wall-clock time of the first one."""
@@ -99,19 +92,13 @@ class ReplaySource(Source):
         Anything that :func:`~sd2core.io.radar.load_capture` opens, or what it opened.
     """
 
-    delay_s = 0.0
-
     def __init__(self, capture: RadarCapture | Path | str) -> None:
         if not isinstance(capture, RadarCapture):
             capture = load_capture(capture)
         self._capture = capture
         self._head = self.head(0.0)
-
-    @property
-    def about(self) -> str:
-        """Radar and file."""
-        simulated = " (simulated)" if self._capture.simulated else ""
-        return f"{self._capture.config.name}{simulated}, replayed from {self._capture.source}"
+        simulated = " (simulated)" if capture.simulated else ""
+        self.about = f"{capture.config.name}{simulated}, replayed from {capture.source}"
 
     def head(self, start_unix_s: float) -> GrowingHead:
         """Description of the frames."""
@@ -188,14 +175,10 @@ class Dca1000Source:
         self._socket = _listening_socket(address, port) if opened is None else opened
         self.address, self.port = self._socket.getsockname()[:2]
         radar = self._setup.config
+        self.about = f"{radar.name}, from a DCA1000 to {self.address}:{self.port}"
         self.delay_s = 0.5 * radar.chirps_per_frame * radar.chirp_repetition_s
         # What the system keeps of packets that wait, with its own overhead.
         self.waiting_bytes = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
-
-    @property
-    def about(self) -> str:
-        """Radar and address."""
-        return f"{self._setup.config.name}, from a DCA1000 to {self.address}:{self.port}"
 
     def head(self, start_unix_s: float) -> GrowingHead:
         """Description of the frames."""

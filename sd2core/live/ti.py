@@ -85,12 +85,8 @@ class TiSource(Dca1000Source):
                 with self._answering(f"{setup}: the board refuses '{line}'", "Change that line"):
                     self._board.send(line)
             super().__init__(setup, opened=self._card.data_socket)
+            self.about += f", set up at {self._board.port.port}"
             self._close = stack.pop_all().close
-
-    @property
-    def about(self) -> str:
-        """Radar and address."""
-        return f"{super().about}, set up at {self._board.port.port}"
 
     def head(self, start_unix_s: float) -> GrowingHead:
         """Description of the frames."""
