@@ -18,10 +18,10 @@ from sd2core.options.shared import Json
 
 if TYPE_CHECKING:
     from sd2core.cli.listen import Status
-    from sd2core.live.cameras import Camera
+    from sd2core.live.cameras import Camera, CameraChoice
     from sd2core.live.checking import Answer
     from sd2core.live.clocks import ClockLine
-    from sd2core.live.filming import CameraChoice, Film
+    from sd2core.live.filming import Film
     from sd2core.live.joint import JointRecording, Station
     from sd2core.live.sources import Source
 
@@ -123,7 +123,7 @@ def _record(options: Record) -> int:
       sd2 record --camera walk.mp4 --radar walk.sd2 --out again.sd2
       sd2 record --camera test --radar test --protocol paper --out session
     """
-    from sd2core.live.filming import CameraChoice
+    from sd2core.live.cameras import CameraChoice
 
     size = _SIZE.fullmatch(options.size) if options.size else None
     choice = CameraChoice(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -33,40 +35,30 @@ class Camera(Protocol):
         """Let go of it."""
 
 
-def open_camera(
-    name: str,
-    size_px: tuple[int, int] | None = None,
-    rate_hz: float | None = None,
-    exposure: float | None = None,
-) -> Camera:
-    """Open a camera.
+@dataclass(frozen=True)
+class CameraChoice:
+    """Camera to film with."""
 
-    Parameters
-    ----------
-    name : str
-        Its number, the URL of a stream, a video file, which is played at its rate, or ``test``.
-    size_px : (int, int), optional
-        Width and height to ask for; by default what the camera gives.
-    rate_hz : float, optional
-        Frames per second to ask for.
-    exposure : float, optional
-        Fixed exposure, in the driver's own unit; by default the camera chooses.
+    name: str
+    """Its number, the URL of a stream, a video file, which is played at its rate, or ``test``."""
+    size_px: Sequence[int] | None = None
+    """Width and height to ask for; by default what the camera gives."""
+    rate_hz: float | None = None
+    """Frames per second to ask for."""
+    exposure: float | None = None
+    """Fixed exposure, in the driver's own unit; by default the camera chooses."""
 
-    Raises
-    ------
-    Sd2Error
-        If there is no such camera, or it gives no picture.
-    """
-    if name == TEST:
-        return TestCamera(size_px or (640, 360), rate_hz or TEST_RATE_HZ)
-    if is_video_file(name):
-        return PlayedVideo(Path(name))
-    return OpenCvCamera(int(name) if name.isdecimal() else name, size_px, rate_hz, exposure)
+    @property
+    def is_played(self) -> bool:
+        """True for a video file, which each recording begins anew."""
+        return not (self.name == TEST or self.name.isdecimal() or "://" in self.name)
 
-
-def is_video_file(name: str) -> bool:
-    """True if :func:`open_camera` plays a file of this name."""
-    return not (name == TEST or name.isdecimal() or "://" in name)
+    def open(self) -> Camera:
+        """Open it; Sd2Error if there is no such camera, or it gives no picture."""
+        if self.name == TEST:
+            width, height = self.size_px or (640, 360)
+            return TestCamera((width, height), self.rate_hz or TEST_RATE_HZ)
+        return PlayedVideo(Path(self.name)) if self.is_played else OpenCvCamera(self)
 
 
 def shrunk(picture: NDArray[np.uint8], width_px: int) -> NDArray[np.uint8]:
@@ -84,23 +76,19 @@ class OpenCvCamera:
     simulated = False
     delay_s = 0.0
 
-    def __init__(
-        self,
-        source: int | str,
-        size_px: tuple[int, int] | None,
-        rate_hz: float | None,
-        exposure: float | None,
-    ) -> None:
+    def __init__(self, choice: CameraChoice) -> None:
         import cv2
 
-        self._capture = cv2.VideoCapture(source)
-        named = f"Camera {source}" if isinstance(source, int) else str(source)
+        is_number = choice.name.isdecimal()
+        asked_width, asked_height = choice.size_px or (None, None)
+        self._capture = cv2.VideoCapture(int(choice.name) if is_number else choice.name)
+        named = f"Camera {int(choice.name)}" if is_number else choice.name
         wanted: list[tuple[int, float | None]] = [
-            (cv2.CAP_PROP_FRAME_WIDTH, size_px and size_px[0]),
-            (cv2.CAP_PROP_FRAME_HEIGHT, size_px and size_px[1]),
-            (cv2.CAP_PROP_FPS, rate_hz),
-            (cv2.CAP_PROP_AUTO_EXPOSURE, None if exposure is None else _MANUAL_EXPOSURE),
-            (cv2.CAP_PROP_EXPOSURE, exposure),
+            (cv2.CAP_PROP_FRAME_WIDTH, asked_width),
+            (cv2.CAP_PROP_FRAME_HEIGHT, asked_height),
+            (cv2.CAP_PROP_FPS, choice.rate_hz),
+            (cv2.CAP_PROP_AUTO_EXPOSURE, None if choice.exposure is None else _MANUAL_EXPOSURE),
+            (cv2.CAP_PROP_EXPOSURE, choice.exposure),
         ]
         for setting, value in wanted:
             if value is not None:
@@ -115,7 +103,7 @@ class OpenCvCamera:
             )
         height, width = first[0].shape[:2]
         self.size_px = width, height
-        self.rate_hz = float(self._capture.get(cv2.CAP_PROP_FPS)) or rate_hz or 30.0
+        self.rate_hz = float(self._capture.get(cv2.CAP_PROP_FPS)) or choice.rate_hz or 30.0
         self.about = f"{named}, {width} × {height} px at {self.rate_hz:g} frames/s"
 
     def read(self) -> tuple[NDArray[np.uint8], float] | None:

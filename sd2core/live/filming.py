@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.appended import AppendedFile
 from sd2core.io.video_writing import VideoEncoder
-from sd2core.live.cameras import Camera, is_video_file, open_camera, shrunk
+from sd2core.live.cameras import Camera, CameraChoice, shrunk
 from sd2core.processes import end_beside
 
 VIDEO_NAME = "video.mp4"
@@ -40,26 +40,6 @@ _PREVIEW_PX = 320
 _PREVIEW_QUALITY = 70
 _END_S = 40.0
 """By then all that waited is encoded, or never will be."""
-
-
-@dataclass(frozen=True)
-class CameraChoice:
-    """Camera to film with, see :func:`~sd2core.live.cameras.open_camera`."""
-
-    name: str
-    size_px: tuple[int, int] | None = None
-    rate_hz: float | None = None
-    exposure: float | None = None
-
-    @property
-    def is_played(self) -> bool:
-        """True for a video file, which each recording begins anew."""
-        return is_video_file(self.name)
-
-    def open(self) -> Camera:
-        """Open it."""
-        size_px = None if self.size_px is None else (self.size_px[0], self.size_px[1])
-        return open_camera(self.name, size_px, self.rate_hz, self.exposure)
 
 
 @dataclass

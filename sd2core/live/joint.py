@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from sd2core.errors import Sd2Error
+from sd2core.live.cameras import CameraChoice
 from sd2core.live.clocks import Clocks, correct_drift, link_clocks
-from sd2core.live.filming import VIDEO_NAME, CameraChoice, Film
+from sd2core.live.filming import VIDEO_NAME, Film
 from sd2core.live.listening import Listening
 from sd2core.live.reception import Reception
 from sd2core.live.recording import GrowingRecording

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from sd2core.io.video import open_video
+from sd2core.live.cameras import CameraChoice
 from sd2core.live.cameras import TestCamera as RehearsedCamera
-from sd2core.live.filming import CameraChoice
 from sd2core.live.joint import JointRecording, Station
 from sd2core.live.reception import Reception
 from sd2core.live.rehearsal import TestSource as RehearsedSource

@@ -20,8 +20,9 @@ from hypothesis import strategies as st
 from sd2core.cli import build_parser, run
 from sd2core.errors import Sd2Error
 from sd2core.io.video import open_video
+from sd2core.live.cameras import CameraChoice
 from sd2core.live.clocks import Clocks, fit_line
-from sd2core.live.filming import CameraChoice, Film
+from sd2core.live.filming import Film
 from sd2core.live.rehearsal import EVENT_S, FLASH_S, share_of_event
 from sd2core.placements.placements import PlacementGrid
 from sd2core.recording.recording import Recording, open_recording
