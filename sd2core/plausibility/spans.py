@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 
@@ -13,37 +12,10 @@ _SLACK_S = 0.5
 """What programs put after the last frame, or round."""
 
 
-def are_beyond(
-    spans_s: Sequence[tuple[float, float]], start_s: float, end_s: float
-) -> NDArray[np.bool_]:
-    """Whether spans lie outside a recording, or reach more than half a second beyond it.
-
-    Parameters
-    ----------
-    spans_s : sequence of (float, float)
-        Start and end of each.
-    start_s, end_s : float
-        Of the recording.
-
-    Examples
-    --------
-    >>> are_beyond([(1.0, 15.2), (14.0, 16.0), (15.1, 15.2)], 0.0, 15.0)
-    array([False,  True,  True])
-    """
-    starts_s, ends_s = np.asarray(spans_s, np.float64).reshape(-1, 2).T
-    reaching = (starts_s < start_s - _SLACK_S) | (ends_s > end_s + _SLACK_S)
-    return np.asarray(reaching | (starts_s >= end_s) | (ends_s <= start_s))
-
-
 def judge_spans(
     spans_s: Sequence[tuple[float, float]], start_s: float, end_s: float
 ) -> list[Sd2Error]:
-    """Findings on spans beyond a recording.
-
-    Parameters
-    ----------
-    spans_s, start_s, end_s
-        As for :func:`are_beyond`.
+    """Findings on spans, (start, end) each, outside a recording or over half a second beyond it.
 
     Examples
     --------
@@ -52,11 +24,13 @@ def judge_spans(
     >>> print(judge_spans([(1.0, 2.0), (20.0, 21.0)], 0.0, 15.0)[0].found)
     1 of 2 labels reaches beyond the recording (0 to 15 s), as far as 21 s
     """
-    count = int(are_beyond(spans_s, start_s, end_s).sum())
+    spans = np.asarray(spans_s, np.float64).reshape(-1, 2)
+    beyond_s = np.maximum(start_s - spans[:, 0], spans[:, 1] - end_s)
+    outside = (spans[:, 0] >= end_s) | (spans[:, 1] <= start_s)
+    reaching = (spans[:, 0] < start_s - _SLACK_S) | (spans[:, 1] > end_s + _SLACK_S)
+    count = int((outside | reaching).sum())
     if not count:
         return []
-    spans = np.asarray(spans_s, np.float64)  # (N, 2)
-    beyond_s = np.maximum(start_s - spans[:, 0], spans[:, 1] - end_s)
     worst = spans[int(np.argmax(beyond_s))]
     far_s = worst[1] if worst[1] - end_s >= start_s - worst[0] else worst[0]
     cause = "The labels are probably of another recording, or their times have an offset"

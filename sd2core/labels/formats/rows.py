@@ -29,7 +29,7 @@ from sd2core.labels.spans import (
     Overlap,
     Span,
 )
-from sd2core.plausibility.spans import are_beyond, judge_spans
+from sd2core.plausibility.spans import judge_spans
 from sd2core.timebase import Timebase
 
 UNNAMED = "unnamed"
@@ -195,15 +195,11 @@ class LabelReading:
         if timebase is None:
             return self
         spans_s = [(one.start_s, one.end_s) for one in self.labels.spans]
-        findings = judge_spans(spans_s, timebase.start_s, timebase.end_s)
-        if not findings:
-            return self
-        beyond = int(are_beyond(spans_s, timebase.start_s, timebase.end_s).sum())
-        reach = "reaches" if beyond == 1 else "reach"
-        extent = f"{timebase.start_s:.3f} to {timebase.end_s:.3f} s"
-        cause = findings[0].remedy[0].lower() + findings[0].remedy[1:]
-        remark = f"of which {beyond} {reach} beyond the recording ({extent}; {cause})"
-        return replace(self, beyond=remark)
+        remarks = (
+            f"{one.found} ({one.remedy[0].lower()}{one.remedy[1:]})"
+            for one in judge_spans(spans_s, timebase.start_s, timebase.end_s)
+        )
+        return replace(self, beyond="".join(remarks))
 
 
 def assembled(content: LabelRows, clock: LabelClock) -> LabelReading:

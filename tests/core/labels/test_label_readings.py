@@ -144,12 +144,12 @@ def test_what_is_beyond_the_recording_stays_and_is_told(
     (span,) = (one for one in found.labels.spans if one.label == "B")
     assert span.start_s == start_s
     assert span.end_s == (end_s if end_s > start_s else pytest.approx(start_s + 0.1))
-    assert "1 reaches beyond the recording (0.000 to 10.000 s; " in found.sentence
+    assert "1 of 2 labels reaches beyond the recording (0 to 10 s), as far as " in found.sentence
 
 
 def test_times_in_another_unit_are_told_as_such(tmp_path: Path) -> None:
     found = reading(tmp_path / "a.csv", "label,start,end\nA,1000,2000\nB,3000,4000\n")
-    assert "(0.000 to 10.000 s; their times are probably milliseconds)" in found.sentence
+    assert "(0 to 10 s), as far as 4000 s (their times are probably milliseconds)" in found.sentence
 
 
 def test_labels_within_the_recording_are_not_beyond_it(tmp_path: Path) -> None:
