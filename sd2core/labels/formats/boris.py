@@ -24,7 +24,7 @@ from sd2core.files.paths import plain_path, stored_path
 from sd2core.files.tables import counted
 from sd2core.files.texts import read_json
 from sd2core.labels.formats.lanes import Lane, edges_s, lanes_of, track_of
-from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss
+from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, details_of
 from sd2core.labels.formats.rows import LabelRows, Row, chosen_observation, clean_name
 from sd2core.labels.label_set import GESTURES, Label, LabelSet, with_own_keys
 from sd2core.labels.spans import Labels, Span
@@ -318,16 +318,8 @@ def _events(lanes: Sequence[Lane], timebase: Timebase, *, frames: bool) -> list[
 
 
 def _stop_comment(span: Span) -> str:
-    kept: dict[str, Any] = {"id": span.id}
-    if span.author:
-        kept["author"] = span.author
-    if span.confidence is not None:
-        kept["confidence"] = float(span.confidence)
-    if span.origin != "import":
-        kept["origin"] = span.origin
-    if span.person:
-        kept["person"] = span.person
-    return _DETAILS + json.dumps(kept)
+    details = {name: value for name, value in details_of(span).items() if name != "note"}
+    return _DETAILS + json.dumps({"id": span.id, **details})
 
 
 def _unwelcome(labels: Labels) -> list[Loss]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from datetime import datetime
 from itertools import count
@@ -25,7 +25,7 @@ from sd2core.files.paths import plain_path, stored_path
 from sd2core.files.tables import counted
 from sd2core.labels.formats.elan_reading import DETAILS, LABELS, PROPERTY, VOCABULARY_LANGUAGE
 from sd2core.labels.formats.lanes import Lane, edges_s, lanes_of
-from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, hold_texts
+from sd2core.labels.formats.losses import ASPECTS, LabelFormat, Loss, details_of, hold_texts
 from sd2core.labels.formats.rows import clean_name
 from sd2core.labels.label_set import LabelSet
 from sd2core.labels.spans import Labels, Span
@@ -81,11 +81,10 @@ def write(path: Path, labels: Labels, _: Timebase, media: Path | None) -> list[L
         },
     )
     lanes = lanes_of(held, edges_ms)
-    details = [
-        (kind, text)
-        for kind, text in _DETAIL_TEXTS.items()
-        if any(text(span) for span in held.spans)
-    ]
+    details: dict[str, dict[int, str]] = {}
+    for span in held.spans:
+        for kind, detail in details_of(span).items():
+            details.setdefault(kind, {})[span.id] = str(detail)
     last = max((span.id for span in held.spans), default=0)
     _header(document, path, media, held.label_set, last + len(details) * len(held.spans))
     slots = _time_order(document, lanes)
@@ -178,7 +177,7 @@ def _tiers(
     lanes: list[Lane],
     slots: dict[int, list[str]],
     entries: dict[str, str],
-    details: list[tuple[str, Callable[[Span], str]]],
+    details: dict[str, dict[int, str]],
     last_id: int,
 ) -> None:
     numbers = count(last_id + 1)
@@ -195,7 +194,7 @@ def _tiers(
             entry = {"CVE_REF": entries[span.label]} if span.label in entries else {}
             slot = {"TIME_SLOT_REF1": first, "TIME_SLOT_REF2": second}
             _annotation(tier, "ALIGNABLE_ANNOTATION", span.label, f"a{span.id}", **slot, **entry)
-        for kind, text_of in details:
+        for kind in filter(details.get, DETAILS):
             name = f"{lane.name} - {kind}"
             while name in taken:
                 name += "'"
@@ -205,11 +204,9 @@ def _tiers(
                 TIER_ID=name,
             )  # fmt: skip
             for span in lane.spans:
-                if text_of(span):
+                if (text := details[kind].get(span.id)) is not None:
                     about = {"ANNOTATION_REF": f"a{span.id}"}
-                    _annotation(
-                        below, "REF_ANNOTATION", text_of(span), f"a{next(numbers)}", **about
-                    )
+                    _annotation(below, "REF_ANNOTATION", text, f"a{next(numbers)}", **about)
 
 
 def _annotation(tier: Element, kind: str, value: str, name: str, **attributes: str) -> None:
@@ -249,12 +246,3 @@ def _common(texts: Iterator[str]) -> str:
     """The one text that all of them are, or nothing."""
     different = set(texts)
     return different.pop() if len(different) == 1 else ""
-
-
-_DETAIL_TEXTS: dict[str, Callable[[Span], str]] = {
-    "note": lambda span: span.note,
-    "author": lambda span: span.author,
-    "confidence": lambda span: "" if span.confidence is None else repr(float(span.confidence)),
-    "origin": lambda span: "" if span.origin == "import" else span.origin,
-    "person": lambda span: span.person,
-}

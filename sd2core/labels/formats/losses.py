@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -77,20 +77,17 @@ def losses_by_format(labels: Labels, file_format: LabelFormat) -> list[Loss]:
     )
     words = f"{title} keeps no numbers of spans: {counted(count, 'span')} renumbered"
     leave_out("ids", count, words)
-    fields: tuple[tuple[Aspect, Callable[[Span], bool], str, str], ...] = (
-        ("notes", lambda span: bool(span.note), "keeps no notes: {} left out", "note"),
-        ("authors", lambda span: bool(span.author),
-         "keeps no authors: those of {} left out", "span"),
-        ("confidence", lambda span: span.confidence is not None,
-         "keeps no confidence: that of {} left out", "span"),
-        ("origin", lambda span: span.origin != "import",
-         "does not say who made a span: {} will count as imported", "span"),
-        ("persons", lambda span: bool(span.person),
-         "keeps no persons: those of {} left out", "span"),
-    )  # fmt: skip
-    for what, has, sentence, thing in fields:
-        count = sum(has(span) for span in labels.spans)
-        leave_out(what, count, f"{title} {sentence.format(counted(count, thing))}")
+    found = Counter(name for span in labels.spans for name in details_of(span))
+    fields: tuple[tuple[Aspect, str, str], ...] = (
+        ("notes", "note", "keeps no notes: {} left out"),
+        ("authors", "author", "keeps no authors: those of {} left out"),
+        ("confidence", "confidence", "keeps no confidence: that of {} left out"),
+        ("origin", "origin", "does not say who made a span: {} will count as imported"),
+        ("persons", "person", "keeps no persons: those of {} left out"),
+    )
+    for what, name, sentence in fields:
+        things = counted(found[name], "note" if name == "note" else "span")
+        leave_out(what, found[name], f"{title} {sentence.format(things)}")
     if labels.label_set != GESTURES:
         name = labels.label_set.name
         if "label set" not in file_format.keeps:
@@ -99,6 +96,18 @@ def losses_by_format(labels: Labels, file_format: LabelFormat) -> list[Loss]:
             words = f"{title} keeps no colours and keys: those of the set {name!r} left out"
             leave_out("colours and keys", len(labels.label_set.labels), words)
     return losses
+
+
+def details_of(span: Span) -> dict[str, str | float]:
+    """What a span holds besides its number, track, times and label, by the names of its fields."""
+    details = {
+        "note": span.note,
+        "author": span.author,
+        "confidence": "" if span.confidence is None else float(span.confidence),
+        "origin": "" if span.origin == "import" else span.origin,
+        "person": span.person,
+    }
+    return {name: value for name, value in details.items() if value != ""}
 
 
 def hold_texts(labels: Labels, banned: re.Pattern[str], title: str) -> tuple[Labels, list[Loss]]:

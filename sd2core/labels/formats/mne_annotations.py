@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from urllib.parse import quote, unquote
@@ -43,24 +42,16 @@ _EXTRAS = ("track", "overlap", "id", "note", "author", "confidence", "origin", "
 def write(path: Path, labels: Labels, *_: object) -> list[Loss]:
     """Write annotations with extra columns; what they cannot hold is returned."""
     overlap = {track.name: track.overlap for track in labels.tracks}
-    texts: dict[str, Callable[[Span], str]] = {
-        "track": lambda span: span.track,
-        "overlap": lambda span: overlap[span.track],
-        "id": lambda span: str(span.id),
-        "note": lambda span: span.note,
-        "author": lambda span: span.author,
-        "confidence": lambda span: (
-            "" if span.confidence is None else positional(float(span.confidence))
-        ),
-        "origin": lambda span: span.origin,
-        "person": lambda span: span.person,
-    }
     lines = ["# MNE-Annotations", _ENCODED, f"# {', '.join((*_BASIC, *_EXTRAS))}"]
     # Track by track, so that their order comes back; MNE sorts by onset.
     for span in (span for track in labels.tracks for span in labels.of_track(track.name)):
+        known = "" if span.confidence is None else positional(float(span.confidence))
         edges = (positional(span.start_s), positional(_duration_s(span)))
-        extras = (_encoded(texts[name](span)) for name in _EXTRAS)
-        lines.append(",".join((*edges, _encoded(span.label), *extras)))
+        texts = (
+            *(span.label, span.track, overlap[span.track], str(span.id)),
+            *(span.note, span.author, known, span.origin, span.person),
+        )
+        lines.append(",".join((*edges, *map(_encoded, texts))))
     atomic_write_text(path, "\n".join(lines) + "\n")
     return _changed(labels)
 
