@@ -225,15 +225,7 @@ class Listening:
             self._to_show.put_nowait((time_s, words, frame))
         except queue.Full:
             self.counts.not_shown += 1
-        self._recording.append(
-            words,
-            head,
-            time_s=frame.time_s,
-            received_s=frame.received_s,
-            dropped=dropped,
-            lost=frame.lost,
-            missing_bytes=frame.missing_bytes,
-        )
+        self._recording.append(words, head, frame, dropped)
         self.counts.recorded += 1
         self.counts.damaged += frame.missing_bytes > 0
 

@@ -27,6 +27,7 @@ from sd2core.io.radar.growing import (
     read_head,
 )
 from sd2core.live.clocks import ARRIVALS_NAME, CLOCKS_NAME
+from sd2core.live.sources import Frame
 from sd2core.recording.recording import Recording, folder_named, open_recording
 
 RADAR_FOLDER = "radar"
@@ -125,15 +126,7 @@ class GrowingRecording:
         return self._begin_s + time_s
 
     def append(
-        self,
-        words: NDArray[Any],
-        head: GrowingHead,
-        *,
-        time_s: float,
-        received_s: float = 0.0,
-        dropped: int = 0,
-        lost: int = 0,
-        missing_bytes: int = 0,
+        self, words: NDArray[Any], head: GrowingHead, frame: Frame, dropped: int = 0
     ) -> None:
         """Append a frame; OSError, after which all before it is there, if it cannot be written.
 
@@ -143,27 +136,25 @@ class GrowingRecording:
             As :meth:`GrowingHead.as_stored` gives them.
         head : GrowingHead
             What the frame is of; ``start_unix_s`` is the wall-clock time of this session's time 0.
-        time_s : float
-            Since the first frame of this session.
-        received_s : float
-            When it arrived, by the monotonic clock.
-        dropped, lost, missing_bytes : int
+        frame : Frame
+            At its time since the first frame of this session.
+        dropped : int
             See :data:`~sd2core.io.radar.growing.ENTRY`.
         """
-        at_s = self.time_of(time_s, head)
+        at_s = self.time_of(frame.time_s, head)
         assert self._streams is not None
         if self.frames and not at_s > self._last_s:
             raise Sd2Error(
                 f"A frame at {at_s:.6f} s follows one at {self._last_s:.6f} s",
                 "times that increase",
             )
-        counts = (min(one, _MAX_COUNT) for one in (dropped, lost, missing_bytes, self._session))
-        entry = np.array([(at_s, *counts)], ENTRY)
+        counts = dropped, frame.lost, frame.missing_bytes, self._session
+        entry = np.array([(at_s, *(min(one, _MAX_COUNT) for one in counts))], ENTRY)
         with full_disk_named(self.radar / SAMPLES_NAME):
             self._streams[0].write(np.ascontiguousarray(words).view(np.uint8).data.cast("B"))
             self._streams[1].write(entry.tobytes())
             for arrivals in self._streams[2:]:
-                arrivals.write(np.float64(received_s).tobytes())
+                arrivals.write(np.float64(frame.received_s).tobytes())
         if not self.frames:
             self._make_recording()
         self.frames += 1  # last, as others open the recording once it has frames

@@ -37,6 +37,7 @@ from sd2core.io.radar import load_capture, load_recorded_map
 from sd2core.io.radar.described import RadarDescription, write_description
 from sd2core.io.radar.growing import GrowingHead
 from sd2core.live.recording import GrowingRecording
+from sd2core.live.sources import Frame
 from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.options.exporting import Exporting
@@ -135,7 +136,7 @@ def _write_live(path: Path) -> None:
     recording = GrowingRecording(path.with_suffix(".sd2"))
     for number in range(60):
         words = np.full(head.frame_shape, number, head.word_type)
-        recording.append(words, head, time_s=number / 30, lost=number % 2)
+        recording.append(words, head, Frame(None, number / 30, 0.0, lost=number % 2))
     recording.close()
     recording.radar.rename(path)
     shutil.rmtree(recording.folder)

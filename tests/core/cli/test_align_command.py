@@ -90,10 +90,8 @@ def _kept_arrivals(folder: Path) -> Path:
     source, recording = TestSource(20.0), GrowingRecording(folder, keep_arrivals=True)
     head = source.head(0.0)
     for number in range(40):
-        frame = Frame(10.0 + 0.05 * number, 0.05 * number, 0.0)
-        recording.append(
-            source.words(frame), head, time_s=0.05 * number, received_s=103.002 + 0.05 * number
-        )
+        frame = Frame(10.0 + 0.05 * number, 0.05 * number, 103.002 + 0.05 * number)
+        recording.append(source.words(frame), head, frame)
     recording.close()
     Clocks(video_first_s=100.0, video_delay_s=0.0, radar_delay_s=0.002).write(folder)
     return folder

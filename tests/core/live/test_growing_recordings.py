@@ -17,6 +17,7 @@ from sd2core.io.kinds import kind_of
 from sd2core.io.radar import load_capture
 from sd2core.io.radar.growing import ENTRY, GrowingHead, Word
 from sd2core.live.recording import GrowingRecording
+from sd2core.live.sources import Frame
 from sd2core.radar_config import PAPER_RADAR, RadarConfig, Sampling
 from sd2core.recording.recording import Recording, open_recording
 from tests.full_disk import full_disk
@@ -34,7 +35,7 @@ def _frame(number: int, head: GrowingHead = HEAD) -> np.ndarray:
 def _filled(folder: Path, frames: int, head: GrowingHead = HEAD) -> Path:
     recording = GrowingRecording(folder)
     for number in range(frames):
-        recording.append(_frame(number, head), head, time_s=number / 30)
+        recording.append(_frame(number, head), head, Frame(None, number / 30, 0.0))
     recording.close()
     return recording.folder
 
@@ -43,7 +44,7 @@ def test_a_recording_is_whole_after_every_frame(tmp_path: Path) -> None:
     recording = GrowingRecording(tmp_path / "walk")
     assert not recording.folder.exists()  # nothing is left behind where nothing comes
     for number in range(4):
-        recording.append(_frame(number), HEAD, time_s=0.1 * number)
+        recording.append(_frame(number), HEAD, Frame(None, 0.1 * number, 0.0))
         opened = open_recording(tmp_path / "walk.sd2")
         capture = opened.load_capture()
         assert kind_of(opened.radar) == "radar"
@@ -73,7 +74,7 @@ def test_every_kind_of_sample_comes_back(tmp_path: Path, sampling: Sampling, wor
     samples = samples[..., ::-1]  # of any layout in memory
     recording = GrowingRecording(tmp_path / "walk.sd2")
     for number, one in enumerate(samples):
-        recording.append(head.as_stored(one), head, time_s=number / 30)
+        recording.append(head.as_stored(one), head, Frame(None, number / 30, 0.0))
     recording.close()
     capture = load_capture(recording.radar)
     assert capture.config == radar
@@ -150,16 +151,16 @@ def test_what_says_that_it_has_a_frame_can_be_opened(
         make()
 
     monkeypatch.setattr(recording, "_make_recording", slowly)
-    recording.append(_frame(0), HEAD, time_s=0.0)
+    recording.append(_frame(0), HEAD, Frame(None, 0.0, 0.0))
     assert (frames_before, recording.frames) == ([0], 1)
     recording.close()
 
 
 def test_losses_are_told_and_kept(tmp_path: Path) -> None:
     recording = GrowingRecording(tmp_path / "walk.sd2")
-    recording.append(_frame(0), HEAD, time_s=0.0)
-    recording.append(_frame(1), HEAD, time_s=1.0, dropped=4, lost=2)
-    recording.append(_frame(2), HEAD, time_s=1.1, missing_bytes=24)
+    recording.append(_frame(0), HEAD, Frame(None, 0.0, 0.0))
+    recording.append(_frame(1), HEAD, Frame(None, 1.0, 0.0, lost=2), dropped=4)
+    recording.append(_frame(2), HEAD, Frame(None, 1.1, 0.0, missing_bytes=24))
     recording.close(dropped=5)
     _filled(recording.folder, 1)
     capture = load_capture(recording.radar)
@@ -208,9 +209,9 @@ def test_a_recording_without_its_json_is_completed(tmp_path: Path) -> None:
 def test_a_full_disk_leaves_whole_frames(tmp_path: Path) -> None:
     recording = GrowingRecording(tmp_path / "walk.sd2")
     for number in range(100):
-        recording.append(_frame(number), HEAD, time_s=number / 30)
+        recording.append(_frame(number), HEAD, Frame(None, number / 30, 0.0))
     with full_disk(HEAD.frame_bytes * 100 + 7), pytest.raises(OSError, match="free some"):
-        recording.append(_frame(100), HEAD, time_s=100 / 30)
+        recording.append(_frame(100), HEAD, Frame(None, 100 / 30, 0.0))
     recording.close()
     assert load_capture(recording.radar).frame_count == 100
     assert (recording.radar / "live.index").stat().st_size == 100 * ENTRY.itemsize
