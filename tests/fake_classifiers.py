@@ -63,8 +63,8 @@ class FakeLive:
 
 
 class FakeClassifier:
-    def __init__(self, library):
-        self.library = library
+    def __init__(self, library, card):
+        self.library, self.card = library, card
 
     def probabilities(self, doppler):
         self.library.wait()
@@ -108,4 +108,4 @@ class FakeClassifiers:
     def _load(self, path):
         self.loaded.append(path)
         self.wait()
-        return FakeClassifier(self)
+        return FakeClassifier(self, self._describe(path))

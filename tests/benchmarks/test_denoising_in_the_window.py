@@ -18,7 +18,7 @@ from PySide6.QtCore import Qt, QTimer
 from window_models import models_of
 from window_on_sample import settle, window_on_sample
 
-from sd2app.background.model_worker.client import ModelProcess
+from sd2app.background.model_worker.client import ModelProcess, RemoteDenoiser
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.scaling import Compression, Scaling
 from sd2core.maps import DopplerMap
@@ -31,7 +31,7 @@ TICK = """
 import json, sys, threading, time
 import numpy as np
 from PySide6.QtCore import QCoreApplication, Qt, QTimer
-from sd2app.background.model_worker.client import ModelProcess
+from sd2app.background.model_worker.client import ModelProcess, RemoteDenoiser
 
 how, model = sys.argv[1:]
 application = QCoreApplication([])
@@ -48,7 +48,7 @@ def work():
         from sd2core.denoise.files import load_model
         load_model(model)
     elif how == "process":
-        process.load(model)
+        RemoteDenoiser(process, model)
     else:
         time.sleep(2.0)
 
@@ -124,7 +124,7 @@ def test_what_the_way_to_the_process_costs(benchmark, model):
     from sd2core.denoise.files import load_model
 
     process, given = ModelProcess(), a_map()
-    both: dict[str, Any] = {"here": load_model(model), "process": process.load(model)}
+    both: dict[str, Any] = {"here": load_model(model), "process": RemoteDenoiser(process, model)}
     frame = np.ascontiguousarray(given.values[:, 0])
 
     def best_ms(work, times):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 from PySide6.QtCore import QObject, Signal, SignalInstance
 
@@ -28,11 +27,6 @@ _PATIENCE_MS = 1500
 """Delay after the first map before the last session's classifier is loaded."""
 
 _MODEL, _SHOWN, _NONE = "classify/model", "classify/shown", "classify/none"
-
-
-class _Loaded(NamedTuple):
-    card: ClassifierCard
-    classifier: RemoteClassifier
 
 
 class ClassifyModel(ReportingModel, SpanFinder):
@@ -210,7 +204,7 @@ class ClassifyModel(ReportingModel, SpanFinder):
         self._settings.set_value(_NONE, self.path is None)
         self._asleep = False
         self._set_card(card)
-        self.track.use(None, None)
+        self.track.use(None)
         if path is not None:
             self.set_shown(True)
         self._load()
@@ -267,16 +261,16 @@ class ClassifyModel(ReportingModel, SpanFinder):
         self._problem = ""
         path, library = self.path, self._library
         if path is not None and self.source is not None:
-            self._runner.submit(lambda emit: _Loaded(library.describe(path), library.load(path)))
+            self._runner.submit(lambda emit: library.load(path))
         self.changed.emit()
 
     def _set_card(self, card: ClassifierCard | None) -> None:
         self.card = card
         self.track.look_at(self.source)
 
-    def _set_loaded(self, loaded: _Loaded) -> None:
+    def _set_loaded(self, loaded: RemoteClassifier) -> None:
         self._set_card(loaded.card)
-        self.track.use(loaded.classifier, loaded.card)
+        self.track.use(loaded)
         self.changed.emit()
 
     def _fail(self, error: Exception) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import BackgroundModel, Emit, LatestRunner, delayed
-from sd2app.background.model_worker.client import RemoteClasses, RemoteClassifier
+from sd2app.background.model_worker.client import RemoteClassifier, RemoteSession
 from sd2app.denoise.map import AT_ONCE, cut_out
 from sd2app.session.maps import MapModel
 from sd2core.classify.card import ClassifierCard
@@ -49,7 +49,7 @@ class ClassReading:
 class _Going(NamedTuple):
     """Session of a stretch that is classified up to a frame."""
 
-    session: RemoteClasses
+    session: RemoteSession
     start: int
     next: int
     answered: int
@@ -150,9 +150,9 @@ class ClassTrack(BackgroundModel):
 
     # --- requests -------------------------------------------------------------------------
 
-    def use(self, classifier: RemoteClassifier | None, card: ClassifierCard | None) -> None:
+    def use(self, classifier: RemoteClassifier | None) -> None:
         """Use another classifier, or none."""
-        self._classifier, self.card = classifier, card if classifier is not None else None
+        self._classifier, self.card = classifier, classifier.card if classifier else None
         self._restart()
 
     def look_at(self, source: MapModel | None) -> None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import BackgroundModel, LatestRunner, delayed
-from sd2app.background.model_worker.client import RemoteDenoiser, RemoteLive
+from sd2app.background.model_worker.client import RemoteDenoiser, RemoteSession
 from sd2app.maps.partial_map import FINAL, Part, PartialMap, View
 from sd2app.maps.quality import Postprocess
 from sd2app.session.maps import MapModel
@@ -59,7 +59,7 @@ class _Order(NamedTuple):
     """How far a clip whose map stands is gone through, with what the model remembers there."""
 
     next: int = 0
-    session: RemoteLive | None = None
+    session: RemoteSession | None = None
 
 
 class _Answer(NamedTuple):
@@ -69,7 +69,7 @@ class _Answer(NamedTuple):
     values: NDArray[np.float32]  # (bins, n)
     like: DopplerMap  # map with their unit and axis
     order: _Order | None = None  # that it goes on with
-    session: RemoteLive | None = None  # at its end, where pieces follow in order
+    session: RemoteSession | None = None  # at its end, where pieces follow in order
 
 
 class DenoisedMap(BackgroundModel):

@@ -9,7 +9,12 @@ import numpy as np
 import psutil
 import pytest
 
-from sd2app.background.model_worker.client import COMMAND, ModelProcess
+from sd2app.background.model_worker.client import (
+    COMMAND,
+    ModelProcess,
+    RemoteClassifier,
+    RemoteDenoiser,
+)
 from sd2core.denoise.card import ModelCard
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.registry import build
@@ -74,7 +79,7 @@ def test_the_answer_is_that_of_the_library(process, folder):
     present = np.ones(120, bool)
     present[40:55] = False
     given = a_map(present=present, meta={"sensor": {"position_m": [1, 0, 0]}})
-    made = process.load(folder / "gru.safetensors").denoise(given)
+    made = RemoteDenoiser(process, folder / "gru.safetensors").denoise(given)
     expected = load_model(folder / "gru.safetensors").denoise(given)
     np.testing.assert_allclose(made.values, expected.values, rtol=1e-5, atol=1e-10)
     assert made.values.any()
@@ -87,7 +92,7 @@ def test_the_answer_is_that_of_the_library(process, folder):
 def test_frame_by_frame_it_is_the_same_where_the_model_is_causal(process, folder):
     given, answers = a_map(), {}
     for name in ("gru", "unet"):
-        model = process.load(folder / f"{name}.safetensors")
+        model = RemoteDenoiser(process, folder / f"{name}.safetensors")
         live = model.live()
         answers[name] = model.equals_batch
         one = np.ones(1, bool)
@@ -100,10 +105,10 @@ def test_frame_by_frame_it_is_the_same_where_the_model_is_causal(process, folder
 
 def test_what_is_wrong_is_said_and_the_process_goes_on(process, folder):
     with pytest.raises(Sd2Error, match=r"text.safetensors"):
-        process.load(folder / "text.safetensors")
+        RemoteDenoiser(process, folder / "text.safetensors")
     with pytest.raises(Sd2Error, match=r"gone.safetensors"):
-        process.load(folder / "gone.safetensors")
-    model = process.load(folder / "gru.safetensors")
+        RemoteDenoiser(process, folder / "gone.safetensors")
+    model = RemoteDenoiser(process, folder / "gru.safetensors")
     with pytest.raises(Sd2Error, match="500 frames/s"):
         model.denoise(a_map(rate=500.0))
     assert model.denoise(a_map()).values.any()
@@ -111,7 +116,7 @@ def test_what_is_wrong_is_said_and_the_process_goes_on(process, folder):
 
 @pytest.mark.slow
 def test_one_that_died_is_started_again(process, folder):
-    model = process.load(folder / "gru.safetensors")
+    model = RemoteDenoiser(process, folder / "gru.safetensors")
     before = model.denoise(a_map()).values
     # Other tests of the same process may have others.
     children = psutil.Process().children()
@@ -125,14 +130,14 @@ def test_what_is_closed_stays_closed(folder):
     process = ModelProcess()
     process.close()
     with pytest.raises(Sd2Error, match="closed"):
-        process.load(folder / "gru.safetensors")
+        RemoteDenoiser(process, folder / "gru.safetensors")
 
 
 @pytest.mark.slow
 def test_a_process_that_ends_at_once_is_an_error_in_words(folder):
     process = ModelProcess([sys.executable, "-c", "pass"])
     with pytest.raises(Sd2Error, match="has ended"):
-        process.load(folder / "gru.safetensors")
+        RemoteDenoiser(process, folder / "gru.safetensors")
     process.close()
 
 
@@ -158,8 +163,8 @@ def test_a_classifier_beside_the_denoisers_answers_as_the_library(
     present = np.ones(120, bool)
     present[40:55] = False
     given = a_map(present=present)
-    denoiser = process.load(folder / "gru.safetensors")
-    classifier = process.load_classifier(path)
+    denoiser = RemoteDenoiser(process, folder / "gru.safetensors")
+    classifier = RemoteClassifier(process, path)
     whole = classifier.probabilities(given)
     np.testing.assert_allclose(whole, load_classifier(path).probabilities(given), atol=1e-5)
     assert np.ptp(whole, axis=0).max() > 1e-3  # it does look at the map
@@ -173,7 +178,7 @@ def test_a_classifier_beside_the_denoisers_answers_as_the_library(
     found.append(owed)
     np.testing.assert_allclose(np.concatenate(found), whole[55:], atol=1e-5)
     with pytest.raises(Sd2Error, match="is a denoiser"):
-        process.load_classifier(folder / "gru.safetensors")
+        RemoteClassifier(process, folder / "gru.safetensors")
 
 
 @pytest.mark.slow

@@ -34,7 +34,7 @@ def set_up(qtbot):
     fake, source, state = FakeClassifiers(), MapModel("Denoised"), SimpleNamespace(counts=True)
     track = ClassTrack(lambda _: state.counts, ByteBudget(1 << 20))
     track.look_at(source)
-    track.use(FakeClassifier(fake), class_card("/a.safetensors"))
+    track.use(FakeClassifier(fake, class_card("/a.safetensors")))
 
     def settle():
         qtbot.waitUntil(lambda: not track.busy, timeout=10_000)
@@ -105,7 +105,7 @@ def test_a_map_that_grows_is_gone_on_with(set_up):
 def test_a_map_to_which_frames_are_added_is_gone_on_with(set_up, delay_frames):
     set_up.fake.delay_frames = delay_frames
     card = replace(class_card("/late.safetensors"), delay_frames=delay_frames)
-    set_up.track.use(FakeClassifier(set_up.fake), card)
+    set_up.track.use(FakeClassifier(set_up.fake, card))
     whole, set_up.source.growing = a_map(), True
     told = expected(whole.values.T)
     for frames in (1, 2, 11, 40, 41, 89, 90):
@@ -153,7 +153,7 @@ def late(set_up):
     """One that answers six frames late."""
     set_up.fake.delay_frames = 6
     card = replace(class_card("/late.safetensors"), delay_frames=6)
-    set_up.track.use(FakeClassifier(set_up.fake), card)
+    set_up.track.use(FakeClassifier(set_up.fake, card))
     return set_up
 
 
@@ -302,9 +302,9 @@ def test_a_failure_is_said_and_the_next_map_is_tried(set_up):
 def test_no_classifier_and_no_map_say_nothing(set_up):
     set_up.source.set_map(a_map())
     set_up.settle()
-    set_up.track.use(None, None)
+    set_up.track.use(None)
     assert set_up.track.at(1.0) is None
-    set_up.track.use(FakeClassifier(set_up.fake), class_card("/a.safetensors"))
+    set_up.track.use(FakeClassifier(set_up.fake, class_card("/a.safetensors")))
     set_up.settle()
     set_up.source.set_map(None)
     assert set_up.track.at(1.0) is None

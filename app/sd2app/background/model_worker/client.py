@@ -10,6 +10,7 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -45,14 +46,6 @@ class ModelProcess:
     def running(self) -> bool:
         """True while there is a process."""
         return self._process is not None and self._process.poll() is None
-
-    def load(self, path: Path) -> RemoteDenoiser:
-        """Load a model, or raise Sd2Error; the first one takes as long as loading torch."""
-        return RemoteDenoiser(self, path)
-
-    def load_classifier(self, path: Path) -> RemoteClassifier:
-        """Load a classifier beside the denoisers, or raise Sd2Error."""
-        return RemoteClassifier(self, path)
 
     def ask(self, do: str, *arguments: Any) -> Any:
         """Call a method of its ``Worker``; raises what that raises, or Sd2Error if it is gone."""
@@ -119,13 +112,17 @@ def _let_go(process: subprocess.Popen[bytes]) -> None:
 
 
 class _Remote:
-    """Stand-in for a model in the model process."""
+    """Stand-in for a model in the model process, or Sd2Error; the first one loads torch there."""
 
     def __init__(self, process: ModelProcess, path: Path) -> None:
         self._process = process
         self._path = path
         self._number = self._load()
         self._generation = process.generation
+
+    def live(self) -> RemoteSession:
+        """Session for the frames of a clip; those of a classifier all have a person in."""
+        return RemoteSession(self._process, self._ready())
 
     def _load(self) -> int:
         """Load the model and return its number."""
@@ -155,10 +152,6 @@ class RemoteDenoiser(_Remote):
         denoised: DopplerMap = self._process.ask("call", self._ready(), "denoise", given)
         return replace(denoised, timebase=doppler.timebase)
 
-    def live(self) -> RemoteLive:
-        """Session for live frames; it replaces the session before."""
-        return RemoteLive(self._process, self._ready())
-
     def _load(self) -> int:
         number, self.equals_batch = self._process.ask("load", self._path)
         return int(number)
@@ -167,26 +160,43 @@ class RemoteDenoiser(_Remote):
 class RemoteClassifier(_Remote):
     """Stand-in for a ``TrainedClassifier`` that works in the model process."""
 
+    def __init__(self, process: ModelProcess, path: Path) -> None:
+        self.card = describe_classifier(path)
+        super().__init__(process, path)
+
     def probabilities(self, doppler: DopplerMap) -> NDArray[np.float32]:
         """Class probabilities of every frame of a map, (frames, classes)."""
         given = replace(doppler, uncertainty=None)
         return self._process.ask("call", self._ready(), "probabilities", given)
 
-    def live(self) -> RemoteClasses:
-        """Session for live frames of one stretch, all with a person."""
-        return RemoteClasses(self._process, self._ready())
-
     def _load(self) -> int:
         return int(self._process.ask("load_classifier", self._path))
 
 
-class _RemoteSession:
+class RemoteSession:
     """A clip whose frames come one after another."""
 
     def __init__(self, process: ModelProcess, model: int) -> None:
         self._process = process
         self._clip = process.ask("begin", model)
         self._generation = process.generation
+
+    def advance(
+        self, energies: NDArray[np.float32], *present: NDArray[np.bool_]
+    ) -> NDArray[np.float32]:
+        """Answers of a model to the next frames (frames, features), a row each.
+
+        A denoiser is told in which of them a person is. A classifier answers with probabilities of
+        its classes, as late as its card says.
+        """
+        return self._ask("advance", energies, *present)
+
+    def finish(self) -> NDArray[np.float32]:
+        """Outstanding answers of a classifier, as if nothing moved from now on.
+
+        The session stays usable.
+        """
+        return self._ask("finish")
 
     def _ask(self, do: str, *arguments: Any) -> NDArray[np.float32]:
         if self._process.generation != self._generation:
@@ -195,28 +205,6 @@ class _RemoteSession:
                 remedy="Choose the model again",
             )
         return self._process.ask("call", self._clip, do, *arguments)
-
-
-class RemoteClasses(_RemoteSession):
-    """Frames with a person in; probabilities of the classes out, as late as the card says."""
-
-    def advance(self, energies: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Probabilities that follow from the next frames: (frames, bins) → (answers, classes)."""
-        return self._ask("advance", energies)
-
-    def finish(self) -> NDArray[np.float32]:
-        """Outstanding answers, as if nothing moved from now on; the session stays usable."""
-        return self._ask("finish")
-
-
-class RemoteLive(_RemoteSession):
-    """Session that takes frames and answers each of them."""
-
-    def advance(
-        self, energies: NDArray[np.float32], present: NDArray[np.bool_]
-    ) -> NDArray[np.float32]:
-        """Answers to the next frames (frames, features), one row for each."""
-        return self._ask("advance", energies, present)
 
 
 Card = TypeVar("Card", bound=Any)
@@ -243,9 +231,13 @@ ClassifierLibrary = ModelLibrary[ClassifierCard, RemoteClassifier]
 
 def core_denoisers(process: ModelProcess) -> DenoiserLibrary:
     """Denoisers of the library, in the model process; cards are read here."""
-    return ModelLibrary(available_models, describe_model, process.load, process.close)
+    return ModelLibrary(
+        available_models, describe_model, partial(RemoteDenoiser, process), process.close
+    )
 
 
 def core_classifiers(process: ModelProcess) -> ClassifierLibrary:
     """Classifiers of the library, in the model process; cards are read here."""
-    return ModelLibrary(available_classifiers, describe_classifier, process.load_classifier)
+    return ModelLibrary(
+        available_classifiers, describe_classifier, partial(RemoteClassifier, process)
+    )
