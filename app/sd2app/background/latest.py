@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from functools import partial
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, TypeVar
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
@@ -17,6 +17,7 @@ Emit = Callable[[Any], None]
 """Hands an intermediate result to the window; raises Cancelled when it is stale."""
 
 Task = Callable[[Emit], Any]
+Child = TypeVar("Child", bound=QObject)
 
 
 def delayed(work: Callable[[], object], delay_ms: int, parent: QObject) -> QTimer:
@@ -132,22 +133,26 @@ class LatestRunner(QObject):
 
 
 class BackgroundModel(QObject):
-    """Model that works in the background, by runners and other such models: its children."""
+    """Model that works in the background, by its children: runners, timers, other such models."""
 
     @property
     def busy(self) -> bool:
-        """True while one of them works."""
-        return any(worker.busy for worker in self._workers())
+        """True while one of them works, or is about to."""
+        waiting = any(timer.isActive() for timer in self._own(QTimer))
+        return waiting or any(worker.busy for worker in self._workers())
 
     def close(self) -> None:
         """Stop all work for good, and wait until it has ended."""
+        for timer in self._own(QTimer):
+            timer.stop()
         for worker in self._workers():
             worker.close()
 
     def _workers(self) -> list[LatestRunner | BackgroundModel]:
-        direct = Qt.FindChildOption.FindDirectChildrenOnly
-        runners = self.findChildren(LatestRunner, options=direct)
-        return [*runners, *self.findChildren(BackgroundModel, options=direct)]
+        return [*self._own(LatestRunner), *self._own(BackgroundModel)]
+
+    def _own(self, kind: type[Child]) -> list[Child]:
+        return self.findChildren(kind, options=Qt.FindChildOption.FindDirectChildrenOnly)
 
 
 class ReportingModel(BackgroundModel):

@@ -89,11 +89,6 @@ class ClassifyModel(ReportingModel, SpanFinder):
         return self._runner.busy
 
     @property
-    def busy(self) -> bool:
-        """True while it is being loaded, is about to be, or is at work."""
-        return super().busy or self._patience.isActive()
-
-    @property
     def problem(self) -> str:
         """Reason why nothing is classified; empty where something is, or nothing was asked for."""
         return self._problem or self.track.problem
@@ -230,11 +225,6 @@ class ClassifyModel(ReportingModel, SpanFinder):
             self.wake()
             self._settings.set_value(_SHOWN, shown)
             self.changed.emit()
-
-    def close(self) -> None:
-        """Stop classifying."""
-        self._patience.stop()
-        super().close()
 
     # --- following ------------------------------------------------------------------------
 

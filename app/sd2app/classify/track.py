@@ -101,11 +101,6 @@ class ClassTrack(BackgroundModel):
     # --- what is known --------------------------------------------------------------------
 
     @property
-    def busy(self) -> bool:
-        """True while frames are being classified or about to be."""
-        return super().busy or self._calm.isActive()
-
-    @property
     def complete(self) -> bool:
         """True once every frame of the current map is classified."""
         source = self.source
@@ -165,11 +160,6 @@ class ClassTrack(BackgroundModel):
         if source is not None:
             source.changed.connect(self._follow)
         self._restart()
-
-    def close(self) -> None:
-        """Stop."""
-        self._calm.stop()
-        super().close()
 
     # --- following the map ----------------------------------------------------------------
 

@@ -134,7 +134,7 @@ class DenoisedMap(BackgroundModel):
     @property
     def busy(self) -> bool:
         """True while something is being denoised or about to be."""
-        return super().busy or self._again.isActive() or self._lacks_limbs
+        return super().busy or self._lacks_limbs
 
     @property
     def _lacks_limbs(self) -> bool:

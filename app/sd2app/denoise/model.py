@@ -113,7 +113,7 @@ class DenoiseModel(ReportingModel):
     def busy(self) -> bool:
         """True while a model is being loaded or a map denoised."""
         waiting = self.path is not None and self._patience.isActive()
-        return waiting or super().busy
+        return waiting or any(worker.busy for worker in self._workers())
 
     @property
     def can_export(self) -> bool:
@@ -206,7 +206,6 @@ class DenoiseModel(ReportingModel):
 
     def close(self) -> None:
         """Stop computing and let go of the models."""
-        self._patience.stop()
         self._runner.cancel()
         self._library.close()
         super().close()

@@ -112,11 +112,6 @@ class ImuModel(ReportingModel):
         return bool(self.places) or self.measured is not None
 
     @property
-    def busy(self) -> bool:
-        """True while signals are computed or read."""
-        return self._runner.busy or self._reader.busy or self._adder.busy
-
-    @property
     def why_not(self) -> str:
         """Reason why no sensor can be placed; empty if one can."""
         mesh = self._document.mesh

@@ -42,11 +42,6 @@ class RecordingPictures(BackgroundModel):
         for signal in (session.document.opened, session.document.saved):
             signal.connect(self._patience.start)
 
-    def close(self) -> None:
-        """Finish."""
-        self._patience.stop()
-        super().close()
-
     def path_of(self, paths: Sequence[Path]) -> Path:
         """File of the picture of what is opened together, which may not be there."""
         names = "\n".join(str(plain_path(path)) for path in paths)
