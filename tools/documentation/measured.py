@@ -28,7 +28,7 @@ OLD = {
     "range-synthesis.md": _HOURS,
     "paper.md": _HOURS,
     "denoiser.md": _HOURS,
-    "classifier.md": "hours of training; without added maps its networks draw clips otherwise by now",
+    "classifier.md": "hours of training; by now its networks draw and weigh clips otherwise",
     "studies.md": "hours of training; how late ridge regression is was put right in it",
     "real-pairs.md": "gaps in time, notes and names of people changed, none of which it has",
     "real-gestures.md": "only what counts as a gap in time changed, and its recordings have none",
