@@ -120,9 +120,9 @@ def train(
     """Train a classifier on clips of ``known``.
 
     The loss is the cross entropy, every class weighted by the inverse of its number of
-    frames, so that all of them count the same. The clips are shuffled again when all have
-    been seen. The best on validation is the one with the highest mean recall of frames;
-    without validation the last one is taken.
+    frames, as often as they are shown, so that all of them count the same. The clips are
+    shuffled again when all have been seen. The best on validation is the one with the
+    highest mean recall of frames; without validation the last one is taken.
 
     Parameters
     ----------
@@ -146,7 +146,6 @@ def train(
     """
     chosen = chosen or TrainOptions()
     own_weights = np.ones(len(training)) if weights is None else np.asarray(weights, np.float64)
-    of_classes = _class_weights(training, own_weights, known.classes)
     features = Features(chosen.features, known.axis, known.null_bins, known.frame_rate_hz)
     delay_frames = round(chosen.delay_s * known.frame_rate_hz)
     events: list[dict[str, Any]] = []
@@ -159,6 +158,12 @@ def train(
     with _one_thread(), torch.random.fork_rng(devices=[]):
         torch.manual_seed(chosen.seed)
         network = build(chosen.model, features.size, len(known.classes), **own)
+        shares = own_weights
+        if not network.closed_form:  # Windows are cut from clips, which are drawn.
+            lengths = np.array([len(clip) for clip in training])
+            chances = np.ones(len(training)) if weights is None else own_weights * lengths
+            shares = chances * np.minimum(lengths, chosen.window_frames) / lengths
+        of_classes = _class_weights(training, shares / shares.max(initial=1e-12), known.classes)
         shown = some_noisy(training, known.null_bins, chosen.noisy_share, chosen.seed)
         if network.closed_form:  # It has no second look at a clip.
             noisy = zip(shown, training, strict=True)

@@ -10,6 +10,7 @@ import pytest
 import torch
 from labelled_clips import clip_set
 
+from sd2core.classify import training
 from sd2core.classify.data import UNKNOWN, ClipSet
 from sd2core.classify.defaults import MODELS
 from sd2core.classify.files import load_classifier, save_classifier
@@ -114,6 +115,28 @@ def test_clips_of_any_length_are_learnt_from(known: ClipSet) -> None:
     short = replace(SHORT, steps=3, window_frames=40)
     made = train(clips, (), known, short)
     assert made.classifier.probabilities_of(known.clips[0].energies).shape == (90, 3)
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+def test_classes_count_the_same_by_what_is_shown_of_them(
+    known: ClipSet, weighted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a long recording beside short ones windows are shown, not all of its background."""
+    long = clip_set(1, 1, frames=3000).clips[0]
+    clips = [replace(long, label=np.zeros_like(long.label)), *known.clips[:3]]
+    shown = np.zeros(3)
+    learn = training._ClassifierLoop._learn
+
+    def counted(loop, energies, label):
+        shown[:] += np.bincount(label[label >= 0].numpy(), minlength=3)
+        weights.append(loop._weights.numpy())
+        return learn(loop, energies, label)
+
+    weights: list[np.ndarray] = []
+    monkeypatch.setattr(training._ClassifierLoop, "_learn", counted)
+    chosen = replace(SHORT, steps=400, check_steps=400, options={"width": 4})
+    train(clips, (), known, chosen, weights=[1.0] * len(clips) if weighted else None)
+    np.testing.assert_allclose(weights[0] * shown, (weights[0] * shown).mean(), rtol=0.15)
 
 
 def test_a_trained_classifier_comes_back_from_its_file(known: ClipSet, tmp_path: Path) -> None:
