@@ -61,6 +61,11 @@ _BREAK_FRAMES = 5.0
 """Frame durations from one frame to the next, beyond which a new clip begins."""
 
 
+def is_same_rate(one_hz: float, other_hz: float) -> bool:
+    """True if frame rates are equal but for what does not affect a model."""
+    return abs(one_hz / other_hz - 1.0) <= SAME_RATE
+
+
 def can_resample(from_hz: float, to_hz: float) -> bool:
     """True if one frame rate is at most :data:`MAX_RESAMPLED` times the other, but for rounding."""
     return max(from_hz / to_hz, to_hz / from_hz) <= MAX_RESAMPLED * (1.0 + 1e-6)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.denoise.metrics import stands_out
+from sd2core.denoise.resample_to_model import is_same_rate
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import check_distinct
 from sd2core.maps import peak_velocity_mps
@@ -112,9 +113,12 @@ def read_mixed(paths: Sequence[Path]) -> PairSet:
     if len(sets) == 1:
         return first
     for path, other in zip(paths[1:], sets[1:], strict=True):
+        rates = (f"{first.frame_rate_hz:g} Hz", f"{other.frame_rate_hz:g} Hz")
+        if is_same_rate(first.frame_rate_hz, other.frame_rate_hz):
+            rates = (rates[0], rates[0])
         for what, mine, theirs in (
             ("velocity axis", first.axis.words, other.axis.words),
-            ("frame rate", f"{first.frame_rate_hz:g} Hz", f"{other.frame_rate_hz:g} Hz"),
+            ("frame rate", *rates),
             ("null bins", str(list(first.null_bins)), str(list(other.null_bins))),
         ):
             if mine != theirs:

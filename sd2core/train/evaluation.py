@@ -23,6 +23,7 @@ from sd2core.denoise.card import ModelCard
 from sd2core.denoise.live import TrainedDenoiser
 from sd2core.denoise.metrics import MapError, VelocityError, map_error, stands_out, velocity_error
 from sd2core.denoise.registry import FILTERS, fit_filter, options
+from sd2core.denoise.resample_to_model import is_same_rate
 from sd2core.denoise.scaling import Compression, Scaling
 from sd2core.errors import Sd2Error
 from sd2core.maps import mean_velocity_mps, peak_velocity_mps
@@ -378,12 +379,13 @@ def _notes(
 
 def check_fits(card: ModelCard, pairs: PairSet, remedy: str) -> None:
     """Raise Sd2Error, with a remedy, for a model that is not made for maps like those of pairs."""
-    for what, mine, theirs in (
-        ("velocity axis", card.axis, pairs.axis),
-        ("null bins", card.null_bins, tuple(pairs.null_bins)),
-        ("frame rate", card.frame_rate_hz, pairs.frame_rate_hz),
+    same_rate = is_same_rate(card.frame_rate_hz, pairs.frame_rate_hz)
+    for what, mine, theirs, alike in (
+        ("velocity axis", card.axis, pairs.axis, card.axis == pairs.axis),
+        ("null bins", card.null_bins, pairs.null_bins, card.null_bins == tuple(pairs.null_bins)),
+        ("frame rate", card.frame_rate_hz, pairs.frame_rate_hz, same_rate),
     ):
-        if mine != theirs:
+        if not alike:
             raise Sd2Error(
                 f"The {what} of the model {_title(card)} is {mine}, that of the pairs {theirs}",
                 "the same",

@@ -13,6 +13,7 @@ from sd2app.widgets.text import counted, duration_text
 from sd2core.denoise.card import PARTS_OF, ModelCard
 from sd2core.denoise.files import available_models
 from sd2core.denoise.registry import is_network
+from sd2core.denoise.resample_to_model import is_same_rate
 from sd2core.errors import Sd2Error
 from sd2core.options.training import (
     DataConfig,
@@ -129,7 +130,9 @@ class TrainingSetupModel(RunSetup[Store]):
         facts = [store.facts for store in self.data if store.facts is not None]
         if len(facts) < len(self.data):
             return "Reading the pairs…"
-        if len({(one.bins, one.v_max_mps, one.frame_rate_hz) for one in facts}) > 1:
+        if len({(one.bins, one.v_max_mps) for one in facts}) > 1 or not all(
+            is_same_rate(facts[0].frame_rate_hz, one.frame_rate_hz) for one in facts
+        ):
             return (
                 "These pairs differ in their velocity axis or frame rate. Choose pairs of one kind."
             )

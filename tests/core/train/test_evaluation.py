@@ -174,6 +174,7 @@ def test_a_model_that_does_not_fit() -> None:
     pairs = lines(0)
     with pytest.raises(Sd2Error, match=r"frame rate of the model gru is 30\.0"):
         evaluate([model(pairs)], replace(pairs, frame_rate_hz=10.0))
+    assert evaluate([model(pairs)], replace(pairs, frame_rate_hz=29.97)).frames == pairs.frames
 
 
 def test_tables_and_picture() -> None:

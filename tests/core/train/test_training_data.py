@@ -109,6 +109,11 @@ class TestMixed:
         with pytest.raises(Sd2Error, match=said):
             read_mixed([one, two])
 
+    def test_a_cameras_30_frames_a_second_are_those_of_a_simulation(self, tmp_path: Path) -> None:
+        one = write_pairs(tmp_path / "one.zarr")
+        two = write_pairs(tmp_path / "two.zarr", ("t1",), rate_hz=29.97)
+        assert read_mixed([one, two]).subjects == ("s1", "s2", "s3", "t1")
+
 
 class TestSegments:
     def test_range_synthesis_by_placements(self, tmp_path: Path) -> None:
