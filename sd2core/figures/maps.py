@@ -14,7 +14,8 @@ from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import save_figure
 from sd2core.labels.formats.lanes import apart
 from sd2core.labels.spans import Labels, Span
-from sd2core.maps import DopplerMap, draw_cells
+from sd2core.maps import DopplerMap, draw_cells, without_shares
+from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 Scale = Literal["dB", "linear"]
 
 _WIDTH_IN, _ROW_IN, _PIXELS_PER_INCH = 8.0, 1.55, 200
+_COLUMNS = round(0.8 * _WIDTH_IN * _PIXELS_PER_INCH)
+"""Pixels across a map."""
 _MUTED = "#5a6370"
 _DIFFERENCE = ["#b4520b", "#f7f8f9", "#0b7a5b"]
 """Colours of negative, no and positive differences."""
@@ -172,7 +175,7 @@ def draw_maps(
     maps_axes = all_axes[:-1] if lanes else all_axes
     shown: Any = None
     for axes, row in zip(maps_axes, rows, strict=False):
-        row = _in_view(row, start_s, end_s)
+        row = _strongest(_in_view(row, start_s, end_s))
         level = levels.of(row.doppler.values, row.reference)
         low, high = levels.ends
         shown = _draw(axes, row, level, levels.colour_map, low, high)
@@ -221,7 +224,7 @@ def save_maps(figure: Figure, path: Path, rows: Sequence[MapRow], about: dict[st
     provenance = about | {
         "maps": [
             {"title": row.title, "kind": row.doppler.kind, "reference": row.reference}
-            | {"offset_s": row.offset_s, "provenance": row.doppler.meta}
+            | {"offset_s": row.offset_s, "provenance": without_shares(row.doppler.meta)}
             for row in rows
         ]
     }
@@ -232,6 +235,26 @@ def _in_view(row: MapRow, start_s: float, end_s: float) -> MapRow:
     """Part of a map between two times of the figure: hours are not drawn for a second."""
     start, stop = row.doppler.timebase.frames_between(start_s - row.offset_s, end_s - row.offset_s)
     return replace(row, doppler=row.doppler.between(start, max(stop, start + 2)))
+
+
+def _strongest(row: MapRow) -> MapRow:
+    """The strongest of the frames that share a column of pixels, as on screen: nothing is lost."""
+    doppler, frames = row.doppler, len(row.doppler.timebase)
+    starts = np.arange(0, frames, -(-frames // _COLUMNS))
+    if len(starts) == frames:
+        return row
+    pooled = DopplerMap(
+        np.maximum.reduceat(doppler.values, starts, axis=1),
+        doppler.axis,
+        Timebase(doppler.times_s[starts]),
+        doppler.kind,
+        unit=doppler.unit,
+        null_bins=doppler.null_bins,
+        unseen_bins=doppler.unseen_bins,
+        present=None if doppler.present is None else np.maximum.reduceat(doppler.present, starts),
+        meta=doppler.meta,
+    )
+    return replace(row, doppler=pooled)
 
 
 def _draw(

@@ -82,6 +82,28 @@ def test_a_part_of_the_difference_is_that_of_the_whole():
     assert drawn[1].min() > 15.0
 
 
+def test_what_is_short_is_seen_in_a_figure_of_hours(tmp_path):
+    """As on screen; drawn one by one, of the frames in a pixel the last would be seen."""
+    frames = 40_000
+    values = np.full((4, frames), 1e-3)
+    moments = np.arange(1_003, frames, 4_001)
+    values[:, moments] = 1.0
+    share = [0.5] * frames
+    rows = [row_of(values, present=np.arange(frames) >= 500, meta={"visible_share": share})]
+    figure = draw_maps(rows, Levels(), start_s=0.0, end_s=frames / 10.0)
+    save_maps(figure, tmp_path / "hours.png", rows, {})
+    with Image.open(tmp_path / "hours.png") as picture:
+        assert json.loads(picture.info["Description"])["maps"][0]["provenance"] == {}
+        pixels = np.asarray(picture.convert("RGB"), int)
+    box = figure.axes[0].get_window_extent()
+    scale = pixels.shape[1] / figure.bbox.width
+    line = pixels[round(pixels.shape[0] - scale * (box.y0 + box.y1) / 2)]
+    for moment in moments:
+        x = scale * (box.x0 + box.width * moment / frames)
+        near = line[round(x) - 3 : round(x) + 4]
+        assert (np.abs(near - (253, 231, 36)).sum(axis=1) < 60).any()  # the strongest colour
+
+
 @pytest.mark.slow
 def test_the_figure_shows_the_sign_and_carries_provenance(tmp_path):
     loud, quiet = np.full((8, 10), 1.0), np.full((8, 10), 0.01)
