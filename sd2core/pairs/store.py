@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, full_disk_named
+from sd2core.files.lock import FileLock
 from sd2core.files.stores import (
     StoredArray,
     array_in,
@@ -47,6 +48,7 @@ from sd2core.sensor import VelocityAxis
 
 LOST = "frames_lost"
 """Entry of the provenance with the frames lost of each take, where chunks are damaged."""
+LOCK_NAME = ".sd2-lock"
 _ARRAYS = ("synthetic", "radar", "times_s", "label")
 SPLIT = ("limbs", "kinematics")
 """Arrays that a store has where its input is split by the parts of the body."""
@@ -233,6 +235,7 @@ class PairWriter:
         drop_torn_line(self._path / INDEX_NAME)
         self._done = {take.key: take.rows for take in takes}
         self._frames = max((take.stop for take in takes), default=0)
+        self._bytes = self._index_bytes()
 
     @property
     def done(self) -> Set[TakeKey]:
@@ -257,7 +260,8 @@ class PairWriter:
     def append(self, take: Take) -> None:
         """Add one take.
 
-        Raises Sd2Error when it is there already, or of other bins or labels.
+        Raises Sd2Error when it is there already, or of other bins or labels, or another process
+        writes takes.
         """
         if take.key in self._done:
             raise Sd2Error(f"{self._path} already holds the take {take.title}", "each take once")
@@ -274,8 +278,25 @@ class PairWriter:
                 f"Take {take.title} is split into the parts {list(parts)}",
                 f"{header.get('parts', [])}, as {self._path} has",
             )
+        lock = FileLock(self._path / LOCK_NAME)
         with full_disk_named(self._path):
-            self._write(take)
+            alone = lock.take()
+            try:
+                # It would write over the takes of the other.
+                if not alone or self._index_bytes() != self._bytes:
+                    raise Sd2Error(
+                        f"Another process writes to {self._path}",
+                        "one at a time",
+                        "Wait until it ends; the same command goes on where it was",
+                    )
+                self._write(take)
+                self._bytes = self._index_bytes()
+            finally:
+                lock.release(delete=True)
+
+    def _index_bytes(self) -> int:
+        index = self._path / INDEX_NAME
+        return index.stat().st_size if index.exists() else 0
 
     def _write(self, take: Take) -> None:
         start, stop = self._frames, self._frames + len(take.times_s)

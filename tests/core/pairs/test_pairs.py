@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from sd2core.errors import Sd2Error
 from sd2core.maps import LimbMaps
 from sd2core.pairs.segments import cut, join, segment_starts
-from sd2core.pairs.store import PairWriter, Take, read_pairs
+from sd2core.pairs.store import LOCK_NAME, PairWriter, Take, read_pairs
 from sd2core.pairs.summary import INDEX_NAME, TakeKey, is_pair_store
 from sd2core.sensor import VelocityAxis
 from tests.damaged_files import change, lose, states_of
@@ -135,6 +135,17 @@ def test_a_killed_writer_loses_only_the_take_it_was_at(tmp_path: Path) -> None:
     again.append(take("b", 11))
     assert [each.name for each in read_pairs(path).takes] == ["a", "b"]
     assert same(read_pairs(path).takes[1], take("b", 11))
+
+
+def test_two_do_not_write_the_same_takes(tmp_path: Path) -> None:
+    path = tmp_path / "pairs.zarr"
+    writer, other = PairWriter(path, **HEADER), PairWriter(path, **HEADER)
+    writer.append(take("a"))
+    with pytest.raises(Sd2Error, match="Another process writes to"):
+        other.append(take("a"))
+    writer.append(take("b"))
+    assert [each.name for each in read_pairs(path).takes] == ["a", "b"]
+    assert not (path / LOCK_NAME).exists()
 
 
 def test_a_begun_store_goes_on_only_with_the_same_settings(tmp_path: Path) -> None:
