@@ -9,7 +9,6 @@ import numpy as np
 
 from sd2app.background.model_worker.client import ClassifierLibrary
 from sd2core.classify.card import ClassifierCard
-from sd2core.classify.features import Features
 from sd2core.errors import Sd2Error
 from sd2core.sensor import VelocityAxis
 
@@ -20,7 +19,10 @@ def class_card(path, kinds=("simulated", "denoised"), bins=32):
     return ClassifierCard(
         model="lstm",
         options={},
-        features=Features("columns", VelocityAxis(bins, 2.0), (14, 15, 16), 30.0),
+        axis=VelocityAxis(bins, 2.0),
+        null_bins=(14, 15, 16),
+        frame_rate_hz=30.0,
+        shown="columns",
         classes=CLASSES,
         trained_on=kinds,
         parameters=1234,

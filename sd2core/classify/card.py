@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core.classify.defaults import DELAYS_S
+from sd2core.classify.defaults import DELAYS_S, FeatureKind
 from sd2core.classify.features import Features
-from sd2core.denoise.network_card import CardKind, NetworkCard, axis_json, axis_of
+from sd2core.denoise.network_card import CardKind, NetworkCard
 from sd2core.errors import Sd2Error
 from sd2core.labels.label_set import check_name
 from sd2core.labels.per_frame import BACKGROUND
-from sd2core.sensor import VelocityAxis
 
 FORMAT = "sd2-classifier"
 
@@ -28,13 +28,14 @@ class ClassifierCard(NetworkCard):
 
     KIND = CardKind(FORMAT, 2, "classifier", "a classifier written by `sd2 classify train`")
 
-    features: Features  # its input, and the maps that it is computed from
+    shown: FeatureKind  # what it sees of a frame
     classes: tuple[str, ...]  # in the order of its answers; at least two
     trained_on: tuple[str, ...]  # sd2core.maps.MapKind
     delay_frames: int = 0  # number of frames seen after one before it is answered
 
     def __post_init__(self) -> None:
-        self.check_frame_rate(self.frame_rate_hz)
+        super().__post_init__()
+        _ = self.features  # or fail
         if len(self.classes) < 2 or len(set(self.classes)) < len(self.classes):
             raise Sd2Error(
                 f"The classes are {', '.join(self.classes) or 'none'}", "two or more, each once"
@@ -46,20 +47,10 @@ class ClassifierCard(NetworkCard):
                 f"The classifier answers {self.delay_s:g} s late", f"0 to {DELAYS_S.high:g} s"
             )
 
-    @property
-    def axis(self) -> VelocityAxis:
-        """Velocity axis of the maps."""
-        return self.features.axis
-
-    @property
-    def null_bins(self) -> tuple[int, ...]:
-        """Bins that are set to zero."""
-        return self.features.null_bins
-
-    @property
-    def frame_rate_hz(self) -> float:
-        """Frame rate of the maps."""
-        return self.features.frame_rate_hz
+    @cached_property
+    def features(self) -> Features:
+        """Its input, computed from maps."""
+        return Features(self.shown, self.axis, self.null_bins, self.frame_rate_hz)
 
     @property
     def delay_s(self) -> float:
@@ -85,10 +76,7 @@ class ClassifierCard(NetworkCard):
     def own_header(self) -> dict[str, Any]:
         """Return what only classifiers have, as JSON can hold it."""
         return {
-            "features": self.features.kind,
-            "axis": axis_json(self.axis),
-            "null_bins": list(self.null_bins),
-            "frame_rate_hz": self.frame_rate_hz,
+            "features": self.shown,
             "classes": list(self.classes),
             "trained_on": list(self.trained_on),
             "delay_frames": self.delay_frames,
@@ -100,12 +88,7 @@ class ClassifierCard(NetworkCard):
         before = {"width": 16} if content["version"] < 2 else {}
         return {
             "options": {**before, **content["options"]},
-            "features": Features(
-                content["features"],
-                axis_of(content["axis"]),
-                tuple(map(int, content["null_bins"])),
-                float(content["frame_rate_hz"]),
-            ),
+            "shown": content["features"],
             "classes": tuple(map(str, content["classes"])),
             "trained_on": tuple(map(str, content["trained_on"])),
             "delay_frames": int(content.get("delay_frames", 0)),  # version 1 answers at once

@@ -181,7 +181,7 @@ def train(
                 chosen.seed,
             )
             say("end", best_step=1, interrupted=False)
-            card = _card(chosen, own, features, known, training, delay_frames, about, 1, True)
+            card = _card(chosen, own, known, training, delay_frames, about, 1, True)
             return Trained(TrainedClassifier(network, card), events, False)
         loop = _ClassifierLoop(
             network,
@@ -202,7 +202,7 @@ def train(
         # Stopped before the first check, it is as far as it came.
         if loop.best is not None:
             network.load_state_dict(loop.best)
-    card = _card(chosen, own, features, known, training, delay_frames, about, loop.best_step, False)
+    card = _card(chosen, own, known, training, delay_frames, about, loop.best_step, False)
     return Trained(TrainedClassifier(network, card), events, interrupted)
 
 
@@ -217,7 +217,6 @@ def _options_of(chosen: TrainOptions, delay_frames: int) -> dict[str, Any]:
 def _card(
     chosen: TrainOptions,
     own: Mapping[str, Any],
-    features: Features,
     known: ClipSet,
     training: Sequence[Clip],
     delay_frames: int,
@@ -232,7 +231,10 @@ def _card(
     return ClassifierCard(
         chosen.model,
         {**options(chosen.model), **own},
-        features,
+        known.axis,
+        known.null_bins,
+        known.frame_rate_hz,
+        chosen.features,
         known.classes,
         tuple(dict.fromkeys(clip.kind for clip in training)),
         delay_frames,

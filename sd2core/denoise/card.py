@@ -7,13 +7,12 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
 
 from sd2core.denoise.known import KnownMovements
-from sd2core.denoise.network_card import CardKind, NetworkCard, axis_json, axis_of
+from sd2core.denoise.network_card import CardKind, NetworkCard
 from sd2core.denoise.registry import options_of_version_1
 from sd2core.denoise.scaling import Scaling, null_columns
 from sd2core.denoise.texture import Texture
 from sd2core.errors import Sd2Error
 from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, PARTS, QUANTITIES
-from sd2core.sensor import VelocityAxis
 
 VERSION = 2
 
@@ -54,9 +53,6 @@ class ModelCard(NetworkCard):
     KIND = CardKind("sd2-denoiser", VERSION, "model", "a model file written by `sd2 train`")
 
     scaling: Scaling
-    axis: VelocityAxis
-    null_bins: tuple[int, ...]  # Bins that are zero on purpose, in the input and in the result.
-    frame_rate_hz: float
     trained_on: TrainedOn
     unit: str = "power"  # Meaning of the value 1 in the result.
     parts: tuple[str, ...] = ()
@@ -66,12 +62,11 @@ class ModelCard(NetworkCard):
     known: KnownMovements | None = None  # What it learnt from; None: files of before do not say.
 
     def __post_init__(self) -> None:
-        self.check_frame_rate(self.frame_rate_hz)
+        super().__post_init__()
         if self.trained_on not in get_args(TrainedOn):
             raise Sd2Error(
                 f"The model was trained on {self.trained_on!r}", f"one of {get_args(TrainedOn)}"
             )
-        object.__setattr__(self, "null_bins", self.axis.checked_bins(self.null_bins, "null_bins"))
 
     @property
     def inputs(self) -> Inputs:
@@ -114,9 +109,6 @@ class ModelCard(NetworkCard):
         """Return what only denoisers have, as JSON can hold it."""
         return {
             "scaling": self.scaling.to_json(),
-            "axis": axis_json(self.axis),
-            "null_bins": list(self.null_bins),
-            "frame_rate_hz": self.frame_rate_hz,
             "trained_on": self.trained_on,
             "unit": self.unit,
             "parts": list(self.parts),
@@ -132,9 +124,6 @@ class ModelCard(NetworkCard):
             before["options"] = options_of_version_1(str(content["model"]), content["options"])
         return before | {
             "scaling": Scaling.from_json(content["scaling"]),
-            "axis": axis_of(content["axis"]),
-            "null_bins": tuple(content["null_bins"]),
-            "frame_rate_hz": float(content["frame_rate_hz"]),
             "trained_on": content["trained_on"],
             "unit": str(content["unit"]),
             "parts": tuple(str(part) for part in content.get("parts", ())),

@@ -32,6 +32,9 @@ class NetworkCard:
 
     model: str  # A name of the networks that this program or a plug-in has.
     options: Mapping[str, Any]  # Options of the network.
+    axis: VelocityAxis  # Of the maps that it knows.
+    null_bins: tuple[int, ...]  # Bins that are zero on purpose, in the input and in a map made.
+    frame_rate_hz: float
     _: KW_ONLY
     title: str = ""  # Name in lists; the file's name if it is empty.
     about: Mapping[str, Any] = field(default_factory=dict)
@@ -45,12 +48,12 @@ class NetworkCard:
         """Name of the file, without its suffix; the kind of network before there is a file."""
         return self.path.stem if self.path is not None else self.model
 
-    def check_frame_rate(self, frame_rate_hz: float) -> None:
-        """Refuse a frame rate that no map has."""
-        if frame_rate_hz not in FRAME_RATE_HZ:
+    def __post_init__(self) -> None:
+        if self.frame_rate_hz not in FRAME_RATE_HZ:
             raise Sd2Error(
-                f"The {self.KIND.noun}'s frame rate is {frame_rate_hz}", FRAME_RATE_HZ.words
+                f"The {self.KIND.noun}'s frame rate is {self.frame_rate_hz}", FRAME_RATE_HZ.words
             )
+        object.__setattr__(self, "null_bins", self.axis.checked_bins(self.null_bins, "null_bins"))
 
     def own_header(self) -> dict[str, Any]:
         """Return what only this kind of card has, as JSON can hold it."""
@@ -68,6 +71,9 @@ class NetworkCard:
             "version": self.KIND.version,
             "model": self.model,
             "options": dict(self.options),
+            "axis": {"bins": self.axis.bins, "v_max_mps": self.axis.v_max_mps},
+            "null_bins": list(self.null_bins),
+            "frame_rate_hz": self.frame_rate_hz,
             **self.own_header(),
             "title": self.title,
             "about": dict(self.about),
@@ -85,22 +91,16 @@ class NetworkCard:
         where = f"The {kind.noun}" if path is None else str(path)
         with damage_in(where, kind.written):
             check_version(content, where, kind.format, kind.version)
+            axis = content["axis"]
             common = {
                 "model": str(content["model"]),
                 "options": dict(content["options"]),
+                "axis": VelocityAxis(int(axis["bins"]), float(axis["v_max_mps"])),
+                "null_bins": tuple(content["null_bins"]),
+                "frame_rate_hz": float(content["frame_rate_hz"]),
                 "title": str(content["title"]),
                 "about": dict(content["about"]),
                 "parameters": int(content["parameters"]),
                 "package": str(content.get("package", "")),
             }
             return cls(**{**common, **cls.parsed(content)}, path=path)
-
-
-def axis_json(axis: VelocityAxis) -> dict[str, Any]:
-    """Return a velocity axis as JSON can hold it."""
-    return {"bins": axis.bins, "v_max_mps": axis.v_max_mps}
-
-
-def axis_of(content: dict[str, Any]) -> VelocityAxis:
-    """Parse :func:`axis_json`."""
-    return VelocityAxis(int(content["bins"]), float(content["v_max_mps"]))

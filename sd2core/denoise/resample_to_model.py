@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,36 +14,11 @@ from sd2core.maps import DopplerMap
 from sd2core.mesh.presence import Presence, runs
 from sd2core.plausibility.clock import ROUNDING_S
 from sd2core.progress import Progress
-from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 
 if TYPE_CHECKING:
     from sd2core.denoise.card import ModelCard
-
-
-class Card(Protocol):
-    """Properties of the maps that a model knows, as :class:`~sd2core.denoise.card.ModelCard`."""
-
-    @property
-    def name(self) -> str:
-        """Name of the model in messages."""
-
-    @property
-    def title(self) -> str:
-        """Title of the model, which may be empty."""
-
-    @property
-    def axis(self) -> VelocityAxis:
-        """Velocity axis."""
-
-    @property
-    def null_bins(self) -> tuple[int, ...]:
-        """Bins that are zero on purpose."""
-
-    @property
-    def frame_rate_hz(self) -> float:
-        """Frames per second."""
-
+    from sd2core.denoise.network_card import NetworkCard
 
 Energies = NDArray[np.float32]
 """Energies without a gap, (frames, bins)."""
@@ -106,7 +81,7 @@ def input_of(doppler: DopplerMap, parts: Sequence[str] = ()) -> Energies:
     return doppler.limbs.inputs(parts)
 
 
-def check_bins(doppler: DopplerMap, card: Card) -> None:
+def check_bins(doppler: DopplerMap, card: NetworkCard) -> None:
     """Raise Sd2Error for a map of another axis, other emptied bins or too different a rate."""
     model = f"the model {card.title or card.name}"
     if doppler.axis != card.axis:

@@ -11,7 +11,6 @@ from timing import spent_s
 
 from sd2core.classify.card import ClassifierCard
 from sd2core.classify.defaults import MODELS
-from sd2core.classify.features import Features
 from sd2core.classify.live import LiveClasses, TrainedClassifier
 from sd2core.classify.models import build
 from sd2core.sensor import VelocityAxis
@@ -23,9 +22,9 @@ pytestmark = pytest.mark.usefixtures("one_thread")
 
 
 def classifier(name: str) -> TrainedClassifier:
-    features = Features("columns", VelocityAxis(), (14, 15, 16), RATE_HZ)
-    card = ClassifierCard(name, {}, features, ("background", "one", "other"), ("real",), 15)
-    return TrainedClassifier(build(name, features.size, 3), card)
+    maps, classes = (VelocityAxis(), (14, 15, 16), RATE_HZ), ("background", "one", "other")
+    card = ClassifierCard(name, {}, *maps, "columns", classes, ("real",), 15)
+    return TrainedClassifier(build(name, card.features.size, 3), card)
 
 
 def test_a_clip_at_once_and_frame_by_frame(

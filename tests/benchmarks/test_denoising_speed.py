@@ -29,7 +29,7 @@ pytestmark = pytest.mark.usefixtures("one_thread")
 
 def denoiser(name: str) -> TrainedDenoiser:
     scaling = Scaling(Compression(0.01), Compression(0.01))
-    card = ModelCard(name, {}, scaling, VelocityAxis(), (14, 15, 16), 30.0, "simulated")
+    card = ModelCard(name, {}, VelocityAxis(), (14, 15, 16), 30.0, scaling, "simulated")
     return TrainedDenoiser(build(name), card)
 
 

@@ -149,17 +149,16 @@ def test_a_classifier_beside_the_denoisers_answers_as_the_library(
     import torch
 
     from sd2core.classify.card import ClassifierCard
-    from sd2core.classify.features import Features
     from sd2core.classify.files import load_classifier, save_classifier
     from sd2core.classify.live import TrainedClassifier
     from sd2core.classify.models import build
 
     torch.manual_seed(5)
-    features = Features("columns", VelocityAxis(32, 2.0), (14, 15, 16), 30.0)
     classes = ("background", "horizontal", "vertical")
-    card = ClassifierCard(kind, {}, features, classes, ("synthetic",), delay)
+    maps = VelocityAxis(32, 2.0), (14, 15, 16), 30.0
+    card = ClassifierCard(kind, {}, *maps, "columns", classes, ("synthetic",), delay)
     path = tmp_path / "classifier.safetensors"
-    save_classifier(path, TrainedClassifier(build(kind, features.size, 3), card))
+    save_classifier(path, TrainedClassifier(build(kind, card.features.size, 3), card))
     present = np.ones(120, bool)
     present[40:55] = False
     given = a_map(present=present)

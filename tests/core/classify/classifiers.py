@@ -21,6 +21,7 @@ CLASSES = ("background", "horizontal", "vertical")
 AXIS = VelocityAxis(32, 2.0)
 NULLED = (14, 15, 16)
 RATE_HZ = 30.0
+MAPS = AXIS, NULLED, RATE_HZ
 
 
 def features(kind: FeatureKind = "columns", null_bins: tuple[int, ...] = NULLED) -> Features:
@@ -39,7 +40,7 @@ def classifier(
         label = torch.arange(300) // 10 % len(CLASSES)
         network.fit([torch.from_numpy(values)], [label], torch.ones(len(CLASSES)), [1.0], seed)
     return TrainedClassifier(
-        network, ClassifierCard(model, {}, shown, CLASSES, ("simulated",), **card)
+        network, ClassifierCard(model, {}, *MAPS, kind, CLASSES, ("simulated",), **card)
     )
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from classifiers import CLASSES, classifier, energies, features
+from classifiers import CLASSES, MAPS, classifier, energies
 from safetensors.torch import save
 
 from sd2core.classify.card import ClassifierCard
@@ -128,7 +128,7 @@ def test_a_file_of_the_first_version_is_the_same_classifier(tmp_path: Path) -> N
     """It did not say how wide it is, nor when it answers."""
     path = tmp_path / "old.safetensors"
     network = build("lstm", 32, len(CLASSES), width=16)
-    card = ClassifierCard("lstm", {"width": 16}, features(), CLASSES, ("simulated",))
+    card = ClassifierCard("lstm", {"width": 16}, *MAPS, "columns", CLASSES, ("simulated",))
     save_classifier(path, TrainedClassifier(network, card))
     before = load_classifier(path).probabilities_of(energies(50))
 
@@ -153,7 +153,8 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
 
 def test_a_card_needs_two_classes_and_options_must_be_numbers() -> None:
     with pytest.raises(Sd2Error, match="two or more"):
-        ClassifierCard("lstm", {}, features(), (), ("real",))
+        ClassifierCard("lstm", {}, *MAPS, "columns", (), ("real",))
     with pytest.raises(Sd2Error, match="a whole number, 1 to 1024"):
         build("lstm", 2, len(CLASSES), width="wide")
-    assert ClassifierCard("lstm", {}, features(), ("a", "b"), ("real",)).background is None
+    card = ClassifierCard("lstm", {}, *MAPS, "columns", ("a", "b"), ("real",))
+    assert card.background is None
