@@ -8,7 +8,7 @@ import signal
 import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -198,21 +198,34 @@ def _check_worker(address: str, about: Any, folder: Path) -> None:
 
 
 @contextmanager
-def local_pool(folder: BatchFolder, processes: int) -> Iterator[Pool]:
-    """Start processes on this machine, one thread each, that end with this one.
+def opened_pool(folder: BatchFolder, processes: int, scheduler: str | None) -> Iterator[Pool]:
+    """Open the workers of a running ``dask-scheduler``, or else so many on this machine."""
+    with _dask_log(folder), _client(folder.path / BEGUN, processes, scheduler) as client:
+        # Workers of a cluster may be taken away at any time.
+        yield Pool(client, folder, most_deaths=4 if scheduler else 2)
 
-    Reachable on the loopback interface only, with keys of its own, without a
-    dashboard.
-    """
-    with _dask_log(folder), local_client(folder.path / BEGUN, processes) as client:
-        yield Pool(client, folder, most_deaths=2)
+
+@contextmanager
+def study_client(
+    scratch: Path, processes: int, scheduler: str | None
+) -> Iterator[tuple[Any, Callable[[Iterable[Any]], Iterable[Any]]]]:
+    """Return a client of this machine or of a scheduler, and what yields futures when done."""
+    from distributed import as_completed
+
+    with _client(scratch, processes, scheduler) as client:
+        yield client, lambda futures: as_completed(futures, loop=client.loop)
+
+
+def _client(scratch: Path, processes: int, scheduler: str | None) -> AbstractContextManager[Any]:
+    return _scheduler_client(scheduler) if scheduler else local_client(scratch, processes)
 
 
 @contextmanager
 def local_client(scratch: Path, processes: int) -> Iterator[Any]:
-    """Start a cluster on this machine, as :func:`local_pool` does, and return its client.
+    """Start processes on this machine, one thread each, that end with this one.
 
-    Dask may put files into ``scratch``.
+    Reachable on the loopback interface only, with keys of its own, without a dashboard. Dask may
+    put files into ``scratch``.
     """
     import dask
     from distributed import Client, LocalCluster
@@ -253,26 +266,6 @@ def _security() -> Any:
             " the processes of this batch"
         )
         return None
-
-
-@contextmanager
-def scheduler_pool(folder: BatchFolder, address: str) -> Iterator[Pool]:
-    """Open the workers of a running ``dask-scheduler``."""
-    with _dask_log(folder), _scheduler_client(address) as client:
-        # Workers of a cluster may be taken away at any time.
-        yield Pool(client, folder, most_deaths=4)
-
-
-@contextmanager
-def study_client(
-    scratch: Path, processes: int, scheduler: str | None
-) -> Iterator[tuple[Any, Callable[[Iterable[Any]], Iterable[Any]]]]:
-    """Return a client of this machine or of a scheduler, and what yields futures when done."""
-    from distributed import as_completed
-
-    opened = _scheduler_client(scheduler) if scheduler else local_client(scratch, processes)
-    with opened as client:
-        yield client, lambda futures: as_completed(futures, loop=client.loop)
 
 
 @contextmanager

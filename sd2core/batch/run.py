@@ -20,7 +20,7 @@ from sd2core.batch.folder import PROGRESS_FORMAT, PROGRESS_VERSION, BatchFolder
 from sd2core.batch.inputs import find_origins
 from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import plan_text
-from sd2core.batch.pool import Pool, local_pool, scheduler_pool
+from sd2core.batch.pool import Pool, opened_pool
 from sd2core.batch.task_graph import TaskGraph
 from sd2core.batch.tasks import BEGUN, Task
 from sd2core.errors import Sd2Error
@@ -99,12 +99,7 @@ def run_batch(
             shutil.rmtree(begun, ignore_errors=True)
             begun.mkdir()
             remove_old_leftovers(folder.path)
-            if pool is None:
-                pool = (
-                    local_pool(folder, processes)
-                    if scheduler is None
-                    else scheduler_pool(folder, scheduler)
-                )
+            pool = pool or opened_pool(folder, processes, scheduler)
             with ProgressWriter(folder.progress, watch) as lines:
                 run = _Run(graph, lines, control, scheduler)
                 return run.through(pool, source)

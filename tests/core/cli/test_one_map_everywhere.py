@@ -32,9 +32,7 @@ files = ["anna.sd2"]
 @pytest.fixture(autouse=True)
 def batches_here(monkeypatch: pytest.MonkeyPatch, without_sheet: None) -> None:
     """Have batches work in this process; ``test_batch_command.py`` has them start their own."""
-    monkeypatch.setattr(
-        batch_run, "local_pool", lambda folder, processes: in_this_process(folder.path)
-    )
+    monkeypatch.setattr(batch_run, "opened_pool", lambda folder, *_: in_this_process(folder.path))
 
 
 @pytest.fixture
