@@ -75,7 +75,7 @@ def export_dataset(folder: BatchFolder, export: Exporting) -> None:
         for path in (*folder.path.glob("dataset.*"),):
             remove(path)
     atomic_write_text(note, json.dumps({"settings": settings}) + "\n")
-    written = write_dataset(out, _Counted(folder, export), export)
+    written = write_dataset(out, _sources(folder, export), export)
     if written.failed:
         first = written.failed[0]
         raise Sd2Error(
@@ -117,20 +117,6 @@ def _is_stale(out: Path, folder: BatchFolder, export: Exporting) -> bool:
             )
     except Sd2Error:  # begun, and not come to its end
         return False
-
-
-class _Counted:
-    """Iterable of sources with a known length."""
-
-    def __init__(self, folder: BatchFolder, export: Exporting) -> None:
-        self._folder, self._export = folder, export
-        self._count = sum(1 for _ in _sources(folder, export))
-
-    def __len__(self) -> int:
-        return self._count
-
-    def __iter__(self) -> Iterator[LazySource]:
-        return _sources(self._folder, self._export)
 
 
 def rows_of(folder: BatchFolder) -> Iterator[list[Row]]:

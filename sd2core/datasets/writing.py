@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable, Sequence, Sized
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -169,7 +169,7 @@ class _Writer:
         self, sources: Iterable[Source | LazySource], progress: Progress
     ) -> tuple[int, list[Failed], Sd2Error | None]:
         """Append all sources: number added, failures, and first error."""
-        total = len(sources) if isinstance(sources, Sized) else 0
+        total = len(sources) if isinstance(sources, Sequence) else 0
         if isinstance(sources, Sequence) and sources:  # a wrong name is known before the work
             names = [*self._names.subjects, *(one.key.subject for one in sources)]
             split_people(list(dict.fromkeys(names)), *self._kept_out)
