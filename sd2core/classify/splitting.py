@@ -69,7 +69,10 @@ def split_clips(
     parts = {name: known.of(getattr(split, name)) for name in ("training", "validation", "test")}
     if split.by_take:
         kept = _kept_movements(known, parts["training"])
-        parts["training"], parts["validation"] = _apart(parts["training"], kept)
+        parts["training"], parts["validation"] = (
+            tuple(clip for clip in parts["training"] if (clip.key in kept) == checks)
+            for checks in (False, True)
+        )
     for name, clips in parts.items():
         if first_only or name != "training":
             parts[name] = tuple(filter(seen_first(clips), clips))
@@ -92,22 +95,12 @@ def dealt(known: ClipSet, clips: Sequence[Clip], parts: int, seed: int) -> dict[
     seed : int
         Of the order in which the movements of a class are dealt.
     """
-    by_class: dict[int, list[Movement]] = {}
-    for key, number in rarest(known, clips).items():
-        by_class.setdefault(number, []).append(key)
     part_of: dict[Movement, int] = {}
-    for number, keys in by_class.items():
+    for number, keys in by_rarest(known, clips).items():
         order = np.random.default_rng([seed, number]).permutation(len(keys))
         # The next class goes on where this one has ended, so that parts are of one size.
         part_of |= {keys[place]: (len(part_of) + at) % parts for at, place in enumerate(order)}
     return part_of
-
-
-def _apart(clips: Sequence[Clip], kept: set[Movement]) -> tuple[tuple[Clip, ...], tuple[Clip, ...]]:
-    return (
-        tuple(clip for clip in clips if clip.key not in kept),
-        tuple(clip for clip in clips if clip.key in kept),
-    )
 
 
 def _kept_movements(known: ClipSet, clips: Sequence[Clip]) -> set[Movement]:
@@ -115,11 +108,8 @@ def _kept_movements(known: ClipSet, clips: Sequence[Clip]) -> set[Movement]:
 
     A movement counts as one of the rarest class that it holds.
     """
-    groups: dict[int, list[Movement]] = {}
-    for key, label in rarest(known, clips).items():
-        groups.setdefault(label, []).append(key)
     kept: set[Movement] = set()
-    for keys in groups.values():
+    for keys in by_rarest(known, clips).values():
         if len(keys) > 1:
             count = max(1, len(keys) // 5)
             kept |= {keys[step * len(keys) // count] for step in range(count)}
@@ -134,13 +124,14 @@ def _kept_movements(known: ClipSet, clips: Sequence[Clip]) -> set[Movement]:
     return kept
 
 
-def rarest(known: ClipSet, clips: Sequence[Clip]) -> dict[Movement, int]:
-    """Return the rarest class that every movement holds."""
+def by_rarest(known: ClipSet, clips: Sequence[Clip]) -> dict[int, list[Movement]]:
+    """Return the movements by the rarest class that each holds."""
     total = frame_counts(clips, len(known.classes))
     own: dict[Movement, Any] = {}
     for clip in clips:
         own[clip.key] = own.get(clip.key, 0) + frame_counts([clip], len(known.classes))
-    return {
-        key: int(np.where(counts > 0, total, np.iinfo(np.int64).max).argmin())
-        for key, counts in own.items()
-    }
+    movements: dict[int, list[Movement]] = {}
+    for key, counts in own.items():
+        rarest = int(np.where(counts > 0, total, np.iinfo(np.int64).max).argmin())
+        movements.setdefault(rarest, []).append(key)
+    return movements

@@ -16,7 +16,7 @@ import numpy as np
 
 from sd2core.classify.data import UNKNOWN, ClipSet
 from sd2core.classify.metrics import gesture_runs
-from sd2core.classify.splitting import dealt, rarest
+from sd2core.classify.splitting import by_rarest, dealt
 from sd2core.errors import Sd2Error
 from sd2core.labels.per_frame import BACKGROUND
 from sd2core.study.data import Movement
@@ -122,11 +122,8 @@ def share_of(
 def _whole(
     known: ClipSet, movements: Sequence[Movement], share: float, seed: int
 ) -> list[Movement]:
-    by_class: dict[int, list[tuple[str, str]]] = {}
-    for key, number in rarest(known, [one.clip for one in movements]).items():
-        by_class.setdefault(number, []).append(key)
     drawn: set[tuple[str, str]] = set()
-    for number, keys in by_class.items():
+    for number, keys in by_rarest(known, [one.clip for one in movements]).items():
         order = np.random.default_rng([seed, number]).permutation(len(keys))
         drawn |= {keys[place] for place in order[: max(1, round(share * len(keys)))]}
     return [one for one in movements if one.clip.key in drawn]
