@@ -17,7 +17,7 @@ from sd2core.errors import Sd2Error
 from sd2core.io.kinds import RADAR_MAP_SUFFIXES, kind_of
 from sd2core.io.radar import holds_map, load_recorded_map
 from sd2core.labels.spans import Labels, Span
-from sd2core.pairs.summary import names_together, pair_facts
+from sd2core.pairs.summary import PairFacts, names_together, pair_facts
 from sd2core.recording.recording import SUFFIX, is_recording, open_recording
 
 LabelledKind = Literal["pairs", "data set", "recording", "radar file"]
@@ -53,7 +53,7 @@ class LabelledFacts:
     grid: Grid | None = None  # None where it depends on what it is learnt from with.
     # Subjects that train, validate and test, where the source says so.
     splits: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    known_people: str = ""  # Of pairs, see PairFacts.
+    pairs: PairFacts | None = None  # Of a store of them.
 
 
 def unfolded(sources: Sequence[LabelledSource]) -> list[LabelledSource]:
@@ -101,8 +101,8 @@ def people_of(facts: Sequence[LabelledFacts]) -> tuple[str, ...]:
     Pairs come last, called as :func:`~sd2core.pairs.summary.names_together` says; in recordings,
     radar files and data sets people of the same name are the same.
     """
-    stores = [one for one in facts if one.kind == "pairs"]
-    others = [name for one in facts if one.kind != "pairs" for name in one.subjects]
+    stores = [one.pairs for one in facts if one.pairs is not None]
+    others = [name for one in facts if one.pairs is None for name in one.subjects]
     in_stores = [name for names in names_together(stores) for name in names.values()]
     return tuple(dict.fromkeys([*others, *in_stores]))
 
@@ -118,7 +118,7 @@ def _of_pairs(path: Path) -> LabelledFacts:
         facts.kind == "simulated",
         facts.placements,
         grid=Grid(facts.bins, facts.v_max_mps, facts.frame_rate_hz),
-        known_people=facts.known_people,
+        pairs=facts,
     )
 
 

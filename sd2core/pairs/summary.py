@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Protocol, get_args
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -161,23 +161,7 @@ class PairFacts(BaseModel):
         )
 
 
-class StoreOfPeople(Protocol):
-    """Facts of a store on which people's names depend where stores are used together."""
-
-    @property
-    def path(self) -> Path:
-        """Folder of the store."""
-
-    @property
-    def subjects(self) -> tuple[str, ...]:
-        """Names of its people."""
-
-    @property
-    def known_people(self) -> str:
-        """People known from elsewhere, as :attr:`PairFacts.known_people`."""
-
-
-def names_together(stores: Sequence[StoreOfPeople]) -> list[dict[str, str]]:
+def names_together(stores: Sequence[PairFacts]) -> list[dict[str, str]]:
     """Names of the people of each store among all of them, by their names in it.
 
     People of the same name in different stores are different ones, called ``STORE:NAME``, but for
