@@ -84,8 +84,8 @@ class Hdf5Rows:
         return tuple(damaged)
 
 
-def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], Any]:
-    """Open an HDF5 data set: header, arrays and the open file."""
+def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], int, Any]:
+    """Open an HDF5 data set: header, arrays, number of the sources, and the open file."""
     file = open_hdf5_file(path, _EXPECTED)
     with ExitStack() as stack, refusing_damage(path, _EXPECTED):
         stack.push(file)
@@ -97,8 +97,9 @@ def open_hdf5(path: Path) -> tuple[Header, dict[str, Any], Any]:
             for name in whole_names(header, file.keys(), path)
         }
         check_arrays(header, arrays, path)
+        count = len(member_of(file, path, SOURCES))
         stack.pop_all()
-    return header, arrays, file
+    return header, arrays, count, file
 
 
 def open_npz(path: Path) -> tuple[Header, dict[str, Any], list[dict[str, Any]]]:
@@ -110,12 +111,6 @@ def open_npz(path: Path) -> tuple[Header, dict[str, Any], list[dict[str, Any]]]:
     arrays = {name: members[name] for name in whole_names(header, members.keys(), path)}
     check_arrays(header, arrays, path)
     return header, arrays, lines
-
-
-def count_hdf5_sources(file: Any, path: Path) -> int:
-    """Number of the sources of an open HDF5 data set."""
-    with refusing_damage(path, _EXPECTED):
-        return len(member_of(file, path, SOURCES))
 
 
 def hdf5_sources(file: Any, path: Path) -> Iterator[dict[str, Any]]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,8 @@ class Dataset:
     form: FileFormat
     header: Header
     arrays: dict[str, Any]
-    _sources: list[dict[str, Any]] | None = None
+    source_count: int
+    _lines: Callable[[], Iterable[dict[str, Any]]]  # Of the sources.
     _file: Any = None
 
     def __len__(self) -> int:
@@ -55,25 +57,9 @@ class Dataset:
 
     def sources(self) -> Iterator[dict[str, Any]]:
         """Yield the facts of each source, in the order of the array ``source``."""
-        entries: Iterable[dict[str, Any]]
-        if self._sources is not None:
-            entries = self._sources
-        elif self.form == "zarr":
-            entries = store.read_sources(self.path / store.SOURCES_NAME)
-        else:
-            entries = formats.hdf5_sources(self._file, self.path)
-        for number, entry in enumerate(entries, start=1):
+        for number, entry in enumerate(self._lines(), start=1):
             check_record(SourceEntry, entry, f"{self.path}: source {number}")
             yield entry
-
-    @property
-    def source_count(self) -> int:
-        """Number of sources; none of them is read."""
-        if self._sources is not None:
-            return len(self._sources)
-        if self.form == "zarr":
-            return store.count_sources(self.path / store.SOURCES_NAME)
-        return formats.count_hdf5_sources(self._file, self.path)
 
     def of_split(self, split: str) -> NDArray[np.int64]:
         """Return the indices of the segments of a split, ascending.
@@ -110,9 +96,12 @@ def _opened(path: Path) -> Dataset:
         raise Sd2Error(f"{path} does not exist", "a data set that `sd2 export` made")
     if form == "zarr":
         header, arrays = store.open_arrays(path)
-        return Dataset(path, form, header, arrays)
+        index = path / store.SOURCES_NAME
+        count, lines = store.count_sources(index), partial(store.read_sources, index)
+        return Dataset(path, form, header, arrays, count, lines)
     if form == "hdf5":
-        header, arrays, file = formats.open_hdf5(path)
-        return Dataset(path, form, header, arrays, _file=file)
+        header, arrays, count, file = formats.open_hdf5(path)
+        lines = partial(formats.hdf5_sources, file, path)
+        return Dataset(path, form, header, arrays, count, lines, file)
     header, arrays, sources = formats.open_npz(path)
-    return Dataset(path, form, header, arrays, sources)
+    return Dataset(path, form, header, arrays, len(sources), lambda: sources)
