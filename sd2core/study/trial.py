@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from sd2core.classify.data import Clip, ClipSet, frame_counts
 from sd2core.classify.metrics import Score, mean_recall, score
@@ -41,15 +42,8 @@ class Task:
     share: float
     seed: int
 
-    @classmethod
-    def from_json(cls, content: Mapping[str, Any]) -> Task:
-        """Parse what :func:`dataclasses.asdict` gave."""
-        fold = content["fold"]
-        return cls(
-            Fold(fold["judged"], fold["video"], tuple(fold["real"])),
-            content["share"],
-            content["seed"],
-        )
+
+_TASK = TypeAdapter(Task)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +77,8 @@ class Run:
         }
         scores = {name: Score.from_json(one) for name, one in content["scores"].items()}
         missing = dict(content["missing"])
-        return cls(Task.from_json(content), int(content["real_frames"]), takes, scores, missing)
+        task = _TASK.validate_python(content)
+        return cls(task, int(content["real_frames"]), takes, scores, missing)
 
 
 def drawn(plan: StudyPlan, data: StudyData, real: Sequence[str], share: float, seed: int
