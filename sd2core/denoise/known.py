@@ -166,12 +166,8 @@ class KnownMovements:
             f" spread up to {self.spread_mps:.2f} m/s"
         )
 
-    def note(self, parts: Iterable[NDArray[np.float32]], axis: VelocityAxis) -> str | None:
-        """Sentence on the frames of a map, given in parts (frames, bins), that are passed through.
-
-        None if none is.
-        """
-        strange = np.concatenate([self.strange(energies, axis) for energies in parts])
+    def note(self, strange: NDArray[np.bool_]) -> str | None:
+        """Sentence on the frames of a map that are :meth:`strange`; None if none is."""
         if not strange.any():
             return None
         return (

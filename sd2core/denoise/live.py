@@ -101,24 +101,19 @@ class TrainedDenoiser:
 
     def note(self, parts: Iterable[DopplerMap]) -> str | None:
         """Sentences on what of a map, given in parts, the model has learnt nothing of."""
-        peaks, known = [0.0], self.card.known
-
-        def energies() -> Iterator[NDArray[np.float32]]:
-            for one in parts:
-                peaks.append(float(one.values.max(initial=0.0)))
-                yield one.values.T
-
-        every = energies()
-        strange = None if known is None else known.note(every, self.card.axis)
-        deque(every, 0)  # what nobody has asked for
-        share = max(peaks) / self.card.scaling.input.reference
-        faint = None
+        peak, strange, known = 0.0, [], self.card.known
+        for one in parts:
+            peak = max(peak, float(one.values.max(initial=0.0)))
+            if known is not None:
+                strange.append(known.strange(one.values.T, self.card.axis))
+        notes = [] if known is None else [known.note(np.concatenate(strange))]
+        share = peak / self.card.scaling.input.reference
         if 0.0 < share < _FAINT:
-            faint = (
+            notes.append(
                 f"its strongest cell has {share:.2g} times the mean energy that the model learnt"
                 " from: little or nothing of echoes so faint stands out of a radar's noise"
             )
-        return "; ".join(filter(None, (strange, faint))) or None
+        return "; ".join(filter(None, notes)) or None
 
     def as_denoised(
         self, doppler: DopplerMap, energies: NDArray[np.float32], resampled: bool, note: str | None
