@@ -171,8 +171,9 @@ def train(
             own_weights = np.concatenate([own_weights, own_weights[again]])
             shown = [*training, *(shown[number] for number in again)]
         arrays = TrainingArrays.of(shown, features, delay_frames)
+        steps, interrupted = 1 if network.closed_form else chosen.steps, False
+        say("start", steps=steps, clips=len(training), frames=sum(map(len, training)))
         if network.closed_form:
-            say("start", steps=1, clips=len(training), frames=sum(map(len, training)))
             network.fit(
                 [torch.from_numpy(one) for one in arrays.features],
                 [torch.from_numpy(one) for one in arrays.labels],
@@ -180,29 +181,43 @@ def train(
                 own_weights.tolist(),
                 chosen.seed,
             )
-            say("end", best_step=1, interrupted=False)
-            card = _card(chosen, own, known, training, delay_frames, about, 1, True)
-            return Trained(TrainedClassifier(network, card), events, False)
-        loop = _ClassifierLoop(
-            network,
-            arrays,
-            TrainingArrays.of(validation, features, delay_frames),
-            of_classes,
-            chosen,
-            None if weights is None else own_weights * [len(clip) for clip in training],
-            say,
-        )
-        say("start", steps=chosen.steps, clips=len(training), frames=sum(map(len, training)))
-        interrupted = False
-        try:
-            loop.run()
-        except KeyboardInterrupt:
-            interrupted = True
-        say("end", best_step=loop.best_step, interrupted=interrupted)
-        # Stopped before the first check, it is as far as it came.
-        if loop.best is not None:
-            network.load_state_dict(loop.best)
-    card = _card(chosen, own, known, training, delay_frames, about, loop.best_step, False)
+            best_step = 1
+        else:
+            loop = _ClassifierLoop(
+                network,
+                arrays,
+                TrainingArrays.of(validation, features, delay_frames),
+                of_classes,
+                chosen,
+                None if weights is None else own_weights * [len(clip) for clip in training],
+                say,
+            )
+            try:
+                loop.run()
+            except KeyboardInterrupt:
+                interrupted = True
+            best_step = loop.best_step
+            # Stopped before the first check, it is as far as it came.
+            if loop.best is not None:
+                network.load_state_dict(loop.best)
+        say("end", best_step=best_step, interrupted=interrupted)
+    every = {**options(chosen.model), **own}
+    told = {**chosen.to_json(), "options": every}
+    if network.closed_form:  # There are no steps.
+        used = ("model", "features", "delay_s", "options", "noisy_share", "seed")
+        told = {name: told[name] for name in used}
+    card = ClassifierCard(
+        chosen.model,
+        every,
+        known.axis,
+        known.null_bins,
+        known.frame_rate_hz,
+        chosen.features,
+        known.classes,
+        tuple(dict.fromkeys(clip.kind for clip in training)),
+        delay_frames,
+        about={**(about or {}), "best_step": best_step, "training": told},
+    )
     return Trained(TrainedClassifier(network, card), events, interrupted)
 
 
@@ -212,34 +227,6 @@ def _options_of(chosen: TrainOptions, delay_frames: int) -> dict[str, Any]:
     if "frames" in options(chosen.model):
         given["frames"] = 2 * delay_frames + 1
     return given
-
-
-def _card(
-    chosen: TrainOptions,
-    own: Mapping[str, Any],
-    known: ClipSet,
-    training: Sequence[Clip],
-    delay_frames: int,
-    about: Mapping[str, Any] | None,
-    best_at: int,
-    closed_form: bool,
-) -> ClassifierCard:
-    training_options = {**chosen.to_json(), "options": {**options(chosen.model), **own}}
-    if closed_form:  # There are no steps.
-        used = ("model", "features", "delay_s", "options", "noisy_share", "seed")
-        training_options = {name: training_options[name] for name in used}
-    return ClassifierCard(
-        chosen.model,
-        {**options(chosen.model), **own},
-        known.axis,
-        known.null_bins,
-        known.frame_rate_hz,
-        chosen.features,
-        known.classes,
-        tuple(dict.fromkeys(clip.kind for clip in training)),
-        delay_frames,
-        about={**(about or {}), "best_step": best_at, "training": training_options},
-    )
 
 
 class _ClassifierLoop(Loop):
