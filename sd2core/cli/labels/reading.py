@@ -79,44 +79,18 @@ class LabelFile(LabelReading):
 def read_named(options: LabelFile) -> tuple[Labels, Timebase | None]:
     """Read the labels that are named, and the frame times as far as they are known."""
     clock = clock_of(options, options.file)
-    labels = labels_at(
-        options.file,
-        clock,
-        options.format,
-        options.observation,
-        frames_per_s=options.fps,
-        mark_s=options.mark_s,
-    )
+    labels = labels_at(options.file, clock, options)
     return labels, with_rate(options, clock, labels)
 
 
 def labels_at(
-    path: Path,
-    timebase: Timebase | None = None,
-    file_format: str | None = None,
-    observation: str | None = None,
-    *,
-    frames_per_s: float | None = None,
-    mark_s: float | None = None,
+    path: Path, timebase: Timebase | None = None, how: LabelReading | None = None
 ) -> Labels:
     """Read labels of a ``labels.json``, a recording, a radar file or another program's file.
 
-    What was taken of another program's file, and what was not, is said on standard error.
-
-    Parameters
-    ----------
-    path : Path
-        Sd2Error if it does not exist, or cannot be read.
-    timebase : Timebase, optional
-        Times of frames, for files that have frames only and for marks without a duration.
-    file_format : str, optional
-        Name of a program's format; by default found by kind, suffix and content.
-    observation : str, optional
-        Which one of a BORIS project or a Label Studio export with several.
-    frames_per_s : float, optional
-        Rate of frames from 0 s on, where there is no timebase.
-    mark_s : float, optional
-        Length of marks without a duration.
+    ``timebase`` has the times of frames, for files that have frames only and for marks without a
+    duration. What was taken of another program's file, and what was not, is said on standard
+    error. Raises Sd2Error if the file does not exist, or cannot be read.
     """
     from sd2core.io.radar import holds_map, load_recorded_map
     from sd2core.labels.formats import is_own, read_label_file
@@ -124,19 +98,20 @@ def labels_at(
 
     if not path.exists():
         raise Sd2Error(f"{path} does not exist", "a file with labels", "Check the path")
-    if file_format is None and is_recording(path):
+    how = how or LabelReading()
+    if how.format is None and is_recording(path):
         return open_recording(path).effective_labels()
-    if file_format is None and holds_map(path):
+    if how.format is None and holds_map(path):
         return load_recorded_map(path).labels
     reading = read_label_file(
         path,
         timebase,
-        file_format,
-        observation=observation,
-        frames_per_s=frames_per_s,
-        mark_s=mark_s,
+        how.format,
+        observation=how.observation,
+        frames_per_s=how.fps,
+        mark_s=how.mark_s,
     )
-    if reading.beyond or not (file_format == "sd2" or (file_format is None and is_own(path))):
+    if reading.beyond or not (how.format == "sd2" or (how.format is None and is_own(path))):
         print(f"sd2: {path}: {reading.sentence}", file=sys.stderr)
     return reading.labels
 
