@@ -294,36 +294,29 @@ def _read_times(
     times = _parse_times(path)
     plausible = times.size > 0 and _FIRST_PLAUSIBLE_UNIX_S < times[0] < _LAST_PLAUSIBLE_UNIX_S
     start_unix_s = float(times[0]) if plausible else None
+    steps = np.diff(times)
     if len(times) != frames:
         which = "fewer" if len(times) < frames else "more"
-        note = f"{path.name} has {len(times)} times for {frames} frames, {which} than it should"
-        return regular, start_unix_s, (f"{note}: {fallback}.",)
-    if frames == 1:
+        why = f"has {len(times)} times for {frames} frames, {which} than it should"
+    elif frames == 1:
         return regular, start_unix_s, ()
-    steps = np.diff(times)
-    if not np.isfinite(times).all() or (steps <= 0).any():
+    elif not np.isfinite(times).all() or (steps <= 0).any():
         bad = int(np.flatnonzero(~(steps > 0))[0])
-        note = f"{path.name} does not increase from frame {bad} to {bad + 1}"
-        return regular, start_unix_s, (f"{note}: {fallback}.",)
-    if steps.size and np.median(steps) > _FAR_TOO_SLOW * nominal_s:
-        note = (
-            f"{path.name} has steps of {np.median(steps):g} s, which looks like milliseconds; it"
-            " should hold seconds"
-        )
-        return regular, None, (f"{note}: {fallback}.",)
+        why = f"does not increase from frame {bad} to {bad + 1}"
+    elif (usual_s := float(np.median(steps))) > _FAR_TOO_SLOW * nominal_s:
+        why = f"has steps of {usual_s:g} s, which looks like milliseconds; it should hold seconds"
+        start_unix_s = None
     # No frame can follow sooner than the radar sends one; the host read several at once.
-    if steps.size and steps.min() < 0.5 * nominal_s:
-        note = (
-            f"{path.name} has steps down to {1e3 * steps.min():.1f} ms, so frames were buffered"
-            " before they got their time"
-        )
-        return regular, start_unix_s, (f"{note}: {fallback}.",)
-    return Timebase(times - times[0]), start_unix_s, _notes_on_steps(path.name, steps, nominal_s)
+    elif (least_s := float(steps.min())) < 0.5 * nominal_s:
+        why = f"has steps down to {1e3 * least_s:.1f} ms, so frames were buffered before they got"
+        why += " their time"
+    else:
+        notes = _notes_on_steps(path.name, steps, nominal_s)
+        return Timebase(times - times[0]), start_unix_s, notes
+    return regular, start_unix_s, (f"{path.name} {why}: {fallback}.",)
 
 
 def _notes_on_steps(name: str, steps_s: NDArray[np.float64], nominal_s: float) -> tuple[str, ...]:
-    if not steps_s.size:
-        return ()
     notes = []
     late = steps_s > 1.5 * nominal_s
     if late.any():

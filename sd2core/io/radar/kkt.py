@@ -132,13 +132,12 @@ def _over_ranges(values: NDArray[np.floating]) -> NDArray[np.float32]:
 
 
 def _labels(marks: NDArray[np.bool_], timebase: Timebase, gesture: str) -> Labels:
-    edges_s = np.append(timebase.times_s, timebase.end_s)
     spans = tuple(
         Span(
             id=number,
             track=TRACK,
-            start_s=float(edges_s[start]),
-            end_s=float(edges_s[stop]),
+            start_s=float(timebase.edges_s[start]),
+            end_s=float(timebase.edges_s[stop]),
             label=gesture,
             origin="import",
         )
