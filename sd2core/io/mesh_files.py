@@ -188,20 +188,16 @@ def surface_files(path: Path, notes: list[str]) -> list[Path]:
     """Files of frames in natural order; notes say what is left out."""
     if path.is_file():
         return [path]
-    if path.is_dir():
-        files = [file for file in path.iterdir() if file.suffix.lower() in SURFACE_SUFFIXES]
-        files = frames_among(files, notes)
-        kinds = sorted({file.suffix.lower() for file in files})
-        if len(kinds) > 1:
-            raise Sd2Error(
-                f"{path} holds meshes of several kinds ({', '.join(kinds)})",
-                "one kind of file, one file per frame",
-                f"Name those that are meant, for example '{path.name}/*{kinds[0]}'",
-            )
-    else:
-        files = files_of_pattern(path)
-        files = [file for file in files if file.suffix.lower() in SURFACE_SUFFIXES]
-        files = frames_among(files, notes)
+    found = path.iterdir() if path.is_dir() else files_of_pattern(path)
+    files = [file for file in found if file.suffix.lower() in SURFACE_SUFFIXES]
+    files = frames_among(files, notes)
+    kinds = sorted({file.suffix.lower() for file in files})
+    if path.is_dir() and len(kinds) > 1:
+        raise Sd2Error(
+            f"{path} holds meshes of several kinds ({', '.join(kinds)})",
+            "one kind of file, one file per frame",
+            f"Name those that are meant, for example '{path.name}/*{kinds[0]}'",
+        )
     if not files:
         raise Sd2Error(
             f"{path} matches no mesh file",

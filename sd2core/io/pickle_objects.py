@@ -212,6 +212,7 @@ class _Name:
 
 
 def _array(content: Any, dtype: Any, shape: Any, order: Any) -> NDArray[Any]:
+    """``numpy.core.numeric._frombuffer`` of pickle protocol 5."""
     plain = _checked_dtype(content, dtype, shape)
     return np.ndarray(shape, plain, buffer=content, order="F" if order == "F" else "C")
 
@@ -250,11 +251,6 @@ def _size(shape: Any, dtype: np.dtype[Any], left: int) -> int:
 def _new_array(kind: Any, shape: Any, code: Any) -> PlainArray:
     """``numpy.core.multiarray._reconstruct``: an empty array, filled by its state."""
     return PlainArray.__new__(PlainArray, (0,), dtype=np.int8)
-
-
-def _array_from_buffer(content: Any, dtype: Any, shape: Any, order: Any) -> NDArray[Any]:
-    """``numpy.core.numeric._frombuffer`` of pickle protocol 5."""
-    return _array(content, dtype, shape, order)
 
 
 def _scalar(dtype: Any, content: Any = b"") -> Any:
@@ -327,7 +323,7 @@ for _kind, _stand_in in (("csc", ColumnMatrix), ("csr", SparseMatrix)):
 for _core in ("numpy.core", "numpy._core"):
     ALLOWED[f"{_core}.multiarray", "_reconstruct"] = _new_array
     ALLOWED[f"{_core}.multiarray", "scalar"] = _scalar
-    ALLOWED[f"{_core}.numeric", "_frombuffer"] = _array_from_buffer
+    ALLOWED[f"{_core}.numeric", "_frombuffer"] = _array
     ALLOWED[f"{_core}.memmap", "memmap"] = _Name()
 OF_A_LIST = (set, frozenset, collections.OrderedDict)
 COPIES = (*OF_A_LIST, bytes, bytearray)
@@ -341,7 +337,7 @@ CALLED = (
     PlainDtype,
     _new_array,
     _scalar,
-    _array_from_buffer,
+    _array,
     tensor_array,
     _parameter,
     _reconstructed,
