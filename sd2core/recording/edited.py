@@ -29,15 +29,14 @@ def edited_fields(recording: Recording) -> dict[str, Any]:
     entry = {name: getattr(recording, name) for name in EDITED} | {
         "sensor": recording.sensor.as_dict(),
         "placements": None if planned is None else planned.as_dict(),
-        "things": [asdict(thing) for thing in recording.things],
-        "bodies": [asdict(body) for body in recording.bodies],
-        "walls": [asdict(wall) for wall in recording.walls],
     }
     return dict(json.loads(json.dumps(entry, default=_encoded)))
 
 
-def _encoded(value: Path | BaseModel) -> Any:
-    return str(plain_path(value)) if isinstance(value, Path) else value.model_dump(mode="json")
+def _encoded(value: Any) -> Any:
+    if isinstance(value, Path):
+        return str(plain_path(value))
+    return value.model_dump(mode="json") if isinstance(value, BaseModel) else asdict(value)
 
 
 def decoded_fields(entry: Mapping[str, Any]) -> dict[str, Any]:

@@ -391,6 +391,9 @@ class Recording:
         self._read, self._base = document, self.state()
 
     def _document(self) -> Document:
+        def stored(_: Role, path: Path | str) -> str:
+            return stored_path(Path(path), self.folder)
+
         document = self._read.model_copy(deep=True)
         document.version = VERSION
         for name in _AS_THEY_ARE:
@@ -401,25 +404,16 @@ class Recording:
                 raise Sd2Error(f"The {words} is {value}", "a finite number")
             setattr(document, name, value)
         document.placements = None if self.placements is None else self.placements.as_dict()
-        document.things = tuple(
-            ThingEntry.model_validate(asdict(one))
-            for one in _with_files(
-                self.things, lambda _, path: stored_path(Path(path), self.folder)
-            )
-        )
-        document.bodies = tuple(
-            BodyEntry.model_validate(asdict(one))
-            for one in _with_paths(
-                self.bodies, lambda _, path: stored_path(Path(path), self.folder)
-            )
-        )
+        things, bodies = _with_files(self.things, stored), _with_paths(self.bodies, stored)
+        document.things = tuple(ThingEntry.model_validate(asdict(one)) for one in things)
+        document.bodies = tuple(BodyEntry.model_validate(asdict(one)) for one in bodies)
         document.walls = tuple(WallEntry.model_validate(asdict(one)) for one in self.walls)
         document.spans = () if self._writes_labels else tuple(self.spans)
         stated = {"beam": None} | self.sensor.as_dict()
         document.sensor = SensorEntry.model_validate(document.sensor.model_dump() | stated)
         for role in ROLES:
             path = getattr(self, role)
-            setattr(document, role, None if path is None else stored_path(path, self.folder))
+            setattr(document, role, None if path is None else stored(role, path))
         return document
 
     @property
@@ -684,23 +678,24 @@ def settings_of(document: Document, folder: Path) -> dict[str, Any]:
 
     Raises Sd2Error where the sensor, the placements, a thing, a body or a wall cannot be.
     """
+
+    def located(_: Role, path: str | None) -> Path | None:
+        return located_path(path, folder)
+
     planned = document.placements
     return {
         **{name: getattr(document, name) for name in (*_AS_THEY_ARE, *_OFFSETS)},
-        **{role: located_path(getattr(document, role), folder) for role in ROLES},
+        **{role: located(role, getattr(document, role)) for role in ROLES},
         "imu_places": tuple(dict.fromkeys(document.imu_places)),
         "sensor": VirtualSensor.from_dict(document.sensor.model_dump()),
         "placements": None if planned is None else placements_from_dict(planned),
-        "things": _with_files(
-            (Thing(**entry.model_dump()) for entry in document.things),
-            lambda _, path: located_path(path, folder),
-        ),
+        "things": _with_files((Thing(**one.model_dump()) for one in document.things), located),
         "bodies": _with_paths(
             (
-                Body(**entry.model_dump(exclude={"reading"}), reading=entry.reading.options())
-                for entry in document.bodies
+                Body(**one.model_dump(exclude={"reading"}), reading=one.reading.options())
+                for one in document.bodies
             ),
-            lambda _, path: located_path(path, folder),
+            located,
         ),
         "walls": tuple(Wall(**entry.model_dump()) for entry in document.walls),
     }
@@ -781,20 +776,18 @@ def _copied(
         # Files that belong together keep their names, in a folder of their own.
         name = source.stem if beside else source.name
         target = free_path(folder, name, role, reserved=FILE_NAME)
-        temporary = Path(tempfile.mkdtemp(prefix=".copy-", dir=folder))
-        made.append(temporary)
-        with full_disk_named(target):
+        with full_disk_named(target), tempfile.TemporaryDirectory("", ".copy-", folder) as place:
+            part = Path(place, target.name)
             if source.is_dir():
-                shutil.copytree(source, temporary / target.name)
+                shutil.copytree(source, part)
             elif beside:
-                (temporary / target.name).mkdir()
+                part.mkdir()
                 for one in (source, *beside):
-                    shutil.copy2(one, temporary / target.name / one.name)
+                    shutil.copy2(one, part / one.name)
             else:
-                shutil.copy2(source, temporary / target.name)
-        (temporary / target.name).rename(target)
+                shutil.copy2(source, part)
+            part.rename(target)
         made.append(target)
-        temporary.rmdir()
         inside[role] = copies[source] = target / source.name if beside else target
     progress(len(files), len(files))
     return inside
