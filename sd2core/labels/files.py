@@ -100,11 +100,8 @@ def write_labels(
 def read_labels(path: Path) -> LabelFile:
     """Read a ``labels.json``.
 
-    Raises
-    ------
-    Sd2Error
-        When it is missing, damaged, of a later version, or holds unknown keys or invalid spans;
-        the message names file and place.
+    Raises Sd2Error, which names file and place, when it is missing, damaged, of a later version, or
+    holds unknown keys or invalid spans.
     """
     path = Path(path)
     document = _read(path, _LabelsDocument, FORMAT)
