@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 import sys
@@ -103,17 +104,13 @@ def _listen(options: Listen) -> None:
         from sd2core.classify.files import load_classifier
 
         classifier = load_classifier(options.classifier)
-    source = _source(options)
-    try:
+    with contextlib.ExitStack() as begun:
+        source = _source(options)
+        begun.callback(source.close)
         recording = GrowingRecording(options.out)
-        try:
-            listening = Listening(source, recording, classifier=classifier)
-        except BaseException:
-            recording.close()
-            raise
-    except BaseException:
-        source.close()
-        raise
+        begun.callback(recording.close)
+        listening = Listening(source, recording, classifier=classifier)
+        begun.pop_all()  # it closes both
     status = Status(listening, source, as_json=options.json, columns=options.columns)
     status.begin(recording.folder, recording.is_continued)
     follow(listening, status, options.seconds, listening.stop)

@@ -64,21 +64,9 @@ class Column(NamedTuple):
 class Listening:
     """A source being recorded, with its live map.
 
-    Parameters
-    ----------
-    source : Source or Reception
-        A source is closed at the end, a reception goes on.
-    recording : GrowingRecording
-        Is closed at the end.
-    axis : VelocityAxis
-        Of the map; that of the classifier where there is one.
-    classifier : TrainedClassifier, optional
-        Asked about every column. Its card must be of the radar's frame rate.
-
-    Raises
-    ------
-    Sd2Error
-        When the source does not fit the recording or the classifier.
+    The recording is closed at the end, and a source as well; a reception goes on. The classifier is
+    asked about every column of the map, which then has its axis; its card must be of the radar's
+    frame rate. Raises Sd2Error when the source does not fit the recording or the classifier.
     """
 
     def __init__(
@@ -86,7 +74,6 @@ class Listening:
         source: Source | Reception,
         recording: GrowingRecording,
         *,
-        axis: VelocityAxis | None = None,
         classifier: TrainedClassifier | None = None,
     ) -> None:
         self._run = source.run
@@ -97,7 +84,7 @@ class Listening:
         self.counts = Counts()
         self._source, self._recording = source, recording
         self._labeller = None if classifier is None else _Labeller(classifier, head.radar)
-        axis = axis or (VelocityAxis() if classifier is None else classifier.card.axis)
+        axis = VelocityAxis() if classifier is None else classifier.card.axis
         self._head = head
         self._channel = recording.channel
         like = head.as_capture(np.zeros(head.frame_shape, head.word_type))
