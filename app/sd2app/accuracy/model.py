@@ -16,6 +16,7 @@ from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
+    from sd2core.accuracy.plans import AccuracyPlan
     from sd2core.accuracy.results import Choice, PlanResult
     from sd2core.accuracy.survey import Survey
 
@@ -82,17 +83,10 @@ class AccuracyModel(ReportingModel):
     @property
     def in_use(self) -> InUse | None:
         """The plan at rest; None until the first choice."""
-        if self._clicked is not None:
-            result, cost = self._clicked, self._clicked.cost
-            return InUse(
-                result.plan,
-                result.errors.l1,
-                cost.all_cores_ms.median,
-                "clicked",
-                self._clicked_elsewhere,
-                *self._body,
-            )
-        return self._of_choice(self.choice)
+        if (result := self._clicked) is None:
+            return self._of_choice(self.choice)
+        cost_ms, elsewhere = result.cost.all_cores_ms.median, self._clicked_elsewhere
+        return InUse(result.plan, result.errors.l1, cost_ms, True, elsewhere, *self._body)
 
     @property
     def while_dragging(self) -> InUse | None:
@@ -103,11 +97,14 @@ class AccuracyModel(ReportingModel):
         if choice is None:
             return None
         error, cost_ms = choice.errors.l1, choice.cost_ms
-        counting = self.measured.counting
         # The figures that the plot shows of the same plan, where it was measured here.
-        if counting is not None and not counting.stale and (here := counting.of(choice.plan)):
+        if here := self._measured_here(choice.plan):
             error, cost_ms = here.errors.l1, here.cost.all_cores_ms.median
-        return InUse(choice.plan, error, cost_ms, "chosen", False, *self._body)
+        return InUse(choice.plan, error, cost_ms, False, False, *self._body)
+
+    def _measured_here(self, plan: AccuracyPlan) -> PlanResult | None:
+        counting = self.measured.counting
+        return None if counting is None or counting.stale else counting.of(plan)
 
     @property
     def choosing(self) -> bool:
@@ -224,8 +221,7 @@ class AccuracyModel(ReportingModel):
             return
         self.hold()
         self._clicked = result
-        counting = self.measured.counting
-        self._clicked_elsewhere = counting is None or counting.stale
+        self._clicked_elsewhere = self._measured_here(result.plan) is None
         self.plan_changed.emit()
         self.changed.emit()
 
@@ -289,9 +285,9 @@ class AccuracyModel(ReportingModel):
 
     def _follow_measured(self) -> None:
         """Keep the plan of a clicked point, with figures for this sensor once measured."""
-        before, counting = self.in_use, self.measured.counting
+        before = self.in_use
         if self._clicked is not None:
-            here = None if counting is None or counting.stale else counting.of(self._clicked.plan)
+            here = self._measured_here(self._clicked.plan)
             self._clicked, self._clicked_elsewhere = here or self._clicked, here is None
         if self.in_use != before:
             self.plan_changed.emit()

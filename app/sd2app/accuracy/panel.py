@@ -114,7 +114,7 @@ class AccuracyPanel(QWidget):
 
     def _refresh_use(self) -> None:
         accuracy, in_use = self._accuracy, self._accuracy.in_use
-        clicked = in_use is not None and in_use.origin == "clicked"
+        clicked = in_use is not None and in_use.clicked
         warning = ""
         if in_use is None:
             doing = "Choosing what this scene requires. " if accuracy.choosing else ""
@@ -225,7 +225,7 @@ class ToleranceRow(QWidget):
         """Show the tolerance, and what each costs."""
         accuracy = self._accuracy
         self._box.show_value(100 * accuracy.tolerance)
-        clicked = accuracy.in_use is not None and accuracy.in_use.origin == "clicked"
+        clicked = accuracy.in_use is not None and accuracy.in_use.clicked
         known = accuracy.measured.counting is not None
         for tolerance, button in self._presets.items():
             cost_ms = accuracy.cost_at(tolerance)

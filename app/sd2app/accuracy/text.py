@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from sd2app.accuracy.measurements import cheapest_within, serves_at_rest
 from sd2app.widgets.text import milliseconds, seconds
@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from sd2core.accuracy.plans import AccuracyPlan
     from sd2core.accuracy.results import Measurement, PlanResult
 
-Origin = Literal["chosen", "clicked"]
-
 
 @dataclass(frozen=True)
 class InUse:
@@ -23,7 +21,7 @@ class InUse:
     plan: AccuracyPlan
     error: float  # relative L1 after smoothing, as measured on this scene
     cost_ms: float  # per frame, on all cores
-    origin: Origin = "chosen"  # by tolerance or budget, or a point of the plot
+    clicked: bool = False  # a point of the plot, not chosen by tolerance or budget
     elsewhere: bool = False  # measured with the sensor at another place
     body: float | None = None  # likewise, of a fitted body; None: its mesh states none
     pending: bool = False  # the body's is of another place, until it is found for this one
@@ -40,7 +38,7 @@ class InUse:
 
 def chosen_sentence(in_use: InUse, frames: int) -> str:
     """One sentence of the plan in use: its error, and its cost per frame and for the clip."""
-    way = "Clicked" if in_use.origin == "clicked" else "Chosen"
+    way = "Clicked" if in_use.clicked else "Chosen"
     body = "" if in_use.body is None else f" – {in_use.accuracy} with the body –"
     return (
         f"{way}: {short(in_use.plan)}, whose map is {percent(in_use.error)} off the reference{body}"

@@ -149,7 +149,7 @@ class RunMonitor(QObject, Generic[F]):
         self._launched = process
         self._clock_s = time.monotonic
         self._tail = ProgressTail(self.folder.progress)
-        self._phase: Phase = "starting"
+        self.phase: Phase = "starting"  # an order that was just given counts at once
         self.loaded = False  # true once the folder has been read
         self.text = ""  # why it failed
         self._has_begun = False
@@ -180,14 +180,9 @@ class RunMonitor(QObject, Generic[F]):
         return self._launched or self.folder.process
 
     @property
-    def phase(self) -> Phase:
-        """Current phase; an order that was just given counts at once."""
-        return self._phase
-
-    @property
     def under_way(self) -> bool:
         """True while a process works on it."""
-        return self._phase in UNDER_WAY
+        return self.phase in UNDER_WAY
 
     # --- steering ---------------------------------------------------------------------------
 
@@ -200,7 +195,7 @@ class RunMonitor(QObject, Generic[F]):
         if word == "stop" and self.history.saving:
             return
         self._request, self._asked_s = word, self._clock_s()
-        self._phase = self._phase_under_way(word)
+        self.phase = self._phase_under_way(word)
         if self.path.is_dir():
             write_control(self.folder.control, word)
         elif word in ("stop", "cancel") and self._launched is not None:
@@ -259,16 +254,16 @@ class RunMonitor(QObject, Generic[F]):
         self.facts = status.facts
         if self._launched is None or status.live or _is_begun_by(status.process, self._launched):
             self._has_begun = True
-        before, was_loaded = self._phase, self.loaded
-        self._phase, self.loaded = self._phase_of(status), True
+        before, was_loaded = self.phase, self.loaded
+        self.phase, self.loaded = self._phase_of(status), True
         self._obey(status)
-        another = self._phase != before or not was_loaded
+        another = self.phase != before or not was_loaded
         if another:
             self._settle()
             self.phase_changed.emit()
         if has_news or another:
             self.changed.emit()
-        if before in UNDER_WAY and self._phase not in UNDER_WAY:
+        if before in UNDER_WAY and self.phase not in UNDER_WAY:
             self.ended.emit()
 
     def _phase_of(self, status: _Status) -> Phase:
@@ -278,7 +273,7 @@ class RunMonitor(QObject, Generic[F]):
         if status.launching and not (self._has_begun and ended):
             # It is taking its folder while one looks, or about to exit.
             is_told = self._request in ("stop", "cancel")
-            return self._phase if self._has_begun or is_told else "starting"
+            return self.phase if self._has_begun or is_told else "starting"
         if self._request == "cancel":
             # It may have ended before it could clear up.
             self.folder.discard()
@@ -316,7 +311,7 @@ class RunMonitor(QObject, Generic[F]):
                 write_control(self.folder.control, self._request)
         elif not status.live and self._request in ("stop", "cancel") and self._launched is not None:
             self._launched.terminate()
-        elif self._phase == {"run": "running", "pause": "paused"}.get(self._request):
+        elif self.phase == {"run": "running", "pause": "paused"}.get(self._request):
             self._request = None
         process = status.process if status.live else self._launched
         if process is None:
@@ -329,8 +324,8 @@ class RunMonitor(QObject, Generic[F]):
 
     def _settle(self) -> None:
         """Take over another phase."""
-        under_way = self._phase in UNDER_WAY
-        rests = not under_way or self._phase == "paused"
+        under_way = self.phase in UNDER_WAY
+        rests = not under_way or self.phase == "paused"
         self._timer.setInterval(SLOW_POLL_MS if rests else self.poll_ms or POLL_MS)
         if under_way:
             return
@@ -339,11 +334,11 @@ class RunMonitor(QObject, Generic[F]):
         lines = [line for line in last_output(output).splitlines() if not line.startswith("{")]
         message = "\n".join(lines)
         self.text = ""
-        if self._phase == "failed":
+        if self.phase == "failed":
             self.text = self.history.error or message.removeprefix("sd2: ") or _SILENT
-        elif self._phase == "died":
+        elif self.phase == "died":
             self.text = lines[-1] if lines else ""
-        if self._phase in ("finished", "stopped", "gone") and output.parent != self.path:
+        if self.phase in ("finished", "stopped", "gone") and output.parent != self.path:
             output.unlink(missing_ok=True)
 
     def _fail(self, error: Exception) -> None:

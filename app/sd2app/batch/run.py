@@ -94,7 +94,7 @@ class BatchMonitor(RunMonitor[BatchFolder]):
     @property
     def resumable(self) -> bool:
         """True if the same command would go on with it."""
-        return not self.under_way and self._phase != "gone" and self.facts.has_plan
+        return not self.under_way and self.phase != "gone" and self.facts.has_plan
 
     def _settle(self) -> None:
         super()._settle()

@@ -25,6 +25,7 @@ from sd2app.widgets.time_axis import (
     signed_text,
 )
 from sd2core.imu.signals import InertialSignals
+from sd2core.mesh.presence import runs
 
 Line = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Pixels and values of the points of a line, (n,) each."""
@@ -63,14 +64,10 @@ def curve_lines(
         )
         values = np.stack([least, largest], axis=1).reshape(-1, values.shape[1])
         x_px = np.repeat(column[starts] + 0.5, 2)
-    return [_unbroken(x_px, axis) for axis in values.T]
-
-
-def _unbroken(x_px: NDArray[np.float64], values: NDArray[np.float64]) -> list[Line]:
-    """Lines between what is not known."""
-    known = np.concatenate([[False], np.isfinite(values), [False]])
-    edges = np.flatnonzero(known[1:] != known[:-1]).reshape(-1, 2)
-    return [(x_px[start:stop], values[start:stop]) for start, stop in edges.tolist()]
+    return [
+        [(x_px[start:stop], axis[start:stop]) for start, stop in runs(np.isfinite(axis))]
+        for axis in values.T
+    ]
 
 
 def extent(signals: list[InertialSignals], name: str) -> tuple[float, float]:

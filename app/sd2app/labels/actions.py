@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QMenu, QWidget
@@ -19,8 +18,6 @@ from sd2core.labels.label_set import Label, LabelSet
 def editing(edits: LabelEdits, *rows: Action) -> tuple[Action, ...]:
     """Actions that change labels: disabled, with the reason, while edits are refused."""
 
-    # The same question of several actions stays one, which is asked once.
-    @cache
     def why_not(question: Callable[[], str] | None) -> Callable[[], str]:
         return lambda: edits.refusal or (question() if question is not None else "")
 

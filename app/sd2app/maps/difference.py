@@ -100,9 +100,8 @@ class DifferenceModel(QObject):
 
     def full_scale(self, levels: HeatmapLevels) -> tuple[float, str]:
         """Difference that has the strongest colour, and its unit."""
-        if levels.scale == "dB":
-            return levels.high_db - levels.low_db, "dB"
-        return 100.0 * 10.0 ** (levels.high_db / 10.0), "%"
+        low, high, unit = levels.ends
+        return high - low, unit
 
     def shades(
         self, denoised: NDArray[np.float32], real: NDArray[np.float32], levels: HeatmapLevels

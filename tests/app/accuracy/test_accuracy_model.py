@@ -187,13 +187,13 @@ def test_a_clicked_point_rules_until_the_tolerance_is_set_again(desk, qtbot):
     trade = desk.trade
     desk.choose(qtbot)
     trade.use(COUNTING[0])
-    assert (trade.in_use.plan, trade.in_use.origin) == (FACING, "clicked")
+    assert (trade.in_use.plan, trade.in_use.clicked) == (FACING, True)
     desk.fake.asked.clear()
     desk.choose(qtbot, THERE)
     assert desk.fake.asked == [(None, BUDGET_MS, THERE)]
     assert trade.in_use.plan == FACING
     trade.set_tolerance(trade.tolerance)
-    assert trade.in_use.origin == "chosen"
+    assert not trade.in_use.clicked
     trade.use(COUNTING[0])
     trade.choose_by_tolerance()
     assert trade.in_use.plan == AccuracyPlan(mask_stride=5)

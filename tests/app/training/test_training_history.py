@@ -87,7 +87,7 @@ def test_a_process_that_takes_its_folder_meanwhile_is_not_taken_for_dead(run) ->
     run._has_begun = True
     begins = _Status(True, False, False, None, None, "run", [], None)
     assert run._phase_of(begins) == "starting"
-    run._phase = "running"
+    run.phase = "running"
     assert run._phase_of(begins._replace(exists=True, state="died")) == "running"
     assert run._phase_of(begins._replace(exists=True, state="finished")) == "finished"
     assert run._phase_of(begins._replace(launching=False, exists=True, state="died")) == "died"
