@@ -151,7 +151,10 @@ def fitted_to(model: BodyModel, turns: Floats) -> Floats:
 def read_body_model(path: Path) -> BodyModel:
     """Read a model file, ``.npz`` or ``.pkl``, of which nothing is executed.
 
-    Raises Sd2Error if it is no model of the family, or its arrays do not agree.
+    Raises
+    ------
+    Sd2Error
+        If it is no model of the family, or its arrays do not agree.
     """
     if not path.is_file():
         raise Sd2Error(f"The body model {path} does not exist", _EXPECTED, _REMEDY)

@@ -63,8 +63,11 @@ def is_estimate(path: Path) -> bool:
 def read_model_output(path: Path, hints: MeshHints = _NO_HINTS) -> RawMesh:
     """Read one person's mesh without executing anything in the file.
 
-    Raises Sd2Error if the file holds no vertices, and no parameters with a body model for them,
-    something that is not plain data, no such person, or a camera that does not fit its frames.
+    Raises
+    ------
+    Sd2Error
+        If the file holds no vertices, and no parameters with a body model for them, something that
+        is not plain data, no such person, or a camera that does not fit its frames.
     """
     try:
         return _person_of(path, hints)

@@ -100,8 +100,11 @@ def write_labels(
 def read_labels(path: Path) -> LabelFile:
     """Read a ``labels.json``.
 
-    Raises Sd2Error, which names file and place, when it is missing, damaged, of a later version, or
-    holds unknown keys or invalid spans.
+    Raises
+    ------
+    Sd2Error
+        When it is missing, damaged, of a later version, or holds unknown keys or invalid spans;
+        the message names file and place.
     """
     path = Path(path)
     document = _read(path, _LabelsDocument, FORMAT)

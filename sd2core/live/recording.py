@@ -43,11 +43,20 @@ class GrowingRecording:
 
     Nothing is written before the first frame. A recording that is there is continued if it was
     written by listening to the same radar; its times go on by the wall clock, so that the pause is
-    a gap. The suffix ``.sd2`` is appended to a folder's name without it.
+    a gap.
 
-    ``keep_arrivals`` keeps when each frame arrived, by which clocks are compared
-    (:mod:`sd2core.live.clocks`); then it cannot be continued. Raises Sd2Error when something else
-    is there, or another process listens into it.
+    Parameters
+    ----------
+    folder : path
+        ``NAME.sd2``; the suffix is appended where it is not there.
+    keep_arrivals : bool
+        True to keep when each frame arrived, by which clocks are compared
+        (:mod:`sd2core.live.clocks`); then it cannot be continued.
+
+    Raises
+    ------
+    Sd2Error
+        When something else is there, or another process listens into it.
     """
 
     def __init__(self, folder: Path | str, *, keep_arrivals: bool = False) -> None:
