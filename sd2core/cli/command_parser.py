@@ -240,7 +240,12 @@ def command_group(name: str) -> Callable[[Handler], Handler]:
 def add_declared(commands: Subcommands, modules: Mapping[str, str]) -> None:
     """Add commands that modules of ``sd2core.cli`` declare: that which is typed, or else all.
 
-    ``modules`` are those of each command; they declare them in the order of the help.
+    Parameters
+    ----------
+    commands : Subcommands
+        Where they are added.
+    modules : mapping of str to str
+        Module of each command; they declare them in the order of the help.
     """
     name = commands.first
     if name in commands.choices:

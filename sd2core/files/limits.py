@@ -24,9 +24,16 @@ MULTIPLE = 50
 def read_limit_bytes(stored_bytes: int = 0) -> int:
     """Bytes of memory that what is read from a file may take.
 
-    Numbers that are really there by the size of the file, or compressed to a fiftieth, are read
-    whatever the limit. Raises Sd2Error if the environment variable ``SD2_READ_LIMIT_GB`` is no
-    positive number.
+    Parameters
+    ----------
+    stored_bytes : int, optional
+        Size of the file. Numbers that are really there, or compressed to a fiftieth, are read
+        whatever the limit.
+
+    Raises
+    ------
+    Sd2Error
+        If the environment variable ``SD2_READ_LIMIT_GB`` is no positive number.
     """
     text = os.environ.get(VARIABLE, "")
     try:

@@ -63,9 +63,19 @@ def frames_among(files: Sequence[Path], notes: list[str]) -> list[Path]:
 def numbered_frames(files: Sequence[Path], person: int | str | None, source: str) -> FrameFiles:
     """Files of one person with the numbers of their frames, by what changes in their names.
 
-    Files are in natural order; ``person`` is a number in the names, None the one in most frames;
-    ``source`` is their folder or pattern, for messages. Raises Sd2Error if there is no such person,
-    or the names are of two kinds.
+    Parameters
+    ----------
+    files : sequence of Path
+        In natural order.
+    person : optional
+        Number in the names; None: the one in most frames.
+    source : str
+        Folder or pattern, for messages.
+
+    Raises
+    ------
+    Sd2Error
+        If there is no such person, or the names are of two kinds.
     """
     numbers = _numbers_in(files, source)
     if numbers is None or len(numbers) < 2:

@@ -48,9 +48,19 @@ def is_of_clock(name: str) -> bool:
 def clock_of(places: Sequence[Mapping[Any, Any]], frames: int, source: str) -> Clock:
     """Clock by names and values, the first place that has them taking precedence.
 
-    Places hold arrays, numbers or lists by name, and others, which are passed over; ``frames`` is
-    the number of those of the mesh, ``source`` the file, for errors. Raises Sd2Error if times, rate
-    or numbers of frames are none.
+    Parameters
+    ----------
+    places : sequence of mappings
+        Arrays, numbers or lists by name; others are passed over.
+    frames : int
+        Number of frames of the mesh.
+    source : str
+        Name of the file, for errors.
+
+    Raises
+    ------
+    Sd2Error
+        If times, rate or numbers of frames are none.
     """
     entries = [
         (str(name), value)

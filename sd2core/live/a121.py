@@ -49,9 +49,17 @@ _SESSION: dict[str, Any] = {
 class A121Source(Source):
     """Frames of an A121.
 
-    It is at an IP address, a serial port, ``usb`` or ``mock``; empty: wherever the tool finds it.
-    ``session`` is one of the exploration tool as JSON, of one sensor. Raises Sd2Error if the tool
-    or the sensor is not there, or the session is none.
+    Parameters
+    ----------
+    place : str
+        IP address or serial port, ``usb``, or ``mock``; empty: wherever the tool finds it.
+    session : path, optional
+        Session of the exploration tool as JSON, of one sensor.
+
+    Raises
+    ------
+    Sd2Error
+        If the tool or the sensor is not there, or the session is none.
     """
 
     def __init__(self, place: str = "", session: Path | None = None) -> None:

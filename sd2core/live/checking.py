@@ -144,8 +144,13 @@ def moved_between(
 def check_place(config: RadarConfig, seen: Sequence[Seen], moved: Sequence[Moved]) -> list[Answer]:
     """Four findings: motion, range, view, agreement.
 
-    What the radar has seen, on the clock of the pictures, and what has moved in these are both in
-    order of time.
+    Parameters
+    ----------
+    config : RadarConfig
+    seen : sequence of Seen
+        By the radar, in order of time, on the clock of the pictures.
+    moved : sequence of Moved
+        In the pictures, in order of time.
     """
     return [_motion(config, seen), _range(config, seen), _view(moved), _agreement(seen, moved)]
 

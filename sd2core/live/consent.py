@@ -38,10 +38,19 @@ class _Document(BaseModel):
 
 
 class Consent:
-    """Agreements to the text of a protocol, in the folder of a session that begins or goes on.
+    """Agreements to the text of a protocol, of a session that begins or goes on.
 
-    Who agreed to another text is asked again. Raises Sd2Error if there are agreements that cannot
-    be read.
+    Parameters
+    ----------
+    folder : Path
+        Of the session.
+    text : str
+        What people are asked to agree to. Who agreed to another text is asked again.
+
+    Raises
+    ------
+    Sd2Error
+        If there are agreements that cannot be read.
     """
 
     def __init__(self, folder: Path, text: str) -> None:

@@ -55,7 +55,16 @@ class Filmed:
 class Film:
     """A camera that is open in a process of its own, and films into one video after the other.
 
-    ``previews`` are small pictures. Raises Sd2Error if the camera cannot be opened.
+    Parameters
+    ----------
+    choice : CameraChoice
+    previews : bool
+        True if small pictures are wanted, too.
+
+    Raises
+    ------
+    Sd2Error
+        If the camera cannot be opened.
     """
 
     def __init__(self, choice: CameraChoice, *, previews: bool = False) -> None:

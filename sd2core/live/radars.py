@@ -42,9 +42,18 @@ LIVE_RADARS = Group("live_radars", LiveRadar, (TEST, A121, TI))
 def open_radar(name: str, setup: Path | None = None) -> Source:
     """Radar by name, a DCA1000 by this computer's address, or a capture or recording to replay.
 
-    A name is ``test`` or ``test:RATE``, ``a121``, ``ti`` or a plug-in's, each with ``:PLACE``
-    behind it or not; with a set-up, which the radar runs with, ``ADDRESS[:PORT]``; or a file.
-    Raises Sd2Error if there is no such radar.
+    Parameters
+    ----------
+    name : str
+        ``test`` or ``test:RATE``, ``a121``, ``ti`` or a plug-in's, each with ``:PLACE`` behind it
+        or not; with a set-up ``ADDRESS[:PORT]``; or a file.
+    setup : path, optional
+        What the radar runs with.
+
+    Raises
+    ------
+    Sd2Error
+        If there is no such radar.
     """
     word, _, place = name.partition(":")
     if word == TEST and (not place or place.isdecimal()):

@@ -21,7 +21,11 @@ class Reception:
     """A source's frames, handed to the take that is recorded, and let go between takes.
 
     Each take begins at its own time 0; the source's clock is known by all frames since it began.
-    The source is begun by the first take, and closed by :meth:`close`.
+
+    Parameters
+    ----------
+    source : Source
+        Is begun by the first take, and closed by :meth:`close`.
     """
 
     def __init__(self, source: Source) -> None:

@@ -21,8 +21,13 @@ away."""
 class Session:
     """Takes of a protocol, one after the other; times are those of any clock, in seconds.
 
-    ``done`` are the names of the takes that are there already, ``agreed`` the people who have
-    agreed to the protocol's consent already.
+    Parameters
+    ----------
+    protocol : Protocol
+    done : iterable of str
+        Names of the takes that are there already.
+    agreed : iterable of str
+        People who have agreed to the protocol's consent already.
     """
 
     def __init__(

@@ -84,7 +84,13 @@ class Source(Protocol):
 
 
 class ReplaySource(Source):
-    """Frames of a capture, or of what is opened as one, at the times at which they were taken."""
+    """Frames of a capture at the times at which they were taken.
+
+    Parameters
+    ----------
+    capture : path or RadarCapture
+        Anything that :func:`~sd2core.io.radar.load_capture` opens, or what it opened.
+    """
 
     def __init__(self, capture: RadarCapture | Path | str) -> None:
         if not isinstance(capture, RadarCapture):

@@ -42,9 +42,18 @@ class Card:
 class TiSource(Dca1000Source):
     """Frames of a board that is set up here.
 
-    Its place is the serial port of its commands; empty: the first that calls itself XDS110. Its
-    set-up is a ``.cfg`` of the mmWave SDK, for the SDK's demo, which runs on the board. Raises
-    Sd2Error when ``xwr``, board or card are not there, or the board refuses a line.
+    Parameters
+    ----------
+    place : str
+        Serial port of the board's commands; empty: the first that calls itself XDS110.
+    setup : path
+        ``.cfg`` of the mmWave SDK, for the SDK's demo, which runs on the board.
+    card : Card
+
+    Raises
+    ------
+    Sd2Error
+        When ``xwr``, board or card are not there, or the board refuses a line.
     """
 
     def __init__(self, place: str, setup: Path | None, card: Card | None = None) -> None:

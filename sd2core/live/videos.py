@@ -38,9 +38,20 @@ def hide_person(folder: Path, how: Literal["blur", "drop"], progress: Progress =
     """Cover the head in a recording's video, or delete that; True if it was done.
 
     False where it was done before. The body has the times of the video, and so the recording
-    keeps its clock. ``progress`` counts the pictures that are written. Raises Sd2Error where there
-    is no body that was fitted here, or the video lies outside of the recording, and so is somebody
-    else's.
+    keeps its clock.
+
+    Parameters
+    ----------
+    folder : Path
+    how : {"blur", "drop"}
+    progress : Progress
+        Counts the pictures that are written.
+
+    Raises
+    ------
+    Sd2Error
+        Where there is no body that was fitted here, or the video lies outside of the recording,
+        and so is somebody else's.
     """
     recording = open_recording(folder)
     video = recording.video

@@ -16,8 +16,13 @@ from sd2core.sensor import Vector
 class MadeVertices:
     """Vertices (T, V, 3) of frames that a function makes when they are asked for.
 
-    ``make`` takes numbers of frames (n,), at least one, and gives their vertices (n, V, 3), of this
-    ``dtype``.
+    Parameters
+    ----------
+    shape : tuple of 3 int
+    dtype : numpy dtype
+        Of what is made.
+    make : callable
+        Takes numbers of frames (n,), at least one, and gives their vertices (n, V, 3).
     """
 
     def __init__(

@@ -126,9 +126,16 @@ class PairProvenance(_Record):
 
 
 def check_record(kind: type[BaseModel], content: Any, place: str | Path) -> None:
-    """Refuse a description, as parsed from JSON, whose keys are not of a record's types or bounds.
+    """Refuse a description whose keys are not of their types, or beyond their bounds.
 
-    ``kind`` is one of the records of this module; ``place`` is where it stands, for the error.
+    Parameters
+    ----------
+    kind : type
+        One of the records of this module.
+    content : object
+        As parsed from JSON.
+    place : str or Path
+        Where it stands, for the error.
     """
     with faults_in(place, "a description as it was written", _DAMAGED):
         kind.model_validate(content)

@@ -108,10 +108,16 @@ def judge_clock(
     *,
     of_a_mesh: bool = False,
 ) -> list[Sd2Error]:
-    """Findings on the rate of frames, whose times (T,) increase, and on gaps between them.
+    """Findings on the rate of frames and on gaps between them.
 
-    Time without anybody ``present``, (T,), is no gap. ``of_a_mesh`` is True where options of a mesh
-    can put it right.
+    Parameters
+    ----------
+    times_s : float64 array, shape (T,)
+        Increasing.
+    present : bool array, shape (T,), optional
+        Frames with somebody: time without anybody is no gap.
+    of_a_mesh : bool
+        True where options of a mesh can put it right.
     """
     steps_s = np.diff(times_s)
     if not steps_s.size:

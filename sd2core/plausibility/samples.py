@@ -20,7 +20,14 @@ def judge_inertial(
     acceleration_mps2: NDArray[np.float64],
     turn_rate_radps: NDArray[np.float64],
 ) -> list[Sd2Error]:
-    """Findings on the rate of samples (N,), gravity and turn rates, (N, 3), NaN where not known."""
+    """Findings on the rate of samples, gravity and turn rates.
+
+    Parameters
+    ----------
+    times_s : float64 array, shape (N,)
+    acceleration_mps2, turn_rate_radps : float64 arrays, shape (N, 3)
+        NaN where not known.
+    """
     findings = []
     slowest, fastest = _USUAL_HZ
     if len(times_s) > 1:
