@@ -441,7 +441,8 @@ def _values(
 
 
 def _range(ends: tuple[float, float]) -> str:
-    return f"{100 * ends[0]:+.1f} to {100 * ends[1]:+.1f}"
+    """Interval in words; of one take each, or one, there is none."""
+    return f"{100 * ends[0]:+.1f} to {100 * ends[1]:+.1f}" if ends[0] < ends[1] else "unknown"
 
 
 def _points(gain: Gain) -> str:

@@ -26,7 +26,7 @@ from sd2core.study.certainty import adjusted, gain_of
 from sd2core.study.data import StudyData, study_data_of
 from sd2core.study.folds import folds_of, groups_of, share_of
 from sd2core.study.plan import Learner, StudyPlan, read_study, study_text
-from sd2core.study.report import conclusion, findings_of, untried, write_report
+from sd2core.study.report import _points, conclusion, findings_of, untried, write_report
 from sd2core.study.trial import _judged, _played, describing, learnt
 from sd2core.study.windows import Ridge, at_speed, window_features
 from tests.damaged_files import lose
@@ -265,6 +265,11 @@ def test_nothing_gained_is_nothing_certain() -> None:
     assert sure.over_takes[0] == pytest.approx(found.over_takes[0] + 0.3)
     assert sure.p < 0.001
     assert gain_of({who: values - 0.3 for who, values in chance.items()}).certain == -1
+
+
+def test_of_one_take_each_no_interval_over_takes_is_told() -> None:
+    gain = gain_of({who: np.array([0.2]) for who in "abcdef"})
+    assert _points(gain) == "+20.0 points (unknown over takes)"
 
 
 def test_people_who_differ_make_it_uncertain_for_others() -> None:
