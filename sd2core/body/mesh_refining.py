@@ -39,6 +39,8 @@ _LIVELY = 1.15
 """Standard deviation of a jerk over what was found around it, which jitter's removal lessened."""
 _LEAST_MPS3 = 1.0
 """Limit at rest. These four were chosen on the same motion (tools/motion_capture/refining.py)."""
+_JERK_S = 1.0 / 30.0
+"""Time for which a jerk lasts: seen more often, it is not another one each time."""
 _QUICK = 3.0
 """Jitter over what was found before motion is known: where it turns it looks like a jump."""
 _JUMP_FRAMES = 5
@@ -299,10 +301,12 @@ def _velocity_sd(times_s: Floats, removed_m: Floats, sd_mps3: Floats) -> Floats:
     """Standard deviation (T, N) of velocities, by what was taken away around each moment.
 
     White noise of density n² dt that passes 1 / (1 + (ω / ω₀)⁶), with ω₀³ = s / n for jerks s,
-    leaves a velocity of variance n² dt ω₀³ / 6 uncertain.
+    leaves a velocity of variance n² dt ω₀³ / 12 uncertain, and what it takes of motion whose jerks
+    last for τ one of s² τ / 12 ω₀³.
     """
     step_s = float(np.median(np.diff(times_s)))
+    both_s = step_s + max(step_s, _JERK_S)
     jitter_m = liveliness(removed_m, times_s, _MIN_JITTER_M, share=1.0)
     edge = np.concatenate([sd_mps3[:1], sd_mps3, sd_mps3[-1:], sd_mps3[-1:]])
     cutoff_cubed = np.minimum(edge / jitter_m, (np.pi / step_s) ** 3)
-    return np.asarray(_LASTING * jitter_m * np.sqrt(step_s * cutoff_cubed / 6.0))
+    return np.asarray(_LASTING * jitter_m * np.sqrt(both_s * cutoff_cubed / 12.0))

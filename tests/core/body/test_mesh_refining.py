@@ -152,6 +152,19 @@ def test_the_uncertainty_is_as_large_as_the_errors() -> None:
         assert 0.5 < ours / found < 2.0, known.limbs[limb]
 
 
+@pytest.mark.parametrize("frames_per_s", [15, 30, 60, 120, 240])
+def test_uncertainty_is_as_large_as_the_errors_at_every_rate(frames_per_s: int) -> None:
+    rng = np.random.default_rng(0)
+    times_s = np.arange(10 * frames_per_s) / frames_per_s
+    turns = 2.0 * np.pi * np.array([0.4, 0.9, 1.6, 2.6])
+    angles = turns * times_s[:, None, None] + rng.uniform(0.0, 2.0 * np.pi, (30, 4))  # (T, 30, 4)
+    swing_m = np.array([0.3, 0.12, 0.05, 0.02])
+    true_m, true_mps = np.sin(angles) @ swing_m, np.cos(angles) @ (swing_m * turns)
+    smooth, known_mps = smooth_paths(times_s, true_m + rng.normal(0.0, 0.006, true_m.shape))
+    error_mps = (np.gradient(smooth, times_s, axis=0) - true_mps)[5:-5]
+    assert 0.7 < np.std(error_mps) / np.sqrt(np.mean(known_mps[5:-5] ** 2)) < 1.4
+
+
 @pytest.mark.slow
 def test_a_calm_mesh_stays_as_it_is() -> None:
     true = swipes()
