@@ -137,28 +137,13 @@ class PairFacts(BaseModel):
         seen = [take for take in self.takes if take.placement == 0]
         return sum(take.stop - take.start for take in seen) / self.frame_rate_hz
 
-    def segments(
-        self, subjects: Iterable[str], length: int, overlap: int, *, first_only: bool = False
-    ) -> int:
-        """Count the windows of the takes of these subjects.
+    def segments(self, subject: str, length: int, overlap: int) -> int:
+        """Count the windows of a person's takes: :func:`~sd2core.pairs.segments.segment_starts`.
 
-        Parameters
-        ----------
-        subjects : iterable of str
-        length : int
-            Frames of a window.
-        overlap : int
-            Frames that neighbours share, 0 to ``length - 1``; see
-            :func:`~sd2core.pairs.segments.segment_starts`.
-        first_only : bool
-            Only takes as the first placement of the sensor sees them.
+        ``length`` is in frames, of which neighbours share ``overlap``, 0 to ``length - 1``.
         """
-        wanted = set(subjects)
-        return sum(
-            len(segment_starts(take.stop - take.start, length, overlap))
-            for take in self.takes
-            if take.subject in wanted and not (first_only and take.placement)
-        )
+        own = (take for take in self.takes if take.subject == subject)
+        return sum(len(segment_starts(take.stop - take.start, length, overlap)) for take in own)
 
 
 def names_together(stores: Sequence[PairFacts]) -> list[dict[str, str]]:

@@ -205,7 +205,7 @@ class TrainingSetupModel(RunSetup[Store]):
         if division is None:
             return 0
         count = sum(
-            facts.segments([subject], _DATA.segment_frames, _DATA.overlap_frames)
+            facts.segments(subject, _DATA.segment_frames, _DATA.overlap_frames)
             for name, facts, subject in self._people()
             if name in division.training
         )
