@@ -337,27 +337,17 @@ def _mars(options: Mars) -> None:
             {
                 "pairs": str(options.out),
                 "kind": "real",
-                "subjects": {
-                    subject: {
-                        "takes": takes,
-                        "frames": frames,
-                        "stature_m": made.stature_m.get(subject),
-                        "residual_m": made.residual_m.get(subject),
-                        "radar": asdict(made.places[subject]) if subject in made.places else None,
-                    }
-                    for subject, (takes, frames) in made.subjects.items()
-                },
+                "subjects": {subject: asdict(one) for subject, one in made.items()},
             }
         )
         return
     facts = {"radar": "real"}
-    for subject, (takes, frames) in made.subjects.items():
-        line = f"{counted(takes, 'take')}, {counted(frames, 'frame')}"
-        if subject in made.stature_m:
+    for subject, one in made.items():
+        line = f"{counted(one.takes, 'take')}, {counted(one.frames, 'frame')}"
+        if one.stature_m is not None and one.residual_m is not None and one.radar is not None:
             line += (
-                f"; a body of {made.stature_m[subject]:.2f} m, its joints"
-                f" {100 * made.residual_m[subject]:.1f} cm from the skeleton's;"
-                f" {_place_words(made.places[subject])}"
+                f"; a body of {one.stature_m:.2f} m, its joints"
+                f" {100 * one.residual_m:.1f} cm from the skeleton's; {_place_words(one.radar)}"
             )
         facts[subject] = line
     print_facts(str(options.out), facts)

@@ -66,13 +66,14 @@ class MarsChoices:
 
 
 @dataclass(frozen=True)
-class MadePairs:
-    """Result of :func:`make_mars_pairs`."""
+class PersonMade:
+    """Pairs of one person; the rest is known where this run drove their body."""
 
-    subjects: dict[str, tuple[int, int]]  # takes and frames
-    stature_m: dict[str, float]  # height of the body of every subject of this run
-    residual_m: dict[str, float]  # mean distance of its joints from the skeleton's
-    places: dict[str, RadarPlace]  # of the radar, for every subject of this run
+    takes: int
+    frames: int
+    stature_m: float | None = None  # height of the body
+    residual_m: float | None = None  # mean distance of its joints from the skeleton's
+    radar: RadarPlace | None = None
 
 
 def radar_doppler(
@@ -110,10 +111,10 @@ def make_mars_pairs(
     out: Path,
     choices: MarsChoices | None = None,
     progress: Progress = silent,
-) -> MadePairs:
+) -> dict[str, PersonMade]:
     """Write the pairs of some folders, each with one person's parts; resume a stopped run.
 
-    The subject of a take is the person; every stretch is a take.
+    The subject of a take is the person; every stretch is a take. Returns what is made of each.
 
     Parameters
     ----------
@@ -146,18 +147,19 @@ def make_mars_pairs(
     )
     total = sum(stretch.frame_count for part in parts for stretch in part.stretches)
     done = 0
-    made = MadePairs({}, {}, {}, {})
+    made: dict[str, PersonMade] = {}
     for person in dict.fromkeys(part.subject for part in parts):
         own = [part for part in parts if part.subject == person]
         stretches = {key: stretch for part in own for key, stretch in takes_of(part)}
         frames = sum(stretch.frame_count for stretch in stretches.values())
+        made[person] = PersonMade(len(stretches), frames)
         if not stretches.keys() <= writer.done:
 
             def report(inside: int, before: int = done) -> None:
                 progress(before + inside, total)
 
-            _write(writer, stretches, choices, made, report)
-        made.subjects[person] = (len(stretches), frames)
+            stature_m, residual_m, place = _write(writer, stretches, choices, report)
+            made[person] = PersonMade(len(stretches), frames, stature_m, residual_m, place)
         done += frames
         progress(done, total)
     return made
@@ -167,12 +169,10 @@ def _write(
     writer: PairWriter,
     stretches: Mapping[TakeKey, MarsStretch],
     choices: MarsChoices,
-    made: MadePairs,
     progress: Callable[[int], None],
-) -> None:
-    """Append those takes of one person that are not there; ``progress`` gets frames done."""
+) -> tuple[float, float, RadarPlace]:
+    """Append the takes of a person that are not there; stature, residual and radar of all."""
     progress(0)
-    person = next(iter(stretches)).subject
     driven, place = driven_clips([*stretches.values()], choices.place, progress)
     done = sum(len(one.clip.times_s) - 1 for one in driven)
     synthesis = choices.synthesis
@@ -195,11 +195,8 @@ def _write(
                 limbs=doppler.limbs,
             )
         )
-    made.places[person] = place
-    made.stature_m[person] = driven[0].puppet.shape.stature_m
-    made.residual_m[person] = float(
-        np.nanmean(np.concatenate([one.residual_m.ravel() for one in driven]))
-    )
+    residual_m = float(np.nanmean(np.concatenate([one.residual_m.ravel() for one in driven])))
+    return driven[0].puppet.shape.stature_m, residual_m, place
 
 
 def driven_clips(

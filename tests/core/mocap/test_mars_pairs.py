@@ -81,8 +81,9 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 def pairs(folders: list[Path], tmp_path_factory: pytest.TempPathFactory) -> PairSet:
     out = tmp_path_factory.mktemp("pairs") / "pairs.zarr"
     made = make_mars_pairs(folders, out, MarsChoices(limbs=True))
-    assert made.subjects == {"7": (1, 25), "8": (1, 25)}
-    assert made.stature_m["7"] == pytest.approx(1.75, abs=0.03)
+    assert [*made] == ["7", "8"]
+    assert {(one.takes, one.frames) for one in made.values()} == {(1, 25)}
+    assert made["7"].stature_m == pytest.approx(1.75, abs=0.03)
     return read_pairs(out)
 
 
@@ -129,7 +130,7 @@ def test_a_given_place_is_used(folders: list[Path], tmp_path: Path) -> None:
     """From below, who approaches is slower along the line of sight."""
     place = RadarPlace((0.0, 1.5, 0.0), 0.1)
     made = make_mars_pairs(folders[:1], tmp_path / "low.zarr", MarsChoices(place=place))
-    assert made.places == {"7": place}
+    assert made["7"].radar == place
     (take,) = read_pairs(tmp_path / "low.zarr").takes
     np.testing.assert_array_equal(take.sensor_position_m, place.position_m)
     assert (_mean_mps(take.synthetic)[2:-3] < 0.95 * SPEED_MPS).all()
