@@ -69,8 +69,8 @@ class _Files:
     """Frames from the files of stretches; the last two stay in memory."""
 
     def __init__(self, maps: Sequence[Path], parts: Sequence[str]) -> None:
-        self._maps, self._parts = maps, parts
-        self._loaded: dict[int, DopplerMap] = {}
+        self._parts = parts
+        self.part = lru_cache(maxsize=2)(lambda number: DopplerMap.load(maps[number]))
         times_s, present = [], []
         for number in range(len(maps)):
             part = self.part(number)
@@ -79,14 +79,6 @@ class _Files:
         self.times_s = np.concatenate(times_s)
         self.present_mask = np.concatenate(present)
         self.edges = np.cumsum([0, *map(len, times_s)])
-
-    def part(self, number: int) -> DopplerMap:
-        """Return the map of one stretch."""
-        if number not in self._loaded:
-            while len(self._loaded) > 1:
-                del self._loaded[next(iter(self._loaded))]
-            self._loaded[number] = DopplerMap.load(self._maps[number])
-        return self._loaded[number]
 
     def holding(self, frame: int) -> int:
         """Return the stretch that holds a frame of the whole map."""

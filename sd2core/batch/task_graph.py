@@ -102,12 +102,6 @@ class TaskGraph:
         self.total += Counter(self._maps_of_one(len(origins)))
 
     @property
-    def model(self) -> tuple[str, str]:
-        """File of the denoiser and the hash of its content."""
-        assert self._model is not None
-        return self._model
-
-    @property
     def steps(self) -> tuple[Step, ...]:
         """Steps of the plan, in order."""
         return ("inspect", *(step for step in STEPS[1:] if getattr(self.plan, step) is not None))
@@ -299,7 +293,8 @@ class TaskGraph:
 
     def _denoising_task(self, synthesis: Sequence[Task], maps: Sequence[Path]) -> Task:
         assert self.plan.denoise is not None
-        (model, digest), texture = self.model, self.plan.denoise.texture
+        assert self._model is not None
+        (model, digest), texture = self._model, self.plan.denoise.texture
         drawn = {} if texture is None else {"texture": texture}
         key = key_of("denoise", {"model": digest, "maps": [one.stem for one in maps], **drawn})
         outs = self._files("denoised", key, len(maps))
