@@ -12,7 +12,7 @@ from sd2app.accuracy.measurements import cheapest_within, front_at_rest, serves_
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.accuracy.text import point_text
 from sd2app.session.display import DisplayModel
-from sd2app.widgets.canvas import tick_text
+from sd2app.widgets.canvas import faint, tick_text
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2core.numerics.map_accuracy import percent
 
@@ -71,9 +71,8 @@ class AccuracyPlot(ChartView):
 
     def _paint_tolerance(self, painter: QPainter) -> None:
         colour, plot, y = self._display.palette.accent, self.plot_rect(), self._tolerance_px()
-        below = QColor(colour)
-        below.setAlpha(18)
-        painter.fillRect(QRectF(plot.left(), y, plot.width(), plot.bottom() - y), below)
+        below = QRectF(plot.left(), y, plot.width(), plot.bottom() - y)
+        painter.fillRect(below, faint(colour, 18))
         painter.setPen(QPen(QColor(colour), 1.5, Qt.PenStyle.DashLine))
         painter.drawLine(QPointF(plot.left(), y), QPointF(plot.right(), y))
 
@@ -83,9 +82,7 @@ class AccuracyPlot(ChartView):
         y, width = self._tolerance_px(), metrics.horizontalAdvance(text) + 6
         above = y - line_px - 1 if y - line_px > plot.top() else y + 1
         box = QRectF(plot.right() - width, above, width, line_px)
-        ground = QColor(colours.panel)
-        ground.setAlpha(220)
-        painter.fillRect(box, ground)
+        painter.fillRect(box, faint(colours.panel, 220))
         painter.setPen(QColor(colours.accent))
         painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
 

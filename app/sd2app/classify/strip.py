@@ -15,7 +15,7 @@ from sd2app.labels.model import LabelsModel
 from sd2app.maps.track_mouse import SeekingPlot, ZoomedPlot
 from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import AT_RIGHT, Canvas, clipped, image_of
+from sd2app.widgets.canvas import AT_RIGHT, Canvas, clipped, faint, image_of
 from sd2app.widgets.inputs import Choice
 from sd2app.widgets.layouts import column_of, row_of
 from sd2app.widgets.model_menu import ModelButton
@@ -154,10 +154,9 @@ class ClassReadout(Canvas):
             x += width + 4
             box = QRectF(x, centre - _BAR_PX[1] / 2, *_BAR_PX)
             painter.fillRect(box, QColor(palette.well))
-            colour = QColor(offered.colour_of(name))
-            colour.setAlpha(255 if reading.current else _FAINT)
             box.setWidth(share * box.width())
-            painter.fillRect(box, colour)
+            alpha = 255 if reading.current else _FAINT
+            painter.fillRect(box, faint(offered.colour_of(name), alpha))
             x += _BAR_PX[0] + _GAP_PX
 
 

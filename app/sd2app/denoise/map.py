@@ -70,6 +70,7 @@ class _Answer(NamedTuple):
     like: DopplerMap  # map with their unit and axis
     order: _Order | None = None  # that it goes on with
     session: RemoteSession | None = None  # at its end, where pieces follow in order
+    cost_s: float = 0.0  # of each frame there
 
 
 class DenoisedMap(BackgroundModel):
@@ -274,25 +275,11 @@ class DenoisedMap(BackgroundModel):
         longest = _JUMP_S * source.timebase.frames_per_s * clock.speed
         if self._reached is None or not -1 <= frame - self._reached.next <= longest:
             self._reached = _Order(frame)
-        reached, stop = self._reached, frame + 1
-        start = reached.next
-        if stop <= start or not self._synthetic.known[start:stop].all():
-            return
-        energies = input_of(source.between(start, stop), denoiser.card.parts)
-        present = source.present_mask[start:stop]
-        like = replace(source, kind="denoised", meta={}, uncertainty=None, limbs=None)
+        ahead = self._synthetic.known[self._reached.next : frame + 1]
+        if ahead.size and ahead.all():
+            self._stepper.submit(self._in_order(self._reached, frame + 1))
 
-        def work(emit: object) -> tuple[_Answer, float]:
-            live = reached.session or denoiser.live()
-            began = time.perf_counter()
-            answers = live.advance(energies, present)
-            cost_s = (time.perf_counter() - began) / len(answers)
-            return _Answer((start, stop), answers.T, like, reached, live), cost_s
-
-        self._stepper.submit(work)
-
-    def _take_live(self, result: tuple[_Answer, float]) -> None:
-        answer, cost_s = result
+    def _take_live(self, answer: _Answer) -> None:
         assert self.denoiser is not None
         if self._reached is not None and self._reached.session is None:
             self._partial.quality[:] = 0  # it began here
@@ -305,7 +292,7 @@ class DenoisedMap(BackgroundModel):
         if source is not None and not is_regular(source.times_s, rate_hz):
             past += f", as if at {rate_hz:g} frames/s"
         self.track.set_status(
-            f"{self.words} · live, frame by frame{past}: {1e3 * cost_s:.1f} ms a frame"
+            f"{self.words} · live, frame by frame{past}: {1e3 * answer.cost_s:.1f} ms a frame"
         )
         self._step()
 
@@ -387,18 +374,26 @@ class DenoisedMap(BackgroundModel):
         if not (denoiser.equals_batch and is_regular(source.times_s, rate_hz)):
             return False
         self._report(frames - order.next)
-        start = order.next
-        stop = min(start + AT_ONCE, frames)
+        self._runner.submit(self._in_order(order, min(order.next + AT_ONCE, frames)))
+        return True
+
+    def _in_order(self, order: _Order, stop: int) -> Callable[[object], _Answer]:
+        """Go on to a frame, with what the model remembers of those before."""
+        source, denoiser, start = self._synthetic.map, self.denoiser, order.next
+        assert source is not None
+        assert denoiser is not None
         energies = input_of(source.between(start, stop), denoiser.card.parts).copy()
         present = source.present_mask[start:stop]
+        like = replace(source, kind="denoised", meta={}, uncertainty=None, limbs=None)
 
         def work(emit: object) -> _Answer:
-            live = order.session or denoiser.live()
-            answers = live.advance(energies, present)
-            return _Answer((start, stop), answers.T, source, order, live)
+            session = order.session or denoiser.live()
+            began = time.perf_counter()
+            answers = session.advance(energies, present)
+            cost_s = (time.perf_counter() - began) / len(answers)
+            return _Answer((start, stop), answers.T, like, order, session, cost_s)
 
-        self._runner.submit(work)
-        return True
+        return work
 
     def _end(self) -> None:
         """Everything is denoised: say which frames the model passes through."""

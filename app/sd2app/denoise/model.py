@@ -329,8 +329,7 @@ class DenoiseModel(ReportingModel):
 
     def _say_problem(self, words: str) -> None:
         self.problem = words
-        if self._loaded is not None:
-            self._loaded = None
+        self._loaded = None
         # The user did not ask for the default; that it cannot be used here is no failure.
         if self._choice != _UNSAID:
             self.failed.emit(words)

@@ -14,7 +14,7 @@ from PySide6.QtGui import QBrush, QColor, QImage, QPainter, QPen
 from sd2app.labels.model import WIDE_PX, LabelsModel, Mark, SpanArrays, SpanColumns, span_columns
 from sd2app.maps.arrangement import BELOW_PX
 from sd2app.palette import Palette
-from sd2app.widgets.canvas import AT_RIGHT, Overlay, clipped, image_of
+from sd2app.widgets.canvas import AT_RIGHT, Overlay, clipped, faint, image_of
 from sd2app.widgets.time_axis import GUTTER_PX, TimeScale
 from sd2core.labels.spans import LabelTrack, Span
 
@@ -117,9 +117,7 @@ def paint_span(
     suggestion: bool = False,
 ) -> None:
     """Paint one span in its row: tint, edges in full colour, and label."""
-    full = QColor(colour)
-    tint = QColor(full)
-    tint.setAlpha(_SELECTED_TINT if selected else _TINT)
+    full, tint = QColor(colour), faint(colour, _SELECTED_TINT if selected else _TINT)
     painter.setBrush(Qt.BrushStyle.NoBrush)
     if suggestion:
         painter.fillRect(box, QBrush(tint, Qt.BrushStyle.BDiagPattern))

@@ -14,7 +14,7 @@ from sd2app.maps.heatmap import BinMarks, HeatmapView
 from sd2app.maps.heatmap_image import difference_image
 from sd2app.session.maps import Reading
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import AT_RIGHT, Overlay, image_of, signed_table
+from sd2app.widgets.canvas import AT_RIGHT, Overlay, faint, image_of, signed_table
 
 _BAR_PX = 72
 
@@ -46,8 +46,7 @@ class DifferenceView(HeatmapView):
 
     def bin_marks(self) -> BinMarks:
         """Bins in which one of the two has no information, over the colour of no difference."""
-        hatch = QColor(self._display.palette.hatch)  # legible on that colour in either theme
-        hatch.setAlpha(150)
+        hatch = faint(self._display.palette.hatch, 150)  # legible on that colour in either theme
         marked = ((self._difference.blank_bins, Qt.BrushStyle.BDiagPattern),)
         return QColor.fromRgb(int(self._table()[127])), hatch, marked
 

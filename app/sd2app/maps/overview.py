@@ -10,7 +10,7 @@ from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPen
 from sd2app.maps.heatmap_image import MapWidget
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import AT_RIGHT, Overlay
+from sd2app.widgets.canvas import AT_RIGHT, Overlay, faint
 from sd2app.widgets.time_axis import GUTTER_PX, TimeScale, paint_cursor
 
 _EDGE_PX = 6
@@ -52,8 +52,7 @@ class Overview(MapWidget):
         for overlay in self._overlays:
             overlay.paint(painter, strip, scale)
         left, right = scale.x_of(self._span.start_s), scale.x_of(self._span.end_s)
-        veil = QColor(colours.panel)
-        veil.setAlpha(150)
+        veil = faint(colours.panel, 150)
         painter.fillRect(QRectF(plot.left(), plot.top(), left - plot.left(), plot.height()), veil)
         painter.fillRect(QRectF(right, plot.top(), plot.right() - right, plot.height()), veil)
         painter.setPen(QPen(QColor(colours.accent), 2))

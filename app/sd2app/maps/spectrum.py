@@ -13,7 +13,7 @@ from sd2app.maps.heatmap import paint_velocity_labels, velocity_labels, y_of
 from sd2app.maps.stack import MapStack
 from sd2app.session.maps import MapModel, colours_of, part_words, title_of
 from sd2app.session.session import Session
-from sd2app.widgets.canvas import AT_LEFT, Canvas, clipped, paint_axes
+from sd2app.widgets.canvas import AT_LEFT, Canvas, clipped, faint, paint_axes
 from sd2app.widgets.time_axis import paint_title, ticks
 from sd2core.maps import DopplerMap
 
@@ -184,11 +184,9 @@ class SpectrumView(Canvas):
         if bottom > self.height():
             inside = plot.adjusted(8, 2, -2, 0)
             entries, bottom = self._legend(metrics, curves, inside)
-            back = QColor(colours.panel)
-            back.setAlpha(215)  # read over the curves, which are still seen
-            painter.fillRect(
-                QRectF(plot.left() + 1, inside.top(), plot.width(), bottom - inside.top()), back
-            )
+            room = QRectF(plot.left() + 1, inside.top(), plot.width(), bottom - inside.top())
+            # It is read over the curves, which are still seen.
+            painter.fillRect(room, faint(colours.panel, 215))
         for place, text, colour in entries:
             middle = place.y() + _LEGEND_PX / 2
             painter.setPen(QPen(colour, 2))
@@ -216,8 +214,6 @@ class SpectrumView(Canvas):
 def _fill(
     painter: QPainter, points: list[QPointF], colour: QColor, alpha: int, style: Qt.BrushStyle
 ) -> None:
-    light = QColor(colour)
-    light.setAlpha(alpha)
     painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QBrush(light, style))
+    painter.setBrush(QBrush(faint(colour, alpha), style))
     painter.drawPolygon(QPolygonF(points))

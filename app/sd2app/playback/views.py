@@ -12,6 +12,7 @@ from sd2app.labels.loop import SpanLoop
 from sd2app.maps.track_mouse import SeekingPlot
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.session import Session
+from sd2app.widgets.canvas import faint
 from sd2app.widgets.layouts import Part, row_of
 from sd2app.widgets.panel import ElidedLabel
 from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale, clock_text, tick_step, ticks
@@ -118,10 +119,9 @@ class TimeRuler(SeekingPlot):
             min(max(scale.x_of(time_s), GUTTER_PX - 2.0), self.width() - MARGIN_PX + 2.0)
             for time_s in self._playback.stretch_s
         )
-        band = QColor(self._display.palette.accent)
-        band.setAlpha(60)
-        painter.fillRect(QRectF(left, 0, right - left, self.height()), band)
-        painter.setPen(QPen(QColor(self._display.palette.accent), 2))
+        accent = self._display.palette.accent
+        painter.fillRect(QRectF(left, 0, right - left, self.height()), faint(accent, 60))
+        painter.setPen(QPen(QColor(accent), 2))
         bottom = self.height() - 1
         for x, inner in ((left + 1, left + 5), (right - 1, right - 5)):
             corners = ((inner, 1), (x, 1), (x, bottom), (inner, bottom))

@@ -469,7 +469,7 @@ class DocumentModel(BackgroundModel):
         self._process_capture()
 
     def set_count(self, count: HowCounted) -> None:
-        """HowCounted the vertices of synthetic maps another way."""
+        """Count the vertices of synthetic maps another way."""
         if count != self.count:
             self.count = count
             self.changed.emit()

@@ -290,7 +290,7 @@ class Edits:
     # --- synthesis ------------------------------------------------------------------------
 
     def choose_count(self, count: HowCounted) -> None:
-        """HowCounted the vertices of synthetic maps another way."""
+        """Count the vertices of synthetic maps another way."""
         self._push("Choose counting", self._document.set_count, self._document.count, count)
 
     # --- processing of the capture --------------------------------------------------------

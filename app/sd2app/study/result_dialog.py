@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 from sd2app.manual.help import help_button
 from sd2app.session.display import DisplayModel
 from sd2app.study.result import ClassResult, Matrix
-from sd2app.widgets.canvas import AT_RIGHT, Canvas
+from sd2app.widgets.canvas import AT_RIGHT, Canvas, faint
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
 from sd2app.widgets.dialogs import Dialog, closing
 from sd2app.widgets.inputs import Choice
@@ -95,11 +95,10 @@ class ConfusionView(Canvas):
     def _paint_cell(self, painter: QPainter, box: QRectF, row: int, column: int) -> None:
         assert self.matrix is not None
         palette, value = self._display.palette, self.matrix.cell(row, column)
-        tint = QColor(palette.accent if row == column else palette.real)
+        tint = palette.accent if row == column else palette.real
         share = value.mean if value.mean == value.mean else 0.0
-        tint.setAlpha(round(_STRONGEST * min(max(share, 0.0), 1.0)))
         painter.fillRect(box, QColor(palette.panel))
-        painter.fillRect(box, tint)
+        painter.fillRect(box, faint(tint, round(_STRONGEST * min(max(share, 0.0), 1.0))))
         painter.setPen(QPen(QColor(palette.border), 1))
         painter.drawRect(box.adjusted(0.5, 0.5, -0.5, -0.5))
         painter.setPen(QColor(palette.text))

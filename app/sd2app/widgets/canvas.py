@@ -36,6 +36,13 @@ def clipped(painter: QPainter, area: QRectF) -> Iterator[None]:
         painter.restore()
 
 
+def faint(colour: str | QColor, alpha: int) -> QColor:
+    """A colour through which one sees what is below; an ``alpha`` of 255 hides that."""
+    shade = QColor(colour)
+    shade.setAlpha(alpha)
+    return shade
+
+
 def image_of(
     pixels: NDArray[np.uint32], form: QImage.Format = QImage.Format.Format_ARGB32
 ) -> QImage:
