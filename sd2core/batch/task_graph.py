@@ -90,7 +90,8 @@ class TaskGraph:
             settings = ("tolerance", "vertices_kept", "left_out", "limbs")
             self._scene = {name: getattr(section, name) for name in settings}
             self._scene["options"] = asdict(chosen_options(section))
-        self._model = None if plan.denoise is None else _model_of(plan)
+        # File of the denoiser and the hash of its content.
+        self.model = None if plan.denoise is None else _model_of(plan)
         self._simulation = None if plan.simulate is None else simulation_of(plan.simulate)
         # Of a map whose stretches are not all there yet: how many are missing.
         self._missing: dict[tuple[str, int], int] = {}
@@ -194,7 +195,7 @@ class TaskGraph:
             return
         for planned in self.maps_of(origin, inspection, mesh):
             self.total["synthesise"] += len(planned.stretches) - 1
-            if self._model is not None:
+            if self.model is not None:
                 self.total["denoise"] += len(planned.denoising) - 1
             if planned.denoising:
                 where = (origin.name, planned.placement)
@@ -240,7 +241,7 @@ class TaskGraph:
         if who.body is None:
             return PlannedShare(who, ())
         maps = tuple(one.arguments["outs"][who.body] for one in synthesis)
-        denoising = None if self._model is None else self._denoising_task(synthesis, maps)
+        denoising = None if self.model is None else self._denoising_task(synthesis, maps)
         return PlannedShare(who, maps, denoising)
 
     def _choosing(self, mesh: MeshInput, sensors: Sequence[VirtualSensor]) -> Choosing | None:
@@ -293,8 +294,8 @@ class TaskGraph:
 
     def _denoising_task(self, synthesis: Sequence[Task], maps: Sequence[Path]) -> Task:
         assert self.plan.denoise is not None
-        assert self._model is not None
-        (model, digest), texture = self._model, self.plan.denoise.texture
+        assert self.model is not None
+        (model, digest), texture = self.model, self.plan.denoise.texture
         drawn = {} if texture is None else {"texture": texture}
         key = key_of("denoise", {"model": digest, "maps": [one.stem for one in maps], **drawn})
         outs = self._files("denoised", key, len(maps))

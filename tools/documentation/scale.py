@@ -215,7 +215,9 @@ def _costs_of_maps(plan: BatchPlan, folder: Path, title: str) -> tuple[Cost, Cos
     """Costs of a map and of denoising it, from many frames of a recording and from few."""
     folder.mkdir()
     origins = find_origins(plan.recordings, Path(plan.out))
-    model, digest = TaskGraph(plan, BatchFolder(Path(plan.out)), origins).model
+    denoiser = TaskGraph(plan, BatchFolder(Path(plan.out)), origins).model
+    assert denoiser is not None
+    model, digest = denoiser
     inspection, section = glance(origins[0]), plan.synthesise
     mesh, counts = inspection.mesh, _TIMED_FRAMES
     assert mesh is not None
