@@ -80,7 +80,8 @@ class DenoisedMap(BackgroundModel):
     map (:meth:`postprocess`), so that both are of the same place and are shown together. At
     rest one piece after another is denoised behind the synthetic map. Pieces of a long clip
     are a preview, where a model remembers more than is around them: when the synthetic map
-    stands, the clip is gone through in order (:meth:`finish`). Live it grows frame by frame.
+    stands, the clip is gone through in order, or denoised at once where a model looks ahead or
+    knows another frame rate (:meth:`finish`). Live it grows frame by frame.
     """
 
     failed = Signal(str)
@@ -363,17 +364,27 @@ class DenoisedMap(BackgroundModel):
         self._runner.submit(work)
 
     def _go_on_in_order(self) -> bool:
-        """Denoise the next piece with what the model remembers of those before, if need be."""
+        """Denoise the next piece with what the model remembers of those before, if need be.
+
+        At another frame rate, and with a look ahead, pieces are not those of the whole: all at
+        once, as the command does.
+        """
         source, denoiser, order = self._synthetic.map, self.denoiser, self._order
         frames = self._wanted.size
         if order is None or frames <= AT_ONCE or order.next >= frames:
             return False
         assert source is not None
         assert denoiser is not None
-        rate_hz = denoiser.card.frame_rate_hz
-        if not (denoiser.equals_batch and is_regular(source.times_s, rate_hz)):
-            return False
         self._report(frames - order.next)
+        if not (denoiser.equals_batch and is_regular(source.times_s, denoiser.card.frame_rate_hz)):
+            whole = cut_out(source, 0, source.values.copy(), deepcopy(source.limbs))
+
+            def at_once(emit: object) -> _Answer:
+                denoised = denoiser.denoise(whole)
+                return _Answer((0, frames), denoised.values, denoised, order)
+
+            self._runner.submit(at_once)
+            return True
         self._runner.submit(self._in_order(order, min(order.next + AT_ONCE, frames)))
         return True
 
