@@ -106,25 +106,20 @@ class LatestRunner(QObject):
         if value is not None:
             self._post(revision, "partial", value)
 
-    def _post(self, revision: int, what: str, value: object) -> None:
+    def _post(self, revision: int, signal: str, value: object) -> None:
         try:
-            self._posted.emit(revision, what, value)
+            self._posted.emit(revision, signal, value)
         except RuntimeError:
             # The window is gone and takes no results.
             self._closed = True
             self._asked.put(None)
 
-    def _deliver(self, revision: int, what: str, value: object) -> None:
+    def _deliver(self, revision: int, signal: str, value: object) -> None:
         if revision != self._revision:
             return
-        if what == "partial":
-            self.partial.emit(value)
-            return
-        self._set_busy(False)
-        if what == "finished":
-            self.finished.emit(value)
-        else:
-            self.failed.emit(value)
+        if signal != "partial":
+            self._set_busy(False)
+        getattr(self, signal).emit(value)
 
     def _set_busy(self, busy: bool) -> None:
         if busy != self.busy:

@@ -238,14 +238,14 @@ class ExportModel(Runs[ExportRun]):
 
     def follow(self, run: ExportRun | None, under_way: bool = False) -> None:
         """Show an export among the tasks; after its end, look for one that ended unseen."""
-        if self._job is not None:
-            self._jobs.finish(self._job)
-            self._job = None
+        self._jobs.finish(self._job)
+        self._job = None
         super().follow(run, under_way)
         if run is None:
             self.look_for_runs()
         else:
-            self._job = self._jobs.start(f"Exporting {run.out.name}", partial(self.tell, "stop"))
+            self._job = Job(f"Exporting {run.out.name}", partial(self.tell, "stop"))
+            self._jobs.start(self._job)
             run.changed.connect(self._report)
 
     def _report(self) -> None:

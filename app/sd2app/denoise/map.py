@@ -470,7 +470,8 @@ class DenoisedMap(BackgroundModel):
         """Report a long clip as a task that can be cancelled."""
         total = self._wanted.size
         if left > AT_ONCE and self._job is None:
-            self._job = self._jobs.start("Denoising the map", self._give_up)
+            self._job = Job("Denoising the map", self._give_up)
+            self._jobs.start(self._job)
         if self._job is not None:
             self._jobs.report(self._job, total - left, total)
             if left == 0:
@@ -498,9 +499,8 @@ class DenoisedMap(BackgroundModel):
         self._end_job()
 
     def _end_job(self) -> None:
-        if self._job is not None:
-            self._jobs.finish(self._job)
-            self._job = None
+        self._jobs.finish(self._job)
+        self._job = None
 
 
 def next_piece(wanted: NDArray[np.bool_], view: View) -> View | None:

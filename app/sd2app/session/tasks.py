@@ -31,14 +31,8 @@ class TaskList(QObject):
         super().__init__(parent)
         self.jobs: tuple[Job, ...] = ()  # that run
 
-    def start(self, title: str, cancel: Callable[[], None]) -> Job:
+    def start(self, job: Job) -> None:
         """Announce a job."""
-        job = Job(title, cancel)
-        self.add(job)
-        return job
-
-    def add(self, job: Job) -> None:
-        """Announce a job that is known already."""
         self.jobs = (*self.jobs, job)
         self.changed.emit()
 
@@ -48,8 +42,8 @@ class TaskList(QObject):
             job.done, job.total = done, total
             self.changed.emit()
 
-    def finish(self, job: Job) -> None:
-        """Remove an ended job."""
+    def finish(self, job: Job | None) -> None:
+        """Remove an ended job, if there was one."""
         if job in self.jobs:
             self.jobs = tuple(one for one in self.jobs if one is not job)
             self.changed.emit()
@@ -89,7 +83,7 @@ class ListedRunner(LatestRunner):
         self._end()
         if title:
             self.job = Job(title, self._cancel)
-            self._tasks.add(self.job)
+            self._tasks.start(self.job)
         super().submit(task)
         if not self.busy:
             self._end()  # closed
@@ -103,6 +97,5 @@ class ListedRunner(LatestRunner):
         self.cancelled.emit()
 
     def _end(self) -> None:
-        if self.job is not None:
-            job, self.job = self.job, None
-            self._tasks.finish(job)
+        job, self.job = self.job, None
+        self._tasks.finish(job)
