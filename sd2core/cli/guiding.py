@@ -14,6 +14,7 @@ from typing import Any, Literal
 from sd2core.cli import keys
 from sd2core.cli.output import counted, print_event, print_rows, tell
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import replace_folder
 from sd2core.files.lock import FileLock
 from sd2core.files.paths import remove
 from sd2core.files.tables import capitalised
@@ -188,8 +189,7 @@ class _Takes:
         unfinished = self._folder / UNFINISHED
         unfinished.mkdir(exist_ok=True)
         folder = unfinished / f"{self._session.take.name}{SUFFIX}"
-        if folder.exists():  # left by a session that was killed
-            remove(folder)
+        remove(folder)  # left by a session that was killed
         recording = self._open_take(folder)
         recording.listening.start()
         self._silent_after_s = time.monotonic() + _OPEN_S
@@ -204,13 +204,9 @@ class _Takes:
         recording.correct_clocks()
         span = label_take(recording.folder, session.protocol, session.take, session.prompt_s, end_s)
         place = self._folder / recording.folder.name
-        if place.exists():  # it was made again
-            before = recording.folder.with_suffix(".before")
-            place.rename(before)
-            recording.folder.rename(place)
-            remove(before)
-        else:
-            recording.folder.rename(place)
+        before = recording.folder.with_suffix(".before")
+        replace_folder(recording.folder, place, before)
+        remove(before)  # where it was made again
         self._telling.stored(session.take, span, _losses(recording))
 
 
