@@ -127,27 +127,33 @@ class LatestRunner(QObject):
             self.idle_changed.emit(not busy)
 
 
-class BackgroundModel(QObject):
-    """Model that works in the background, by its children: runners, timers, other such models."""
-
-    @property
-    def busy(self) -> bool:
-        """True while one of them works, or is about to."""
-        waiting = any(timer.isActive() for timer in self._own(QTimer))
-        return waiting or any(worker.busy for worker in self._workers())
+class ClosingModel(QObject):
+    """Model whose children work in the background: runners, timers, other such models."""
 
     def close(self) -> None:
         """Stop all work for good, and wait until it has ended."""
         for timer in self._own(QTimer):
             timer.stop()
-        for worker in self._workers():
-            worker.close()
-
-    def _workers(self) -> list[LatestRunner | BackgroundModel]:
-        return [*self._own(LatestRunner), *self._own(BackgroundModel)]
+        for runner in self._own(LatestRunner):
+            runner.close()
+        for model in self._own(ClosingModel):
+            model.close()
 
     def _own(self, kind: type[Child]) -> list[Child]:
         return self.findChildren(kind, options=Qt.FindChildOption.FindDirectChildrenOnly)
+
+
+class BackgroundModel(ClosingModel):
+    """Model of which one can tell whether it works."""
+
+    @property
+    def busy(self) -> bool:
+        """True while one of its children works, or is about to."""
+        waiting = any(timer.isActive() for timer in self._own(QTimer))
+        return waiting or any(worker.busy for worker in self._workers())
+
+    def _workers(self) -> list[LatestRunner | BackgroundModel]:
+        return [*self._own(LatestRunner), *self._own(BackgroundModel)]
 
 
 class ReportingModel(BackgroundModel):

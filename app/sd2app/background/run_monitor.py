@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Generic, Literal, NamedTuple, TypeVar
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from sd2app.background.latest import LatestRunner
+from sd2app.background.latest import ClosingModel, LatestRunner
 from sd2core.errors import Sd2Error
 from sd2core.processes import ProcessId
 from sd2core.runs.command_folder import CommandFolder, last_output
@@ -117,8 +117,8 @@ class _Status(NamedTuple):
     facts: Any
 
 
-class RunMonitor(QObject, Generic[F]):
-    """State and progress of one run, and orders to its process.
+class RunMonitor(ClosingModel, Generic[F]):
+    """State and progress of one run, and orders to its process, which goes on when it is closed.
 
     The folder may be missing at first; ``process`` is one that was just started for it.
     Subclasses say what the folder is, and who reads its lines.
@@ -214,11 +214,6 @@ class RunMonitor(QObject, Generic[F]):
         """Look at the folder now, in the background, unless a look is under way."""
         if not self._looker.busy:
             self._looker.submit(lambda emit: self._look())
-
-    def close(self) -> None:
-        """Stop following the run; its process goes on."""
-        self._timer.stop()
-        self._looker.close()
 
     def kill(self) -> None:
         """Stop following the run, and end its process at once."""

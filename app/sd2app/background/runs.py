@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from sd2app.background.latest import LatestRunner
+from sd2app.background.latest import ClosingModel, LatestRunner
 from sd2app.background.run_monitor import RunMonitor
 from sd2app.background.run_setup import RunSetup
 from sd2app.settings import Settings
@@ -38,11 +38,11 @@ class KnownRun(NamedTuple):
         return self.state in LIVE
 
 
-class Runs(QObject, Generic[Run]):
+class Runs(ClosingModel, Generic[Run]):
     """A run in view, or a new one that is being set up, and the others in a list.
 
-    They are in a ``folder``; ``command`` is the program that runs ``sd2`` commands. Subclasses say
-    what follows a run.
+    They are in a ``folder``; ``command`` is the program that runs ``sd2`` commands. A process under
+    way goes on when it is closed. Subclasses say what follows a run.
     """
 
     monitor: ClassVar[type[RunMonitor[Any]]]
@@ -202,15 +202,6 @@ class Runs(QObject, Generic[Run]):
             self._attempt(run.delete)
             self.select(None)
             self.refresh()
-
-    def close(self) -> None:
-        """Stop looking; a process under way goes on."""
-        self._timer.stop()
-        self._lister.close()
-        if self._set_up is not None:
-            self._set_up.close()
-        if self.run is not None:
-            self.run.close()
 
     # --- following --------------------------------------------------------------------------
 

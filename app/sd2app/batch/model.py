@@ -143,13 +143,6 @@ class BatchModel(Runs[BatchMonitor]):
         if self.run is not None and self.run.resumable:
             self._launch(self.run.path, self.run.folder.plan)
 
-    def close(self) -> None:
-        """Stop polling; a running batch goes on."""
-        self._patience.stop()
-        self._estimating.close()
-        self.results.close()
-        super().close()
-
     def _launch(self, out: Path, plan: Path) -> None:
         output = BatchFolder(out).output
         # What an earlier start said is not about this one.

@@ -56,7 +56,7 @@ class BatchResults(RecordTableModel[Result]):
     def __init__(self, parent: QObject) -> None:
         super().__init__([Heading(text) for text in _COLUMNS], parent)
         self.card = ""  # of the exported data set, as Markdown; empty where there is none
-        self._runner = LatestRunner("results", self, self._take)
+        self._runner = LatestRunner("results", parent, self._take)
         # There may be none, or the disk is away.
         self._runner.failed.connect(lambda error: self.forget())
 
@@ -68,10 +68,6 @@ class BatchResults(RecordTableModel[Result]):
         """Show none."""
         self._runner.cancel()
         self._take(([], ""))
-
-    def close(self) -> None:
-        """Stop reading."""
-        self._runner.close()
 
     def _take(self, results: tuple[list[Result], str]) -> None:
         self.beginResetModel()

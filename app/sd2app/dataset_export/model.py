@@ -208,11 +208,6 @@ class ExportModel(Runs[ExportRun]):
         self.result = None
         self.changed.emit()
 
-    def close(self) -> None:
-        """Stop polling; a running export goes on."""
-        self._runner.close()
-        super().close()
-
     # --- following ------------------------------------------------------------------------
 
     def candidates(self) -> Iterable[Path]:

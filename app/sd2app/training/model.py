@@ -115,11 +115,6 @@ class TrainingModel(Runs[TrainingMonitor]):
         words = [*self._command, *arguments]
         self.follow_new(path, launch(words, TrainingFolder(path).output, ONE_THREAD))
 
-    def close(self) -> None:
-        """Stop polling; a running training goes on."""
-        self.pair_maker.close()
-        super().close()
-
     def name_of(self, path: Path, about: Mapping[str, Any]) -> str:
         """Name of its kind of model."""
         return model_name(str(about.get("model", "")))

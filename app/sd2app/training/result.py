@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import delayed
+from sd2app.background.latest import ClosingModel, delayed
 from sd2app.denoise.model import DenoiseModel
 from sd2app.session.session import Maps
 from sd2app.training.model import TrainingModel
@@ -37,7 +37,7 @@ class Improvement:
     simulated: bool
 
 
-class ModelAdoption(QObject):
+class ModelAdoption(ClosingModel):
     """Keeps the best model of a run among the user's models, and denoises with it.
 
     ``models`` gives the folder of the user's models.
@@ -125,10 +125,6 @@ class ModelAdoption(QObject):
         except Sd2Error as error:
             self.failed.emit(str(error))
         self.changed.emit()
-
-    def close(self) -> None:
-        """Stop comparing."""
-        self._calm.stop()
 
     def _keep(self, name: str, best: Path) -> Path:
         """Copy the model to the user's models, so that it outlives the run."""
