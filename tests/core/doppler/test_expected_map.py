@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from doppler_scenes import CAMERA, RAW, sensor_at, wobbling
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles.plain_maps import plainly
@@ -57,6 +57,7 @@ def raw_of(mesh: MeshSequence, options: SynthesisOptions, **how: Any) -> NDArray
     return Synthesizer(mesh, options).stretch(ASIDE, 0, mesh.frame_count, **how).raw
 
 
+@example(speed_mps=2.0, sigma_mps=0.0625, beyond="drop")
 @given(
     speed_mps=st.floats(-3.0, 3.0),
     sigma_mps=st.floats(0.02, 2.0),
@@ -79,7 +80,10 @@ def test_one_vertex_is_a_normal_distribution(
     if beyond == "clip":
         below[:, 0], below[:, -1] = 0.0, 1.0
     share = np.diff(below).sum(axis=0)
-    np.testing.assert_allclose(found, share, atol=5e-4)
+    # The axis is closed: what is at its end is put a thousandth of a bin inside.
+    inside_mps = 1e-3 * BIN_MPS
+    at_end = 0.0 <= RAW.axis.v_max_mps - speed_mps <= inside_mps
+    np.testing.assert_allclose(found, share, atol=5e-4 + 0.4 * at_end * inside_mps / spread_mps)
     if beyond != "drop":
         assert found.sum() == pytest.approx(1.0, abs=1e-9)
 
