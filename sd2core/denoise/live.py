@@ -450,7 +450,7 @@ def _from(start: int, read: Read) -> Read:
 def _at_rate(
     trained: TrainedDenoiser, start: int, times_s: NDArray[np.float64], read: Read, write: Write
 ) -> None:
-    """Denoise one run of another or uneven frame rate, as :func:`matching.at_rate` does."""
+    """Denoise one run of another or uneven frame rate, interpolated there and back."""
     even_s = matching.even_times(times_s, trained.card.frame_rate_hz)
 
     def between(low: int, high: int) -> NDArray[np.float32]:

@@ -184,32 +184,11 @@ def apply_to_stretches(
             result[start:stop] = own(values)
         else:
             resampled = True
-            result[start:stop] = at_rate(own, values, times_s, frame_rate_hz)
+            even_s = even_times(times_s, frame_rate_hz)
+            answer = own(interpolated(values, times_s, even_s))
+            result[start:stop] = interpolated(answer, even_s, times_s)
     progress(total, total)
     return resampled
-
-
-def at_rate(
-    work: Callable[[Energies], Energies],
-    values: Energies,
-    times_s: NDArray[np.float64],
-    frame_rate_hz: float,
-) -> Energies:
-    """Apply ``work`` at an even frame rate, with linear interpolation there and back.
-
-    Parameters
-    ----------
-    work : callable
-        Takes float32 (frames at that rate, features) and returns as many frames.
-    values : float32 ndarray, (frames, features)
-        Energies without a gap.
-    times_s : float64 ndarray, (frames,)
-        Their times, which the result has, too.
-    frame_rate_hz : float
-        Rate at which ``work`` is done.
-    """
-    even_s = even_times(times_s, frame_rate_hz)
-    return interpolated(work(interpolated(values, times_s, even_s)), even_s, times_s)
 
 
 def even_times(times_s: NDArray[np.float64], frame_rate_hz: float) -> NDArray[np.float64]:
