@@ -12,7 +12,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.stores import StoredArray
 from sd2core.mesh.presence import runs
 from sd2core.mesh.vertex_parts import QUANTITIES
-from sd2core.pairs.summary import INDEX_NAME, REMAKE, TakeEntry
+from sd2core.pairs.summary import TakeEntry
 
 UNKNOWN = -1
 """Label of a frame that is neither learnt from nor judged, in place of a number of one."""
@@ -36,33 +36,6 @@ def check_labels(label: NDArray[np.integer], count: int, title: str, remedy: str
             f"{title} has labels from {label.min()} to {label.max()}",
             f"0 to {count - 1}, or {UNKNOWN} where it is not known",
             remedy,
-        )
-
-
-def check_array(array: StoredArray, frames: int, row: tuple[int, ...], kind: str) -> None:
-    """Raise Sd2Error for an array that is not of this type, or has too few frames.
-
-    Parameters
-    ----------
-    array : StoredArray
-    frames : int
-        Least number of rows.
-    row : tuple of int
-        Shape of a row.
-    kind : str
-        Wanted dtype, such as ``"float32"``.
-    """
-    if array.shape[:1] < (frames,):
-        raise Sd2Error(
-            f"{array.path}: the array {array.name} is missing or shorter than {INDEX_NAME} says",
-            f"{frames} frames",
-            REMAKE,
-        )
-    if array.shape[1:] != row or array.dtype != np.dtype(kind):
-        raise Sd2Error(
-            f"{array.path}: rows of {array.name} are {array.dtype} of shape {array.shape[1:]}",
-            f"{kind} of shape {row}",
-            REMAKE,
         )
 
 

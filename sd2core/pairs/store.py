@@ -30,7 +30,7 @@ from sd2core.files.stores import (
 )
 from sd2core.files.texts import append_lines, drop_torn_line, refuse_change
 from sd2core.maps import LimbMaps, joints_of
-from sd2core.pairs.rows import check_array, check_labels, kept_parts, read_rows, row_kinds
+from sd2core.pairs.rows import check_labels, kept_parts, read_rows, row_kinds
 from sd2core.pairs.summary import (
     FORMAT,
     INDEX_NAME,
@@ -376,7 +376,7 @@ def open_takes(path: Path) -> tuple[PairFacts, dict[str, StoredArray]]:
     arrays: dict[str, StoredArray] = {}
     for name, (row, kind) in row_kinds(facts.bins, facts.parts, facts.joints).items():
         arrays[name] = array_in(group, facts.path, name, "frames")
-        check_array(arrays[name], facts.frames, row, kind)
+        _check_array(arrays[name], facts.frames, row, kind)
     return facts, arrays
 
 
@@ -390,6 +390,22 @@ def limbs_of(facts: PairFacts, arrays: Mapping[str, Any], take: TakeEntry) -> Li
     )
     assert limbs is not None
     return LimbMaps(facts.parts, limbs, moves)
+
+
+def _check_array(array: StoredArray, frames: int, row: tuple[int, ...], kind: str) -> None:
+    """Refuse an array whose rows are of another shape or type, or that has too few frames."""
+    if array.shape[:1] < (frames,):
+        raise Sd2Error(
+            f"{array.path}: the array {array.name} is missing or shorter than {INDEX_NAME} says",
+            f"{frames} frames",
+            REMAKE,
+        )
+    if array.shape[1:] != row or array.dtype != np.dtype(kind):
+        raise Sd2Error(
+            f"{array.path}: rows of {array.name} are {array.dtype} of shape {array.shape[1:]}",
+            f"{kind} of shape {row}",
+            REMAKE,
+        )
 
 
 def _stillborn(path: Path) -> bool:

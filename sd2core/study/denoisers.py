@@ -10,11 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sd2core.denoise.files import load_model
-from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.paths import remove
 from sd2core.files.texts import read_json
@@ -113,43 +109,3 @@ def denoiser_in(place: Path) -> tuple[Any, str]:
     if model.exists():
         return load_model(model), ""
     return None, str(read_json(place / "done").get("reason", "")) or "it could not be trained"
-
-
-def added_map(
-    condition: str, take: Take, model: Any, reason: str, seed: tuple[int, int]
-) -> NDArray[np.float32]:
-    """Return the map of a take that is added, of a condition that is not the radar's.
-
-    Parameters
-    ----------
-    condition : {"synthetic", "synthetic+texture", "denoised", "denoised+texture"}
-    take : Take
-    model : TrainedDenoiser or None
-        Needed by all but the first.
-    reason : str
-        Why there is no denoiser, for the error.
-    seed : (int, int)
-        Of the texture.
-
-    Returns
-    -------
-    float32 array, shape (frames, bins)
-
-    Raises
-    ------
-    Sd2Error
-        Where it needs a denoiser and there is none.
-    """
-    if condition == "synthetic":
-        return take.synthetic
-    if model is None:
-        raise Sd2Error(f"The fold has no denoiser ({reason})", "one for denoised maps and textures")
-    card = model.card
-    denoised: NDArray[np.float32]
-    if condition.startswith("denoised"):
-        denoised = model.denoise_values(take.inputs(card.parts))
-    else:
-        denoised = np.float32(1.0 if card.known is None else card.known.gain) * take.synthetic
-    if not condition.endswith("+texture"):
-        return denoised
-    return card.needed_texture().drawn(np.ascontiguousarray(denoised), seed)

@@ -20,8 +20,9 @@ from sd2core.denoise.files import load_model
 from sd2core.denoise.resample_to_model import SAME_RATE
 from sd2core.errors import Sd2Error
 from sd2core.labels.per_frame import BACKGROUND
+from sd2core.pairs.store import Take
 from sd2core.study.data import Movement, StudyData, study_data_of
-from sd2core.study.denoisers import added_map, denoiser_in
+from sd2core.study.denoisers import denoiser_in
 from sd2core.study.folds import Fold, folds_of, groups_of, share_of
 from sd2core.study.plan import Learner, StudyPlan
 from sd2core.study.windows import Features, Ridge, at_speed, half_window, window_features
@@ -168,12 +169,31 @@ def _added(
         made = [one.clip for one in data.others if one.clip.kind == "simulated"]
     else:
         made = [
-            replace(one.clip, energies=added_map(condition, one.take, model, reason, (seed, at)))
+            replace(one.clip, energies=_made_of(condition, one.take, model, reason, (seed, at)))
             for at, one in enumerate([*filmed, *data.others])
             if one.take is not None
         ]
     known = data.known
     return [*made, *(_played(one, known, speed) for speed in plan.speeds for one in made)]
+
+
+def _made_of(
+    condition: str, take: Take, model: Any, reason: str, seed: tuple[int, int]
+) -> NDArray[np.float32]:
+    """Map of a take that is added; Sd2Error with the reason where it needs a missing denoiser."""
+    if condition == "synthetic":
+        return take.synthetic
+    if model is None:
+        raise Sd2Error(f"The fold has no denoiser ({reason})", "one for denoised maps and textures")
+    card = model.card
+    denoised: NDArray[np.float32]
+    if condition.startswith("denoised"):
+        denoised = model.denoise_values(take.inputs(card.parts))
+    else:
+        denoised = np.float32(1.0 if card.known is None else card.known.gain) * take.synthetic
+    if not condition.endswith("+texture"):
+        return denoised
+    return card.needed_texture().drawn(np.ascontiguousarray(denoised), seed)
 
 
 def _played(clip: Clip, known: ClipSet, speed: float) -> Clip:
