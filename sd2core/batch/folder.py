@@ -49,20 +49,11 @@ class BatchFolder(RunFolder):
     maker = "sd2 batch"
     look = "sd2 batch --status"
 
-    @property
-    def plan(self) -> Path:
-        """Copy of the plan."""
-        return self.path / "plan.toml"
-
-    @property
-    def report(self) -> Path:
-        """End of the last run, and its failures."""
-        return self.path / "report.json"
-
-    @property
-    def results(self) -> Path:
-        """Maps that are there, one JSON line each."""
-        return self.path / "results.jsonl"
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.plan = self.path / "plan.toml"  # copy of the plan
+        self.report = self.path / "report.json"  # end of the last run, and its failures
+        self.results = self.path / "results.jsonl"  # maps that are there, one JSON line each
 
     def result(self, kind: str, key: str, suffix: str) -> Path:
         """Path of a task's result: in one of 256 folders, so that none gets too long."""
