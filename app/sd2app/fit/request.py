@@ -102,13 +102,9 @@ class FitRequest:
     def asks_the_same(self, other: FitRequest) -> bool:
         """True if the work of the other request can be continued for this one."""
         focal_px, other_px = self.focal_px or 0.0, other.focal_px or 0.0
-        return (
-            self.video == other.video
-            and self.stature_m == other.stature_m
-            and abs(focal_px - other_px) < _SAME_FOCAL_PX
-            and self.person == other.person
-            and self.people == other.people
-        )
+        there = replace(other, folder=self.folder, mesh_name=self.mesh_name)
+        same = replace(there, focal_px=self.focal_px) == self
+        return same and abs(focal_px - other_px) < _SAME_FOCAL_PX
 
     def save(self) -> None:
         """Keep it in its folder, which is made; what was done for other choices goes."""

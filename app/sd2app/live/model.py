@@ -132,11 +132,6 @@ class LiveModel(SteeredCommand):
         elif self.can_be_shown and self.request is not None:
             self._document.open([self.request.folder])
 
-    def close(self) -> None:
-        """Stop, and wait until all that was received is stored."""
-        self._teller.stop()
-        super().close()
-
     # --- the process ----------------------------------------------------------------------
 
     def _begin_when_open(self) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, Signal
 from PySide6.QtGui import QImage
 
+from sd2app.background.latest import ClosingModel
 from sd2app.live.setup import ListenRequest
 from sd2core.live.checking import Answer
 from sd2core.placements.placements import Place
@@ -27,7 +28,7 @@ _STOP_MS = 10_000
 """By then, all that waited to be stored is stored, or never will be."""
 
 
-class SteeredCommand(QObject):
+class SteeredCommand(ClosingModel):
     """A command that tells lines of JSON, and is steered by keys as on a terminal.
 
     A subclass takes its events.
@@ -66,6 +67,7 @@ class SteeredCommand(QObject):
 
     def close(self) -> None:
         """End it with what shows it, and wait until all that was received is stored."""
+        super().close()
         if (process := self._process) is not None:
             process.blockSignals(True)
             self._press_stop(process)

@@ -337,11 +337,6 @@ class SynthesisModel(ReportingModel):
             meta |= in_use.plan.provenance(in_use.error)
         return replace(made, meta=meta, uncertainty=self._track.uncertainty)
 
-    def close(self) -> None:
-        """Stop computing."""
-        self._stop()
-        super().close()
-
     def _stop(self) -> None:
         self._rest.stop()
         self._runner.cancel()
