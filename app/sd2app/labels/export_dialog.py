@@ -42,7 +42,6 @@ def export_labels(shell: Shell, session: Session, labels: LabelsModel) -> None:
     )
     dialog.written.connect(shell.note)
     accepted(dialog)
-    dialog.finish()
 
 
 class LabelExportDialog(Dialog):
@@ -68,6 +67,7 @@ class LabelExportDialog(Dialog):
         self.problem = ""  # why the file cannot be written
         self.exporting = False
         self._runner = LatestRunner("labels", self, self._receive, self._refuse)
+        self.finished.connect(lambda _: self._runner.close())
         self._format = Choice("The program that is to read the file", self)
         self._formats = all_formats()
         self._format.addItems([one.title for one in self._formats])
@@ -113,10 +113,6 @@ class LabelExportDialog(Dialog):
         self.exporting, self.problem = True, ""
         self._runner.submit(write)
         self._refresh()
-
-    def finish(self) -> None:
-        """Finish the file being written."""
-        self._runner.close()
 
     def _look(self) -> None:
         self.losses, self.problem = None, ""

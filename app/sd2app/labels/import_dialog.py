@@ -76,7 +76,6 @@ def import_labels(shell: Shell, edits: LabelEdits, path: Path | None = None) -> 
     labels, base = edits.labels.labels, edits.playback.timebase
     dialog = LabelImportDialog(path, labels, base, parent, edits.recording)
     taken, incoming, way, name = accepted(dialog), dialog.incoming, dialog.way, path.stem
-    dialog.finish()
     if taken and incoming is not None:
         edits.apply(lambda now: incoming.take_into(now.labels, way, name))
 
@@ -123,6 +122,7 @@ class LabelImportDialog(Dialog):
         self.observations: tuple[str, ...] = ()  # to choose from, where there are several videos
         self._observed: str | None = None
         self._runner = LatestRunner("labels", self, self._receive, self._refuse)
+        self.finished.connect(lambda _: self._runner.close())
         self._runner.partial.connect(self._learn)
         self._format = Choice(
             "The program that the file is of",
@@ -215,10 +215,6 @@ class LabelImportDialog(Dialog):
         if not count:
             return "There are no labels to replace. Undo takes the import back."
         return f"The {counted(count, 'span')} of this recording go. Undo brings them back."
-
-    def finish(self) -> None:
-        """Stop reading."""
-        self._runner.close()
 
     def _read_as(self, _: str | None) -> None:
         self._observed, self.observations = None, ()

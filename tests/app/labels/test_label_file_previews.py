@@ -38,7 +38,7 @@ def importing(qtbot):
 
     yield read
     for model in models:
-        model.finish()
+        model.reject()
 
 
 def test_the_preview_says_what_becomes_of_everything(importing, tmp_path) -> None:
@@ -114,8 +114,12 @@ def test_an_export_says_its_losses_before_and_after(qtbot, tmp_path) -> None:
     qtbot.waitUntil(lambda: model.losses is not None, timeout=10_000)
     assert "notes" in {loss.what for loss in model.losses}
     assert model.line == "sd2 labels convert walk.sd2 --out mine.txt --to audacity"
+    model.export(tmp_path / "no such folder" / "mine.txt")
+    qtbot.waitUntil(lambda: bool(model.problem), timeout=10_000)
+    assert not model.exporting
     with qtbot.waitSignal(model.written, timeout=10_000) as said:
         model.export(tmp_path / "mine")
+        assert not model.problem
     (text,), path = said.args, tmp_path / "mine.txt"
     assert text.startswith(f"Wrote {path} with ")
     assert "keeps no notes: 1 note left out" in text
@@ -124,11 +128,6 @@ def test_an_export_says_its_losses_before_and_after(qtbot, tmp_path) -> None:
     model.export(tmp_path / "mine")
     assert f"{path} exists" in model.problem
     assert path.read_bytes() == before
-    model.export(tmp_path / "no such folder" / "mine.txt")
-    assert not model.problem
-    qtbot.waitUntil(lambda: bool(model.problem), timeout=10_000)
-    assert not model.exporting
-    model.finish()
 
 
 def test_what_of_the_file_was_not_read_is_listed_and_marks_get_a_length(
