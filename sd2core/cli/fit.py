@@ -168,10 +168,12 @@ def _fit(options: Fit) -> None:
         keep_pace(fit_kind(options.resolution), core_s, made.frames)
     if options.progress_json:
         _tell_end(options, [(options.out, made)], seconds)
-    elif options.json:
-        print_json(_summary(options, options.out, made, seconds))
+        return
+    about = _summary(options, options.out, made, seconds)
+    if options.json:
+        print_json(about)
     else:
-        _print(options, options.out, made, seconds)
+        _print(about, made)
 
 
 def _tell_end(options: Fit, meshes: list[tuple[Path, FittedVideo]], seconds: float) -> None:
@@ -223,10 +225,10 @@ def _fit_people(options: Fit) -> None:
         ):
             seconds = time.perf_counter() - begun_s
             meshes.append((mesh, made))
-            about = {"person": person.number, "certainty": person.certainty}
-            summaries.append(about | _summary(options, mesh, made, seconds, chosen))
+            about = _summary(options, mesh, made, seconds, chosen)
+            summaries.append({"person": person.number, "certainty": person.certainty, **about})
             if not (options.progress_json or options.json):
-                _print(options, mesh, made, seconds, chosen)
+                _print(about, made)
     if options.progress_json:
         _tell_end(options, meshes, time.perf_counter() - begun_s)
     elif options.json:
@@ -378,14 +380,11 @@ def _summary(
     }
 
 
-def _print(
-    options: Fit, out: Path, made: FittedVideo, seconds: float, choices: FitChoices | None = None
-) -> None:
-    about = _summary(options, out, made, seconds, choices)
+def _print(about: dict[str, Any], made: FittedVideo) -> None:
     camera, sources = about["camera"], {"user": "as given", "metadata": "as the file says"}
     frames, present, bridged = about["frames"], about["present"], about["bridged"]
     print_facts(
-        f"Made {out}",
+        f"Made {about['out']}",
         {
             "frames": f"{frames}, {present} with the person"
             + (f" ({bridged} of them interpolated)" if bridged else ""),
@@ -394,7 +393,7 @@ def _print(
             f" {sources.get(camera['source'], 'by default (56° across the longer side)')}",
             "stature": f"{about['stature_m']:g} m"
             + _STATURES[about["stature_source"]],
-            "took": f"{seconds:.0f} s, {seconds / frames:.2f} s per frame",
+            "took": f"{about['seconds']:.0f} s, {about['seconds'] / frames:.2f} s per frame",
         },
     )  # fmt: skip
     for note in (*made.notes, *made.doubts):
