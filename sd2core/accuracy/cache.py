@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -25,8 +25,8 @@ from sd2core.sensor import VirtualSensor
 from sd2core.version import __version__
 
 
-def clip_fingerprint(mesh: MeshSequence) -> str:
-    """Fingerprint of a moving mesh: faces, counts, times, gaps, and three of its frames."""
+def clip_fingerprint(mesh: MeshSequence, frames: Iterable[int] = ()) -> str:
+    """Fingerprint of a moving mesh: faces, counts, times, gaps, and some frames, or three."""
     digest = hashlib.sha256(repr((mesh.vertex_count, mesh.frame_count)).encode())
     if mesh.faces is not None:
         digest.update(mesh.faces.tobytes())
@@ -35,7 +35,7 @@ def clip_fingerprint(mesh: MeshSequence) -> str:
     digest.update(np.ascontiguousarray(mesh.times_s).tobytes())
     if mesh.present is not None:
         digest.update(mesh.present.tobytes())
-    for frame in (0, mesh.frame_count // 2, mesh.frame_count - 1):
+    for frame in frames or (0, mesh.frame_count // 2, mesh.frame_count - 1):
         digest.update(np.ascontiguousarray(mesh.frame(frame)).tobytes())
     return digest.hexdigest()[:16]
 
@@ -116,7 +116,7 @@ def cached_measurement(
     same = (
         measurement.scene == scene_fingerprint(mesh, sensor, options, family)
         and measurement.machine == this_machine()
-        and vertices == _vertices_digest(mesh, measurement.frames)
+        and vertices == _as_measured(mesh, measurement.frames)
     )
     return replace(measurement, stale=not same)
 
@@ -126,7 +126,7 @@ def store_measurement(mesh: MeshSequence, measurement: Measurement) -> None:
 
     A folder that cannot be written to is no error.
     """
-    vertices = _vertices_digest(mesh, measurement.frames)
+    vertices = _as_measured(mesh, measurement.frames)
     content = {"format": _FORMAT, **asdict(measurement), "vertices": vertices}
     del content["stale"]
     keep_text(_place(mesh, measurement.family), json.dumps(content))
@@ -136,23 +136,20 @@ def _place(mesh: MeshSequence, family: Family) -> Path:
     return user_cache("ladder") / f"{family}-{clip_fingerprint(mesh)}.json"
 
 
-def _vertices_digest(mesh: MeshSequence, frames: Sequence[int]) -> str:
-    """Hash of all bodies in the frames measured, and beside them, which tell velocities."""
-    digest = hashlib.sha256()
-    for body in mesh.bodies:
-        near = {frame + step for frame in frames for step in (-1, 0, 1)}
-        for frame in sorted(near.intersection(range(body.frame_count))):
-            digest.update(np.ascontiguousarray(body.frame(frame)).tobytes())
-    return digest.hexdigest()[:16]
+def _as_measured(mesh: MeshSequence, frames: Sequence[int]) -> list[str]:
+    """Fingerprints of all bodies by the frames measured, and those beside: they tell velocities."""
+    near = {frame + step for frame in frames for step in (-1, 0, 1)}
+    within = sorted(near.intersection(range(mesh.frame_count)))
+    return [clip_fingerprint(body, within) for body in mesh.bodies]
 
 
-def _read(path: Path) -> tuple[Measurement, str]:
-    """A kept measurement, and the hash of the vertices that it is of."""
+def _read(path: Path) -> tuple[Measurement, Any]:
+    """A kept measurement, and the fingerprints of the vertices that it is of."""
     from pydantic import TypeAdapter
 
     content = json.loads(read_text(path, "a measurement"))
     if content["format"] != _FORMAT:
         raise ValueError(f"format {content['format']}")
-    vertices = content.pop("vertices", "")
+    vertices = content.pop("vertices", None)
     text = json.dumps(content)
     return TypeAdapter(Measurement).validate_json(text, strict=True), vertices

@@ -243,16 +243,13 @@ def _strongest(row: MapRow) -> MapRow:
     starts = np.arange(0, frames, -(-frames // _COLUMNS))
     if len(starts) == frames:
         return row
-    pooled = DopplerMap(
-        np.maximum.reduceat(doppler.values, starts, axis=1),
-        doppler.axis,
-        Timebase(doppler.times_s[starts]),
-        doppler.kind,
-        unit=doppler.unit,
-        null_bins=doppler.null_bins,
-        unseen_bins=doppler.unseen_bins,
+    pooled = replace(
+        doppler,
+        values=np.maximum.reduceat(doppler.values, starts, axis=1),
+        timebase=Timebase(doppler.times_s[starts]),
         present=None if doppler.present is None else np.maximum.reduceat(doppler.present, starts),
-        meta=doppler.meta,
+        uncertainty=None,
+        limbs=None,
     )
     return replace(row, doppler=pooled)
 
