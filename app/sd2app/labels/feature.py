@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QObject, QPointF
-from PySide6.QtWidgets import QMenu, QWidget
+from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
 from sd2app.feature import Action, Drop, Feature, Shell, report
 from sd2app.labels.actions import LabelActions, editing
@@ -24,6 +24,7 @@ from sd2app.labels.painting import map_overlay, strip_overlay
 from sd2app.labels.panel import LabelsPanel
 from sd2app.labels.recovery import LabelNotice, recover
 from sd2app.labels.span_buttons import SpanButtons
+from sd2app.labels.table import SpanTable
 from sd2app.labels.timeline import LabelArea, LabelTimeline, TargetLine
 from sd2app.labels.tracks import LabelTracks, offer_tracks
 from sd2app.maps.model import SynthesisModel
@@ -214,7 +215,7 @@ class LabelsFeature(Feature):
             ),
             Action(
                 "select_all", "Labels", "Select all spans", ("Ctrl+A",), "On all tracks",
-                labels.select_all, self._has_spans,
+                self._select_all, self._has_spans,
             ),
             Action(
                 "next_span", "Labels", "Next span", ("N",), "Select it and go to its start",
@@ -290,6 +291,11 @@ class LabelsFeature(Feature):
 
     def _can_put(self) -> bool:
         return self._some_selected() and self._has_tracks()
+
+    def _select_all(self) -> None:
+        """Select all spans; in the table only those that a search has left there."""
+        focus = QApplication.focusWidget()
+        (focus.selectAll if isinstance(focus, SpanTable) else self.model.select_all)()
 
     def _to_cancel(self) -> Iterator[Callable[[], object]]:
         """Things that can be let go of; the first one is."""

@@ -7,19 +7,10 @@ from functools import partial
 from itertools import pairwise
 from typing import cast
 
-from PySide6.QtCore import (
-    QEvent,
-    QItemSelection,
-    QItemSelectionModel,
-    QItemSelectionRange,
-    QModelIndex,
-    Qt,
-)
+from PySide6.QtCore import QItemSelection, QItemSelectionModel, QItemSelectionRange, QModelIndex, Qt
 from PySide6.QtGui import (
     QContextMenuEvent,
     QFocusEvent,
-    QKeyEvent,
-    QKeySequence,
     QPainter,
     QPaintEvent,
     QResizeEvent,
@@ -163,17 +154,6 @@ class SpanTable(CellTable):
             cut = action.isVisible() and action.isChecked() and at not in shown
             action.setText(COLUMNS[at].heading + (" (no room here)" if cut else ""))
             self.setColumnHidden(at, at not in shown)
-
-    def event(self, event: QEvent) -> bool:
-        """Claim the key that selects all: of the rows here, not of spans that a filter hides."""
-        if (
-            event.type() == QEvent.Type.ShortcutOverride
-            and isinstance(event, QKeyEvent)
-            and event.matches(QKeySequence.StandardKey.SelectAll)
-        ):
-            event.accept()
-            return True
-        return super().event(event)
 
     # --- one selection --------------------------------------------------------------------
 
