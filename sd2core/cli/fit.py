@@ -168,12 +168,10 @@ def _fit(options: Fit) -> None:
         keep_pace(fit_kind(options.resolution), core_s, made.frames)
     if options.progress_json:
         _tell_end(options, [(options.out, made)], seconds)
-        return
-    about = _summary(options, options.out, made, seconds)
-    if options.json:
-        print_json(about)
+    elif options.json:
+        print_json(_summary(options, options.out, made, seconds))
     else:
-        _print(about, made)
+        _print(_summary(options, options.out, made, seconds), made)
 
 
 def _tell_end(options: Fit, meshes: list[tuple[Path, FittedVideo]], seconds: float) -> None:

@@ -298,8 +298,7 @@ def untried(results: Results) -> list[str]:
         more.append(f"more movements of {', '.join(few)}: over so few, intervals are too narrow")
     # With three, intervals over people miss the truth in a quarter of all studies, not in 5 %.
     if 1 < len(results.takes) < _FEW:
-        count = len(results.takes)
-        more.append(f"more people: over {count}, intervals over people are far too narrow")
+        more.append(f"more people: over {len(results.takes)}, intervals over people are too narrow")
     if not plan.placements and not plan.video:
         more.append("other places of the sensor, bodies of other shape, mirrored movements")
     return [*left, *missing, *more]
