@@ -78,7 +78,7 @@ def opened(qtbot, compiled_kernels, fake, fake_models, recording_copy):
     for window in windows:
         run = models_of(window).batch.run
         if run is not None and run.folder.live:
-            os.kill(run.folder.status().pid, signal.SIGKILL)
+            os.kill(run.process.pid, signal.SIGKILL)
         models_of(window).document.undo_stack.clear()
         window.close()
         window.deleteLater()
