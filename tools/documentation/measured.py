@@ -30,8 +30,6 @@ OLD = {
     "denoiser.md": _HOURS,
     "classifier.md": "hours of training; by now its networks draw and weigh clips otherwise",
     "studies.md": "hours of training; how late ridge regression is was put right in it",
-    "real-pairs.md": "gaps in time, notes and names of people changed, none of which it has",
-    "real-gestures.md": "only what counts as a gap in time changed, and its recordings have none",
 }
 """Pages that may be older than the program, and why they were not measured anew."""
 
