@@ -113,7 +113,7 @@ class PairFacts(BaseModel):
 
     @property
     def known_people(self) -> str:
-        """What its people are the same in, in all stores that are made of it; or nothing.
+        """Origin whose people are the same in all stores that are made of it; empty: none.
 
         People of recordings are called as users say; a campaign's are drawn by its seed.
         """
