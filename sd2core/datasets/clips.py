@@ -11,6 +11,7 @@ from sd2core.classify.data import UNKNOWN, Clip, ClipSet, in_order
 from sd2core.datasets.reading import Dataset
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
+from sd2core.labels.per_frame import BACKGROUND
 from sd2core.maps import MapKind
 
 _SLACK_FRAMES = 0.01
@@ -33,9 +34,9 @@ def clips_of_dataset(dataset: Dataset, kind: MapKind) -> ClipSet:
         )
     if kind not in header.kinds:
         raise Sd2Error(f"{dataset.path} holds no {kind} maps", f"one of {', '.join(header.kinds)}")
-    classes = in_order(header.classes.values())
-    # Labels that have no class are not learnt from.
-    numbers = {label: classes.index(name) for label, name in header.classes.items()}
+    named = {BACKGROUND: BACKGROUND, **header.classes}
+    classes = in_order(named.values())
+    numbers = {label: classes.index(name) for label, name in named.items()}
     table = np.array([numbers.get(label, UNKNOWN) for label in header.labels], np.int8)
     rows = np.flatnonzero(dataset["available"][:][:, KINDS.index(kind)])
     if not len(rows):

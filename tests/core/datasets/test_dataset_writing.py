@@ -157,16 +157,16 @@ from test_dataset_writing import OPTIONS, several
 from sd2core.datasets import store, writing
 
 calls = 0
-put = store.SegmentStore._put
+put = store.put_rows
 
-def put_or_die(self, *arguments):
+def put_or_die(*arguments):
     global calls
     calls += 1
     if calls == int(sys.argv[2]):
         os.kill(os.getpid(), signal.SIGKILL)
-    put(self, *arguments)
+    put(*arguments)
 
-store.SegmentStore._put = put_or_die
+store.put_rows = put_or_die
 store.FLUSH_EVERY_S = float(sys.argv[3])
 writing.write_dataset(Path(sys.argv[1]), several(), OPTIONS)
 """
