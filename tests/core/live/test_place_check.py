@@ -272,7 +272,8 @@ def test_what_was_found_is_told_as_it_comes_and_q_ends_it() -> None:
     assert "preview" in kinds
     assert told[-1]["left_s"] == 0
     assert _all_passed(told[-1])
-    assert told[-1]["place"]["range_m"] == pytest.approx(1.5, abs=0.15)
+    # The figure sways by a quarter of a metre, and where in its sway the key comes is chance.
+    assert told[-1]["place"]["range_m"] == pytest.approx(1.5, abs=0.25)
     assert abs(told[-1]["place"]["azimuth_deg"]) < 3.0
 
 
