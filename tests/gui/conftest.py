@@ -11,9 +11,9 @@ from fake_accuracy import FakeAccuracy
 from fake_classifiers import FakeClassifiers
 from fake_denoisers import FakeDenoisers
 from grey_video import FRAMES, RATE, write_video
-from kept_window import KeptWindow, close_window, new_window
 from PySide6.QtCore import QPoint
 from PySide6.QtGui import QCursor
+from whole_window import close_window, new_window, opened
 
 from sd2core.io.mesh import save_mesh
 from sd2core.io.radar.infineon import write_capture
@@ -70,90 +70,55 @@ def recording_copy(small_recording, tmp_path) -> Path:
     return Path(shutil.copytree(small_recording, tmp_path / small_recording.name))
 
 
-@pytest.fixture(scope="session")
-def kept():
-    """Keeps a window for the tests that take ``window`` or ``labelled``."""
-    kept = KeptWindow()
-    yield kept
-    kept.close()
-
-
-@pytest.fixture(autouse=True, scope="module")
-def first_of_file(request, kept) -> None:
-    """Another file begins."""
-    kept.begin_file()
-
-
 @pytest.fixture(autouse=True)
 def pointer_elsewhere(qapp) -> None:
     """The pointer is where no test left it: what goes where it is already is no move."""
     QCursor.setPos(QPoint(5_000, 5_000))
 
 
-def shares(request) -> bool:
-    """True for a test that takes the window that is kept."""
-    return not {"window", "labelled"}.isdisjoint(request.fixturenames)
-
-
 @pytest.fixture(autouse=True)
-def own_data(request, kept, tmp_path_factory, monkeypatch) -> Path:
+def own_data(tmp_path_factory, monkeypatch) -> Path:
     """Runs and models of whoever runs the tests are left alone."""
-    if kept.of_another_file and not shares(request):
-        kept.close()
-    folder = kept.data if shares(request) else None
-    if folder is None:
-        folder = tmp_path_factory.mktemp("data")
+    folder = tmp_path_factory.mktemp("data")
     monkeypatch.setenv("XDG_DATA_HOME", str(folder))
     return folder
 
 
-def fresh(request, kept, name, kind):
-    """A fake as it is made, the one of the window that is kept where a test takes that."""
-    return kept.fake(name, kind) if shares(request) else kind()
-
-
 @pytest.fixture
-def fake(request, kept) -> FakeAccuracy:
+def fake() -> FakeAccuracy:
     """Chooses exact visibility unless a test tells it otherwise."""
-    return fresh(request, kept, "fake", FakeAccuracy)
+    return FakeAccuracy()
 
 
 @pytest.fixture
-def fake_models(request, kept) -> FakeDenoisers:
+def fake_models() -> FakeDenoisers:
     """No model, unless a test adds some."""
-    return fresh(request, kept, "fake_models", FakeDenoisers)
+    return FakeDenoisers()
 
 
 @pytest.fixture
-def fake_classes(request, kept) -> FakeClassifiers:
+def fake_classes() -> FakeClassifiers:
     """No classifier, unless a test adds some."""
-    return fresh(request, kept, "fake_classes", FakeClassifiers)
+    return FakeClassifiers()
 
 
 @pytest.fixture
-def empty_window(qtbot, kept, compiled_kernels, fake, fake_models, fake_classes):
+def empty_window(qtbot, compiled_kernels, fake, fake_models, fake_classes):
     """A new window without a recording, all views in place."""
-    kept.close()
     window = new_window(qtbot, fake, fake_models, fake_classes)
     yield window
-    fake.gate.set()
-    fake_classes.gate.set()
+    for one in (fake, fake_models, fake_classes):
+        one.gate.set()
     close_window(window)
 
 
 @pytest.fixture
-def fakes(fake, fake_models, fake_classes):
-    """What the window is made with, by the names of the fixtures."""
-    return {"fake": fake, "fake_models": fake_models, "fake_classes": fake_classes}
-
-
-@pytest.fixture
-def window(qtbot, kept, compiled_kernels, own_data, fakes, small_recording):
+def window(qtbot, empty_window, small_recording):
     """The window on the small recording, everything computed."""
-    return kept.open(qtbot, small_recording, own_data, fakes)
+    return opened(empty_window, qtbot, small_recording)
 
 
 @pytest.fixture
-def labelled(qtbot, kept, compiled_kernels, own_data, fakes, recording_copy):
+def labelled(qtbot, empty_window, recording_copy):
     """The window on the small recording: "there" 0.2 to 0.8 s, "back" 1 to 2 s, 60 frames."""
-    return kept.open(qtbot, recording_copy, own_data, fakes)
+    return opened(empty_window, qtbot, recording_copy)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 from finding import panel_of
-from kept_window import close_window
 from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QSlider
+from whole_window import close_window
 from window_models import models_of
 
 from sd2app.maps.level_bar import ColourScale

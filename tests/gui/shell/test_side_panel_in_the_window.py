@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 from finding import button_of, named, panel_of, splitter_around
-from kept_window import close_window, opened
 from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtGui import QFontMetrics
 from PySide6.QtTest import QTest
@@ -17,6 +16,7 @@ from PySide6.QtWidgets import (
     QSplitterHandle,
     QWidget,
 )
+from whole_window import close_window, opened
 
 from sd2app.maps.arrangement import HEADER_PX
 from sd2app.settings import Settings

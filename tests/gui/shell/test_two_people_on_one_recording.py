@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import pytest
 from answering import answer
-from kept_window import close_window, new_window
 from left_behind import end_process
 from PySide6.QtCore import Qt
+from whole_window import close_window, new_window
 from window_models import models_of
 
 from sd2app.labels.recovery import LabelNotice

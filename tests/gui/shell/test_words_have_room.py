@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import pytest
 from finding import button_of
-from kept_window import opened
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -16,6 +15,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QWidget,
 )
+from whole_window import opened
 
 from sd2app.playback.views import TransportBar
 from sd2app.session.display import LAYOUTS

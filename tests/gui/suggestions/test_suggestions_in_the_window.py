@@ -12,10 +12,10 @@ import pytest
 from answering import once_asked
 from copied import copied_record
 from finding import button_of
-from kept_window import opened
 from PySide6.QtCore import QPoint, QRect, QRectF, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QComboBox, QInputDialog, QToolButton, QWidget
+from whole_window import opened
 from window_models import models_of
 
 from sd2app.background.quoting import quoted

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from kept_window import opened
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QSlider, QToolButton
+from whole_window import opened
 from window_models import models_of
 
 from sd2app.video.view import VideoBar, VideoView

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from answering import once_asked
 from dropping import drop
-from kept_window import close_window, new_window, opened
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialog
+from whole_window import close_window, new_window, opened
 from window_models import models_of
 
 from sd2app.live.dialog import ListenDialog
