@@ -166,7 +166,8 @@ def load_mesh(
 def save_mesh(mesh: MeshSequence, path: Path | str, progress: Progress = silent) -> None:
     """Write a mesh as ``.npz``, ``.zarr`` or ``.zarr.zip``, block by block and in one step.
 
-    Things and walls around it, and that it is simulated, are a recording's and are not written.
+    Things and walls around it, and that it is simulated, are a recording's and are not written;
+    nor is what only the file of a fit tells: camera, stature, doubts. To keep them, copy that file.
 
     Raises
     ------
