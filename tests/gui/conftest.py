@@ -103,11 +103,17 @@ def fake_classes() -> FakeClassifiers:
 
 
 @pytest.fixture
-def empty_window(qtbot, compiled_kernels, fake, fake_models, fake_classes):
+def fakes(fake, fake_models, fake_classes):
+    """What the window is made with, by the names of the fixtures."""
+    return {"fake": fake, "fake_models": fake_models, "fake_classes": fake_classes}
+
+
+@pytest.fixture
+def empty_window(qtbot, compiled_kernels, fakes):
     """A new window without a recording, all views in place."""
-    window = new_window(qtbot, fake, fake_models, fake_classes)
+    window = new_window(qtbot, **fakes)
     yield window
-    for one in (fake, fake_models, fake_classes):
+    for one in fakes.values():
         one.gate.set()
     close_window(window)
 
