@@ -17,7 +17,13 @@ from sd2core.timebase import Timebase
 KEPT = 10
 """Frames of a run that are compared; more are read around them."""
 
-_CANDIDATES = 24
+_CANDIDATES, _MOST_CANDIDATES = 24, 240
+_EVERY_FRAMES = 75
+"""Of a long clip one candidate: some recordings are gestures with long pauses between them."""
+
+_LIVELY_SHARE = 0.01
+"""Of the liveliest candidate's squared speed: what moves less hardly counts in the map."""
+
 _MIN_MARGIN = 5
 _SMOOTHING_REACH = 5.0
 _PROBED_VERTICES = 500
@@ -99,15 +105,17 @@ def take_sample(mesh: MeshSequence, options: SynthesisOptions, runs: int = 6) ->
     length = -(-(KEPT + 2 * margin) // every) * every
     if frames < 2 * length:
         return _whole(frames)
-    starts = np.unique(np.linspace(0, frames - length, _CANDIDATES).astype(int) // every * every)
+    candidates = min(max(_CANDIDATES, frames // _EVERY_FRAMES), _MOST_CANDIDATES)
+    starts = np.unique(np.linspace(0, frames - length, candidates).astype(int) // every * every)
     present = mesh.presence.present
     with_person = [bool(present[start : start + length].all()) for start in starts.tolist()]
     peopled = _apart(starts[with_person], length)
     starts = peopled if len(peopled) >= _MIN_STARTS else _apart(starts, length)
     speed = np.array([_speed(mesh, int(start) + length // 2) for start in starts])
     order = starts[np.argsort(-speed, kind="stable")]
-    # From the liveliest down to those of middling liveliness.
-    pool = order[: max(len(order) * 2 // 3, runs)]
+    # From the liveliest down to those of middling liveliness, where so many move at all.
+    moving = int((speed >= _LIVELY_SHARE * speed.max()).sum())
+    pool = order[: max(min(len(order) * 2 // 3, moving), runs)]
     lively = pool[np.unique(np.linspace(0, len(pool) - 1, runs).astype(int))]
     ascending = np.sort(lively)
     before = (length - KEPT) // 2

@@ -66,6 +66,18 @@ def swinging(middle_m: tuple[float, float, float], speed_mps: float, rate_hz: fl
     return path
 
 
+def waving(starts_s: NDArray[np.float64], lasting_s: float = 1.5) -> Path:
+    """To and fro from time to time, and still in between."""
+
+    def path(t: NDArray[np.float64]) -> NDArray[np.float64]:
+        since = t[:, None] - starts_s
+        within = (since > 0) & (since < lasting_s)
+        along = np.where(within, 0.3 * np.sin(np.pi * since / lasting_s) ** 2, 0.0).sum(axis=1)
+        return np.stack([0 * along, 0 * along, 3 - along], axis=1)
+
+    return path
+
+
 def plate(
     centre_m: tuple[float, float, float], width_m: float, height_m: float, frames: int = FRAMES
 ) -> MeshSequence:

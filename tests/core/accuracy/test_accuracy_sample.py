@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from accuracy_scenes import ball, steady
+from accuracy_scenes import FPS, ball, steady, waving
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -75,6 +75,15 @@ def test_the_liveliest_frames_are_among_them() -> None:
     sample = take_sample(mesh, PAPER)
     assert any(run.frames.start >= 200 and run.frames.stop <= 240 for run in sample.runs)
     assert all(len(run.frames) == KEPT for run in sample.runs)
+
+
+def test_of_gestures_with_long_pauses_the_gestures_are_sampled() -> None:
+    """Of pauses an empty map is right whatever the plan is."""
+    starts_s = np.arange(10.0, 300.0, 20.0)
+    mesh = ball(waving(starts_s), fineness=1, frames=9000)
+    sample = take_sample(mesh, PAPER)
+    for run in sample.runs:
+        assert np.abs((run.first + 5) / FPS - starts_s - 0.75).min() < 0.75
 
 
 def test_one_frame_is_chosen_and_checked_on() -> None:
