@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-from sd2core.accuracy.plans import MASK_REUSE_M, AccuracyPlan, counting_plans
+from sd2core.accuracy.plans import FRAME_RATE_FACTORS, MASK_REUSE_M, AccuracyPlan, counting_plans
 from sd2core.accuracy.reasons import reasons_for
 from sd2core.accuracy.results import Choice, Errors
 from sd2core.accuracy.survey import Survey, survey_scene
@@ -141,9 +141,6 @@ def _cheapest(
     ``tried`` gets all errors: on the frames to choose on where they are too large already, else on
     those to check on.
     """
-    plans = sorted(_candidates(survey, tolerance), key=survey.cost_key)
-    forecast = {plan: survey.forecast_error(plan) for plan in plans}
-
     sample = survey.trial.sample
 
     def holds(plan: AccuracyPlan) -> bool:
@@ -153,6 +150,11 @@ def _cheapest(
                 return False
         return True
 
+    most_accurate = replace(survey.base, frame_rate_factor=max(FRAME_RATE_FACTORS))
+    if not survey.trial.tells and holds(most_accurate):
+        return most_accurate
+    plans = sorted(_candidates(survey, tolerance), key=survey.cost_key)
+    forecast = {plan: survey.forecast_error(plan) for plan in plans}
     safe = [plan for plan in plans if forecast[plan] <= tolerance]
     # What must hold if anything does.
     safe.append(min(plans, key=lambda plan: (forecast[plan], survey.settings_changed(plan))))
@@ -181,7 +183,8 @@ def _most_accurate(
 
     def beyond_budget_then_error(plan: AccuracyPlan) -> tuple[float, float, tuple[int, int]]:
         cost_ms = max(survey.forecast_ms(plan), budget_ms)
-        return cost_ms, survey.forecast_error(plan), survey.cost_key(plan)
+        lowered = survey.forecast_error if survey.trial.tells else survey.settings_changed
+        return cost_ms, lowered(plan), survey.cost_key(plan)
 
     return min(plans, key=beyond_budget_then_error)
 

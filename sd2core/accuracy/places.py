@@ -110,7 +110,7 @@ def choose_for_places(
         chosen = search.chosen()
         if chosen is not None and search.frame_s(chosen.plan) < frame_s:
             return chosen
-        why = f"No cheaper plan holds {tolerance:.1%} from every place"
+        why = f"No cheaper plan is known to hold {tolerance:.1%} from every place"
     else:
         why = f"Choosing a plan would take longer than it saves on {frames:,} frames of maps"
     return held or search.top(why)
@@ -150,9 +150,8 @@ class PlanSearch:
         """Plan with its largest error, or None if it does not hold everywhere."""
         worst = 0.0
         for trial in self._tried():
-            runs = trial.sample.checked_on
-            worst = max(worst, trial.errors(plan, runs).l1)
-            if worst > self._tolerance:
+            worst = max(worst, trial.errors(plan, trial.sample.checked_on).l1)
+            if worst > self._tolerance or not trial.tells:
                 return None
         return PlacedPlan(plan, worst, reasons)
 

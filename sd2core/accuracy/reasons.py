@@ -157,6 +157,8 @@ def _because(
     if not modelled:
         off = percent(tried[plan].l1)
         return f", but with the rest of the plan the map is off by {off} only"
+    if not survey.trial.tells:
+        return ", since more may move in frames that were not tried"
     held = f"the tolerance of {percent(tolerance)}"
     if tried[plan].l1 > tolerance:
         return f", since no plan holds {held}"

@@ -137,6 +137,14 @@ class Trial:
         }
         return tuple(part for part, is_there in in_scene.items() if is_there)
 
+    @property
+    def tells(self) -> bool:
+        """False if some of the runs are empty, which tells nothing of the rest of the clip."""
+        sample = self.sample
+        return len(sample.frames) == self.mesh.frame_count or all(
+            self.reference(runs).raw.any() for runs in (sample.chosen_on, sample.checked_on)
+        )
+
     def at(self, sensor: VirtualSensor) -> Trial:
         """Trial from another place, sharing what does not depend on it."""
         other = copy.copy(self)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from accuracy_scenes import ball, moving, plate, steady, swinging, together
+from accuracy_scenes import FPS, ball, moving, plate, steady, swinging, together, waving
 
 from sd2core.accuracy.choosing import choose
-from sd2core.accuracy.plans import FRAME_RATE_FACTORS, AccuracyPlan
+from sd2core.accuracy.plans import FRAME_RATE_FACTORS, AccuracyPlan, reference_plan
 from sd2core.accuracy.sample import take_sample
 from sd2core.accuracy.survey import Survey, survey_scene
 from sd2core.accuracy.trial import Columns, Trial, synthesizer_for
@@ -95,6 +95,23 @@ def test_a_body_at_rest_needs_nothing() -> None:
     assert choice.errors.l1 == 0
     (still,) = (reason for reason in choice.reasons if reason.setting == "static")
     assert still.value == 1
+
+
+def test_what_moves_only_between_the_frames_that_are_tried_is_counted_as_well_as_can_be() -> None:
+    """It was counted with a tenth of the vertices, hidden ones too, and called 0 % off."""
+    still = ball(steady((0, 0, 3), (0, 0, 0)), fineness=2, frames=600)
+    seen = set(take_sample(still, PAPER).frames.tolist())
+    unseen = next(first for first in range(600) if seen.isdisjoint(range(first, first + 5)))
+    mesh = ball(waving(np.array([unseen / FPS]), 4 / FPS), fineness=2, frames=600)
+    assert seen == set(take_sample(mesh, PAPER).frames.tolist())
+    survey = survey_scene(mesh, CAMERA, PAPER)
+    choice = choose(mesh, CAMERA, tolerance=0.1, survey=survey)
+    assert choice.plan == reference_plan("histogram")
+    assert choice.holds
+    assert any("frames that were not tried" in reason.text for reason in choice.reasons)
+    dragging = choose(mesh, CAMERA, budget_ms=1e3, survey=survey)
+    assert dragging.plan.visibility == "exact"
+    assert dragging.plan.vertices_kept == 1
 
 
 @pytest.mark.one_in(3)

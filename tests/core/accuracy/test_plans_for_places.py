@@ -19,6 +19,7 @@ from sd2core.doppler import PRESETS
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.sensor import VirtualSensor
+from sd2core.timebase import Timebase
 
 PAPER = PRESETS["paper"]
 TOP = reference_plan("histogram")
@@ -68,7 +69,20 @@ def test_the_plan_holds_at_every_place() -> None:
 def test_where_nothing_else_holds_the_most_accurate_is_taken() -> None:
     found = choose_for_places(swinging_sphere(45), AROUND, 10**6, 1e-9, PAPER)
     assert (found.plan, found.error_l1) == (TOP, 0.0)
-    assert "holds 0.0% from every place" in found.reasons[0]
+    assert "known to hold 0.0% from every place" in found.reasons[0]
+
+
+@pytest.mark.usefixtures("free")
+def test_of_frames_in_which_nothing_moves_no_plan_is_known_to_hold() -> None:
+    ball = swinging_sphere(45)
+    still = replace(
+        ball,
+        vertices=np.repeat(ball.read(0, 1), 600, axis=0),
+        timebase=Timebase.regular(600, 30.0),
+    )
+    found = choose_for_places(still, AROUND, 10**6, 0.1, PAPER)
+    assert found.plan == TOP
+    assert "known to hold" in found.reasons[0]
 
 
 @pytest.mark.usefixtures("free")
