@@ -160,7 +160,10 @@ def _cheapest(
     safe.append(min(plans, key=lambda plan: (forecast[plan], survey.settings_changed(plan))))
     safe_plan = next(filter(holds, (*safe[: _MAX_TRIALS - 1], safe[-1])), None)
     if safe_plan is None:
-        return min(tried, key=lambda plan: tried[plan].l1)
+        holds(most_accurate)  # of the frames to check on more may be beyond the axis
+        best = min(tried, key=lambda plan: tried[plan].l1)
+        tried[best] = survey.trial.errors(best, sample.checked_on, progress=progress)
+        return best
     # Changes do not quite add up: some of the cheaper plans may hold as well.
     cheaper = plans[: plans.index(safe_plan)]
     near = [plan for plan in cheaper if tolerance < forecast[plan] <= _SLACK * tolerance]

@@ -13,7 +13,7 @@ from accuracy_scenes import FPS, ball, moving, plate, steady, swinging, together
 
 from sd2core.accuracy.choosing import choose
 from sd2core.accuracy.plans import FRAME_RATE_FACTORS, AccuracyPlan, reference_plan
-from sd2core.accuracy.sample import take_sample
+from sd2core.accuracy.sample import Run, Sample, take_sample
 from sd2core.accuracy.survey import Survey, survey_scene
 from sd2core.accuracy.trial import Columns, Trial, synthesizer_for
 from sd2core.doppler import PRESETS, Synthesizer
@@ -112,6 +112,33 @@ def test_what_moves_only_between_the_frames_that_are_tried_is_counted_as_well_as
     dragging = choose(mesh, CAMERA, budget_ms=1e3, survey=survey)
     assert dragging.plan.visibility == "exact"
     assert dragging.plan.vertices_kept == 1
+
+
+@pytest.fixture(scope="module")
+def faster_later() -> Survey:
+    """Survey of a ball that passes the axis only in the frames to check on."""
+    slow, fast = (ball(swinging((0, 0, 3), speed, 0.8), fineness=2) for speed in (1.5, 2.8))
+    vertices = np.concatenate([slow.read(0, 60), fast.read(0, 60)])
+    mesh = replace(slow, vertices=vertices, timebase=Timebase.regular(120, FPS))
+    sample = Sample(np.arange(120), (Run(5, 55, 5),), (Run(65, 115, 65),))
+    return survey_scene(mesh, CAMERA, PAPER, trial=Trial(mesh, CAMERA, PAPER, sample))
+
+
+def test_where_more_is_beyond_in_the_frames_to_check_on_it_is_wrapped(faster_later: Survey) -> None:
+    """No plan was said to hold."""
+    choice = choose(faster_later.trial.mesh, CAMERA, tolerance=0.01, survey=faster_later)
+    assert choice.holds
+    assert choice.plan.beyond == "wrap"
+
+
+def test_where_no_plan_holds_the_error_is_of_frames_that_were_not_used(
+    faster_later: Survey,
+) -> None:
+    trial = faster_later.trial
+    choice = choose(trial.mesh, CAMERA, tolerance=1e-9, survey=faster_later)
+    assert not choice.holds
+    assert choice.unseen
+    assert choice.errors == trial.errors(choice.plan, trial.sample.checked_on)
 
 
 @pytest.mark.one_in(3)
