@@ -617,6 +617,7 @@ class Synthesizer:
         if not 0 <= start < stop <= self.mesh.frame_count:
             raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
         chosen, of = self._choose(visibility), len(self._bodies)
+        sensor = replace(sensor, beam=None) if "beam" in self.left_out else sensor
         await_kernels(lambda: progress(0, stop - start))
         known = any(body.uncertainty is not None for body in self.mesh.bodies)
         each = []

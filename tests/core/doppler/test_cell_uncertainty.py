@@ -18,7 +18,7 @@ from sd2core.errors import Sd2Error
 from sd2core.maps import CellUncertainty, DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
-from sd2core.sensor import VelocityAxis, VirtualSensor
+from sd2core.sensor import Beam, VelocityAxis, VirtualSensor
 from sd2core.timebase import Timebase
 
 FRAMES = 12
@@ -161,6 +161,17 @@ def test_a_sensor_aside_of_the_camera_knows_more() -> None:
     made = Synthesizer(scene(0.3, across=0.03), PRESETS["paper"])
     ahead, aside = (made.uncertainty(place) for place in (CAMERA, sensor_at(2.2, 0.0, 2.2)))
     assert aside.sd.sum() < 0.5 * ahead.sd.sum()
+
+
+def test_a_beam_that_the_map_leaves_out_is_left_out_here() -> None:
+    """The expected map had a ninth of the map's echo."""
+    narrow = replace(CAMERA, beam=Beam(10.0, 10.0), azimuth_deg=15.0)
+    alone, without = (
+        Synthesizer(scene(0.2), left_out=parts).uncertainty(place)
+        for place, parts in ((CAMERA, ()), (narrow, ("beam",)))
+    )
+    np.testing.assert_array_equal(without.expected, alone.expected)
+    np.testing.assert_array_equal(without.sd, alone.sd)
 
 
 def test_pieces_fit_together() -> None:
