@@ -186,6 +186,7 @@ class Trial:
             return self._counted(synthesizer, runs, self._aside(), progress=progress)
         parts = []
         for side in (-1.0, 1.0):
+            synthesizer.forget_masks()  # one of another plan may be of this very place
             made_at = self._beside(side * plan.mask_reuse_m)
             self._counted(synthesizer, runs, made_at, progress=progress)
             parts.append(

@@ -290,6 +290,11 @@ class Synthesizer:
         await_kernels(lambda: progress(0, len(blocks)))
         run_jobs([job(index) for index in sorted(blocks)], len(blocks), progress, self._threads)
 
+    def forget_masks(self) -> None:
+        """Let none of the masks that are kept serve while the sensor moves."""
+        for one in self._bodies:
+            one.prepared.places.clear()
+
     def map(
         self,
         sensor: VirtualSensor | None = None,

@@ -244,6 +244,22 @@ def test_inside_a_body_nothing_needs_to_stand_in_between() -> None:
     assert not any(reason.setting in ("mask_reuse", "mask_age") for reason in choice.reasons)
 
 
+def test_what_a_kept_mask_changes_is_that_of_a_mask_made_elsewhere(
+    scene: MeshSequence, survey: Survey
+) -> None:
+    """Those made here for other plans served instead: it changed the map by 0 %."""
+    choose(scene, CAMERA, budget_ms=100.0, survey=survey)
+    kept = next(plan for plan in survey.change if plan.mask_reuse_m > 0)
+    runs = survey.trial.sample
+    alone = [
+        Trial(scene, CAMERA, PAPER, runs).columns(plan, runs.chosen_on).smooth
+        for plan in (kept, survey.base)
+    ]
+    change = relative_l1(alone[0], np.tile(alone[1], 2))
+    assert change > 0
+    assert survey.change[kept] == pytest.approx(change)
+
+
 @pytest.mark.slow
 def test_a_single_map_keeps_no_mask(scene: MeshSequence) -> None:
     """Such a plan is for a sensor that moves: alone it would be worked out whole."""
