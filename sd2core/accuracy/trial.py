@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -74,7 +75,8 @@ _REFERENCE_FRAMES = 5
 """At once: some 50 ms of a large mesh, so that a cancelled choice soon ends."""
 
 _ASIDE_M = 1e-12
-"""Offset that changes no map, but makes another place, whose masks are computed again."""
+"""Offset that changes no map, but makes another place, whose masks are computed again; far out it
+is as little as its coordinates can tell."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,7 +343,8 @@ class Trial:
 
     def _aside(self) -> VirtualSensor:
         self._tried += 1
-        return self._beside(self._tried * _ASIDE_M)
+        told_m = 4 * math.ulp(max(map(abs, self.sensor.position_m)))
+        return self._beside(self._tried * max(_ASIDE_M, told_m))
 
     def _beside(self, distance_m: float) -> VirtualSensor:
         """The sensor moved across its line of sight to the body, level."""

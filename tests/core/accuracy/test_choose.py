@@ -17,6 +17,7 @@ from sd2core.accuracy.sample import Run, Sample, take_sample
 from sd2core.accuracy.survey import Survey, survey_scene
 from sd2core.accuracy.trial import Columns, Trial, synthesizer_for
 from sd2core.doppler import PRESETS, Synthesizer
+from sd2core.doppler.synthesizer import MapFrames
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.numerics.map_accuracy import relative_l1
@@ -258,6 +259,27 @@ def test_what_a_kept_mask_changes_is_that_of_a_mask_made_elsewhere(
     change = relative_l1(alone[0], np.tile(alone[1], 2))
     assert change > 0
     assert survey.change[kept] == pytest.approx(change)
+
+
+def test_masks_are_timed_as_they_are_made_however_far_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An offset that is lost in large coordinates made no other place, and a kept mask no cost."""
+    far_m = np.array([4.8e6, 0.0, 5e5])
+    near = ball(swinging((0, 0, 3), 1.5, 0.8), fineness=1)
+    mesh = replace(near, vertices=near.read(0, 60) + far_m)
+    x, y, z = far_m.tolist()
+    sensor = VirtualSensor((x, y, z))
+    seen, stretch = [], Synthesizer.stretch
+
+    def noted(maker: Synthesizer, place: VirtualSensor, *frames: Any, **options: Any) -> MapFrames:
+        seen.append(place.position_m)
+        return stretch(maker, place, *frames, **options)
+
+    trial = Trial(mesh, sensor, PAPER, take_sample(mesh, PAPER))
+    monkeypatch.setattr(Synthesizer, "stretch", noted)
+    for _ in range(5):
+        trial.milliseconds(AccuracyPlan())
+    assert len(set(seen)) == 5
+    assert sensor.position_m not in seen
 
 
 @pytest.mark.slow
