@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -70,16 +70,6 @@ class Scatterers:
             _NO_PARTS if self.parts is None else self.parts,
             *self.kinds,
             (axes, beam.across, beam.up),
-        )
-
-    def rows(self, rows: slice) -> Scatterers:
-        """View of some of the frames; nothing is copied."""
-        return replace(
-            self,
-            normals=None if self.normals is None else self.normals[rows],
-            mask=None if self.mask is None else self.mask[rows],
-            areas=None if self.areas is None else self.areas[rows],
-            area_vectors=None if self.area_vectors is None else self.area_vectors[rows],
         )
 
     def seen(self, row: int, points: NDArray[Any], ends: NDArray[np.float64]) -> NDArray[np.bool_]:
