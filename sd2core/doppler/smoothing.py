@@ -11,12 +11,7 @@ from numpy.typing import NDArray
 
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.presence import Presence
-
-_REACH = 4.0
-"""Half width at which the Gaussian on time is cut, in sigmas."""
-
-_SLACK_S = 1e-9
-"""A frame that lies on the cut is inside on both sides, whatever the last digit says."""
+from sd2core.scattering.trajectory import REACH, SLACK_S
 
 
 def smooth(
@@ -57,7 +52,7 @@ def velocity_kernel(bins: int, sigma_bins: float) -> NDArray[np.float64]:
     """Smoothing matrix along velocity, (bins, bins), reflecting at the axis's ends."""
     kernel: NDArray[np.float64] = np.eye(bins)
     if sigma_bins > 0:
-        reach = int(_REACH * sigma_bins + 0.5)
+        reach = int(REACH * sigma_bins + 0.5)
         bell = np.exp(-0.5 / (sigma_bins * sigma_bins) * np.arange(-reach, reach + 1) ** 2)
         bell /= bell.sum()
         around = np.pad(kernel, ((reach, reach), (0, 0)), "symmetric")
@@ -85,7 +80,7 @@ def frames_within_reach(
     """
     if sigma_s == 0:
         return start, stop
-    reach = _REACH * sigma_s + 2 * _SLACK_S
+    reach = REACH * sigma_s + 2 * SLACK_S
     first = int(np.searchsorted(times_s, times_s[start] - reach))
     last = int(np.searchsorted(times_s, times_s[stop - 1] + reach, side="right"))
     return first, last
@@ -161,8 +156,8 @@ def _bells(clock: _Clock) -> _Bells:
             return bells
     frames = np.arange(start, stop)
     centres = times_s[frames]
-    reach = _REACH * sigma_s + _SLACK_S
-    slack = reach + _SLACK_S
+    reach = REACH * sigma_s + SLACK_S
+    slack = reach + SLACK_S
     before = int((frames - np.searchsorted(times_s, centres - slack)).max())
     after = int((np.searchsorted(times_s, centres + slack, side="right") - frames).max())
     neighbours, weights = [], np.zeros(len(frames))

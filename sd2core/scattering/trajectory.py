@@ -19,10 +19,10 @@ from sd2core.mesh.presence import Presence
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-_REACH = 4.0
-"""Where the Gaussian is cut, in sigmas (its value there: 3e-4 of the peak)."""
+REACH = 4.0
+"""Where a Gaussian on time is cut, in sigmas (its value there: 3e-4 of the peak)."""
 
-_SLACK_S = 1e-9
+SLACK_S = 1e-9
 """A frame that lies on the cut is inside on both sides, whatever the last digit says."""
 
 
@@ -59,7 +59,7 @@ class Trajectory:
         first = first_knot // self.oversampling
         last = -((1 - last_knot) // self.oversampling) + 1
         if self.smoothing_s > 0:
-            reach = _REACH * self.smoothing_s + 2 * _SLACK_S
+            reach = REACH * self.smoothing_s + 2 * SLACK_S
             times = self.knot_times_s
             first = int(np.searchsorted(self.frame_times_s, times[first_knot] - reach))
             last = int(
@@ -135,7 +135,7 @@ def line_weights(
     Returns the first frame, and its and the following frames' weights; None when fewer than
     two frames lie under the Gaussian.
     """
-    reach = _REACH * sigma_s + _SLACK_S
+    reach = REACH * sigma_s + SLACK_S
     first = int(np.searchsorted(times_s, time_s - reach))
     last = int(np.searchsorted(times_s, time_s + reach, side="right"))
     if last - first < 2:
