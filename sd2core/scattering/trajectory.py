@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 REACH = 4.0
 """Where a Gaussian on time is cut, in sigmas (its value there: 3e-4 of the peak)."""
 
-SLACK_S = 1e-9
-"""A frame that lies on the cut is inside on both sides, whatever the last digit says."""
+SLACK_S = 1e-6
+"""A frame that lies on the cut is inside on both sides, whatever the last digit says, which is
+2e-7 s of times since 1970."""
 
 
 @dataclass(frozen=True, eq=False)

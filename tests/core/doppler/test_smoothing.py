@@ -80,3 +80,12 @@ def test_stretches_join_without_a_seam(sigma_s: float) -> None:
             first, last = frames_within_reach(times, start, stop, sigma_s)
             part = smooth_time(values[:, first:last], times, first, start, stop, sigma_s)
             np.testing.assert_array_equal(part, whole[:, start:stop])
+
+
+def test_a_clock_since_1970_smooths_as_one_that_starts_with_the_clip() -> None:
+    """Four frames away is four sigmas: the last digit decided, frame by frame."""
+    values, times_s = np.random.default_rng(5).random((8, 90)), np.arange(90) / 30.0
+    here, since_1970 = (
+        smooth_time(values, clock, 0, 0, 90, 1.0 / 30.0) for clock in (times_s, 1.7e9 + times_s)
+    )
+    np.testing.assert_allclose(since_1970, here, rtol=2e-5)
