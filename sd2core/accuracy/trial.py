@@ -247,10 +247,7 @@ class Trial:
 
     def load_kernels(self, progress: Progress = silent) -> None:
         """Call the compiled kernels once, so that loading them from disk is not timed."""
-        for plan in (
-            AccuracyPlan(visibility="none"),
-            *visibility_plans(surface=self.mesh.faces is not None),
-        ):
+        for plan in visibility_plans(surface=self.mesh.faces is not None):
             if plan.mask_stride == 1:
                 run = self.sample.runs[0]
                 first = [Run(run.start, run.start + 1, 0)]
@@ -326,14 +323,10 @@ class Trial:
             synthesizer.stretch(place, run.start, run.stop, visibility, progress, shares=False)
             for run in runs
         ]
-        frames = sum(len(run.frames) for run in runs)
-        raws = [stretch.raw for stretch in stretches]
-        smoothed = [self._smoothed(raw, run) for raw, run in zip(raws, runs, strict=True)]
-        return Columns(
-            np.concatenate(raws, axis=1),
-            np.concatenate(smoothed, axis=1),
-            1e3 * sum(stretch.processor_s for stretch in stretches) / frames,
-        )
+        made = zip((stretch.raw for stretch in stretches), runs, strict=True)
+        joined = _joined([Columns(raw, self._smoothed(raw, run)) for raw, run in made])
+        spent_ms = 1e3 * sum(stretch.processor_s for stretch in stretches)
+        return replace(joined, milliseconds=spent_ms / joined.raw.shape[1])
 
     def _smoothed(self, raw: NDArray[np.float64], run: Run) -> NDArray[np.float64]:
         mesh = self._sampled(1.0)

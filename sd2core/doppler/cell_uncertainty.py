@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from sd2core.doppler.frame_counts import FrameCounts
 from sd2core.doppler.limb_histograms import FineAxis, fine_histograms
+from sd2core.doppler.limb_kernels import REACH
 from sd2core.doppler.masks import Visibility
 from sd2core.doppler.prepared import Block
 from sd2core.doppler.smoothing import frames_within_reach, smooth_time, velocity_kernel
@@ -31,9 +32,6 @@ from sd2core.numerics.parallel import Ticket, run_jobs
 from sd2core.progress import Progress
 from sd2core.scattering.echo_paths import EchoPath
 from sd2core.sensor import VirtualSensor
-
-_REACH = 4.0
-"""Half width at which the normal distribution is cut, in standard deviations."""
 
 _STEP_BINS = 0.25
 _MIN_STEPS, _MAX_STEPS = 16, 256
@@ -123,7 +121,7 @@ class _Piece:
         frames = slice(self._first, self._last)
         most_mps = float(max(known.along_mps[frames].max(), known.across_mps[frames].max()))
         most_bins = min(most_mps / options.axis.bin_width_mps, options.axis.bins)
-        room_bins = math.ceil(_REACH * most_bins) + 1
+        room_bins = math.ceil(REACH * most_bins) + 1
         self._axis = FineAxis(counts.counting, 0 if options.beyond == "wrap" else room_bins)
 
     def moments(self, go_on: Callable[[], None]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -217,8 +215,8 @@ def _grid(most_bins: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Grid of a standard normal variable and its weights, fine enough for this deviation."""
     if most_bins == 0:
         return np.zeros(1), np.ones(1)
-    wanted = math.ceil(2 * _REACH * most_bins / _STEP_BINS)
+    wanted = math.ceil(2 * REACH * most_bins / _STEP_BINS)
     steps = min(max(_MIN_STEPS, wanted), _MAX_STEPS)
-    nodes = np.linspace(-_REACH, _REACH, steps + 1)
+    nodes = np.linspace(-REACH, REACH, steps + 1)
     share = np.exp(-0.5 * nodes**2)
     return nodes, share / share.sum()

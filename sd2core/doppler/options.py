@@ -112,9 +112,7 @@ class SynthesisOptions(OptionRecord):
         super().__post_init__()
         if self.axis.bins > MAX_BINS:
             raise Sd2Error(f"The velocity axis has {self.axis.bins} bins", f"up to {MAX_BINS}")
-        nulled = tuple(sorted({int(number) for number in self.null_bins}))
-        if nulled and not 0 <= nulled[0] <= nulled[-1] < self.axis.bins:
-            raise Sd2Error(f"null_bins is {nulled}", f"bins from 0 to {self.axis.bins - 1}")
+        nulled = self.axis.checked_bins(self.null_bins, "null_bins")
         object.__setattr__(self, "null_bins", nulled)
         if self.velocity == "vid2doppler" and self.oversampling > 1:
             raise Sd2Error(

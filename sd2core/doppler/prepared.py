@@ -393,10 +393,7 @@ class PreparedMesh:
         return self.budget.get_or_make(key, sized)
 
     def _normals(self, block: Block) -> NDArray[np.int8]:
-        points, faces = self._at_frames(block), self._faces()
-        normals = np.empty(points.shape, np.int8)
-        visibility.vertex_normals_kernel(points, faces, normals)
-        return normals
+        return self._by(visibility.vertex_normals_kernel, block, np.int8, 3)
 
     def _steadiness(self, block: Block) -> NDArray[np.float32]:
         """How little facing tests change within groups of frames, (2, groups, V)."""
@@ -406,16 +403,10 @@ class PreparedMesh:
         return steady
 
     def _area_vectors(self, block: Block) -> NDArray[np.float32]:
-        points, faces = self._at_frames(block), self._faces()
-        vectors = np.empty(points.shape, np.float32)
-        amplitude.vertex_area_vectors_kernel(points, faces, vectors)
-        return vectors
+        return self._by(amplitude.vertex_area_vectors_kernel, block, np.float32, 3)
 
     def _middles(self, block: Block) -> NDArray[np.float64]:
-        multiplicity = (
-            np.ones(self.mesh.vertex_count) if self.multiplicity is None else self.multiplicity
-        )
-        share = multiplicity / multiplicity.sum(dtype=np.float64)
+        share = self.stands_for / self.stands_for.sum(dtype=np.float64)
         return np.stack([points @ share for points in self.points(block)])
 
     def _limb_places(self, block: Block) -> NDArray[Any]:
@@ -428,10 +419,14 @@ class PreparedMesh:
         return (self.points(block) @ member).transpose(0, 2, 1)
 
     def _areas(self, block: Block) -> NDArray[np.float32]:
-        points, faces = self._at_frames(block), self._faces()
-        areas = np.empty((len(points), points.shape[2]), np.float32)
-        amplitude.vertex_areas_kernel(points, faces, areas)
-        return areas
+        return self._by(amplitude.vertex_areas_kernel, block, np.float32)
+
+    def _by(self, kernel: Any, block: Block, precision: Any, *axes: int) -> NDArray[Any]:
+        """What a kernel makes of the surface in a block's frames, (n, *axes, V)."""
+        points = self._at_frames(block)
+        made = np.empty((len(points), *axes, points.shape[2]), precision)
+        kernel(points, self._faces(), made)
+        return made
 
     def _faces(self) -> NDArray[np.int32]:
         if self.faces is None:
