@@ -19,14 +19,8 @@ from sd2core.sensor import VirtualSensor
 _MAX_TRIALS = 8
 _MORE_TRIALS = 4
 
-_FREE_SHARE = 0.1
-"""A setting without cost is modelled when it changes the map by this share of the tolerance."""
-
 _SLACK = 1.5
 """Errors of single settings add up to more than a plan's error; by this factor at most."""
-
-_USUAL_TOLERANCE = 0.02
-"""Where a budget rules: for what costs nothing."""
 
 
 def choose(
@@ -153,14 +147,13 @@ def _cheapest(
     most_accurate = replace(survey.base, frame_rate_factor=max(FRAME_RATE_FACTORS))
     if not survey.trial.tells and holds(most_accurate):
         return most_accurate
-    plans = sorted(_candidates(survey, tolerance), key=survey.cost_key)
+    plans = sorted(_candidates(survey), key=survey.cost_key)
     forecast = {plan: survey.forecast_error(plan) for plan in plans}
     safe = [plan for plan in plans if forecast[plan] <= tolerance]
     # What must hold if anything does.
     safe.append(min(plans, key=lambda plan: (forecast[plan], survey.settings_changed(plan))))
     safe_plan = next(filter(holds, (*safe[: _MAX_TRIALS - 1], safe[-1])), None)
     if safe_plan is None:
-        holds(most_accurate)  # of the frames to check on more may be beyond the axis
         best = min(tried, key=lambda plan: tried[plan].l1)
         tried[best] = survey.trial.errors(best, sample.checked_on, progress=progress)
         return best
@@ -175,7 +168,7 @@ def _most_accurate(
     survey: Survey, budget_ms: float, dragging: bool, progress: Progress
 ) -> AccuracyPlan:
     """Plan of smallest forecast error within a budget, else the fastest."""
-    plans = _candidates(survey, _USUAL_TOLERANCE)
+    plans = _candidates(survey)
     reach_m = _reach_m(survey, progress) if dragging else None
     if reach_m is not None:
         plans += [
@@ -210,20 +203,16 @@ def _reach_m(survey: Survey, progress: Progress) -> float | None:
     return None
 
 
-def _candidates(survey: Survey, tolerance: float) -> list[AccuracyPlan]:
+def _candidates(survey: Survey) -> list[AccuracyPlan]:
+    """Plans to choose from; all wrap: that costs nothing, and more may be beyond elsewhere."""
     options = survey.trial.options
-    dropped = survey.change[replace(survey.base, beyond="drop")]
     # What changes least is left out first.
     parts = sorted(
         survey.trial.scene_parts,
         key=lambda part: survey.change[replace(survey.base, left_out=(part,))],
     )
     return [
-        replace(
-            plan,
-            beyond="wrap" if dropped > _FREE_SHARE * tolerance else "drop",
-            left_out=tuple(parts[:count]),
-        )
+        replace(plan, left_out=tuple(parts[:count]))
         for count in range(len(parts) + 1)
         for plan in counting_plans(
             options.weight,

@@ -169,9 +169,7 @@ class PlanSearch:
             )
             if not choice.holds:
                 return None
-            # What wrapping costs is nothing, and from another place more may be beyond.
-            plan = replace(choice.plan, beyond="wrap")
-            placed = self.checked(plan, tuple(reason.text for reason in choice.reasons))
+            placed = self.checked(choice.plan, tuple(reason.text for reason in choice.reasons))
             if placed is not None:
                 return placed
         return None

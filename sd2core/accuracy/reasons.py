@@ -128,13 +128,11 @@ def reasons_for(
         off = alone(beyond="drop")
         matters = tolerance is None or off > tolerance
         use = "aliasing matters, wrapped" if matters else "wrapped, which costs nothing"
-        if plan.beyond != "wrap":
-            use = "aliasing is left out, dropped"
         passed = (
             f"{percent(facts.beyond_share)} of the velocities pass {edge_mps:g} m/s and change the"
             f" map by {percent(off)}: {use}"
         )
-        add("aliasing", plan.beyond == "wrap", off, passed)
+        add("aliasing", True, off, passed)
     factor, off = plan.frame_rate_factor, alone(frame_rate_factor=1)
     use = "one moment per frame is enough" if factor == 1 else f"frame rate raised {factor} times"
     motion = (

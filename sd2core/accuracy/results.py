@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -123,10 +123,8 @@ class Measurement:
         return asdict(self) | {"results": [result.to_json() for result in self.results]}
 
     def of(self, plan: AccuracyPlan) -> PlanResult | None:
-        """Result of a plan, else of the same plan with velocities wrapped, or None."""
-        wrapped = replace(plan, beyond="wrap")
-        by_plan = {result.plan: result for result in self.results}
-        return by_plan.get(plan) or by_plan.get(wrapped)
+        """Result of a plan, or None."""
+        return next((result for result in self.results if result.plan == plan), None)
 
 
 @dataclass(frozen=True)
