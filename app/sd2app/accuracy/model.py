@@ -65,6 +65,7 @@ class AccuracyModel(ReportingModel):
 
     def _forget(self) -> None:
         self.choice: Choice | None = None  # newest by tolerance; its place may be the one before
+        self._chosen_at: VirtualSensor | None = None
         self._dragging: Choice | None = None
         self._decided_for: _Request | None = None
         self._asking: _Request | None = None
@@ -84,7 +85,8 @@ class AccuracyModel(ReportingModel):
     def in_use(self) -> InUse | None:
         """The plan at rest; None until the first choice."""
         if (result := self._clicked) is None:
-            return self._of_choice(self.choice)
+            elsewhere = self._asking is not None and self._asking.sensor != self._chosen_at
+            return self._of_choice(self.choice, elsewhere=elsewhere)
         cost_ms, elsewhere = result.cost.all_cores_ms.median, self._clicked_elsewhere
         return InUse(result.plan, result.errors.l1, cost_ms, True, elsewhere, *self._body)
 
@@ -93,14 +95,14 @@ class AccuracyModel(ReportingModel):
         """The plan while the sensor moves; None until it is known."""
         return self._of_choice(self._dragging)
 
-    def _of_choice(self, choice: Choice | None) -> InUse | None:
+    def _of_choice(self, choice: Choice | None, *, elsewhere: bool = False) -> InUse | None:
         if choice is None:
             return None
         error, cost_ms = choice.errors.l1, choice.cost_ms
         # The figures that the plot shows of the same plan, where it was measured here.
         if here := self._measured_here(choice.plan):
             error, cost_ms = here.errors.l1, here.cost.all_cores_ms.median
-        return InUse(choice.plan, error, cost_ms, False, False, *self._body)
+        return InUse(choice.plan, error, cost_ms, False, elsewhere, *self._body)
 
     def _measured_here(self, plan: AccuracyPlan) -> PlanResult | None:
         counting = self.measured.counting
@@ -263,7 +265,7 @@ class AccuracyModel(ReportingModel):
         """Use a plan that is chosen."""
         before = self.in_use, self.while_dragging
         if choice.tolerance is not None:
-            self.choice = choice
+            self.choice, self._chosen_at = choice, self._asking and self._asking.sensor
         else:
             self._dragging = choice
         if before != (self.in_use, self.while_dragging):

@@ -335,6 +335,8 @@ class SynthesisModel(ReportingModel):
         meta = made.meta | ({} if error is None else {"body_error_l1": error})
         if (in_use := self._accuracy.in_use) is not None:
             meta |= in_use.plan.provenance(in_use.error)
+            if in_use.elsewhere:  # no error is known from here
+                del meta["plan_error_l1"]
         return replace(made, meta=meta, uncertainty=self._track.uncertainty)
 
     def _stop(self) -> None:

@@ -479,6 +479,22 @@ def test_the_exported_map_is_not_counted_again_and_names_its_plan(
     assert saved.meta["plan_error_l1"] == 0.008
 
 
+def test_a_map_names_no_error_that_was_measured_from_elsewhere(context, fake, qtbot, ball):
+    fake.error = 0.008
+    open_ball(context, qtbot, ball)
+    wait_until_done(context, qtbot)
+    assert context.synthesis.whole_map().meta["plan_error_l1"] == 0.008
+    fake.gate.clear()
+    context.sensor.set_sensor(VirtualSensor((0.4, 0.0, 0.0)))
+    qtbot.waitUntil(lambda: context.synthesis.complete and context.trade.choosing)
+    meta = context.synthesis.whole_map().meta
+    assert meta["plan"]["text"] == str(fake.plan)
+    assert "plan_error_l1" not in meta
+    fake.gate.set()
+    wait_until_done(context, qtbot)
+    assert context.synthesis.whole_map().meta["plan_error_l1"] == 0.008
+
+
 @pytest.mark.parametrize(
     "plan",
     [
