@@ -107,11 +107,12 @@ def take_sample(mesh: MeshSequence, options: SynthesisOptions, runs: int = 6) ->
         return _whole(frames)
     candidates = min(max(_CANDIDATES, frames // _EVERY_FRAMES), _MOST_CANDIDATES)
     starts = np.unique(np.linspace(0, frames - length, candidates).astype(int) // every * every)
-    present = mesh.presence.present
+    present = np.logical_or.reduce([body.presence.present for body in mesh.bodies])
     with_person = [bool(present[start : start + length].all()) for start in starts.tolist()]
     peopled = _apart(starts[with_person], length)
     starts = peopled if len(peopled) >= _MIN_STARTS else _apart(starts, length)
-    speed = np.array([_speed(mesh, int(start) + length // 2) for start in starts])
+    middles = (starts + length // 2).tolist()
+    speed = np.array([sum(_speed(body, middle) for body in mesh.bodies) for middle in middles])
     order = starts[np.argsort(-speed, kind="stable")]
     # From the liveliest down to those of middling liveliness, where so many move at all.
     moving = int((speed >= _LIVELY_SHARE * speed.max()).sum())

@@ -86,6 +86,15 @@ def test_of_gestures_with_long_pauses_the_gestures_are_sampled() -> None:
         assert np.abs((run.first + 5) / FPS - starts_s - 0.75).min() < 0.75
 
 
+def test_where_one_of_several_people_moves_is_sampled() -> None:
+    gesture_s = np.array([5.0])
+    still, gone = ball(steady((0, 0, 2), (0, 0, 0)), frames=400), np.ones(400, bool)
+    gone[140:210] = False
+    scene = replace(still, present=gone, others=(ball(waving(gesture_s), frames=400),))
+    liveliest = take_sample(scene, PAPER).chosen_on[0]
+    assert abs((liveliest.first + 5) / FPS - gesture_s[0] - 0.75) < 0.75
+
+
 def test_one_frame_is_chosen_and_checked_on() -> None:
     _, sample = sampled(1)
     assert sample.chosen_on == sample.checked_on
