@@ -19,7 +19,9 @@ from sd2core.numerics.map_accuracy import percent
 if TYPE_CHECKING:
     from sd2core.accuracy.results import Measurement, PlanResult
 
-_FLOOR_PERCENT = 0.01
+_FLOOR_PERCENT, _CEILING_PERCENT = 0.01, 1e4
+"""Errors beyond are drawn here: the axis is logarithmic, and of an empty map they are infinite."""
+
 _USE = frozenset({Qt.Key.Key_Return, Qt.Key.Key_Enter})
 _UP_AND_DOWN = {Qt.Key.Key_Up: 1, Qt.Key.Key_Down: -1}
 
@@ -158,7 +160,7 @@ def _mark(result: PlanResult, in_front: bool, in_use: bool) -> Mark:
     else:
         tip = f"{words}\nClick to use it"
     pull_px = 2.0 if in_front else 0.0
-    x, y = result.cost.all_cores_ms.median, 100 * result.errors.l1
+    x, y = result.cost.all_cores_ms.median, min(100 * result.errors.l1, _CEILING_PERCENT)
     return Mark(x, y, words, tip=tip, of=result, pull_px=pull_px)
 
 

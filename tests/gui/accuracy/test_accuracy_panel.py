@@ -315,6 +315,20 @@ def test_many_points_are_painted_in_both_themes(panel, window, fake, qtbot):
     assert len(pictures) == 2
 
 
+def test_where_the_exact_map_is_empty_infinite_errors_are_painted(panel, window, fake, qtbot):
+    """Of a body that is hidden, plans that see through what hides it are off by infinity."""
+    here, measured = models_of(window).sensor.sensor, models_of(window).trade.measured
+    through = result_of(AccuracyPlan(visibility="none"), float("inf"), 0.01)
+    fake.known["histogram", here] = measurement_of(through, EXACT_RESULT)
+    measured._place = None
+    measured.rest_at(here)
+    qtbot.waitUntil(lambda: measured.measurement is not None)
+    plot = panel.findChild(AccuracyPlot)
+    qtbot.waitUntil(lambda: len(plot.marks) == 2)
+    assert plot.rect().contains(at(plot, through))
+    assert not plot.grab().isNull()
+
+
 def test_the_status_line_says_how_exact_the_map_is_and_a_click_says_why(window, qtbot):
     button = next(
         one
