@@ -212,23 +212,23 @@ def scene_facts(trial: Trial, progress: Progress = silent) -> SceneFacts:
         runs=trial.sample.chosen_on,
         progress=progress,
     )
-    live = np.zeros(synthesizer.mesh.vertex_count, np.bool_)
+    live = [np.zeros(one.mesh.vertex_count, np.bool_) for one in synthesizer.bodies]
     beyond: list[float] = []
     spreads: list[float] = []
     changes: list[float] = []
     nulled = np.array([bin_number in options.null_bins for bin_number in range(axis.bins)])
-    for run in trial.sample.chosen_on:
+    for run, (number, body) in product(trial.sample.chosen_on, enumerate(synthesizer.bodies)):
         before = None
         for frame in range(run.start, run.stop):
             progress(frame - run.start, run.stop - run.start)
-            if not synthesizer.mesh.presence.measured[frame]:
+            if not body.mesh.presence.measured[frame]:
                 before = None
                 continue
-            seen = synthesizer.frame(trial.sensor, frame, "none")
+            seen = body.frame(trial.sensor, frame, "none")
             place = np.floor((seen.velocity_mps / axis.v_max_mps + 1) * 0.5 * axis.bins)
             outside = np.abs(seen.velocity_mps) > axis.v_max_mps
             moves = outside | ~nulled[np.clip(place, 0, axis.bins - 1).astype(int)]
-            live |= moves
+            live[number] |= moves
             beyond.append(float(outside.mean()))
             low, middle, high = np.percentile(seen.range_m, (5, 50, 95))
             spreads.append(float((high - low) / middle) if middle > 0 else 0.0)
@@ -237,7 +237,7 @@ def scene_facts(trial: Trial, progress: Progress = silent) -> SceneFacts:
                 changes.append(float(step_mps.mean()) / axis.bin_width_mps)
             before = seen.velocity_mps
     return SceneFacts(
-        still_share=1.0 - float(live.mean()),
+        still_share=1.0 - float(np.concatenate(live).mean()),
         beyond_share=float(np.mean(beyond)) if beyond else 0.0,
         range_spread=float(np.median(spreads)) if spreads else 0.0,
         motion_bins=float(np.mean(changes)) if changes else 0.0,

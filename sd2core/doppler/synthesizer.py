@@ -214,7 +214,7 @@ class Synthesizer:
         self._threads = threads
         self.left_out = tuple(left_out)
         share_bytes = memory_budget_bytes // len(mesh.bodies)
-        like = () if blocks_of is None else blocks_of._bodies
+        like = () if blocks_of is None else blocks_of.bodies
         shared = (one.prepared.shared(mesh, options) for one in like)
         self.prepared: PreparedMesh = next(
             (one for one in shared if one is not None), None
@@ -232,12 +232,12 @@ class Synthesizer:
             )
             for body in mesh.others
         )
-        every = [one.prepared for one in self._bodies] if mesh.others else []
-        for one in self._bodies if mesh.others else ():
+        every = [one.prepared for one in self.bodies] if mesh.others else []
+        for one in self.bodies if mesh.others else ():
             one._frames.hide_by(tuple(other for other in every if other is not one.prepared))
 
     @property
-    def _bodies(self) -> tuple[Synthesizer, ...]:
+    def bodies(self) -> tuple[Synthesizer, ...]:
         """One for each body of the scene, this one first; each counts its own."""
         # Not kept: who holds itself is not let go with all that it has prepared.
         return (self, *self._others)
@@ -270,7 +270,7 @@ class Synthesizer:
         Of ``frames``, half-open, or as much of the clip as the budget holds.
         """
         prepared, occluded = self.prepared, self.options.visibility in ("depth", "exact")
-        for one in self._bodies[1:]:
+        for one in self.bodies[1:]:
             one.prepare(progress, frames)
         if frames is None:
             of_block = prepared.block_frames * self.mesh.vertex_count * self._bytes_per_vertex
@@ -292,7 +292,7 @@ class Synthesizer:
 
     def forget_masks(self) -> None:
         """Let none of the masks that are kept serve while the sensor moves."""
-        for one in self._bodies:
+        for one in self.bodies:
             one.prepared.places.clear()
 
     def map(
@@ -399,8 +399,8 @@ class Synthesizer:
         assert stretch.beyond_share is not None
         options, stop = self.options, start + stretch.values.shape[1]
         unshared = stretch.quality in ("none", "facing")
-        around, several = self.mesh.surroundings, len(self._bodies) > 1
-        spreads = any(one.prepared.spreads for one in self._bodies)
+        around, several = self.mesh.surroundings, len(self.bodies) > 1
+        spreads = any(one.prepared.spreads for one in self.bodies)
         measured = [body.presence.measured[start:stop] for body in self.mesh.bodies]
         return DopplerMap(
             values=stretch.values,
@@ -436,7 +436,7 @@ class Synthesizer:
                 notes.append(f"Things in the scene hide nothing in visibility {quality}.")
             if self.mesh.others:
                 notes.append(f"Nobody hides anybody else in visibility {quality}.")
-        for person, one in zip(self.mesh.persons, self._bodies, strict=True):
+        for person, one in zip(self.mesh.persons, self.bodies, strict=True):
             several = bool(self.mesh.others)
             own_notes = _body_notes(one.prepared, sensor, start, stop, several=several)
             notes += [f"{person}: {note}" if several else note for note in own_notes]
@@ -487,14 +487,14 @@ class Synthesizer:
         """
         if not 0 <= start < stop <= self.mesh.frame_count:
             raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
-        by_body = (None,) * len(self._bodies) if parts is None else (parts, *parts.others)
+        by_body = (None,) * len(self.bodies) if parts is None else (parts, *parts.others)
         # Together, so that no thread waits for another between two bodies.
         counted = [
             one._to_count(sensor, (start, stop), one._choose(visibility), its, shares)
-            for one, its in zip(self._bodies, by_body, strict=True)
+            for one, its in zip(self.bodies, by_body, strict=True)
         ]
         processor_s = self._run(counted, progress)
-        bodies = zip(self._bodies, counted, by_body, strict=True)
+        bodies = zip(self.bodies, counted, by_body, strict=True)
         each = [one._summed(its, sensor, (start, stop), part, shares) for one, its, part in bodies]
         return replace(each[0] if len(each) == 1 else self._joined(each), processor_s=processor_s)
 
@@ -621,12 +621,12 @@ class Synthesizer:
         start, stop = frames or (0, self.mesh.frame_count)
         if not 0 <= start < stop <= self.mesh.frame_count:
             raise IndexError(f"frames {start} to {stop} of {self.mesh.frame_count}")
-        chosen, of = self._choose(visibility), len(self._bodies)
+        chosen, of = self._choose(visibility), len(self.bodies)
         sensor = replace(sensor, beam=None) if "beam" in self.left_out else sensor
         await_kernels(lambda: progress(0, stop - start))
         known = any(body.uncertainty is not None for body in self.mesh.bodies)
         each = []
-        for number, one in enumerate(self._bodies):
+        for number, one in enumerate(self.bodies):
             counting = _of_bodies(progress, number, of)
             if known and one.mesh.uncertainty is None:  # what is not said is taken to be right
                 counted = one._to_count(sensor, (start, stop), chosen, None, False)

@@ -188,3 +188,12 @@ def test_a_coarse_body_requires_all_vertices() -> None:
     found = reason(choice, "geometry")
     assert found.modelled
     assert choice.plan.vertices_kept == 1
+
+
+def test_what_moves_of_several_people_is_told_of_all_of_them() -> None:
+    """Beside somebody who stands still, nobody's vertices were said to leave the nulled bins."""
+    still = ball(steady((0, 0, 3), (0, 0, 0)), fineness=2)
+    hand = ball(swinging((0.6, 0, 2), 3.0, 1.0), fineness=2)
+    choice = choose(replace(still, others=(hand,)), CAMERA, tolerance=0.05)
+    assert reason(choice, "static").value == pytest.approx(0.5)
+    assert reason(choice, "aliasing").modelled

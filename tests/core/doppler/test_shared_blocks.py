@@ -129,7 +129,7 @@ def test_a_body_that_is_put_elsewhere_takes_its_blocks_along(
     before = raw(first)
     moved = shifted_like(unshifted(scenes[0].others[0])[0], scenes[1].others[0])
     shared = Synthesizer(replace(scenes[0], others=(moved,)), chosen, blocks_of=first)
-    of_body, of_first = shared._bodies[1].prepared, first._bodies[1].prepared
+    of_body, of_first = shared.bodies[1].prepared, first.bodies[1].prepared
     assert of_body.budget is of_first.budget
     np.testing.assert_array_equal(raw(shared), raw(Synthesizer(scenes[1], chosen)))
     # Nor does what is made there change the map from here, walls included.
