@@ -235,11 +235,11 @@ def capture_of(path: Path, description: RadarDescription) -> RadarCapture:
         with np.errstate(over="ignore", invalid="ignore"):  # refused when it is read
             if "iq" in axes:
                 parts = signal.astype(np.float32)
-                parts -= np.float32(description.zero)
                 cube = parts[..., 0] + np.complex64(1j) * parts[..., 1]
             else:
                 cube = signal[..., 0].astype(np.complex64 if is_complex else np.float32)
-                cube -= np.float32(description.zero)
+            # I and Q come of one converter.
+            cube -= np.float32(description.zero) * (np.complex64(1 + 1j) if is_complex else 1)
             cube *= scale
             if averaged:
                 cube = cube.mean(axis=3, keepdims=True)

@@ -373,6 +373,7 @@ def _chirps(velocity_mps: float, chirps: int = 256) -> np.ndarray:
     return np.exp(2j * np.pi * turns).astype(np.complex64)
 
 
+PLAIN = ("frame", "chirp", "sample")
 GAPLESS = {name: value for name, value in FMCW.items() if name != "frame_repetition_s"}
 
 
@@ -409,6 +410,21 @@ def test_samples_of_matlab_are_those_in_the_order_of_matlab(tmp_path: Path, vers
     capture = load_capture(path)
     np.testing.assert_allclose(capture.read(0, 4)[:, 0], cube.transpose(2, 1, 0), rtol=1e-6)
     np.testing.assert_array_equal(capture.read(2, 3), capture.read(0, 4)[2:3])
+
+
+def test_the_zero_of_complex_samples_is_that_of_both_their_parts(tmp_path: Path) -> None:
+    counts = np.random.default_rng(1).integers(0, 256, (2, 8, SAMPLES, 2)).astype(np.uint8)
+    together = counts[..., 0] + 1j * counts[..., 1]
+    told = FMCW | {"zero": 127.5, "full_scale": 128.0}
+    for name, array, axes in (
+        ("apart", counts, (*PLAIN, "iq")),
+        ("together", together.astype(np.complex64), PLAIN),
+    ):
+        path = tmp_path / f"{name}.npy"
+        np.save(path, array)
+        write_description(RadarDescription(axes=axes, **told), path)
+        read = load_capture(path).read(0, 2)[:, 0]
+        np.testing.assert_allclose(read, (together - (127.5 + 127.5j)) / 128.0, atol=1e-6)
 
 
 def test_a_damaged_file_of_matlab_is_refused(tmp_path: Path) -> None:
