@@ -38,6 +38,7 @@ MapArray = MapKind | Literal["limbs", "kinematics"]
 """Array of energies: a kind of map, or the synthetic map split by the parts of the body; or the
 kinematics of its joints."""
 
+_POWERS = (*KINDS, "limbs")
 _CHUNKS_KEPT = 8
 
 Item = tuple[torch.Tensor, torch.Tensor]
@@ -132,8 +133,8 @@ class SegmentDataset(TorchDataset[Item]):
         items = []
         for row, one, other in zip(rows.tolist(), energies, targets, strict=True):
             gain = self._gain(row)
-            goal = other if self.target in LABEL_TARGETS else other * gain
-            given = one if self.inputs == "kinematics" else one * gain
+            given = one * gain if self.inputs in _POWERS else one
+            goal = other * gain if self.target in _POWERS else other
             items.append((torch.from_numpy(given), torch.as_tensor(goal)))
         return items
 

@@ -114,6 +114,10 @@ def test_limb_maps_are_items_where_there_is_a_synthetic_map(tmp_path: Path) -> N
     for limbs, whole in data:
         assert limbs.shape == (24, 9, 8)
         torch.testing.assert_close(limbs.sum(dim=1), whole)
+    for louder, plain in (("limbs", "kinematics"), ("kinematics", "limbs")):  # m/s have no gain
+        one = SegmentDataset(tmp_path / "set.zarr", louder, plain, gain_db=3)[0]
+        moves = SegmentDataset(tmp_path / "set.zarr", "kinematics", "label")[0][0]
+        assert torch.equal(one[(louder, plain).index("kinematics")], moves)
 
 
 def test_it_can_be_pickled_while_open(stores: dict[str, Path]) -> None:
