@@ -131,9 +131,14 @@ def test_a_description_says_what_numbers_do_not(tmp_path: Path) -> None:
     assert load_recorded_map(path).doppler.timebase.frames_per_s == pytest.approx(20.0)
 
 
-def test_frames_left_out_are_empty_and_long_gaps_are_gaps(tmp_path: Path) -> None:
+@pytest.mark.parametrize("first", ["frame", "time"])
+def test_frames_left_out_are_empty_and_long_gaps_are_gaps(tmp_path: Path, first: str) -> None:
     numbers = np.concatenate([np.arange(60), np.arange(63, 130), np.arange(900, 960)])
-    doppler = load_recorded_map(write_csv(tmp_path / "a.csv", walk(frames=numbers))).doppler
+    table = walk(frames=numbers)
+    if first == "time":
+        table[:, 0] *= FRAME_S
+    path = write_csv(tmp_path / "a.csv", table, (first, *NAMES[1:]))
+    doppler = load_recorded_map(path).doppler
     filled = doppler.values.any(axis=0)
     assert len(filled) == 60 + 3 + 67 + 60
     assert np.flatnonzero(~filled).tolist() == [60, 61, 62]
