@@ -20,7 +20,7 @@ from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, PARTS, QUANTITIES, WHO
 from sd2core.numerics.map_accuracy import MapAccuracy
 from sd2core.options.kinds import MapKind as MapKind
 from sd2core.sensor import VelocityAxis
-from sd2core.timebase import Timebase
+from sd2core.timebase import Timebase, frames_that_begin
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -437,13 +437,13 @@ class DopplerMap:
 
     def during(self, start_s: float, end_s: float) -> DopplerMap:
         """Map of the frames from one time to another (exclusive)."""
-        start, stop = np.searchsorted(self.times_s, [start_s, end_s]).tolist()
-        if start >= stop:
+        inside = frames_that_begin(self.times_s, start_s, end_s)
+        if inside.start >= inside.stop:
             raise Sd2Error(
                 f"The map has no frame from {start_s:g} to {end_s:g} s",
                 f"times between {self.times_s[0]:g} and {self.timebase.end_s:g} s",
             )
-        return self.between(start, stop)
+        return self.between(inside.start, inside.stop)
 
     def within(self, v_mps: float) -> DopplerMap:
         """Map of the bins whose velocities are between -v and v, on an axis of its own."""

@@ -72,7 +72,7 @@ def test_narrower_maps_keep_their_velocities(half: int, v_mps: float) -> None:
 @given(st.floats(-1, 4), st.floats(-1, 4))
 def test_a_part_of_the_time(start_s: float, end_s: float) -> None:
     doppler = made(start_s=0.5)
-    inside = (doppler.times_s >= start_s) & (doppler.times_s < end_s)
+    inside = (doppler.times_s >= start_s - 1e-6) & (doppler.times_s < end_s - 1e-6)
     if not inside.any():
         with pytest.raises(sd2.Sd2Error, match="no frame"):
             doppler.during(start_s, end_s)
@@ -80,6 +80,13 @@ def test_a_part_of_the_time(start_s: float, end_s: float) -> None:
     found = doppler.during(start_s, end_s)
     assert np.array_equal(found.times_s, doppler.times_s[inside])
     assert np.array_equal(found.values, doppler.values[:, inside])
+
+
+def test_typed_times_are_those_of_frames_whatever_the_offset() -> None:
+    for offset_s in np.round(np.arange(-1.0, 1.0, 0.05), 2):
+        doppler = made(start_s=0.0).shifted(offset_s)
+        times_s = doppler.during(round(0.3 + offset_s, 3), round(0.6 + offset_s, 3)).times_s
+        np.testing.assert_allclose(times_s, doppler.times_s[9:18])
 
 
 def test_levels_are_below_the_strongest_cell() -> None:
