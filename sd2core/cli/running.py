@@ -62,6 +62,9 @@ def explanation(error: Exception) -> Sd2Error:
         return of_the_system(error)
     if isinstance(error, MemoryError):
         return Sd2Error(f"There is not enough memory for this ({error})")
+    if isinstance(error, UnicodeEncodeError):  # Linux takes any bytes for a name
+        named = error.object[max(error.start - 20, 0) : error.end + 20]
+        return Sd2Error(f"A name of a file is no UTF-8, in {named!a}", "UTF-8", "Rename that file")
     if isinstance(error, ModuleNotFoundError) and error.name == "torch":
         return Sd2Error(
             "torch is needed for this, which denoises, classifies or trains, or runs a body"

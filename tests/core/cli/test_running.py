@@ -36,6 +36,11 @@ def failing(error: BaseException) -> argparse.ArgumentParser:
         (PermissionError(13, "Permission denied", "/data/a.npz"), 1, "/data/a.npz: Permission"),
         (MemoryError("Unable to allocate 9 TiB"), 1, "not enough memory"),
         (ZeroDivisionError("division by zero"), 1, "Please report it"),
+        (
+            UnicodeEncodeError("utf-8", "/a/f\udcfcr.mp4", 4, 5, "surrogates"),
+            1,
+            "no UTF-8, in '/a/f",
+        ),
     ],
 )
 def test_errors_are_one_paragraph(
