@@ -610,10 +610,11 @@ def draw_cells(
     """
     times_s = timebase.edges_s
     axes.set_facecolor(_NOTHING)
+    gaps = 1 + np.flatnonzero(np.diff(timebase.times_s) > timebase.longest_s)
     shown = axes.pcolormesh(
-        times_s,
+        np.insert(times_s, gaps, times_s[gaps - 1] + timebase.longest_s),
         axis.edges_mps,
-        np.ma.masked_invalid(level),
+        np.ma.masked_invalid(np.insert(level, gaps, np.nan, axis=1)),
         cmap=colours,
         vmin=low,
         vmax=high,

@@ -13,6 +13,7 @@ from sd2core.errors import Sd2Error
 
 _TOLERANCE_S = 1e-6
 """Arithmetic on presentation times loses less than this; no camera is that fast."""
+_LONGEST_FRAMES = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +96,14 @@ class Timebase:
     def frame_duration_s(self) -> float:
         """Typical (median) time from one frame to the next; 1/30 s for a single frame."""
         return float(np.median(np.diff(self.times_s))) if len(self) > 1 else 1.0 / 30.0
+
+    @property
+    def longest_s(self) -> float:
+        """Time for which a frame is shown at most: a radar that was stopped for longer saw nothing.
+
+        Cameras that drop some frames show one for as long.
+        """
+        return _LONGEST_FRAMES * self.frame_duration_s
 
     @cached_property
     def edges_s(self) -> NDArray[np.float64]:

@@ -97,6 +97,7 @@ def difference_of(
     clock = other.timebase
     frames = np.array([clock.frame_at(time_s) for time_s in times_s])
     covered = np.array([clock.covers(time_s) for time_s in times_s])
+    covered &= times_s - clock.times_s[frames] < clock.longest_s
     if one.present is not None:
         covered &= one.present
     if other.present is not None:

@@ -49,7 +49,7 @@ class Columns:
         # Of a column that a gap ends in, the frames after it are shown.
         later = frames[1:] > first + 1
         filled[filled] = later[filled] | (
-            left_s[filled] - timebase.times_s[first[filled]] < track.longest_s
+            left_s[filled] - timebase.times_s[first[filled]] < timebase.longest_s
         )
         if not filled.any():
             return cls(track, filled, 0, 0, np.zeros(0, np.int64))

@@ -21,8 +21,6 @@ UNCERTAIN_SHARE = 0.5
 _FAINT_SHARE = 0.05
 """Share of the highest level below which nothing shows on a linear scale."""
 
-_LONGEST_FRAMES = 5
-
 _SHOWS_SHARE = 0.1
 """Deviation, as share of the highest level, that matters where nothing shows."""
 
@@ -206,16 +204,7 @@ class MapModel(QObject):
         if self.map is None or not self.map.timebase.covers(time_s):
             return None
         frame = self.map.timebase.frame_at(time_s)
-        return frame if time_s - self.map.times_s[frame] < self.longest_s else None
-
-    @property
-    def longest_s(self) -> float:
-        """Time for which a frame is shown at most: a radar that was stopped for longer saw nothing.
-
-        Cameras that drop some frames show one for as long.
-        """
-        assert self.map is not None
-        return _LONGEST_FRAMES * self.map.timebase.frame_duration_s
+        return frame if time_s - self.map.times_s[frame] < self.map.timebase.longest_s else None
 
     def levels_db(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Values in dB above the reference; minus infinity for zero."""

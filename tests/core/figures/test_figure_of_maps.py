@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -67,6 +68,19 @@ def test_where_one_says_nothing_there_is_no_difference():
     np.testing.assert_allclose(difference[2, [0, 2]], 10 * np.log10(0.5005), atol=1e-3)
     with pytest.raises(Sd2Error, match="different velocity axes"):
         difference_of(one, row_of(np.ones((5, 3))), Levels())
+
+
+def test_a_radar_that_was_stopped_saw_nothing():
+    whole = row_of(np.ones((4, 40)), rate=8.0)
+    times_s = np.delete(whole.doppler.times_s, slice(10, 30))
+    doppler = replace(whole.doppler, values=np.ones((4, 20)), timebase=Timebase(times_s))
+    stopped = replace(whole, doppler=doppler)
+    _, known = difference_of(whole, stopped, Levels())
+    assert np.flatnonzero(~known[0]).tolist() == list(range(14, 30))
+    figure = draw_maps([stopped], Levels(), start_s=0.0, end_s=5.0)
+    (cells,) = figure.axes[0].collections
+    assert cells.get_coordinates()[0, 9:12, 0].tolist() == pytest.approx([1.125, 1.75, 3.75])
+    assert np.flatnonzero(cells.get_array().mask[0]).tolist() == [10]
 
 
 def test_a_part_of_the_difference_is_that_of_the_whole():
