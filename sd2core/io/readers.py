@@ -20,7 +20,7 @@ Content = TypeVar("Content")
 
 @dataclass(frozen=True)
 class FileReader(Generic[Content]):
-    """Reader of files, or folders, of one format.
+    """Reader of files of one format; a capture may be a folder, too.
 
     Parameters
     ----------
