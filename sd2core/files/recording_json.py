@@ -168,7 +168,7 @@ class CameraEntry(BaseModel):
 class Document(BaseModel):
     """Content of ``recording.json``; fields that this version does not know are kept."""
 
-    model_config = ConfigDict(extra="allow")
+    model_config = ConfigDict(extra="allow", validate_assignment=True)
 
     format: Literal["sd2-recording"] = FORMAT
     version: int = VERSION

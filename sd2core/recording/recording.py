@@ -42,7 +42,7 @@ from sd2core.files.recording_json import (
     read_document,
 )
 from sd2core.files.resources import resource_path
-from sd2core.files.texts import errors_in
+from sd2core.files.texts import errors_in, faults_in
 from sd2core.labels.files import FILE_NAME as LABELS_NAME
 from sd2core.labels.files import labels_of, read_labels, write_labels
 from sd2core.mesh.bodies import Body, persons_of
@@ -77,13 +77,9 @@ if TYPE_CHECKING:
 
 SUFFIX = ".sd2"
 
-_OFFSETS = {
-    "radar_offset_s": "radar offset in seconds",
-    "imu_offset_s": "inertial sensor's offset in seconds",
-}
 _AS_THEY_ARE = (
     *("title", "subject", "simulated", "camera", "mesh_reading", "bundled_denoiser"),
-    *("radar_receiver", "radar_transmitter", "imu_places"),
+    *("radar_receiver", "radar_transmitter", "radar_offset_s", "imu_places", "imu_offset_s"),
 )
 """Settings that ``recording.json`` holds as a recording does."""
 
@@ -396,13 +392,9 @@ class Recording:
 
         document = self._read.model_copy(deep=True)
         document.version = VERSION
-        for name in _AS_THEY_ARE:
-            setattr(document, name, getattr(self, name))
-        for name, words in _OFFSETS.items():
-            value = float(getattr(self, name))
-            if not math.isfinite(value):
-                raise Sd2Error(f"The {words} is {value}", "a finite number")
-            setattr(document, name, value)
+        with faults_in(self.folder, "what docs/formats.md says of a recording"):
+            for name in _AS_THEY_ARE:
+                setattr(document, name, getattr(self, name))
         document.placements = None if self.placements is None else self.placements.as_dict()
         things, bodies = _with_files(self.things, stored), _with_paths(self.bodies, stored)
         document.things = tuple(ThingEntry.model_validate(asdict(one)) for one in things)
@@ -684,7 +676,7 @@ def settings_of(document: Document, folder: Path) -> dict[str, Any]:
 
     planned = document.placements
     return {
-        **{name: getattr(document, name) for name in (*_AS_THEY_ARE, *_OFFSETS)},
+        **{name: getattr(document, name) for name in _AS_THEY_ARE},
         **{role: located(role, getattr(document, role)) for role in ROLES},
         "imu_places": tuple(dict.fromkeys(document.imu_places)),
         "sensor": VirtualSensor.from_dict(document.sensor.model_dump()),

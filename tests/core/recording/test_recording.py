@@ -270,10 +270,27 @@ class TestCreate:
         with pytest.raises(Sd2Error, match="would hold nothing"):
             Recording.create(files / "x.sd2", faces=faces)
 
-    def test_refuses_an_offset_that_is_no_number(self, files: Path) -> None:
-        with pytest.raises(Sd2Error, match="radar offset"):
-            make(files, radar_offset_s=float("nan"))
+    @pytest.mark.parametrize(
+        ("field", "value"),
+        [
+            ("radar_offset_s", float("nan")),
+            ("imu_offset_s", 1e13),
+            ("radar_receiver", 0),
+            ("subject", 5),
+            ("imu_places", (4711,)),
+        ],
+    )
+    def test_refuses_what_could_not_be_read_again(
+        self, files: Path, field: str, value: object
+    ) -> None:
+        with pytest.raises(Sd2Error, match=rf"walk\.sd2: {field}"):
+            make(files, **{field: value})
         assert not (files.parent / "walk.sd2").exists()
+        recording = make(files)
+        setattr(recording, field, value)
+        with pytest.raises(Sd2Error, match=rf"walk\.sd2: {field}"):
+            recording.save()
+        assert open_recording(recording.folder).title == recording.title
 
     def test_takes_a_folder_into_which_files_were_put(self, files: Path) -> None:
         folder = files / "ready.sd2"
