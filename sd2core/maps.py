@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.files.numpy_files import open_npz_file
-from sd2core.files.texts import check_version
+from sd2core.files.texts import check_version, faults_in
 from sd2core.mesh.presence import Presence, checked, runs
 from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, PARTS, QUANTITIES, WHOLE
 from sd2core.numerics.map_accuracy import MapAccuracy
@@ -488,8 +488,12 @@ class DopplerMap:
 
         Also ``present`` if there are columns without a person, ``expected`` and ``sd`` if
         the uncertainty of the values is known, and ``parts``, ``limbs`` and ``kinematics`` if
-        the map is split. Raises Sd2Error if a value is not finite.
+        the map is split. Raises Sd2Error for what :meth:`load` would refuse.
         """
+        from sd2core.options.declared import MapMeta  # loads pydantic
+
+        with faults_in(path, "the provenance of a map, as docs/formats.md says"):
+            MapMeta.model_validate(json.loads(json.dumps(self.meta)))
         if not np.isfinite(self.values).all():
             raise Sd2Error(f"Values of the map for {path} are NaN or infinite", "finite numbers")
         meta = {

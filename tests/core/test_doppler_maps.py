@@ -116,12 +116,19 @@ def test_a_newer_format_is_refused(tmp_path):
         DopplerMap.load(path)
 
 
+@pytest.mark.parametrize("meta", [{"notes": "by hand"}, {"options": "none"}, {"beyond_share": 2}])
+def test_what_could_not_be_read_again_is_not_saved(tmp_path, meta):
+    with pytest.raises(Sd2Error, match=rf"map\.npz: {next(iter(meta))}"):
+        map_of(np.ones((4, 3)), meta=meta).save(tmp_path / "map.npz")
+    assert not any(tmp_path.iterdir())
+
+
 def test_a_failed_write_leaves_the_old_file(tmp_path):
     path = tmp_path / "map.npz"
     map_of(np.ones((4, 3))).save(path)
     before = path.read_bytes()
     with pytest.raises(TypeError):
-        map_of(np.ones((4, 3)), meta={"sensor": object()}).save(path)
+        map_of(np.ones((4, 3)), meta={"own": object()}).save(path)
     for value in (np.nan, np.inf):
         with pytest.raises(Sd2Error, match="NaN or infinite"):
             map_of(np.full((4, 3), value)).save(path)
