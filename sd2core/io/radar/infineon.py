@@ -146,7 +146,8 @@ def write_capture(
     folder : path
         Becomes the folder with ``radar.npy``. A folder that is something else
         than a radar recording is never replaced.
-    samples : uint16 array, shape (frames, receivers, chirps, samples)
+    samples : uint16 array, shape (frames, channels, chirps, samples)
+        As in a :class:`~sd2core.io.radar.capture.RadarCapture`.
     config : RadarConfig
     times_s : array_like, shape (frames,)
         Time of every frame relative to ``start_unix_s``.
@@ -164,17 +165,20 @@ def write_capture(
     check_cube(cube, config, f"The recording for {folder}")
     if len(timebase) != len(cube):
         raise Sd2Error(f"{len(cube)} radar frames but {len(timebase)} times", "one time per frame")
+    turns = config.transmitters  # which send one chirp after the other
+    cube = cube.reshape(len(cube), turns, config.receivers, *cube.shape[2:])
+    cube = cube.transpose(0, 2, 3, 1, 4).reshape(len(cube), config.receivers, -1, cube.shape[4])
     shape = {
         "rx_antennas": list(range(1, config.receivers + 1)),
-        "tx_antennas": [1],
+        "tx_antennas": list(range(1, turns + 1)),
         "start_frequency_Hz": config.start_frequency_hz,
         "end_frequency_Hz": config.end_frequency_hz,
-        "num_chirps_per_frame": config.chirps_per_frame,
+        "num_chirps_per_frame": config.chirps_per_frame * turns,
         "num_samples_per_chirp": config.samples_per_chirp,
-        "chirp_repetition_time_s": config.chirp_repetition_s,
+        "chirp_repetition_time_s": config.chirp_repetition_s / turns,
         "frame_repetition_time_s": config.frame_repetition_s,
         "sample_rate_Hz": config.sample_rate_hz,
-        "mimo_mode": "off",
+        "mimo_mode": "tdm" if turns > 1 else "off",
     }
     described = {
         "description": config.name,

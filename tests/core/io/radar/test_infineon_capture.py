@@ -97,6 +97,16 @@ def test_a_simulated_recording_has_no_date(tmp_path: Path, cube: np.ndarray) -> 
     np.testing.assert_array_equal(capture.timebase.times_s, times_s)
 
 
+def test_transmitters_in_turns_come_back_as_they_were_written(tmp_path: Path) -> None:
+    config = replace(CONFIG, transmitters=2, receivers=3, chirps_per_frame=7)
+    shape = (FRAMES, 6, 7, config.samples_per_chirp)
+    cube = np.random.default_rng(1).integers(0, 4096, shape).astype(np.uint16)
+    times_s = np.arange(FRAMES) * config.frame_repetition_s
+    capture = load_capture(write_capture(tmp_path / "new", cube, config, times_s, simulated=True))
+    assert capture.config == config
+    np.testing.assert_array_equal(capture.samples[:], cube)
+
+
 def test_an_older_recording_is_replaced_and_anything_else_is_not(
     folder: Path, cube: np.ndarray, tmp_path: Path
 ) -> None:
