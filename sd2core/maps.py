@@ -492,8 +492,6 @@ class DopplerMap:
         """
         from sd2core.options.declared import MapMeta  # loads pydantic
 
-        with faults_in(path, "the provenance of a map, as docs/formats.md says"):
-            MapMeta.model_validate(json.loads(json.dumps(self.meta)))
         if not np.isfinite(self.values).all():
             raise Sd2Error(f"Values of the map for {path} are NaN or infinite", "finite numbers")
         meta = {
@@ -506,11 +504,14 @@ class DopplerMap:
             "unseen_bins": self.unseen_bins,
             "provenance": self.meta,
         }
+        text = json.dumps(meta, default=np.generic.tolist)  # of numbers of NumPy
+        with faults_in(path, "the provenance of a map, as docs/formats.md says"):
+            MapMeta.model_validate(json.loads(text)["provenance"])
         arrays: dict[str, Any] = {
             "values": self.values,
             "velocity_mps": self.axis.centres_mps,
             "times_s": self.times_s,
-            "meta": json.dumps(meta),
+            "meta": text,
         }
         if self.present is not None:
             arrays["present"] = self.present

@@ -123,6 +123,15 @@ def test_what_could_not_be_read_again_is_not_saved(tmp_path, meta):
     assert not any(tmp_path.iterdir())
 
 
+def test_numbers_of_numpy_in_a_provenance_are_plain_ones(tmp_path):
+    numbers = {"turned": np.int64(3), "weights": [np.float32(0.5)], "sure": np.bool_(True)}
+    axis = VelocityAxis(np.int64(4), np.float32(2.0))
+    map_of(np.ones((4, 3)), axis=axis, meta=numbers).save(tmp_path / "map.npz")
+    read = DopplerMap.load(tmp_path / "map.npz")
+    assert (read.meta, read.axis) == (numbers, axis)
+    assert type(read.meta["turned"]) is int
+
+
 def test_a_failed_write_leaves_the_old_file(tmp_path):
     path = tmp_path / "map.npz"
     map_of(np.ones((4, 3))).save(path)
