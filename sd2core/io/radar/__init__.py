@@ -107,7 +107,8 @@ def load_capture(path: Path | str) -> RadarCapture:
             return capture if own else judged(capture)
     plug_in, faults = plug_in_for(path, RADAR_FILES)
     if plug_in is not None:
-        return plug_in.use(lambda reader: reader.read(path), RadarCapture)
+        capture = plug_in.use(lambda reader: reader.read(path), RadarCapture)
+        return capture if capture.simulated else judged(capture)
     holds = sorted(entry.name for entry in path.iterdir())[:6] if path.is_dir() else []
     content = f"; it holds {', '.join(holds) or 'nothing'}" if path.is_dir() else ""
     raise Sd2Error(f"{path} is not a radar recording that can be read{content}", SUPPORTED, faults)

@@ -83,6 +83,8 @@ class TestEach:
         radar = sd2.PAPER_RADAR
         shape = (3, radar.channels, radar.chirps_per_frame, radar.samples_per_chirp)
         np.full(shape, 2048, np.uint16).tofile(path)
+        assert "hold one value" in refusal(load_capture, path)  # looked at as any other
+        np.random.default_rng(1).integers(2000, 2100, shape).astype(np.uint16).tofile(path)
         assert load_capture(path).samples.shape == shape
         assert kind_of(path) == "radar"
 
