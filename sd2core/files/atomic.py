@@ -10,6 +10,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from operator import methodcaller
 from pathlib import Path
 from typing import IO
 
@@ -86,7 +87,8 @@ def atomic_write_text(path: Path, text: str) -> None:
 
 def atomic_write_json(path: Path, content: object) -> None:
     """Replace ``path`` by JSON that people can read, in one step."""
-    atomic_write_text(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+    text = json.dumps(content, indent=2, ensure_ascii=False, default=methodcaller("tolist"))
+    atomic_write_text(path, text + "\n")
 
 
 def keep_text(path: Path, text: str) -> None:

@@ -1,15 +1,23 @@
 from __future__ import annotations
 
+import json
 import os
 import stat
 import sys
 import threading
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write, atomic_write_text, check_writable, remove_leftovers
+from sd2core.files.atomic import (
+    atomic_write,
+    atomic_write_json,
+    atomic_write_text,
+    check_writable,
+    remove_leftovers,
+)
 
 
 def test_a_block_that_raises_leaves_the_old_file_and_no_other(tmp_path):
@@ -26,6 +34,12 @@ def test_the_new_file_replaces_the_old_one(tmp_path):
     atomic_write_text(path, "old")
     atomic_write_text(path, "new: ±2 m/s")
     assert path.read_text(encoding="utf-8") == "new: ±2 m/s"
+
+
+def test_numbers_of_numpy_are_numbers_of_json(tmp_path):
+    path = tmp_path / "file.json"
+    atomic_write_json(path, {"seed": np.int64(3), "db": np.float32(0.5), "at": np.arange(2)})
+    assert json.loads(path.read_text()) == {"seed": 3, "db": 0.5, "at": [0, 1]}
 
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="POSIX permissions")
