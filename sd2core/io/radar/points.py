@@ -141,10 +141,7 @@ def read_points(path: Path, description: PointsDescription | None = None) -> Rad
     Raises Sd2Error if its columns are not known, or it holds what is no finite number.
     """
     table = open_table(path, description.dataset if description else None)
-    recognised = _recognised(table) if description is None else (description.columns, False)
-    if recognised is None:
-        raise _unknown(path, table)
-    columns, guessed = recognised
+    columns, guessed = (description.columns, False) if description else _known(path, table)
     if len(columns) != table.width:
         raise Sd2Error(
             f"{path} has {table.width} columns, its description {len(columns)}", "as many"
@@ -185,16 +182,15 @@ def _with_dates(table: TextTable, places: dict[str, int]) -> dict[str, NDArray[n
 
 def column_names(path: Path, dataset: str | None = None) -> tuple[str, ...]:
     """Columns of a table as far as they are known; Sd2Error where they are not, or it is none."""
-    table = open_table(path, dataset)
-    recognised = _recognised(table)
-    if recognised is None:
-        raise _unknown(path, table)
-    return recognised[0]
+    return _known(path, open_table(path, dataset))[0]
 
 
-def _unknown(path: Path, table: Table) -> Sd2Error:
+def _known(path: Path, table: Table) -> tuple[tuple[str, ...], bool]:
+    """What :func:`_recognised` returns; Sd2Error where columns are not known."""
+    if (recognised := _recognised(table)) is not None:
+        return recognised
     held = ", ".join(table.names) if table.names else f"{table.width} columns without names"
-    return Sd2Error(
+    raise Sd2Error(
         f"{path} holds {held}",
         "frame (or time) and doppler, and x, y, z, intensity where they are known",
         f"Name the columns in order: sd2 radar describe {path.name} {COLUMNS_OPTION}",
