@@ -38,7 +38,7 @@ MapArray = MapKind | Literal["limbs", "kinematics"]
 """Array of energies: a kind of map, or the synthetic map split by the parts of the body; or the
 kinematics of its joints."""
 
-_POWERS = (*KINDS, "limbs")
+_POWERS: tuple[str, ...] = (*KINDS, "limbs")
 _CHUNKS_KEPT = 8
 
 Item = tuple[torch.Tensor, torch.Tensor]
@@ -199,5 +199,4 @@ class SegmentDataset(TorchDataset[Item]):
 
 def _kind_of(array: str) -> int:
     """Place of an array's kind in ``available``; limb maps are where the synthetic map is."""
-    names: tuple[str, ...] = KINDS
-    return names.index("synthetic" if array in ("limbs", "kinematics") else array)
+    return _POWERS.index("synthetic" if array in ("limbs", "kinematics") else array)
