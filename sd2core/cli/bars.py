@@ -10,7 +10,7 @@ from typing import Any, TextIO
 _EVERY_S = 5.0
 
 
-class Lines:
+class Lines(AbstractContextManager["Lines"]):
     """A bar of tqdm, as far as commands use one, as a line of text every few seconds.
 
     Of what is soon done there is none.
@@ -21,9 +21,6 @@ class Lines:
         self.unit, self.total = unit, total
         self._what, self._more = what, ""
         self._last_s = time.monotonic()
-
-    def __enter__(self) -> Lines:
-        return self
 
     def __exit__(self, *_: object) -> None:
         pass

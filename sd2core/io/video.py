@@ -6,7 +6,7 @@ import math
 import threading
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -80,7 +80,7 @@ class Upright:
         return turned[:: self.down, :: self.right]
 
 
-class VideoReader:
+class VideoReader(AbstractContextManager["VideoReader"]):
     """Random access to the frames of one video file.
 
     Made by :func:`open_video`. Safe to use from several threads; a context
@@ -162,9 +162,6 @@ class VideoReader:
 
     def __len__(self) -> int:
         return len(self.timebase)
-
-    def __enter__(self) -> VideoReader:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

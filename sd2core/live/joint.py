@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from sd2core.errors import Sd2Error
 from sd2core.live.cameras import CameraChoice
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from sd2core.live.sources import Source
 
 
-class Station:
+class Station(contextlib.AbstractContextManager["Station"]):
     """A camera and a radar that stay open while recording after recording is made of them.
 
     They are opened by the first one; those that have ended, and a radar that is replayed, by the
@@ -54,9 +54,6 @@ class Station:
         self._placements, self._previews = placements, previews
         self._film: Film | None = None
         self._reception: Reception | None = None
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._close_source()
@@ -100,7 +97,7 @@ class Station:
         self._film = None
 
 
-class JointRecording:
+class JointRecording(contextlib.AbstractContextManager["JointRecording"]):
     """Video and radar of a recording, linked as soon as both are there.
 
     A context manager: what is still open of the recording at its end is closed.
@@ -122,9 +119,6 @@ class JointRecording:
         self._placements, self.linked = placements, False
         self.folder.mkdir()
         film.begin(self.folder / VIDEO_NAME)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._recording.close()
