@@ -23,6 +23,7 @@ from tools.documentation.places import DOCS, REPOSITORY
 
 _HOURS = "hours of training, due with the next denoisers"
 OLD = {
+    "accuracy-and-speed.md": "since then only how maps are cut, drawn and saved has changed",
     "performance.md": "needs an idle machine for an hour",
     "fitting.md": "ten idle minutes; only its commands and how tables are written have changed",
     "range-synthesis.md": _HOURS,
