@@ -108,6 +108,9 @@ def load_capture(path: Path | str) -> RadarCapture:
     plug_in, faults = plug_in_for(path, RADAR_FILES)
     if plug_in is not None:
         capture = plug_in.use(lambda reader: reader.read(path), RadarCapture)
+        if start_s := capture.timebase.start_s:
+            expected = "its first frame at 0 s, and when that was as start_unix_s"
+            raise Sd2Error(f"{plug_in.words} gives a capture from {start_s:g} s on", expected)
         return capture if capture.simulated else judged(capture)
     holds = sorted(entry.name for entry in path.iterdir())[:6] if path.is_dir() else []
     content = f"; it holds {', '.join(holds) or 'nothing'}" if path.is_dir() else ""

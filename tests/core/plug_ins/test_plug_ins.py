@@ -21,6 +21,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.io.kinds import kind_of
 from sd2core.io.radar import load_capture, named_radar
+from sd2core.io.readers import FileReader
 from sd2core.labels.formats import all_formats, read_labels, write_labels
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase
@@ -78,15 +79,20 @@ class TestEach:
             radars.append(plan.simulate.radar)
         assert radars == ["tea-radar", str(tmp_path / "radar.json")]
 
-    def test_capture(self, tmp_path: Path) -> None:
+    def test_capture(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         path = tmp_path / "walk.tea"
         radar = sd2.PAPER_RADAR
         shape = (3, radar.channels, radar.chirps_per_frame, radar.samples_per_chirp)
         np.full(shape, 2048, np.uint16).tofile(path)
         assert "hold one value" in refusal(load_capture, path)  # looked at as any other
         np.random.default_rng(1).integers(2000, 2100, shape).astype(np.uint16).tofile(path)
-        assert load_capture(path).samples.shape == shape
+        capture = load_capture(path)
+        assert capture.samples.shape == shape
         assert kind_of(path) == "radar"
+        late = replace(capture, timebase=capture.timebase.shifted(1.7e9))
+        reader = FileReader(lambda path: late, (".tea",))
+        monkeypatch.setattr(sys.modules["sd2_sample.captures"], "READER", reader)
+        assert "from 1.7e+09 s on. Expected: its first frame at 0 s" in refusal(load_capture, path)
 
     def test_radar_that_is_listened_to(self, tmp_path: Path) -> None:
         out = tmp_path / "cup.sd2"
