@@ -10,6 +10,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from operator import methodcaller
 from pathlib import Path
 from typing import IO
@@ -19,6 +20,8 @@ _PREFIX, _SUFFIX = ".sd2-", ".tmp"
 DISK_FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
 """Errors of the system that another write would meet as well."""
 _SHORT_WRITE = re.compile(r"\d+ requested and \d+ written")
+to_json = partial(json.dumps, ensure_ascii=False, default=methodcaller("tolist"))
+"""JSON of what may hold numbers of NumPy."""
 
 
 @contextmanager
@@ -87,8 +90,7 @@ def atomic_write_text(path: Path, text: str) -> None:
 
 def atomic_write_json(path: Path, content: object) -> None:
     """Replace ``path`` by JSON that people can read, in one step."""
-    text = json.dumps(content, indent=2, ensure_ascii=False, default=methodcaller("tolist"))
-    atomic_write_text(path, text + "\n")
+    atomic_write_text(path, to_json(content, indent=2) + "\n")
 
 
 def keep_text(path: Path, text: str) -> None:

@@ -12,7 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
-from sd2core.files.atomic import atomic_write_text
+from sd2core.files.atomic import atomic_write_text, to_json
 from sd2core.files.paths import located_path, plain_path, stored_path
 from sd2core.files.recording_json import Span as InlineSpan
 from sd2core.files.texts import (
@@ -169,7 +169,7 @@ def _lines(value: Any, indent: str) -> str:
         inner = [f"{json.dumps(key)}: {_lines(one, deeper)}" for key, one in value.items()]
         brackets = "{}"
     elif isinstance(value, list) and value and isinstance(value[0], dict):
-        inner, brackets = [json.dumps(one, ensure_ascii=False) for one in value], "[]"
+        inner, brackets = [to_json(one) for one in value], "[]"
     else:
-        return json.dumps(value, ensure_ascii=False)
+        return to_json(value)
     return f"{brackets[0]}\n{deeper}" + f",\n{deeper}".join(inner) + f"\n{indent}{brackets[1]}"

@@ -17,7 +17,6 @@ cache). Decision 43 compares this with SQLite.
 
 from __future__ import annotations
 
-import json
 import os
 import time
 import zlib
@@ -27,7 +26,7 @@ from typing import Any, Literal
 
 from pydantic import FiniteFloat, NonNegativeInt
 
-from sd2core.files.atomic import atomic_write
+from sd2core.files.atomic import atomic_write, to_json
 from sd2core.labels.comparison import same_ends
 from sd2core.labels.entries import (
     Entry,
@@ -96,7 +95,7 @@ class Kept:
 
 def packed(content: dict[str, Any]) -> bytes:
     """Encode one record."""
-    payload = json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode()
+    payload = to_json(content, separators=(",", ":")).encode()
     return b"%08x %08x %b\n" % (len(payload), zlib.crc32(payload), payload)
 
 

@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -95,6 +96,13 @@ def test_a_line_for_every_span_and_label(tmp_path: Path) -> None:
         {"id": 1, "track": "Gestures", "start_s": 1.6, "end_s": 2.8, "label": "wave"}
     ]
     assert sum('"colour"' in line for line in lines) == len(GESTURES.labels)
+
+
+def test_numbers_of_numpy_are_read_back_as_plain_ones(tmp_path: Path) -> None:
+    start_s, end_s, sure = np.float32([1.5, 2.5, 0.25])
+    span = Span(1, "Gestures", start_s, end_s, "wave", confidence=sure)
+    write_labels(tmp_path / "labels.json", Labels((LabelTrack("Gestures"),), (span,), GESTURES))
+    assert read_labels(tmp_path / "labels.json").labels.spans == (span,)
 
 
 def test_recording_and_video_move_with_the_file(tmp_path: Path) -> None:
