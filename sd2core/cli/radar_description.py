@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -88,8 +89,10 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
     from sd2core.io.radar.described import (
         RadarDescription,
         capture_of,
+        description_of,
         is_describable,
         plain_axes,
+        read_description,
         write_description,
     )
     from sd2core.io.radar.point_tables import TEXT_SUFFIXES
@@ -128,6 +131,8 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
         else:
             entries["axes"] = axes
     _ask(entries)
+    with suppress(Sd2Error):  # there is none, or write_description refuses it
+        entries["simulated"] = read_description(description_of(path)).simulated
     with faults_in(f"The description of {path}", "all that its radar needs"):
         description = RadarDescription.model_validate(entries)
     capture = capture_of(path, description)

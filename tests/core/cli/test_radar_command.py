@@ -116,7 +116,11 @@ def test_a_description_is_written_from_options(sd2: Sd2, tmp_path: Path) -> None
     assert description.axes == ("frame", "receiver", "chirp", "sample")
     assert load_capture(path).config.receivers == 2
     # Described again it is replaced, but not by what does not fit.
+    with path.with_suffix(".toml").open("a") as stream:
+        stream.write("simulated = true\n")  # which no option says
     assert sd2("radar", "describe", path, *DESCRIBED, "--name", "Yours").code == 0
+    again = read_description(path.with_suffix(".toml"))
+    assert (again.name, again.simulated) == ("Yours", True)
     outcome = sd2("radar", "describe", path, *DESCRIBED, "--axes", "frame,chirp,sample")
     assert outcome.code == 1
     assert "array of shape (4, 2, 16, 20)" in outcome.err
