@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -51,7 +52,7 @@ def write_video(
             encoder.add(picture, time_s)
 
 
-class VideoEncoder:
+class VideoEncoder(AbstractContextManager["VideoEncoder"]):
     """H.264 in MP4, picture by picture.
 
     Raises Sd2Error if this build of PyAV has no H.264 encoder.
@@ -118,9 +119,6 @@ class VideoEncoder:
         } | ({"tune": "zerolatency"} if grows else {})
         self._ticks_per_s = ticks_per_s
         self._stream.codec_context.time_base = Fraction(1, ticks_per_s)
-
-    def __enter__(self) -> VideoEncoder:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

@@ -10,8 +10,9 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import open_regular
@@ -20,7 +21,7 @@ from sd2core.files.texts import parse_json, whole_lines
 Event = dict[str, Any]
 
 
-class ProgressWriter:
+class ProgressWriter(AbstractContextManager["ProgressWriter"]):
     """Writer that appends lines to a file, made when missing, and flushes each.
 
     A last line that a kill tore off is ended first. ``watch`` is called with every line.
@@ -40,9 +41,6 @@ class ProgressWriter:
         self._stream.flush()
         if self._watch is not None:
             self._watch(line)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._stream.close()
