@@ -14,6 +14,8 @@ from sd2core.errors import Sd2Error
 _TOLERANCE_S = 1e-6
 """Arithmetic on presentation times loses less than this; no camera is that fast."""
 _LONGEST_FRAMES = 5
+_USUAL = 0.45
+"""Logarithm of a step over the usual one from which on it is a pause, or left by one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +96,13 @@ class Timebase:
 
     @cached_property
     def frame_duration_s(self) -> float:
-        """Typical (median) time from one frame to the next; 1/30 s for a single frame."""
-        return float(np.median(np.diff(self.times_s))) if len(self) > 1 else 1.0 / 30.0
+        """Typical time from one frame to the next, without pauses; 1/30 s for a single frame."""
+        if len(self) == 1:
+            return 1.0 / 30.0
+        steps_s = np.diff(self.times_s)
+        # A clock that ticks coarsely gives steps of two lengths, of which neither is the rate.
+        usual_s = np.quantile(steps_s, 0.5, method="lower")
+        return float(steps_s[np.abs(np.log(steps_s) - np.log(usual_s)) < _USUAL].mean())
 
     @property
     def longest_s(self) -> float:

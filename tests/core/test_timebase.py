@@ -75,6 +75,14 @@ def test_a_regular_timebase_has_its_rate():
     assert timebase.frame_at(124 / 30) == 124
 
 
+@pytest.mark.parametrize("tick_s", [0.0156, 0.001])
+def test_a_coarse_clock_keeps_the_rate(tick_s):
+    true_s = np.arange(100) * (0.1 if tick_s > 0.01 else 1 / 285.7)
+    times_s = np.round(true_s / tick_s) * tick_s
+    times_s[60:] += 50 * tick_s  # a pause
+    assert Timebase(times_s).frame_duration_s == pytest.approx(true_s[1], rel=0.01)
+
+
 @given(starts, steps)
 def test_every_frame_goes_from_edge_to_edge(start_s, steps_s):
     timebase = timebase_of(start_s, steps_s)

@@ -105,7 +105,7 @@ def test_nothing_is_shown_while_a_radar_was_stopped():
     times_s = np.concatenate([np.arange(10) / 10, 4.0 + np.arange(10) / 10])
     track = track_of(np.ones((2, 20)))
     track.set_map(replace(track.map, timebase=Timebase(times_s)))
-    _, filled = shade_columns(track, HeatmapLevels(), 0.0, 6.0, 120)  # 0.05 s each
+    _, filled = shade_columns(track, HeatmapLevels(), 0.01, 6.01, 120)  # 0.05 s each
     expected = [*range(28), *range(80, 100)]
     assert np.flatnonzero(filled).tolist() == expected
     _, filled = shade_columns(track, HeatmapLevels(), 0.0, 6.0, 3)
