@@ -284,13 +284,13 @@ def _clock(
         raise Sd2Error(f"{path} has {len(ticks)} ticks for {frames} frames", "one per frame")
     steps = np.diff(ticks[...].astype(np.float64))
     if server.ticks_per_second > 0 and frames > 1 and (steps > 0).all() and (steps < 1e15).all():
-        times_s = np.concatenate([[0.0], np.cumsum(steps)]) / server.ticks_per_second
+        clock = Timebase(np.append(0.0, np.cumsum(steps)) / server.ticks_per_second)
         if stated_s is None:
-            frame_s = float(np.median(steps)) / server.ticks_per_second
+            frame_s = clock.frame_duration_s
             notes.append(
                 f"No frame rate is set; by the ticks a frame comes every {1e3 * frame_s:.1f} ms."
             )
-        return Timebase(times_s), frame_s
+        return clock, frame_s
     if frame_s == 0.0:
         raise Sd2Error(f"{path} has one sweep per frame, and no rate of frames", "frame_rate")
     if frames > 1:

@@ -179,22 +179,27 @@ def test_a_recording_of_2022_is_read_as_one_of_today(tmp_path: Path) -> None:
     assert (then.config, then.notes) == (today.config, today.notes)
 
 
-def test_frames_of_one_sweep_are_joined(tmp_path: Path) -> None:
-    """A target that approaches at 0.2 m/s, one sweep every 5 ms, 70 of them."""
-    ticks, still_m = np.arange(70), 0.9
-    turns = 2.0 * (still_m - 0.2 * 0.005 * ticks) * 60.5e9 / 299_792_458.0
+@pytest.mark.parametrize("step_s", [0.005, 0.0037])
+def test_frames_of_one_sweep_are_joined(step_s: float, tmp_path: Path) -> None:
+    """A target that approaches at 0.2 m/s, 70 sweeps, their times in whole milliseconds."""
+    times_s, still_m = step_s * np.arange(70), 0.9
+    turns = 2.0 * (still_m - 0.2 * times_s) * 60.5e9 / 299_792_458.0
     frame = np.zeros((70, 1, POINTS), PARTS)
     wave = 3000.0 * np.exp(2j * np.pi * turns)
     frame["real"][:, 0, 3], frame["imag"][:, 0, 3] = np.rint(wave.real), np.rint(wave.imag)
-    changes = {"frame": frame, "tick": 5 * ticks, "data_saturated": np.zeros(70, bool)}
+    changes = {
+        "frame": frame,
+        "tick": (1e3 * times_s + 1e-6).astype(int),
+        "data_saturated": np.zeros(70, bool),
+    }
     changed = {f"{ENTRY}/result/{name}": value for name, value in changes.items()}
     path = write_a121(tmp_path / "a.h5", **changed)
     _sensor(path, sweeps_per_frame=1, sweep_rate=None, frame_rate=None)
     capture = load_capture(path)
     assert capture.samples.shape == (2, 1, 32, POINTS)
-    assert capture.config.chirp_repetition_s == pytest.approx(0.005)
-    np.testing.assert_allclose(capture.timebase.times_s, [0.0, 0.16])
-    assert any("32 are taken as one, their sweeps 5 ms" in note for note in capture.notes)
+    assert capture.config.chirp_repetition_s == pytest.approx(step_s, rel=0.01)
+    np.testing.assert_allclose(capture.timebase.times_s, [0.0, 32 * step_s], atol=1e-3)
+    assert any("32 are taken as one, their sweeps" in note for note in capture.notes)
     assert any("The last 6 frames" in note for note in capture.notes)
     off = np.abs(doppler_map(capture).peak_velocity_mps() - 0.2)
     assert off.max() < 0.51 * capture.config.velocity_resolution_mps
