@@ -29,7 +29,6 @@ from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.files.digests import cached_digest
 from sd2core.files.paths import files_at
-from sd2core.fmcw.processing import doppler_map
 from sd2core.imu.mounting import mounted
 from sd2core.imu.signals import InertialSignals
 from sd2core.imu.virtual import imu_at_frames
@@ -39,14 +38,13 @@ from sd2core.labels.per_frame import BACKGROUND, label_per_frame, plain_name
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.mesh.sequence import MeshSequence
-from sd2core.mocap.recording_pairs import on_clock
+from sd2core.mocap.recording_pairs import on_clock, radar_map
 from sd2core.placements.body_extent import BodyExtent
 from sd2core.placements.placements import Place, Placements
-from sd2core.progress import Progress, part_of, silent
-from sd2core.radar_config import CLUTTER
+from sd2core.progress import Progress, part_of
 from sd2core.recording.recording import Recording, open_recording
 from sd2core.runs.pace import Kind
-from sd2core.sensor import Vector, VelocityAxis, VirtualSensor
+from sd2core.sensor import Vector, VirtualSensor
 from sd2core.timebase import Timebase
 
 _COUNTED_SHARE = 0.05
@@ -158,22 +156,6 @@ def labels_and_classes(labels: Labels) -> tuple[tuple[str, ...], dict[str, str]]
         if one.gesture_class
     }
     return names, classes | {plain_name(one): plain_name(one) for one in (BACKGROUND, *used)}
-
-
-def radar_map(
-    recording: Recording, axis: VelocityAxis | None, progress: Progress = silent
-) -> DopplerMap:
-    """Return the map of a recording's radar file, on the recording's clock.
-
-    ``axis`` is that of a capture's map, None the radar's own; a file that holds a map keeps its
-    own.
-    """
-    if recording.holds_radar_map:
-        radar = recording.load_radar_map().doppler
-    else:
-        capture = recording.load_capture()
-        radar = doppler_map(capture, axis=axis, clutter=CLUTTER, progress=progress)
-    return radar.shifted(recording.radar_offset_s)
 
 
 class _Opened:

@@ -27,6 +27,7 @@ from sd2core.pairs.store import PairWriter, Take
 from sd2core.progress import Progress, part_of, silent
 from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import Recording, open_recording
+from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 from sd2core.version import __version__
 
@@ -177,9 +178,31 @@ def _maps(
     mesh = recording.load_mesh()
     maker, counting = Synthesizer(mesh, synthesis), part_of(progress, 0.0, 0.9)
     made = synthetic_map(maker, recording.sensor, limbs=limbs, progress=counting)
-    radar = doppler_map(recording.load_capture(), axis=synthesis.axis, clutter=CLUTTER)
+    radar = radar_map(recording, synthesis.axis)
+    if radar.axis != synthesis.axis:
+        raise Sd2Error(
+            f"The radar's map of {recording.folder} has {radar.axis.words}",
+            f"{synthesis.axis.words}, as they are asked for",
+            f"Ask for --bins {radar.axis.bins} --v-max {radar.axis.v_max_mps:g}",
+        )
     progress(1, 1)
     return made, radar, damaged_frames(mesh.vertices)
+
+
+def radar_map(
+    recording: Recording, axis: VelocityAxis | None, progress: Progress = silent
+) -> DopplerMap:
+    """Return the map of a recording's radar file, on the recording's clock.
+
+    ``axis`` is that of the map of a capture or of points, None their own; a file that holds a map
+    keeps its own.
+    """
+    if recording.holds_radar_map:
+        radar = recording.load_radar_map(axis).doppler
+    else:
+        capture = recording.load_capture()
+        radar = doppler_map(capture, axis=axis, clutter=CLUTTER, progress=progress)
+    return radar.shifted(recording.radar_offset_s)
 
 
 def check_rates(rates_hz: Mapping[Path, float]) -> None:
@@ -212,7 +235,7 @@ def _takes(
 ) -> tuple[list[Take], float]:
     """Stretches with a person and a radar frame, cut into takes; and the time left out."""
     times_s = synthetic.timebase.times_s
-    aligned = on_clock(radar.shifted(recording.radar_offset_s), synthetic.timebase)
+    aligned = on_clock(radar, synthetic.timebase)
     seen = Presence.of(aligned.present, len(times_s)).present
     if synthetic.present is not None:
         seen &= synthetic.present

@@ -73,6 +73,7 @@ if TYPE_CHECKING:
     from sd2core.io.video import VideoReader
     from sd2core.labels.spans import Labels
     from sd2core.mesh.sequence import MeshSequence
+    from sd2core.sensor import VelocityAxis
     from sd2core.timebase import Timebase
 
 SUFFIX = ".sd2"
@@ -595,11 +596,11 @@ class Recording:
 
         return self.radar is not None and holds_map(self.radar)
 
-    def load_radar_map(self) -> RecordedMap:
-        """Load the radar's own map and labels on their own clock, as the capture's is."""
+    def load_radar_map(self, axis: VelocityAxis | None = None) -> RecordedMap:
+        """Load the radar's own map and labels on their own clock; of points, on an axis."""
         from sd2core.io.radar import load_recorded_map
 
-        return load_recorded_map(self._present("radar"))
+        return load_recorded_map(self._present("radar"), axis)
 
     def _files(self) -> dict[Role, Path]:
         paths = {role: getattr(self, role) for role in ROLES}

@@ -20,11 +20,13 @@ from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
 from sd2core.io.mesh import save_mesh
+from sd2core.io.radar import load_recorded_map
 from sd2core.mocap.recording_pairs import make_recording_pairs
 from sd2core.pairs.rows import UNKNOWN
 from sd2core.pairs.store import read_pairs
 from sd2core.progress import silent
 from sd2core.radar_config import CLUTTER
+from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 from sd2core.train.data import read_mixed
 
@@ -49,6 +51,20 @@ def test_input_and_target_are_the_maps_on_one_clock(tmp_path: Path) -> None:
     assert np.array_equal(take.radar, seen.T)
     assert take.label.tolist() == [1] * 30 + [0] * 30
     assert take.times_s[0] == 0.0
+
+
+def test_a_table_of_points_is_a_target_on_the_axis_asked_for(tmp_path: Path) -> None:
+    one, table = recording(tmp_path / "anna.sd2"), tmp_path / "points.csv"
+    rows = [f"{number},{number / RATE_HZ:.6f},-3,{2 + number % 2}" for number in range(60)]
+    table.write_text("\n".join(["frame,time (s),doppler (m/s),intensity", *rows]))
+    replace(one, radar=table).save()
+    wide = replace(PRESETS["paper"], axis=VelocityAxis(64, 4.0), null_bins=())
+    make_recording_pairs([one.folder], tmp_path / "pairs.zarr", wide)
+    (take,) = read_pairs(tmp_path / "pairs.zarr").takes
+    expected = load_recorded_map(table, wide.axis).doppler.values.T
+    assert np.array_equal(take.radar, expected)
+    assert expected.sum(axis=1).tolist() == [2, 3] * 30
+    assert np.abs(wide.axis.centres_mps[take.radar.argmax(axis=1)] - 3.0).max() < 0.1
 
 
 def test_long_recordings_are_cut_and_several_are_several_people(tmp_path, monkeypatch) -> None:
