@@ -53,7 +53,8 @@ class Content(MeshReading, Channel):
     imu : FILE
         samples of an inertial sensor (.csv, .sto, .npz)
     imu_offset_s : S
-        time in the video, in seconds, of their first sample (default: 0)
+        time in the video, in seconds, of their first sample (default: 0, or their own time where
+        they are simulated)
     title : TEXT
         what to call it (default: its name)
     """
@@ -222,8 +223,7 @@ def _import(options: Import) -> None:
         recording.sensor = VirtualSensor(options.sensor)
     recording.learn_camera()
     recording.learn_simulated()
-    if options.radar_offset_s is None:
-        recording.learn_offset()
+    _learn_offsets(recording, options)
     with ExitStack() as made:
         if options.body_model is not None:
             _keep_vertices(recording, _new_folder_for_vertices(options.out, made))
@@ -274,6 +274,18 @@ def _content(options: Content) -> dict[str, Any]:
     names = ("video", "mesh", "faces", "radar", "imu", "title", "radar_offset_s", "imu_offset_s")
     channel = {f"radar_{name}": value for name, value in given(options, _CHANNEL).items()}
     return given(options, names) | channel
+
+
+def _learn_offsets(recording: Recording, options: Content) -> None:
+    """Put what is new and simulated where it stood on the clock of its mesh."""
+    from sd2core.imu.files import read_signals
+
+    if options.radar is not None and options.radar_offset_s is None:
+        recording.learn_offset()
+    if options.imu is not None and options.imu_offset_s is None:
+        signals = read_signals(options.imu)
+        if signals.simulated:
+            recording.imu_offset_s = float(signals.times_s[0])
 
 
 def _refuse_unused_channel(recording: Recording, options: Content) -> None:
@@ -341,8 +353,7 @@ def _set(options: Set) -> None:
         recording.learn_camera()
         if recording.camera is None and not told:
             recording.camera = known
-    if options.radar is not None and options.radar_offset_s is None:
-        recording.learn_offset()
+    _learn_offsets(recording, options)
     if options.body_model is not None:
         _keep_vertices(recording, recording.folder)
     recording.sensor = _placed(recording, options)

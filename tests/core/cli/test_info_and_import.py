@@ -126,6 +126,18 @@ def test_samples_of_an_inertial_sensor(sd2: Sd2, plate: Path, tmp_path: Path) ->
     assert "no unit" in outcome.err
 
 
+def test_simulated_samples_stay_on_the_clock_of_their_mesh(
+    sd2: Sd2, plate: Path, tmp_path: Path
+) -> None:
+    wrist = tmp_path / "wrist.csv"
+    with np.load(plate) as arrays:
+        np.savez(plate, **{**arrays, "times_s": arrays["times_s"] + 2.0})
+    assert sd2("imu", plate, "--at", "40", "--out", wrist).code == 0
+    outcome = sd2("import", "--out", tmp_path / "a", "--mesh", plate, "--imu", wrist)
+    assert outcome.code == 0, outcome.err
+    assert open_recording(tmp_path / "a.sd2").imu_offset_s == pytest.approx(2.0)
+
+
 def test_what_lies_in_a_simulated_recording_is_simulated(sd2: Sd2, tmp_path: Path) -> None:
     sample = tmp_path / "sample.sd2"
     assert sd2("demo", "--out", sample).code == 0
