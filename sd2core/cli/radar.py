@@ -16,6 +16,7 @@ from sd2core.radar_config import Clutter
 
 if TYPE_CHECKING:
     from sd2core.io.radar import RadarCapture
+    from sd2core.maps import DopplerMap
 
 _AXIS = ("bins", "v_max_mps")
 _CHANNEL = ("receiver", "transmitter")
@@ -131,38 +132,32 @@ def _write_map(options: Radar, out: Path) -> None:
 
     path, capture, offset_s = _found(options)
     if capture is None:
-        _write_recorded(path, offset_s, options, out)
-        return
-    with progress_bar("Processing") as progress:
-        doppler = doppler_map(
-            capture,
-            axis=chosen_axis(options),
-            clutter=options.clutter,
-            range_m=options.range,
-            progress=progress,
-        ).shifted(offset_s)
+        doppler = _recorded(path, options)
+    else:
+        with progress_bar("Processing") as progress:
+            doppler = doppler_map(
+                capture,
+                axis=chosen_axis(options),
+                clutter=options.clutter,
+                range_m=options.range,
+                progress=progress,
+            )
+    doppler = doppler.shifted(offset_s)
     doppler.save(out)
     description = describe_map(out, doppler)
-    description.data["limits"] = limits(capture.config)
-    radar = {"radar": capture.config.name, **limit_facts(capture.config)}
-    description.facts = radar | description.facts
+    if capture is not None:
+        description.data["limits"] = limits(capture.config)
+        radar = {"radar": capture.config.name, **limit_facts(capture.config)}
+        description.facts = radar | description.facts
     show(description, as_json=options.json)
 
 
-def _write_recorded(path: Path, offset_s: float, options: Radar, out: Path) -> None:
-    """Write a map that the radar made itself, or that of its points, on the axis asked for."""
-    from sd2core.cli.info.description import describe_map, show
+def _recorded(path: Path, options: Radar) -> DopplerMap:
+    """Map that the radar made itself, or that of its points, on the axis asked for."""
     from sd2core.cli.reading import chosen_axis
     from sd2core.io.radar import load_recorded_map
     from sd2core.io.radar.points import looks_like_points
 
-    if looks_like_points(path):
-        options.refuse(_OF_SAMPLES, f"and {path} holds points", "for raw samples only")
-        recorded = load_recorded_map(path, chosen_axis(options))
-    else:
-        finished = f"and {path} holds a finished map"
-        options.refuse((*_AXIS, *_OF_SAMPLES), finished, "for raw samples only")
-        recorded = load_recorded_map(path)
-    doppler = recorded.doppler.shifted(offset_s)
-    doppler.save(out)
-    show(describe_map(out, doppler), as_json=options.json)
+    refused, what = ((), "points") if looks_like_points(path) else (_AXIS, "a finished map")
+    options.refuse((*refused, *_OF_SAMPLES), f"and {path} holds {what}", "for raw samples only")
+    return load_recorded_map(path, chosen_axis(options)).doppler
