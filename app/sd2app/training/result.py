@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import ClosingModel, delayed
@@ -152,19 +150,21 @@ class ModelAdoption(ClosingModel):
             self._calm.start()
 
     def _compare(self) -> None:
+        from sd2core.mocap.recording_pairs import on_clock
+
         maps = self._maps
         plain, now, radar = maps.synthetic.map, maps.denoised.map, maps.real.map
         whole = maps.synthetic.covered is None and maps.denoised.covered is None
         ready = self.run is not None and not self.denoise.busy and whole
         if ready and plain is not None and now is not None and radar is not None:
-            target = _radar_at(plain, radar, maps.real.offset_s)
+            target = on_clock(radar.shifted(maps.real.offset_s), plain.timebase)
             before, compared = maps.before.map, self._compared()
             if before is not None:
-                self._before = compared, _peak_error(before, *target)[0]
+                self._before = compared, _peak_error(before, target)[0]
             elif self._before is not None and self._before[0] != compared:
                 self._before = None
-            plain_mps, frames = _peak_error(plain, *target)
-            now_mps, _ = _peak_error(now, *target)
+            plain_mps, frames = _peak_error(plain, target)
+            now_mps, _ = _peak_error(now, target)
             gain = Improvement(
                 plain_mps,
                 None if self._before is None else self._before[1],
@@ -213,23 +213,9 @@ def gain_rows(gain: Improvement) -> list[tuple[str, str]]:
     return [*rows, row("this model", gain.now_mps)]
 
 
-def _radar_at(
-    doppler: DopplerMap, radar: DopplerMap, offset_s: float
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Values of the radar at the frames of a map, and a mask of those it covers."""
-    times_s = doppler.timebase.times_s
-    there_s = radar.timebase.times_s + offset_s
-    nearest = np.rint(np.interp(times_s, there_s, np.arange(len(there_s)))).astype(np.int64)
-    spacing_s = np.median(np.diff(there_s)) if len(there_s) > 1 else 1.0
-    inside = np.abs(there_s[nearest] - times_s) <= 0.51 * spacing_s
-    return radar.values.T[nearest], inside
-
-
-def _peak_error(
-    doppler: DopplerMap, target: NDArray[np.float32], inside: NDArray[np.bool_]
-) -> tuple[float, int]:
+def _peak_error(doppler: DopplerMap, radar: DopplerMap) -> tuple[float, int]:
     """Mean error of the peak velocity in m/s, and of how many frames."""
     from sd2core.denoise.metrics import peak_error
 
-    error = peak_error(doppler.values.T, target, doppler.axis, inside)
+    error = peak_error(doppler.values.T, radar.values.T, doppler.axis, radar.present)
     return error.mae_mps, error.frames
