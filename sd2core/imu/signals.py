@@ -276,7 +276,8 @@ def _felt_on_end(
 
     # In the middle of the motion, where less of the digits is lost.
     values = np.concatenate([position_m - position_m.mean(axis=0), _quaternions(rotation)], axis=1)
-    even_s = np.linspace(times_s[0], times_s[-1], _frames(times_s))
+    steps = round(float(times_s[-1] - times_s[0]) / Timebase(times_s).frame_duration_s)
+    even_s = np.linspace(times_s[0], times_s[-1], max(steps + 1, MIN_FRAMES))
     step_s = even_s[1] - even_s[0]
     if len(even_s) != len(times_s) or np.abs(times_s - even_s).max() > _EVEN * step_s:
         values = make_interp_spline(times_s, values, 5)(even_s)  # (T, 7)
@@ -289,12 +290,6 @@ def _felt_on_end(
     turn_rate *= 2.0 / np.square(turns).sum(axis=1, keepdims=True)
     acceleration = curve(wanted_s, 2)[:, :3] + gravity_mps2
     return Rotation.from_quat(turns).inv().apply(acceleration), turn_rate
-
-
-def _frames(times_s: Floats) -> int:
-    """Number of frames at the typical rate between the first and the last time."""
-    step_s = float(np.median(np.diff(times_s)))
-    return max(round(float(times_s[-1] - times_s[0]) / step_s) + 1, MIN_FRAMES)
 
 
 def _quaternions(rotation: Floats) -> Floats:
