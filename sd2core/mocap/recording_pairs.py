@@ -13,15 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.parts import synthetic_map
-from sd2core.denoise.resample_to_model import clips
+from sd2core.denoise.resample_to_model import clips, even_times, interpolated, is_regular
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import check_distinct
 from sd2core.fmcw.processing import doppler_map
 from sd2core.io.stored_vertices import damaged_frames
 from sd2core.labels.per_frame import BACKGROUND, label_per_frame, plain_name
-from sd2core.maps import DopplerMap
-from sd2core.mesh.presence import Presence
+from sd2core.maps import DopplerMap, MapKind
 from sd2core.pairs.rows import agreed
 from sd2core.pairs.store import PairWriter, Take
 from sd2core.progress import Progress, part_of, silent
@@ -89,7 +88,8 @@ def make_recording_pairs(
     labels = label_names(opened)
     channels = [one.channel_in_words for one in opened]
     writer: PairWriter | None = None
-    first: tuple[Path, float, bool] | None = None
+    rates_hz: dict[Path, float] = {}
+    kinds: list[MapKind] = []
     by_subject: dict[str, tuple[int, int]] = {}
     left_out_s = 0.0
     damaged: dict[str, int] = {}
@@ -97,14 +97,20 @@ def make_recording_pairs(
         synthetic, radar, lost = _maps(
             recording, synthesis, limbs, part_of(progress, number, number + 1, len(opened))
         )
-        rate_hz = synthetic.timebase.frames_per_s
-        this = (recording.folder, rate_hz, radar.kind == "simulated")
-        first = first or this
-        _compare(first, this)
+        rates_hz[recording.folder] = rate_hz = synthetic.timebase.frames_per_s
+        check_rates(rates_hz)
+        kinds.append(radar.kind)
+        if radar.kind != kinds[0]:
+            raise Sd2Error(
+                f"Of {opened[0].folder} and {recording.folder} the radar of one is simulated, of"
+                " the other real",
+                "all real or all simulated",
+                "Make two stores; `sd2 train` mixes them",
+            )
         if writer is None:
             writer = PairWriter(
                 out,
-                kind="simulated" if this[2] else "real",
+                kind="simulated" if radar.kind == "simulated" else "real",
                 axis=synthesis.axis,
                 null_bins=synthesis.null_bins,
                 frame_rate_hz=round(rate_hz, 3),
@@ -216,16 +222,6 @@ def check_rates(rates_hz: Mapping[Path, float]) -> None:
             )
 
 
-def _compare(first: tuple[Path, float, bool], this: tuple[Path, float, bool]) -> None:
-    check_rates({first[0]: first[1], this[0]: this[1]})
-    if this[2] != first[2]:
-        raise Sd2Error(
-            f"Of {first[0]} and {this[0]} the radar of one is simulated, of the other real",
-            "all real or all simulated",
-            "Make two stores; `sd2 train` mixes them",
-        )
-
-
 def _takes(
     recording: Recording,
     subject: str,
@@ -235,31 +231,47 @@ def _takes(
 ) -> tuple[list[Take], float]:
     """Stretches with a person and a radar frame, cut into takes; and the time left out."""
     times_s = synthetic.timebase.times_s
-    aligned = on_clock(radar, synthetic.timebase)
-    seen = Presence.of(aligned.present, len(times_s)).present
-    if synthetic.present is not None:
-        seen &= synthetic.present
-    target = aligned.values.T.copy()  # (frames, bins)
-    target[:, list(synthetic.null_bins)] = 0.0
-    label = frame_labels(recording, labels, times_s)
+    seen = on_clock(radar, synthetic.timebase).present_mask & synthetic.present_mask
     rate_hz = synthetic.timebase.frames_per_s
     takes: list[Take] = []
     kept = 0
     for start, stop in take_frames(times_s, seen, rate_hz):
         kept += stop - start
+        part = _evenly(synthetic.between(start, stop), rate_hz)
+        target = on_clock(radar, part.timebase).values.T.copy()  # (frames, bins)
+        target[:, list(synthetic.null_bins)] = 0.0
         takes.append(
             Take(
                 subject=subject,
                 name=f"{recording.folder.stem}-{len(takes):03d}",
-                synthetic=np.ascontiguousarray(synthetic.values.T[start:stop]),
-                radar=target[start:stop],
-                times_s=times_s[start:stop] - times_s[start],
-                label=label[start:stop],
+                synthetic=np.ascontiguousarray(part.values.T),
+                radar=target,
+                times_s=part.times_s - part.times_s[0],
+                label=frame_labels(recording, labels, part.times_s),
                 sensor_position_m=np.asarray(recording.sensor.position_m, np.float64),
-                limbs=synthetic.between(start, stop).limbs,
+                limbs=part.limbs,
             )
         )
     return takes, float((len(times_s) - kept) / rate_hz)
+
+
+def _evenly(doppler: DopplerMap, rate_hz: float) -> DopplerMap:
+    """The map as a model takes it, at an even rate, where frames of it were lost."""
+    if is_regular(doppler.times_s, rate_hz):
+        return doppler
+    even_s = even_times(doppler.times_s, rate_hz)
+
+    def there(values: NDArray[np.float32]) -> NDArray[np.float32]:
+        frames = np.moveaxis(values, -1, 0)
+        made = interpolated(frames.reshape(len(frames), -1), doppler.times_s, even_s)
+        return np.moveaxis(made.reshape(len(even_s), *frames.shape[1:]), 0, -1)
+
+    limbs = doppler.limbs
+    if limbs is not None:
+        moves = None if limbs.kinematics is None else there(limbs.kinematics)
+        limbs = replace(limbs, values=there(limbs.values), kinematics=moves)
+    clock = Timebase(even_s)
+    return DopplerMap(there(doppler.values), doppler.axis, clock, doppler.kind, limbs=limbs)
 
 
 def take_frames(
@@ -308,19 +320,12 @@ def on_clock(radar: DopplerMap, timebase: Timebase) -> DopplerMap:
     ``radar`` has its times on that clock. ``present`` is False where it recorded no frame
     near enough, or says itself that its frame shows no person.
     """
-    nearest, seen = _nearest(timebase.times_s, radar.times_s)
+    times_s, other_s = timebase.times_s, radar.times_s
+    right = np.clip(np.searchsorted(other_s, times_s), 0, len(other_s) - 1)
+    left = np.maximum(right - 1, 0)
+    nearest = np.where(times_s - other_s[left] <= np.abs(other_s[right] - times_s), left, right)
+    seen = np.abs(other_s[nearest] - times_s) <= 0.75 * radar.timebase.frame_duration_s
     if radar.present is not None:
         seen &= radar.present[nearest]
     values = radar.values[:, nearest]
     return replace(radar, values=values, timebase=timebase, present=seen, uncertainty=None)
-
-
-def _nearest(
-    times_s: NDArray[np.float64], other_s: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Nearest moments of another clock, and whether they are as near as its frames are."""
-    right = np.clip(np.searchsorted(other_s, times_s), 0, len(other_s) - 1)
-    left = np.maximum(right - 1, 0)
-    nearest = np.where(times_s - other_s[left] <= np.abs(other_s[right] - times_s), left, right)
-    spacing_s = float(np.median(np.diff(other_s))) if len(other_s) > 1 else 0.0
-    return nearest, np.abs(other_s[nearest] - times_s) <= 0.75 * spacing_s

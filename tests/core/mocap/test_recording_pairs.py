@@ -21,6 +21,7 @@ from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
 from sd2core.io.mesh import save_mesh
 from sd2core.io.radar import load_recorded_map
+from sd2core.maps import mean_velocity_mps
 from sd2core.mocap.recording_pairs import make_recording_pairs
 from sd2core.pairs.rows import UNKNOWN
 from sd2core.pairs.store import read_pairs
@@ -120,6 +121,24 @@ def test_no_take_reaches_over_lost_frames(tmp_path: Path) -> None:
     save_mesh(replace(mesh, timebase=Timebase(later_s)), one.folder / "mesh.npz")
     make_recording_pairs([one.folder], tmp_path / "pairs.zarr")
     assert [len(take.times_s) for take in read_pairs(tmp_path / "pairs.zarr").takes] == [50, 70]
+
+
+def test_a_take_whose_frames_were_lost_is_at_an_even_rate(tmp_path: Path) -> None:
+    """Every fifth picture is missing, as of a camera that is too slow: nothing moves faster."""
+    one = recording(tmp_path / "anna.sd2")
+    mesh = one.load_mesh()
+    make_recording_pairs([one.folder], tmp_path / "whole.zarr")
+    kept = np.flatnonzero(np.arange(mesh.frame_count) % 5 != 3)
+    fewer = replace(mesh, vertices=mesh.vertices[kept], timebase=Timebase(mesh.times_s[kept]))
+    save_mesh(fewer, one.folder / "mesh.npz")
+    make_recording_pairs([one.folder], tmp_path / "pairs.zarr")
+    (whole,), (take,) = (read_pairs(tmp_path / f"{name}.zarr").takes for name in ("whole", "pairs"))
+    assert len(fewer.times_s) < len(take.times_s) == len(whole.times_s)
+    np.testing.assert_allclose(take.times_s, whole.times_s, atol=1e-9)
+    assert np.array_equal(take.radar, whole.radar)
+    assert np.array_equal(take.label, whole.label)
+    means = [mean_velocity_mps(each.synthetic, PRESETS["paper"].axis) for each in (take, whole)]
+    assert np.corrcoef(*means)[0, 1] > 0.98
 
 
 def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
