@@ -14,7 +14,6 @@ from sd2app.session.session import Maps
 from sd2app.training.model import TrainingModel
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
-from sd2core.maps import DopplerMap
 
 CALM_MS = 150
 
@@ -150,6 +149,7 @@ class ModelAdoption(ClosingModel):
             self._calm.start()
 
     def _compare(self) -> None:
+        from sd2core.denoise.metrics import velocity_error
         from sd2core.mocap.recording_pairs import on_clock
 
         maps = self._maps
@@ -158,23 +158,23 @@ class ModelAdoption(ClosingModel):
         ready = self.run is not None and not self.denoise.busy and whole
         if ready and plain is not None and now is not None and radar is not None:
             target = on_clock(radar.shifted(maps.real.offset_s), plain.timebase)
+            true = target.peak_velocity_mps(), target.present
             before, compared = maps.before.map, self._compared()
             if before is not None:
-                self._before = compared, _peak_error(before, target)[0]
+                self._before = compared, velocity_error(before.peak_velocity_mps(), *true).mae_mps
             elif self._before is not None and self._before[0] != compared:
                 self._before = None
-            plain_mps, frames = _peak_error(plain, target)
-            now_mps, _ = _peak_error(now, target)
+            off = velocity_error(plain.peak_velocity_mps(), *true)
             gain = Improvement(
-                plain_mps,
+                off.mae_mps,
                 None if self._before is None else self._before[1],
-                now_mps,
+                velocity_error(now.peak_velocity_mps(), *true).mae_mps,
                 self.previous.stem if self.previous is not None else "",
-                frames,
+                off.frames,
                 radar.kind == "simulated",
             )
             # Without a frame in which the radar saw a movement there is nothing to tell.
-            self._gain = gain if frames else None
+            self._gain = gain if off.frames else None
             self._gain_of = *compared, self._shown()
         elif radar is None or now is None:
             self._gain = None
@@ -211,11 +211,3 @@ def gain_rows(gain: Improvement) -> list[tuple[str, str]]:
     if gain.before_mps is not None:
         rows.append(row(f"before, {gain.before_title}", gain.before_mps))
     return [*rows, row("this model", gain.now_mps)]
-
-
-def _peak_error(doppler: DopplerMap, radar: DopplerMap) -> tuple[float, int]:
-    """Mean error of the peak velocity in m/s, and of how many frames."""
-    from sd2core.denoise.metrics import peak_error
-
-    error = peak_error(doppler.values.T, radar.values.T, doppler.axis, radar.present)
-    return error.mae_mps, error.frames
