@@ -298,7 +298,7 @@ def scenes_of(recordings: Iterable[Recording]) -> dict[str, Any]:
 
 def label_names(recordings: Iterable[Recording]) -> tuple[str, ...]:
     """Return all names of labels in recordings, the background first."""
-    used = {plain_name(span.label) for one in recordings for span in one.labelled.decided}
+    used = {plain_name(span.label) for one in recordings for span in one.effective_labels().decided}
     most = np.iinfo(np.int8).max
     if len(used) >= most:
         raise Sd2Error(f"The recordings have {len(used)} labels", f"fewer than {most}")
@@ -309,7 +309,7 @@ def frame_labels(
     recording: Recording, names: tuple[str, ...], times_s: NDArray[np.float64]
 ) -> NDArray[np.int8]:
     """Return the number of the label at some times; see :func:`~sd2core.pairs.rows.agreed`."""
-    labels = recording.labelled
+    labels = recording.effective_labels()
     of_person = [labels.of_person(person) for person in labels.persons] or [labels]
     return agreed([label_per_frame(one, names, times_s) for one in of_person])
 

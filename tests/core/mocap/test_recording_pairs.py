@@ -21,15 +21,18 @@ from sd2core.errors import Sd2Error
 from sd2core.fmcw.processing import doppler_map
 from sd2core.io.mesh import save_mesh
 from sd2core.io.radar import load_recorded_map
+from sd2core.io.radar.kkt import FRAME_S
 from sd2core.maps import mean_velocity_mps
 from sd2core.mocap.recording_pairs import make_recording_pairs
 from sd2core.pairs.rows import UNKNOWN
 from sd2core.pairs.store import read_pairs
 from sd2core.progress import silent
 from sd2core.radar_config import CLUTTER
+from sd2core.recording.recording import Recording
 from sd2core.sensor import VelocityAxis
 from sd2core.timebase import Timebase
 from sd2core.train.data import read_mixed
+from tests.core.io.radar.kkt_files import write_kkt
 
 
 def test_input_and_target_are_the_maps_on_one_clock(tmp_path: Path) -> None:
@@ -66,6 +69,21 @@ def test_a_table_of_points_is_a_target_on_the_axis_asked_for(tmp_path: Path) -> 
     assert np.array_equal(take.radar, expected)
     assert expected.sum(axis=1).tolist() == [2, 3] * 30
     assert np.abs(wide.axis.centres_mps[take.radar.argmax(axis=1)] - 3.0).max() < 0.1
+
+
+def test_a_radars_own_map_brings_its_axis_and_its_labels(tmp_path: Path) -> None:
+    mesh = recording(tmp_path / "anna.sd2", radar=False).mesh
+    bare = Recording(tmp_path / "own.sd2", mesh=mesh, radar=write_kkt(tmp_path / "wave.h5", 60))
+    one = bare.save_as(bare.folder)
+    with pytest.raises(Sd2Error, match=r"has 31 bins.*--bins 31 --v-max 1\.9375"):
+        make_recording_pairs([one.folder], tmp_path / "pairs.zarr")
+    own = replace(PRESETS["paper"], axis=VelocityAxis(31, 1.9375), null_bins=())
+    make_recording_pairs([one.folder], tmp_path / "pairs.zarr", own)
+    pairs = read_pairs(tmp_path / "pairs.zarr")
+    assert (pairs.kind, pairs.labels) == ("real", ("background", "Wave"))
+    (take,) = pairs.takes
+    labelled_s = take.times_s[take.label == 1]
+    assert 4 * FRAME_S <= labelled_s[0] < labelled_s[-1] < 9 * FRAME_S
 
 
 def test_long_recordings_are_cut_and_several_are_several_people(tmp_path, monkeypatch) -> None:
