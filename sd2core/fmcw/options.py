@@ -88,9 +88,9 @@ class WaveOptions:
         surface is cut; gamma is set so that a facet of lambda^2 / 4 seen square
         on echoes as it would smooth and small.
     motion : {"constant", "interpolated"}
-        Within a frame: constant velocity, or vertices interpolated at every
-        chirp (cubic Hermite over the mesh's frames; the reference, one sum per
-        chirp).
+        Within a frame: constant velocity (of frames over 1/30 s in pieces of up to
+        1/60 s), or vertices interpolated at every chirp (cubic Hermite over the mesh's
+        frames; the reference, one sum per chirp).
     receiver_offsets_m : tuple of positions
         Receivers relative to the transmitter, which is at the sensor, in the
         sensor's frame: x to its right, y down, z along the boresight. Empty:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -32,6 +33,9 @@ BeatSignal = NDArray[Any]
 
 _LONGEST_PIECE_M = 0.1
 """Of a thing: over it neither its direction nor its range changes much."""
+
+_STEADY_S = 1.0 / 30.0
+"""Longest frame with one velocity; in longer ones, as of Wi-Fi, an arm turns round."""
 
 _NO_PLANE = np.array([0.0, 0.0, 0.0, 1.0])
 
@@ -144,13 +148,18 @@ class WaveScene:
 
     def bursts(self, time_s: float) -> Iterator[tuple[tuple[NDArray[np.float64], ...], int]]:
         """Yield vertices and velocities, and the number of chirps of a frame that they hold for."""
-        chirps = self.config.chirps_per_frame
-        if self.wave.motion == "constant":
+        chirps, step_s = self.config.chirps_per_frame, self.config.chirp_repetition_s
+        pieces = math.ceil(2.0 * chirps * step_s / _STEADY_S)
+        if self.wave.motion == "interpolated":
+            pieces = chirps
+        elif pieces <= 2:
             yield self.scene.moving(time_s), chirps
             return
         places = np.arange(chirps, dtype=np.float64) - 0.5 * (chirps - 1)
-        for moving in self.scene.between(time_s + places * self.config.chirp_repetition_s):
-            yield moving, 1
+        parts = np.array_split(time_s + places * step_s, min(pieces, chirps))
+        middles_s = np.array([part.mean() for part in parts])
+        for moving, part in zip(self.scene.between(middles_s), parts, strict=True):
+            yield moving, len(part)
 
     def echoes(
         self,

@@ -21,6 +21,7 @@ from sd2core.fmcw import (
     range_doppler,
     simulate_radar,
 )
+from sd2core.fmcw.chain import taper
 from sd2core.io.radar import load_capture, named_radar
 from sd2core.io.radar.described import write_described
 from sd2core.mesh.sequence import MeshSequence
@@ -102,6 +103,29 @@ def test_data_sets_hold_maps_of_any_of_them(name: str) -> None:
     width_mps = max(RADARS[name].velocity_resolution_mps, axis.bin_width_mps)
     assert abs(middle - 0.9) <= width_mps
     assert Simulation(RADARS[name]).as_json()["radar"]["name"] == RADARS[name].name
+
+
+@pytest.mark.parametrize("name", ["k-band", "cw-5.8ghz", "wifi-2.4ghz"])
+def test_what_speeds_up_within_a_frame_is_spread_over_its_velocities(name: str) -> None:
+    """Variance of a windowed signal's frequency: that of its phase's slope, and the window's.
+
+    L. Cohen, Time-Frequency Analysis, 1995, section 1.5.
+    """
+    config, rise_mps2 = RADARS[name], 8.0
+    still = plate(0.0)
+    away_m = -0.5 * rise_mps2 * (still.times_s - still.times_s.mean()) ** 2
+    vertices = still.vertices[:] + away_m[:, None, None] * np.array([0.0, 0.0, 1.0])
+    mesh = replace(still, vertices=vertices.astype(np.float32))
+    axis = VelocityAxis(512, config.v_max_mps)
+    column = frame_spectra(mesh, config, [still.times_s.mean()], wave=SMOOTH, axis=axis)[:, 0]
+    share, velocity_mps = column / column.sum(), axis.centres_mps
+    found = share @ velocity_mps**2 - (share @ velocity_mps) ** 2
+    step_s = config.chirp_repetition_s
+    window = taper("hann", config.chirps_per_frame).astype(np.float64)
+    moment_s = (np.arange(len(window)) - 0.5 * (len(window) - 1)) * step_s
+    spread = rise_mps2**2 * (window**2 @ moment_s**2) / (window**2).sum()
+    slope = np.gradient(window, step_s) * config.wavelength_m / (4 * np.pi)
+    assert found == pytest.approx(spread + (slope @ slope) / (window @ window), rel=0.15)
 
 
 def test_a_name_that_is_none_is_refused_with_those_that_are() -> None:
