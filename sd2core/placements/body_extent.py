@@ -111,25 +111,30 @@ class BodyExtent:
 def notes_on(
     mesh: MeshSequence, sensor: VirtualSensor, radar: RadarConfig | None = None
 ) -> tuple[str, ...]:
-    """Sentences on a sensor in the box around the body, and on what of it folds for a radar."""
-    if not mesh.presence.present.any():
-        return ()
-    seen = BodyExtent.of(mesh).coverage((sensor,))
-    problems = {"inside": seen.inside} if radar is None else seen.problems(radar)
-    met, notes = {name for name, mask in problems.items() if mask[0]}, []
-    if "inside" in met:
-        notes.append(
-            "The sensor stands in the box around the body: what is nearest outweighs all else."
-        )
-    if radar is not None and "out_of_range" in met:
-        turned = ", and velocities have the wrong sign" if radar.sampling == "real" else ""
-        notes.append(
-            f"The body is up to {seen.farthest_m[0]:.1f} m away: beyond {radar.range_max_m:.1f} m"
-            f" this radar's beat frequencies fold, so that it seems to be nearer{turned}."
-        )
-    if radar is not None and "aliasing" in met:
-        notes.append(
-            f"The body is as fast as {seen.fastest_mps[0]:.1f} m/s: beyond"
-            f" {radar.v_max_mps:.1f} m/s this radar's velocities fold."
-        )
+    """Sentences on a sensor in the box around a body, and on what of one folds for a radar."""
+    notes = []
+    for person, body in zip(mesh.persons, mesh.bodies, strict=True):
+        if not body.presence.present.any():
+            continue
+        seen = BodyExtent.of(body).coverage((sensor,))
+        problems = {"inside": seen.inside} if radar is None else seen.problems(radar)
+        met = {name for name, mask in problems.items() if mask[0]}
+        whose = f" of {person}" if mesh.others else ""
+        if "inside" in met:
+            notes.append(
+                f"The sensor stands in the box around the body{whose}: what is nearest outweighs"
+                " all else."
+            )
+        if radar is not None and "out_of_range" in met:
+            turned = ", and velocities have the wrong sign" if radar.sampling == "real" else ""
+            notes.append(
+                f"The body{whose} is up to {seen.farthest_m[0]:.1f} m away: beyond"
+                f" {radar.range_max_m:.1f} m this radar's beat frequencies fold, so that it seems"
+                f" to be nearer{turned}."
+            )
+        if radar is not None and "aliasing" in met:
+            notes.append(
+                f"The body{whose} is as fast as {seen.fastest_mps[0]:.1f} m/s: beyond"
+                f" {radar.v_max_mps:.1f} m/s this radar's velocities fold."
+            )
     return tuple(notes)

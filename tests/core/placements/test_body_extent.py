@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -93,3 +95,13 @@ def test_what_is_wrong_with_a_sensor_is_said(position_m, interval_s, radar, word
     assert all(word in notes for word in words)
     assert bool(notes) == bool(words)
     assert notes_on(cube_walking_right(present=np.zeros(10, bool)), sensor, radar) == ()
+
+
+def test_what_folds_of_another_body_is_said_with_its_name():
+    near = replace(cube_walking_right(interval_s=10.0), faces=np.array([[0, 1, 2]], np.int32))
+    far = replace(near, vertices=near.vertices[:] + np.float32([0.0, 0.0, 9.0]), person="anna")
+    alone, both = near, replace(near, others=(far,))
+    sensor = VirtualSensor((4.5, 0.0, 0.0))
+    assert notes_on(alone, sensor, PAPER_RADAR) == ()
+    (note,) = notes_on(both, sensor, PAPER_RADAR)
+    assert note.startswith("The body of anna is up to 13.5 m away: beyond 9.6 m")
