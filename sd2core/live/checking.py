@@ -23,6 +23,8 @@ _CHANCE = 0.01
 _MOVING_SHARE = 0.25
 """Of the frames, in which a person who walks to and fro is seen at the least."""
 _GREATEST_DB = 120.0
+_NOTCH = 5
+"""Bins of the padded spectrum from 0 m/s on, within which the clutter filter takes noise, too."""
 _NOISE_SIGMAS, _MIN_STEP = 5.0, 2.0
 """Change of a pixel that is none of the camera's noise: five standard deviations, two grey levels
 where it has none. Of 14,400 pixels chance gives 0.01."""
@@ -95,7 +97,9 @@ def seen_in(frame: RadarCapture, time_s: float) -> Seen:
         return Seen(time_s, -_GREATEST_DB)
     # Most cells hold noise; a median does not mind those that do not.
     typical = gammaincinv(config.channels, 0.5) / config.channels
-    noise = max(float(np.median(power)) / typical, strongest * 10.0 ** (-0.1 * _GREATEST_DB))
+    notch = min(_NOTCH, len(power) // 2)
+    noise = float(np.median(power[notch : 1 - notch])) / typical
+    noise = max(noise, strongest * 10.0 ** (-0.1 * _GREATEST_DB))
     moving = np.where(power > noise * 10.0 ** (0.1 * chance_db(config)), power, 0.0)
     level_db = 10.0 * float(np.log10(strongest / noise))
     total = float(moving.sum())

@@ -101,9 +101,11 @@ def test_a_reflector_is_at_its_place_and_speed() -> None:
     assert strong.level_db - weak.level_db == pytest.approx(20.0, abs=1.5)
 
 
-@pytest.mark.parametrize("receivers", [1, 3])
-def test_noise_alone_looks_like_motion_in_one_frame_of_a_hundred(receivers: int) -> None:
-    radar = replace(WIDE, receivers=receivers)
+@pytest.mark.parametrize(("receivers", "chirps"), [(1, 64), (3, 64), (1, 8), (1, 4)])
+def test_noise_alone_looks_like_motion_in_one_frame_of_a_hundred(
+    receivers: int, chirps: int
+) -> None:
+    radar = replace(WIDE, receivers=receivers, chirps_per_frame=chirps)
     still = np.full(radar.chirps_per_frame, 1.0)
     levels = [
         seen_in(frame_of(still, still, radar, echo=0.0, seed=seed), 0.0).level_db
