@@ -46,6 +46,7 @@ from sd2core.placements.placements import PlacementGrid
 from sd2core.progress import silent
 from sd2core.radar_config import CLUTTER
 from sd2core.recording.recording import Recording
+from sd2core.sensor import Beam
 from sd2core.train.data import read_mixed
 from tests.damaged_files import lose
 
@@ -80,8 +81,11 @@ def test_a_recording_is_its_own_maps_on_the_clock_of_its_mesh(tmp_path: Path) ->
     assert source.spherical[0] == pytest.approx(2.0, abs=0.05)
 
 
-def test_every_placement_is_seen_from_there(tmp_path: Path) -> None:
+@pytest.mark.parametrize("beam", [None, Beam(60.0, 20.0)])
+def test_every_placement_is_seen_from_there(tmp_path: Path, beam: Beam | None) -> None:
     one = recording(tmp_path / "anna.sd2")
+    one.sensor = replace(one.sensor, beam=beam)
+    one.save()
     making = Making(kinds=("synthetic", "simulated"), placements=GRID)
     sources = made(one.folder, making=making)
     assert [source.placement for source in sources] == [0, 1, 2, 3, 4]
@@ -90,12 +94,12 @@ def test_every_placement_is_seen_from_there(tmp_path: Path) -> None:
     maps = Synthesizer(mesh, PRESETS["paper"])
     target_m = BodyExtent.of(mesh).target_m
     for source, place in zip(sources[1:], GRID.places(), strict=True):
-        assert source.sensor == place.sensor(target_m)
+        sensor = replace(place.sensor(target_m), beam=beam)
+        assert source.sensor == sensor
         assert source.spherical == pytest.approx(
             (place.range_m, place.azimuth_deg, place.elevation_deg), abs=1e-9
         )
-        expected = maps.map(place.sensor(target_m)).values
-        assert np.array_equal(source.maps["synthetic"].values, expected)
+        assert np.array_equal(source.maps["synthetic"].values, maps.map(sensor).values)
 
 
 def test_each_recording_is_seen_from_where_it_plans(tmp_path: Path) -> None:
