@@ -108,7 +108,8 @@ def _placements(options: Placing) -> int:
         with progress_bar("Reading the mesh") as progress:
             mesh = recording.load_mesh(progress)
     body = BodyExtent.of(mesh)
-    sensors = placements.sensors(body.target_m)
+    beam = None if recording is None else recording.sensor.beam
+    sensors = placements.sensors(body.target_m, beam)
     with progress_bar("Checking", "place") as progress:
         coverage = body.coverage(sensors, progress)
     choice, cost = _cost(mesh, placements, sensors, options)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -324,8 +324,8 @@ class _Opened:
             return self.recording.sensor
         target_m = self._target_m("")  # of the first person, whoever a source is of
         assert target_m is not None
-        sensor = places_of(self.recording, self._making)[placement - 1].sensor(target_m)
-        return replace(sensor, beam=self.recording.sensor.beam)
+        place = places_of(self.recording, self._making)[placement - 1]
+        return place.sensor(target_m, self.recording.sensor.beam)
 
     @property
     def _damaged(self) -> int:

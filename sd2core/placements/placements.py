@@ -21,7 +21,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.texts import errors_in, read_json, read_toml
 from sd2core.options.bounds import AZIMUTH_DEG, ELEVATION_DEG, RANGE_M
-from sd2core.sensor import Vector, VirtualSensor, position_from_spherical
+from sd2core.sensor import Beam, Vector, VirtualSensor, position_from_spherical
 
 FORMAT = "sd2-placements"
 VERSION = 1
@@ -43,12 +43,13 @@ class Place:
     azimuth_deg: float = 0.0  # above -180 up to 180
     elevation_deg: float = 0.0  # from -90 to 90
 
-    def sensor(self, target_m: Vector) -> VirtualSensor:
+    def sensor(self, target_m: Vector, beam: Beam | None = None) -> VirtualSensor:
         """Sensor at this place, aimed at the target."""
         return VirtualSensor(
             position_from_spherical(target_m, self.range_m, self.azimuth_deg, self.elevation_deg),
             azimuth_deg=-self.azimuth_deg,
             elevation_deg=-self.elevation_deg,
+            beam=beam,
         )
 
     @property
@@ -72,9 +73,9 @@ class _Spec:
         """Distinct places."""
         raise NotImplementedError
 
-    def sensors(self, target_m: Vector) -> tuple[VirtualSensor, ...]:
+    def sensors(self, target_m: Vector, beam: Beam | None = None) -> tuple[VirtualSensor, ...]:
         """A sensor per place, aimed at a point in the camera frame, in metres."""
-        return tuple(place.sensor(target_m) for place in self.places())
+        return tuple(place.sensor(target_m, beam) for place in self.places())
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON and TOML that :func:`placements_from_dict` reads."""

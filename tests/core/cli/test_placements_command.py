@@ -10,6 +10,7 @@ from cli_outcome import Sd2
 
 from sd2core.placements.placements import PlacementCloud, PlacementGrid, read_placements
 from sd2core.recording.recording import Recording, open_recording
+from sd2core.sensor import Beam, VirtualSensor
 
 
 def test_a_grid_is_listed_with_what_it_costs(sd2: Sd2, plate: Path) -> None:
@@ -64,6 +65,20 @@ def test_what_is_written_is_read_and_what_a_recording_plans_is_listed(
     ]
     assert listed[0] == listed[1]
     assert len(listed[0]) == 4
+
+
+def test_the_cost_is_that_of_maps_through_the_recordings_beam(
+    sd2: Sd2, plate: Path, tmp_path: Path
+) -> None:
+    recording = Recording.create(tmp_path / "plate", mesh=plate)
+    recording.sensor = VirtualSensor(beam=Beam(20.0, 20.0))
+    recording.save()
+    words = ("--ranges", "2", "--json")
+    weighed = [
+        any(reason["rung"] == "beam" for reason in json.loads(outcome.out)["choice"]["reasons"])
+        for outcome in (sd2("placements", path, *words) for path in (recording.folder, plate))
+    ]
+    assert weighed == [True, False]
 
 
 @pytest.mark.parametrize(
