@@ -209,7 +209,7 @@ class MeshSequence:
         return persons_of(body.person for body in self.bodies)
 
     def body(self, person: str | None = None) -> MeshSequence:
-        """Body of a person of the scene alone; Sd2Error without a name where there are several."""
+        """One person of the scene, with what stands around; Sd2Error where a name is needed."""
         names = self.persons
         if person is None and not self.others:
             return self
@@ -221,7 +221,8 @@ class MeshSequence:
                 "Name one with --person, for data sets in the labels, in Python by mesh.body(NAME)",
             )
         number = names.index(person)
-        return replace(self.bodies[number], others=(), person=names[number])
+        alone = replace(self.bodies[number], others=(), person=names[number])
+        return replace(alone, surroundings=self.surroundings)
 
     def read(self, start: int, stop: int) -> NDArray[Any]:
         """Vertices of frames ``start`` to ``stop`` (exclusive) in memory, (n, V, 3)."""

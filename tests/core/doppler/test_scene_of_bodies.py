@@ -17,13 +17,14 @@ from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.doppler.reference import reference_stretch
 from sd2core.errors import Sd2Error
-from sd2core.io.things import with_things
+from sd2core.io.things import with_things, with_walls
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.made_vertices import MadeVertices
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.things import Thing
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
 from sd2core.mesh.vertex_parts import VertexParts
+from sd2core.mesh.walls import Wall
 from sd2core.scattering import behind_things
 from sd2core.scattering.behind_things import Hiding, may_hide
 from sd2core.sensor import VirtualSensor
@@ -159,6 +160,14 @@ def test_a_thing_hides_every_body() -> None:
     made = Synthesizer(with_things(scene, [wall]), RAW).map(SENSOR, visibility="exact")
     assert not made.values.any()
     assert made.meta["visible_share"] == [0] * 6
+
+
+def test_who_is_taken_alone_stays_in_the_same_room() -> None:
+    people = together(wobbling(20), beside(wobbling(20, seed=3), 3.0, 0.1, 0.5))
+    scene = with_walls(people, [Wall(3.0, elevation_deg=90.0, loss_db=0.0)])
+    alone = sum(raw(scene.body(person), "exact") for person in scene.persons)
+    np.testing.assert_allclose(raw(scene, "exact"), alone)
+    assert raw(scene, "exact").sum() > 1.01 * raw(people, "exact").sum()
 
 
 def test_what_a_map_says_of_a_scene() -> None:
