@@ -159,7 +159,9 @@ def compare_meshes(
             notes.append(f"{label}: interpolated to the frame times of {labels[reference]}.")
         elif len(times_s) < mesh.frame_count:
             notes.append(f"{label}: {len(times_s)} of {mesh.frame_count} frames are compared.")
-        placed.append(moved.between(0, moved.frame_count))
+        placed.append(replace(moved, surroundings=None).between(0, moved.frame_count))
+    if any(mesh.surroundings is not None for mesh in meshes):
+        notes.append("The maps are of the bodies alone, without walls and things around them.")
     patches = _patches(placed, labels, notes)
     joints = tuple(
         one.positions(np.asarray(mesh.vertices)) for one, mesh in zip(patches, placed, strict=True)

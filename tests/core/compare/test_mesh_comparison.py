@@ -16,7 +16,9 @@ from sd2core.compare.measures import common_times, map_l1
 from sd2core.compare.meshes import compare_meshes
 from sd2core.errors import Sd2Error
 from sd2core.files.figure_files import save_figure
+from sd2core.io.things import with_walls
 from sd2core.mesh.sequence import MeshSequence
+from sd2core.mesh.walls import Wall
 from sd2core.scattering.resampling import resample_mesh
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
@@ -50,6 +52,13 @@ def test_a_mesh_equals_itself(mesh: MeshSequence) -> None:
         assert one.distance_m.max() == one.velocity_rms_mps.max() == one.map_l1 == 0.0
         assert (one.correlation == 1.0).all()
     assert found.notes == ()
+
+
+def test_a_mesh_in_a_room_equals_itself_outside(mesh: MeshSequence) -> None:
+    room = with_walls(mesh, [Wall(1.5, azimuth_deg=90.0, loss_db=0.0)])
+    found = compare_meshes([room, mesh], ["a", "b"])
+    assert found.differences[1].map_l1 == 0.0
+    assert any("without walls and things" in note for note in found.notes)
 
 
 def test_a_shift_is_a_distance_until_it_is_aligned(mesh: MeshSequence) -> None:
