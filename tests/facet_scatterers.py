@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sd2core.fmcw.scene import NEAREST_M, MeshScene
+from sd2core.fmcw.kernels import NEAREST_M
+from sd2core.fmcw.scene import MeshScene
 from sd2core.radar_config import RadarConfig
 from sd2core.sensor import VirtualSensor
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.converter import check_converter, digitise, simulated_capture
 from sd2core.fmcw.options import SignalOptions
-from sd2core.fmcw.scene import MeshScene
+from sd2core.fmcw.scene import MeshScene, radar_times_s
 from sd2core.io.radar.capture import RadarCapture
 from sd2core.mesh.presence import runs
 from sd2core.mesh.sequence import MeshSequence
@@ -66,7 +66,7 @@ def simulate_capture(
     """
     sensor = sensor or VirtualSensor()
     scene = MeshScene(mesh, config, sensor, visibility)
-    times_s = scene.frame_times_s()
+    times_s = radar_times_s(mesh.timebase, config)
     return capture_scene(
         partial(scatterers_at, scene),
         times_s,

@@ -80,7 +80,7 @@ class Placing(MeshInput, UsualRequest, Overwrite, Json):
 
 
 @command("placements", Placing)
-def _placements(options: Placing) -> int:
+def _placements(options: Placing) -> None:
     """Plan sensors around a body, and say what a map from each would cost.
 
     A grid of every range, azimuth and elevation that is given, or with --cloud as many
@@ -130,7 +130,6 @@ def _placements(options: Placing) -> int:
         )
     else:
         _print(options.mesh, listed, radar, cost, choice)
-    return 0
 
 
 def _spec(options: Placing, recording: Recording | None) -> Placements:

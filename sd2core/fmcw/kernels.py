@@ -15,7 +15,8 @@ from sd2core.scattering.beam_kernels import beam_tables, gain_towards
 Floats = NDArray[np.float64]
 
 # Must be plain numbers here: kernels read module constants when they are compiled.
-_NEAREST_M = 0.05
+NEAREST_M = 0.05
+"""The 1/R^2 of the far field is not continued to nearer than this."""
 _STEADY_BELOW_RAD = 0.1
 _TANGENT_BELOW_RAD = 0.7
 _NODE = 0.7
@@ -176,7 +177,7 @@ def facet_echoes(
             continue
         there = math.sqrt(ox * ox + oy * oy + oz * oz)
         again = there if same else math.sqrt(tx * tx + ty * ty + tz * tz)
-        near_there, near_again = max(there, _NEAREST_M), max(again, _NEAREST_M)
+        near_there, near_again = max(there, NEAREST_M), max(again, NEAREST_M)
         pattern = 1.0
         if pattern_exponent > 0.0:
             leaving = _along(transmitter, 3, ox, oy, oz) / near_there
@@ -211,7 +212,7 @@ def facet_echoes(
                 far = math.sqrt(x * x + y * y + z * z)
                 recede = x * motion[k] + y * motion[k + 1] + z * motion[k + 2]
                 recede /= max(far, 1e-9)
-                near = max(far, _NEAREST_M)
+                near = max(far, NEAREST_M)
                 if same:
                     corner_m[c] = far
                     phase[c] = wave_number * (far - half)
@@ -222,7 +223,7 @@ def facet_echoes(
                 far_back = math.sqrt(x * x + y * y + z * z)
                 recede_back = x * motion[k] + y * motion[k + 1] + z * motion[k + 2]
                 recede_back /= max(far_back, 1e-9)
-                near_back = max(far_back, _NEAREST_M)
+                near_back = max(far_back, NEAREST_M)
                 corner_m[c] = 0.5 * (far + far_back)
                 phase[c] = wave_number * (corner_m[c] - half)
                 turn[c] = wave_number * (0.5 * (recede + recede_back) - rate)

@@ -19,9 +19,6 @@ from sd2core.scattering.facets import facets_before, points_behind, visible_face
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
 
-NEAREST_M = 0.05
-"""The 1/R^2 of the far field is not continued to nearer than this."""
-
 _BLOCK_FRAMES = 64
 
 
@@ -78,10 +75,6 @@ class MeshScene:
         self._block = np.empty((0, mesh.vertex_count, 3))
         self._reading = threading.Lock()
 
-    def frame_times_s(self) -> NDArray[np.float64]:
-        """Times of the radar frames that fit into the mesh, from its first frame on."""
-        return radar_times_s(self.mesh.timebase, self.config)
-
     def is_present(self, time_s: float) -> bool:
         """True if there is a person in the mesh frames around an instant, and no gap between."""
         presence = self.mesh.presence
@@ -105,7 +98,9 @@ class MeshScene:
         """Mask of the facets that nothing hides, (F,); None if only the facing test applies."""
         around = self.mesh.surroundings
         hiding = [around.surface] if around is not None and around.things else []
-        hiding += self._others_before(time_s)
+        if others := self._others_at(time_s):
+            own, place_m = _box(self.surface(time_s)), np.array(self.sensor.position_m)
+            hiding += [one for one in others if may_hide(_box(one), own, place_m)]
         if not hiding and isinstance(self.visibility, str) and self.visibility == "facing":
             return None
         place, vertices_m = self.sensor.position_m, self._nearest(time_s)
@@ -131,7 +126,7 @@ class MeshScene:
     ) -> NDArray[np.bool_] | None:
         """What of that which the sensor sees its image behind a wall sees, too."""
         around = self.mesh.surroundings
-        others = [other.surface(time_s) for other in self.others if other.is_present(time_s)]
+        others = self._others_at(time_s)
         if around is None or (direct is None and not others):
             return direct
         seen = np.ones(len(self._faces), np.bool_) if direct is None else direct
@@ -144,17 +139,9 @@ class MeshScene:
         surface = around.by_way_of(wall, body, others)
         return seen & facets_before(vertices_m, self._faces, image_m, surface)
 
-    def _others_before(self, time_s: float) -> list[Surface]:
-        """Surfaces of the others that may hide some of this one at an instant."""
-        place_m = np.asarray(self.sensor.position_m, np.float64)
-        own, surfaces = None, []
-        for other in self.others:
-            if other.is_present(time_s):
-                own = _box(self.surface(time_s)) if own is None else own
-                surface = other.surface(time_s)
-                if may_hide(_box(surface), own, place_m):
-                    surfaces.append(surface)
-        return surfaces
+    def _others_at(self, time_s: float) -> list[Surface]:
+        """Surfaces of the others who are there at an instant."""
+        return [other.surface(time_s) for other in self.others if other.is_present(time_s)]
 
     def surface(self, time_s: float) -> Surface:
         """Vertices (V, 3) and faces in the mesh frame nearest to an instant."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sd2core.fmcw.converter import check_converter, digitise, simulated_capture, store
 from sd2core.fmcw.options import SignalOptions, WaveOptions
-from sd2core.fmcw.scene import FacetsSeen
+from sd2core.fmcw.scene import FacetsSeen, radar_times_s
 from sd2core.fmcw.wave import BeatSignal, WaveScene
 from sd2core.io.radar.capture import RadarCapture, Signal
 from sd2core.mesh.presence import runs
@@ -81,7 +81,7 @@ def simulate_radar(
     check_converter(config)
     scene = WaveScene(mesh, config, sensor, visibility, wave, options.seed)
     start, stop = frames or (0, None)
-    times_s = scene.scene.frame_times_s()[start:stop]
+    times_s = radar_times_s(mesh.timebase, config)[start:stop]
     count = len(times_s)
     shape = (count, config.receivers, config.chirps_per_frame, config.samples_per_chirp)
     # The gain is known when the last frame is. Single precision rounds the strongest sample

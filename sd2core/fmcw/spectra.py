@@ -65,12 +65,8 @@ def frame_spectra(
     """
     times = np.asarray(times_s, dtype=np.float64)
     scene = WaveScene(mesh, config, sensor or VirtualSensor(), visibility, wave, seed)
-
-    def signal(time_s: float) -> BeatSignal:
-        return scene.frame(time_s)
-
-    beats: Iterable[BeatSignal]
-    beats = (map if threads == 1 else spread)(signal, times.tolist())
+    one_by_one = map if threads == 1 else spread
+    beats: Iterable[BeatSignal] = one_by_one(scene.frame, times.tolist())
     return signal_spectra(np.stack(list(beats)), config, axis=axis, processing=processing)
 
 

@@ -51,11 +51,6 @@ class Echoes:
     amplitude: NDArray[np.complex128]
 
     @property
-    def count(self) -> int:
-        """Number of echoes."""
-        return len(self.range_m)
-
-    @property
     def terms(self) -> NDArray[np.complex128]:
         """Amplitudes with their terms, (terms, n)."""
         return np.atleast_2d(self.amplitude)
@@ -90,7 +85,7 @@ def direct(
     turns = turns_of(echoes, config)
     shape = (chirps or config.chirps_per_frame, config.samples_per_chirp)
     total = np.zeros(shape, np.complex128)
-    count, amplitude = echoes.count, np.ascontiguousarray(echoes.terms)
+    count, amplitude = len(echoes.range_m), np.ascontiguousarray(echoes.terms)
     step = max(1, _TERMS_PER_STEP // total.size)
     for start in range(0, count, step):
         if go_on is not None:
@@ -148,7 +143,7 @@ def nufft(
     chirps = chirps or config.chirps_per_frame
     samples = config.samples_per_chirp
     total = np.zeros((chirps, samples), np.complex128)
-    if not echoes.count:
+    if not len(echoes.range_m):
         return total
     along_chirps = _angle(turns.chirp)
     terms = echoes.terms

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.cutting import pieces_of
-from sd2core.fmcw.kernels import facet_echoes
+from sd2core.fmcw.kernels import NEAREST_M, facet_echoes
 from sd2core.fmcw.options import Antenna, Reflector, WaveOptions, paths
-from sd2core.fmcw.scene import NEAREST_M, FacetsSeen, MeshScene
+from sd2core.fmcw.scene import FacetsSeen, MeshScene
 from sd2core.fmcw.sums import Echoes, direct, nufft
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.walls import Wall
@@ -118,10 +118,7 @@ class WaveScene:
 
         Zero where there is no person.
         """
-        signal = self._own_frame(time_s, go_on)
-        for one in self.bodies[1:]:
-            signal += one._own_frame(time_s, go_on)
-        return signal
+        return np.sum([one._own_frame(time_s, go_on) for one in self.bodies], axis=0)
 
     def _own_frame(self, time_s: float, go_on: GoOn | None) -> BeatSignal:
         """Beat signal of this body alone, among the others."""
@@ -134,12 +131,10 @@ class WaveScene:
         ]
         return rows[0] if len(rows) == 1 else np.concatenate(rows, axis=1)
 
-    def silence(self) -> BeatSignal:
-        """Zero beat signal of a frame without echoes."""
-        return self._blank(self.config.chirps_per_frame)
-
-    def _blank(self, chirps: int) -> BeatSignal:
+    def silence(self, chirps: int | None = None) -> BeatSignal:
+        """Zero beat signal of a frame, or of some of its chirps, without echoes."""
         sampled = np.float64 if self.config.sampling == "real" else np.complex128
+        chirps = chirps or self.config.chirps_per_frame
         return np.zeros((len(self.paths), chirps, self.config.samples_per_chirp), sampled)
 
     def sampled(self, total: NDArray[np.complex128]) -> BeatSignal:
@@ -265,7 +260,7 @@ class WaveScene:
         chirps: int,
         go_on: GoOn | None,
     ) -> BeatSignal:
-        signal = self._blank(chirps)
+        signal = self.silence(chirps)
         for receiver in range(len(self.paths)):
             if go_on is not None:
                 go_on()

@@ -117,22 +117,23 @@ def notes_on(
         if not body.presence.present.any():
             continue
         seen = BodyExtent.of(body).coverage((sensor,))
-        problems = {"inside": seen.inside} if radar is None else seen.problems(radar)
-        met = {name for name, mask in problems.items() if mask[0]}
         whose = f" of {person}" if mesh.others else ""
-        if "inside" in met:
+        if seen.inside[0]:
             notes.append(
                 f"The sensor stands in the box around the body{whose}: what is nearest outweighs"
                 " all else."
             )
-        if radar is not None and "out_of_range" in met:
+        if radar is None:
+            continue
+        problems = seen.problems(radar)
+        if problems["out_of_range"][0]:
             turned = ", and velocities have the wrong sign" if radar.sampling == "real" else ""
             notes.append(
                 f"The body{whose} is up to {seen.farthest_m[0]:.1f} m away: beyond"
                 f" {radar.range_max_m:.1f} m this radar's beat frequencies fold, so that it seems"
                 f" to be nearer{turned}."
             )
-        if radar is not None and "aliasing" in met:
+        if problems["aliasing"][0]:
             notes.append(
                 f"The body{whose} is as fast as {seen.fastest_mps[0]:.1f} m/s: beyond"
                 f" {radar.v_max_mps:.1f} m/s this radar's velocities fold."

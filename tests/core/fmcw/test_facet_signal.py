@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from sd2core.errors import Sd2Error
 from sd2core.fmcw.options import Reflector, SignalOptions
 from sd2core.fmcw.processing import doppler_map, range_doppler
-from sd2core.fmcw.scene import MeshScene
+from sd2core.fmcw.scene import MeshScene, radar_times_s
 from sd2core.io.radar import load_capture
 from sd2core.io.radar.infineon import write_capture
 from sd2core.mesh.sequence import MeshSequence
@@ -190,7 +190,7 @@ def test_frames_between_mesh_frames_are_interpolated() -> None:
     mesh = plate(0.05, 2.4, frames=31, speed_mps=0.9)
     radar = replace(PAPER_RADAR, frame_repetition_s=0.026)
     scene = MeshScene(mesh, radar, CAMERA)
-    times_s = scene.frame_times_s()
+    times_s = radar_times_s(mesh.timebase, radar)
     assert len(times_s) == 39
     for time_s in times_s:
         seen = scatterers_at(scene, float(time_s))

@@ -29,7 +29,7 @@ from sd2core.fmcw.options import (
     paths,
 )
 from sd2core.fmcw.processing import doppler_map
-from sd2core.fmcw.scene import MeshScene
+from sd2core.fmcw.scene import MeshScene, radar_times_s
 from sd2core.fmcw.simulation import simulate_radar
 from sd2core.fmcw.sums import Echoes, direct, nufft, recurrent
 from sd2core.fmcw.wave import WaveScene
@@ -422,7 +422,7 @@ def test_phase_runs_on_from_frame_to_frame(coherent: bool) -> None:
     scene = WaveScene(
         sheet(0.005, places), config, CAMERA, wave=WaveOptions(coherent=coherent), seed=4
     )
-    times_s = scene.scene.frame_times_s()[4:8]
+    times_s = radar_times_s(scene.scene.mesh.timebase, config)[4:8]
     rows = []
     for time_s in times_s:
         position, velocity = scene.scene.moving(float(time_s))
@@ -589,7 +589,7 @@ def test_a_sliver_and_a_missing_vertex() -> None:
     flat = mesh.faces.copy()
     flat[0] = flat[0, [0, 0, 1]]
     thin = MeshSequence(mesh.vertices, flat, mesh.timebase)
-    assert echoes_of(thin, WaveOptions()).count == len(flat) - 1
+    assert len(echoes_of(thin, WaveOptions()).range_m) == len(flat) - 1
     broken = np.array(mesh.vertices)
     broken[1, 3, 2] = np.inf
     with pytest.raises(Sd2Error, match=r"sheet\.npz: vertex 3 of frame 1 is at"):
