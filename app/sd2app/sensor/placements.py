@@ -16,7 +16,7 @@ from sd2app.widgets.text import bytes_text, counted, duration_text, seconds
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.body_extent import BodyExtent, SensorCoverage
 from sd2core.placements.placements import Place, PlacementCost, Placements
-from sd2core.radar_config import PAPER_RADAR, RadarConfig
+from sd2core.radar_config import PAPER_RADAR, RadarConfig, range_in_words
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
 _SHORT_S = 10.0
@@ -178,7 +178,7 @@ def limits_text(model: PlacementsModel) -> str:
         return "Looking at what they see…" if model.planned.places else ""
     # Unbroken, or a line could end within the unit.
     v_max = f"±{radar.v_max_mps:.2f}\N{NO-BREAK SPACE}m/\N{WORD JOINER}s"
-    where = f"{radar.name}: {radar.range_max_m:.1f} m, {v_max}."
+    where = f"{radar.name}: {range_in_words(radar.range_max_m)}, {v_max}."
     if not coverage.beyond(radar).any():
         return f"All within the limits of the radar. {where}"
     return f"Beyond the radar, part of the body is seen at another range or velocity. {where}"

@@ -23,6 +23,7 @@ from sd2app.widgets.text import bytes_text
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.placements.placements import PlacementCloud, PlacementGrid
+from sd2core.radar_profiles import RADARS
 from sd2core.sensor import Beam, VirtualSensor
 from sd2core.timebase import Timebase
 
@@ -137,6 +138,8 @@ def test_what_is_beyond_the_radar_is_counted(stage, qtbot):
     settle(qtbot, stage)
     assert limit_facts(stage) == []
     assert limits_text(stage).startswith("All within")
+    document.capture = SimpleNamespace(config=RADARS["cw-5.8ghz"])
+    assert ": none, ±4.14" in limits_text(stage)
 
 
 def test_the_cost_is_that_of_the_plan_in_use_times_the_places(stage, qtbot):
