@@ -75,8 +75,8 @@ class SimulateRadar(MeshAndSensor, Overwrite, Simulating, Json):
     blocks : N
         parts of a frame that follow the range as it changes
     motion
-        within a frame: constant velocity, or the mesh interpolated at every chirp, which takes as
-        many sums as there are chirps
+        within a frame: constant velocity (for up to 1/30 s), or the mesh interpolated at every
+        chirp, which takes as many sums as there are chirps
     incoherent
         a rough surface: every triangle has a random phase (default: a smooth one)
     visibility

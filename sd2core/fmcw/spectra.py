@@ -52,7 +52,7 @@ def frame_spectra(
     axis : VelocityAxis or None
         The 32 bins over ±2 m/s by default.
     processing : ProcessingOptions
-        Clutter must be ``none`` or ``mean``: a moving average needs the frames between.
+        Clutter must not be ``moving``: a moving average needs the frames between.
     seed : int
         Seed of the random phases of a rough surface.
     threads : 1 or "all"
