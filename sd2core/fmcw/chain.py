@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.io.radar.capture import RadarCapture, Signal
+from sd2core.mesh.presence import Presence
+from sd2core.plausibility.clock import gaps_between
 from sd2core.radar_config import Clutter, RadarConfig
 
 Window = Literal["hann", "blackman", "none"]
@@ -43,7 +45,7 @@ class ProcessingOptions:
         zero, 20 dB below its echo. ``regression`` takes the parabola that
         fits the chirps best (Torp 1997): 60 dB down at a tenth of a Doppler
         bin, 3 dB at 1.25 bins. ``moving`` takes the mean averaged over
-        ``clutter_window_s``, which keeps a slow mover.
+        ``clutter_window_s``, never over a gap in time, which keeps a slow mover.
     clutter_window_s : float
         Length of the centred average of ``moving``; shorter at the ends.
     range_m : (float, float) or None
@@ -167,6 +169,12 @@ class Chain(FrameChain):
         frames = min(self.options.clutter_window_s / frame_s, 2.0 * self.capture.frame_count)
         return round(0.5 * frames)
 
+    @cached_property
+    def _stretches(self) -> Presence:
+        """Frames between gaps in time, over which what stands still may have been moved."""
+        times_s = self.capture.timebase.times_s
+        return Presence.of(None, len(times_s), gaps_between(times_s))
+
     def blocks(self) -> Iterator[tuple[int, int]]:
         """Half-open runs of frames that fit into a few megabytes."""
         config = self.capture.config
@@ -209,8 +217,8 @@ class Chain(FrameChain):
         total = np.cumsum(chirps, axis=0, dtype=np.result_type(chirps, np.float64))
         total = np.concatenate([np.zeros_like(total[:1]), total])  # (frames + 1, rx, samples)
         frames = np.arange(start, stop)
-        low = np.maximum(frames - self._reach, 0) - first
-        high = np.minimum(frames + self._reach + 1, self.capture.frame_count) - first
+        low = np.maximum(frames - self._reach, self._stretches.first[frames]) - first
+        high = np.minimum(frames + self._reach, self._stretches.last[frames]) + 1 - first
         mean = (total[high] - total[low]) / (high - low)[:, None, None]
         signal -= mean[:, :, None, :].astype(signal.dtype)
         return signal

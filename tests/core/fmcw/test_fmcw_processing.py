@@ -230,6 +230,16 @@ def test_the_moving_average_keeps_what_is_slower_than_a_doppler_bin() -> None:
     assert doppler_map(static, clutter="moving").values.sum(axis=0).max() < 1e-9
 
 
+def test_the_moving_average_ends_where_frames_are_missing() -> None:
+    """What stands still may stand elsewhere after a pause."""
+    parts = [0.4 * tone(FINE, range_m, 0.0, frames=40) for range_m in (3.6, 3.601)]
+    capture = capture_of(FINE, np.concatenate(parts))
+    times_s = capture.timebase.times_s + np.repeat([0.0, 10.0], 40)
+    paused = replace(capture, timebase=Timebase(times_s))
+    assert doppler_map(capture, clutter="moving").values.max() > 1e-3
+    assert doppler_map(paused, clutter="moving").values.max() < 1e-9
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_what_is_too_fast_folds_as_in_a_radar(sign: float) -> None:
     v_max = FINE.v_max_mps
