@@ -24,7 +24,7 @@ _FACETS_PER_STEP = 20_000
 class Converged:
     """A frame's signal on facets cut until nothing changes."""
 
-    signal: NDArray[np.float64]  # Signal of the finest cut, (receivers, chirps, samples).
+    signal: BeatSignal  # Signal of the finest cut, (receivers, chirps, samples).
     pieces: tuple[int, ...]  # Triangles per facet that were tried: 1, 4, 16 …
     # L1 of the change of :func:`doppler_marginal` from one to the next of these.
     changes: tuple[float, ...]
@@ -92,8 +92,7 @@ def doppler_marginal(signal: BeatSignal) -> NDArray[np.float64]:
 
 def _cut(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) -> BeatSignal:
     """Beat signal with every facet in 4^cuts pieces, (receivers, chirps, samples)."""
-    each = [_cut_body(one, time_s, cuts, go_on) for one in scene.bodies]
-    return each[0] if len(each) == 1 else np.sum(each, axis=0)
+    return np.sum([_cut_body(one, time_s, cuts, go_on) for one in scene.bodies], axis=0)
 
 
 def _cut_body(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) -> BeatSignal:
@@ -103,9 +102,8 @@ def _cut_body(scene: WaveScene, time_s: float, cuts: int, go_on: GoOn | None) ->
     seen = scene.scene.seen(time_s)
     rows = []
     for (position, velocity), chirps in scene.bursts(time_s):
-        shape = (len(scene.paths), chirps, scene.config.samples_per_chirp)
-        total = np.zeros(shape)
-        for receiver in range(shape[0]):
+        total = scene.silence(chirps)
+        for receiver in range(len(total)):
             for wall, visible in seen.items():
                 if not cuts:
                     echoes = scene.echoes(position, velocity, visible, receiver, wall=wall)

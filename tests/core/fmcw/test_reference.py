@@ -71,6 +71,14 @@ def test_large_facets_converge_to_what_small_ones_give(motion: str) -> None:
     assert np.abs(coarse - fine).sum() <= 2e-3
 
 
+def test_real_samples_are_the_real_part_of_complex_ones() -> None:
+    radars = [replace(RADAR, sampling=kind) for kind in ("real", "complex")]
+    scenes = (WaveScene(flapping(), radar, CAMERA) for radar in radars)
+    real, both = (converged_frame(one, 0.1, tolerance=0.0, most_cuts=1) for one in scenes)
+    np.testing.assert_allclose(both.signal.real, real.signal)
+    assert np.abs(both.signal.imag).max() > 0.5 * np.abs(real.signal).max()
+
+
 def test_what_does_not_converge_says_so() -> None:
     scene = WaveScene(flapping(), RADAR, CAMERA)
     one = converged_frame(scene, 0.1, tolerance=1e-9, most_cuts=1)
