@@ -347,8 +347,6 @@ def _plane_of(out: Antenna, back: Antenna) -> NDArray[np.float64]:
 
 
 def _joined(parts: list[Echoes]) -> Echoes:
-    if len(parts) == 1:
-        return parts[0]
     return Echoes(
         np.concatenate([part.range_m for part in parts]),
         np.concatenate([part.rate_mps for part in parts]),
