@@ -21,6 +21,7 @@ from sd2core.files.tables import capitalised
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.options.records import words_of
 from sd2core.recording.recording import MeshReading, Recording, is_recording, open_recording
+from sd2core.sensor import VirtualSensor
 
 if TYPE_CHECKING:
     from sd2core.compare.meshes import Comparison, Difference
@@ -122,7 +123,9 @@ class ComparisonModel(ProblemModel):
         if recording is None or own is None:
             return
         known = self.mesh(1)
-        other, sensor, reference = self._other, self._session.sensor.sensor, self.reference
+        # Without its beam, as the command for a terminal: bodies are compared, not antennas.
+        sensor = VirtualSensor(self._session.sensor.sensor.position_m)
+        other, reference = self._other, self.reference
         labels, focal_px = self.labels, document.camera.focal_px
 
         def compare(emit: Emit) -> tuple[tuple[MeshSequence, MeshSequence], Comparison]:
@@ -154,7 +157,8 @@ class ComparisonModel(ProblemModel):
 
     def _follow_sensor(self) -> None:
         sensor, comparison = self._session.sensor, self.comparison
-        if not sensor.dragging and (comparison is None or comparison.sensor != sensor.sensor):
+        place_m = sensor.sensor.position_m
+        if not sensor.dragging and (comparison is None or comparison.sensor.position_m != place_m):
             self.work_out()
 
     def _receive(self, result: tuple[tuple[MeshSequence, MeshSequence], Comparison]) -> None:

@@ -22,7 +22,7 @@ from sd2core.body.rotations import about
 from sd2core.io.mesh import save_mesh
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.recording import MeshReading, Recording
-from sd2core.sensor import VirtualSensor
+from sd2core.sensor import Beam, VirtualSensor
 from sd2core.timebase import Timebase
 from tools.build_sample.swipes import posed
 
@@ -151,7 +151,7 @@ def test_the_other_one_can_be_the_reference(compared, qtbot):
 @pytest.mark.slow
 def test_it_follows_the_sensor(compared, empty_window, qtbot):
     sensor = VirtualSensor(position_m=(1.5, 0.0, 1.0))
-    models_of(empty_window).edits.place_sensor(sensor)
+    models_of(empty_window).edits.place_sensor(replace(sensor, beam=Beam(20.0, 20.0)))
     qtbot.waitUntil(lambda: compared.model.comparison.sensor == sensor, timeout=20_000)
 
 
