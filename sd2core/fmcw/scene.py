@@ -77,10 +77,7 @@ class MeshScene:
 
     def is_present(self, time_s: float) -> bool:
         """True if there is a person in the mesh frames around an instant, and no gap between."""
-        presence = self.mesh.presence
-        if presence.whole:
-            return True
-        around = list(self._around(time_s))
+        presence, around = self.mesh.presence, list(self._around(time_s))
         return bool(presence.measured[around].all()) and len({*presence.first[around]}) == 1
 
     def moving(self, time_s: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

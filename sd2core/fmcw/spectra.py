@@ -65,8 +65,7 @@ def frame_spectra(
     """
     times = np.asarray(times_s, dtype=np.float64)
     scene = WaveScene(mesh, config, sensor or VirtualSensor(), visibility, wave, seed)
-    one_by_one = map if threads == 1 else spread
-    beats: Iterable[BeatSignal] = one_by_one(scene.frame, times.tolist())
+    beats: Iterable[BeatSignal] = (map if threads == 1 else spread)(scene.frame, times.tolist())
     return signal_spectra(np.stack(list(beats)), config, axis=axis, processing=processing)
 
 
