@@ -123,12 +123,13 @@ def _texts(path: Path, lines: Iterable[bytes]) -> Iterator[tuple[int, str]]:
     """Lines that are not empty, with their numbers."""
     for number, line in enumerate(lines, start=1):
         try:
-            text = line.decode("utf-8-sig" if number == 1 else "utf-8").strip()
+            # Not tabs, between which the first or last cell may be empty.
+            text = line.decode("utf-8-sig" if number == 1 else "utf-8").strip(" \r\n")
         except UnicodeDecodeError:
             text = "\0"
         if "\0" in text:
             raise Sd2Error(f"{path}: line {number} is no text in UTF-8", EXPECTED)
-        if text:
+        if text.strip():
             yield number, text
 
 

@@ -119,7 +119,7 @@ class TextTable(Table):
             first = next((one for one in lines_of(stream) if one.strip()), b"")
         if b"\0" in first:
             raise Sd2Error(f"{path} is not in UTF-8", EXPECTED, "Save it as UTF-8")
-        self._separator, titles = titles_of(first.decode("utf-8-sig", "replace").strip())
+        self._separator, titles = titles_of(first.decode("utf-8-sig", "replace").strip(" \r\n"))
         self.width = len(titles)
         self._headed = not all(map(_is_number, titles))
         self.names = tuple(titles) if self._headed else ()

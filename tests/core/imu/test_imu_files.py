@@ -116,6 +116,15 @@ def test_order_and_other_columns_do_not_matter(tmp_path: Path) -> None:
     assert signals.known.tolist() == [True, False]
 
 
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_the_first_and_the_last_cell_may_be_empty(tmp_path: Path, separator: str) -> None:
+    """As an index without a title is, and a value that is not known."""
+    rows = ["", *HEADING.split(",")], ["0", "0.00", *"123456"], ["1", "0.01", *"12345", ""]
+    signals = read(tmp_path, "\n".join(separator.join(row) for row in rows))
+    np.testing.assert_allclose(signals.times_s, [0.0, 0.01])
+    np.testing.assert_allclose(signals.turn_rate_radps, [[4, 5, 6], [4, 5, np.nan]])
+
+
 def test_a_rate_stands_for_times_and_options_for_units(tmp_path: Path) -> None:
     text = "acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z\n" + "1,2,3,4,5,6\n" * 4
     units = {"acceleration_unit": "g", "turn_rate_unit": "°/s"}

@@ -75,6 +75,12 @@ def test_columns_go_by_many_names(tmp_path: Path, titles: tuple[str, ...], separ
     assert is_the_walk(write_csv(tmp_path / "a.csv", walk(), titles, separator))
 
 
+@pytest.mark.parametrize("separator", [",", "\t"])
+def test_an_index_without_a_title_shifts_no_column(tmp_path: Path, separator: str) -> None:
+    table = np.column_stack([np.arange(len(walk())) % 7, walk()])
+    assert is_the_walk(write_csv(tmp_path / "a.tsv", table, ("", *NAMES), separator))
+
+
 @pytest.mark.parametrize("title", ["SNR [dB]", "power_dBm"])
 def test_levels_in_decibels_are_powers(tmp_path: Path, title: str) -> None:
     table = walk()
