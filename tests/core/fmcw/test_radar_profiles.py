@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from moving_spheres import swinging_sphere
 
 from sd2core.datasets.simulating import Simulation, simulated_map
 from sd2core.errors import Sd2Error
@@ -126,6 +127,16 @@ def test_what_speeds_up_within_a_frame_is_spread_over_its_velocities(name: str) 
     spread = rise_mps2**2 * (window**2 @ moment_s**2) / (window**2).sum()
     slope = np.gradient(window, step_s) * config.wavelength_m / (4 * np.pi)
     assert found == pytest.approx(spread + (slope @ slope) / (window @ window), rel=0.15)
+
+
+@pytest.mark.parametrize("name", RADARS)
+def test_a_rough_ball_before_the_sensor_fits_into_the_converter(name: str) -> None:
+    """With the link's one gain; what is clipped is distorted."""
+    mesh, sensor = swinging_sphere(20), VirtualSensor((0.0, 0.0, 2.0))
+    wave, link = WaveOptions(coherent=False), SignalOptions(link=LinkBudget())
+    capture = simulate_radar(mesh, RADARS[name], sensor=sensor, wave=wave, options=link)
+    assert capture.meta["simulation"]["clipped_share"] == 0.0
+    assert np.abs(capture.read(0, 1)).max() > 0.01
 
 
 def test_a_name_that_is_none_is_refused_with_those_that_are() -> None:
