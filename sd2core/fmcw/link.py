@@ -23,7 +23,7 @@ class LinkBudget:
         Noise figure of the receiver, and all other losses together.
     full_scale : float
         Amplitude of an echo that fills the converter, in units of square metres of
-        smooth area over squared range; see :meth:`full_scale_of`.
+        smooth area over squared range; in proportion more at wavelengths above 5 mm.
     """
 
     transmitted_dbm: float = 5.0
@@ -33,10 +33,6 @@ class LinkBudget:
     noise_figure_db: float = 12.0
     losses_db: float = 3.0
     full_scale: float = 0.02
-
-    def full_scale_of(self, config: RadarConfig) -> float:
-        """Amplitude that fills a radar's converter: above 5 mm as rough echoes, with wavelength."""
-        return self.full_scale * max(1.0, config.wavelength_m / 5e-3)
 
     def noise_rms(self, config: RadarConfig) -> float:
         """Thermal noise of one real sample, or of I and Q each, in the unit of amplitudes.

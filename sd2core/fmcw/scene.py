@@ -211,8 +211,8 @@ class MeshScene:
         return {right - 1: 1.0 - share, right: share}
 
     def _vertices(self, time_s: float) -> NDArray[np.float64]:
-        parts = [share * self._frame(frame) for frame, share in self._around(time_s).items()]
-        return parts[0] if len(parts) == 1 else parts[0] + parts[1]
+        around = self._around(time_s).items()
+        return np.sum([share * self._frame(frame) for frame, share in around], axis=0)
 
     def _frame(self, index: int) -> NDArray[np.float64]:
         with self._reading:

@@ -220,9 +220,8 @@ class MeshSequence:
                 "one of them by name",
                 "Name one with --person, for data sets in the labels, in Python by mesh.body(NAME)",
             )
-        number = names.index(person)
-        alone = replace(self.bodies[number], others=(), person=names[number])
-        return replace(alone, surroundings=self.surroundings)
+        alone = self.bodies[names.index(person)]
+        return replace(alone, others=(), person=person, surroundings=self.surroundings)
 
     def read(self, start: int, stop: int) -> NDArray[Any]:
         """Vertices of frames ``start`` to ``stop`` (exclusive) in memory, (n, V, 3)."""
