@@ -79,7 +79,7 @@ def test_one_frame(
     reference = direct(echoes, PAPER_RADAR)
     turned = best_s(lambda: recurrent(echoes, PAPER_RADAR), 3)
     lines = [
-        f"{echoes.count} of {len(scene.faces)} facets: {1e3 * min(whole):.2f} ms a frame"
+        f"{len(echoes.range_m)} of {len(scene.faces)} facets: {1e3 * min(whole):.2f} ms a frame"
         f" on one thread, {1e3 * min(factors):.2f} ms of it amplitudes and closed form;"
         f" direct complex128 sum {1e3 * min(summed):.0f} ms = {ratio:.0f} times as long"
     ]
@@ -93,7 +93,7 @@ def test_one_frame(
         )
     with capsys.disabled():
         print("\n" + "\n".join(lines))
-    assert echoes.count == FACETS
+    assert len(echoes.range_m) == FACETS
     assert min(whole) <= 0.006
     assert ratio >= 70
 
