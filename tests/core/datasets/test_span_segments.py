@@ -47,6 +47,11 @@ def cut(one: Source, options: SpanOptions, length: int = 120, rate_hz: float = 3
     return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
 
+def within(times_s: np.ndarray, start_s: float, end_s: float) -> np.ndarray:
+    """Frames from one time to another, to a microsecond: sums have other last bits."""
+    return (times_s >= start_s - 1e-6) & (times_s < end_s - 1e-6)
+
+
 times = st.integers(0, 3900).map(lambda ms: ms / 1000)
 spans = st.lists(st.tuples(times, st.integers(40, 2000), st.integers(1, 2)), min_size=1, max_size=5)
 
@@ -61,12 +66,12 @@ def test_a_segment_holds_the_frames_of_its_span_and_margin(
     assert found["segment_label"].tolist() == [label for _, _, label in chosen]
     values = one.maps["synthetic"].values.T
     for row, (start_s, end_s, label) in enumerate(chosen):
-        mine = (one.times_s >= start_s - margin_s) & (one.times_s < end_s + margin_s)
+        mine = within(one.times_s, start_s - margin_s, end_s + margin_s)
         mask = found["mask"][row]
         assert mask.tolist() == [True] * mine.sum() + [False] * (120 - mine.sum())
         assert np.array_equal(found["synthetic"][row][mask], values[mine])
         assert not found["synthetic"][row][~mask].any()
-        inside = (one.times_s[mine] >= start_s) & (one.times_s[mine] < end_s)
+        inside = within(one.times_s[mine], start_s, end_s)
         assert (found["label"][row][mask][inside] == label).all()
         assert not found["label"][row][~mask].any()
         assert found["purity"][row] == pytest.approx((found["label"][row][mask] == label).mean())
