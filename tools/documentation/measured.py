@@ -29,7 +29,6 @@ OLD = {
     "range-synthesis.md": _HOURS,
     "paper.md": _HOURS,
     "denoiser.md": _HOURS,
-    "classifier.md": "hours of training; by now its networks draw and weigh clips otherwise",
     "real-pairs.md": "since then only pairs of recordings, which it has none of, take radar maps",
     "scale.md": "since then only how classes of data sets and maps of radars are read has changed",
     "studies.md": "hours of training; how late ridge regression is was put right in it",
