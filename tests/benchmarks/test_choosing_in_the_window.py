@@ -74,7 +74,7 @@ def choose_and_drag(window, qtbot, ended):
         if under_way:
             spin(lambda surveyed=surveyed: len(ended) > surveyed)
             left.append(1e3 * (ended[surveyed] - asked))
-        context.edits.end_sensor_drag()
+        context.edits.end_drag()
         settle(window, qtbot)
     return {
         "turn_p95_ms": float(np.percentile(turns, 95)),

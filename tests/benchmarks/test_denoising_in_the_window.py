@@ -185,7 +185,7 @@ def test_dragging_with_and_without_a_denoiser(benchmark, model, window, qtbot):
         hand.stop()
         tick.stop()
         track.changed.disconnect(count)
-        c.edits.end_sensor_drag()
+        c.edits.end_drag()
         settle(window, qtbot)
         steps = 1e3 * np.diff(ticks)
         return {

@@ -74,7 +74,7 @@ while time.time() - began < 3:
     session.edits.drag_sensor((time.time() - began, 0.0, 0.0))
     spin(lambda: False, 0.008)
 marks["maps_per_s_dragging"] = len(maps) / (time.time() - began)
-session.edits.end_sensor_drag()
+session.edits.end_drag()
 spin(lambda: False, 3)
 marks["peak_memory_mb"] = resident_mb()
 print(json.dumps(marks))

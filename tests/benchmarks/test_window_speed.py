@@ -76,7 +76,7 @@ edits.drag_sensor((0.1, 0.0, 0.0))
 spin(lambda: dragged)
 marks["first_drag_s"] = dragged[0] - moved
 print(json.dumps(marks))
-edits.end_sensor_drag()
+edits.end_drag()
 session.document.undo_stack.clear()
 window.close()
 """
@@ -177,7 +177,7 @@ def test_dragging_the_sensor_while_playing(benchmark, sample_window, qtbot, scen
         edits.drag_sensor((0.5 * math.sin(2 * phase), 0.2 * math.cos(3 * phase), 0.0))
 
     rates = benchmark.pedantic(play, (sample_window, qtbot, move), rounds=1)
-    edits.end_sensor_drag()
+    edits.end_drag()
     began = time.perf_counter()
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=60_000)
     rates["settled_s"] = time.perf_counter() - began

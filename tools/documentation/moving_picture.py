@@ -41,7 +41,7 @@ def main() -> None:
             edits.drag_sensor((1.7 * turned, -0.25 * turned, 0.9 * turned))
             _run(FOLLOWS_S)
             pictures.append(_picture(window))
-        edits.end_sensor_drag()
+        edits.end_drag()
     # All colours of the maps' table are covered; the means then keep greys grey.
     palette = pictures[STEPS // 2].quantize(COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=2)
     frames = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures]

@@ -399,6 +399,8 @@ class LabelsFeature(Feature):
 
     def attach(self) -> None:
         """Show the labels of the recording that was opened."""
+        if not self._session.document.same_recording:
+            self.dragging.cancel_drag()  # what is held is of the one before
         self.autosave.attach()
         self._follow_capture()
 

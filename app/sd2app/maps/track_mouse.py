@@ -191,7 +191,7 @@ class TrackMouse(ZoomedPlot):
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """End the drag."""
         if self._grab is not None and self._grab[0] == "offset":
-            self._session.edits.end_offset_drag()
+            self._session.edits.end_drag()
             self._dragged_px = 0.0
             self.update()
         self._grab = None

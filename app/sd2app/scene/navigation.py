@@ -179,13 +179,9 @@ class Navigator:
     def let_go(self) -> None:
         """End whatever is going on, e.g. because the view is hidden."""
         self._button = self._moving = self._clicking = None
-        if self._held is not None:
-            self._held = None
-            self._edits.end_sensor_drag()
-            self._show_hot()
-        if self._held_thing is not None:
-            held, self._held_thing = self._held_thing, None
-            self._edits.end_scene_drag(triple(held.moved_m))
+        if self._held is not None or self._held_thing is not None:
+            self._held = self._held_thing = None
+            self._edits.end_drag()
             self._show_hot()
 
     def look_again(self) -> None:

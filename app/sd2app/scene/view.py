@@ -98,11 +98,11 @@ class SceneView(QWidget):
             (session.display.theme_changed, self._follow_theme),
             (session.display.mesh_changed, self._follow_colour),
             (session.document.opened, self._attach),
+            (session.sensor.dragging_changed, self._follow_sensor),
             (session.document.changed, self._follow_things),
             (session.sensor.dragging_changed, self._follow_things),
             (session.playback.time_changed, self._follow_clock),
             (session.sensor.changed, self._follow_sensor),
-            (session.sensor.dragging_changed, self._follow_sensor),
             (synthesis.frame_changed, self._follow_scattering),
             (placements.changed, self._follow_placements),
             (inertial.changed, self._follow_inertial),
@@ -266,6 +266,8 @@ class SceneView(QWidget):
 
     def _follow_sensor(self) -> None:
         model, seen = self._session.sensor, self.scene.sensor_in_sight or self._dragged
+        if self._dragged and not model.dragging:
+            self.navigator.let_go()  # an edit, or another recording, ended the drag
         self._dragged = model.dragging
         self.scene.set_sensor(model.sensor)
         # Not while the hand turns the view, and not for who looks at something else.

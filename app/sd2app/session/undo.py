@@ -58,15 +58,48 @@ class Assign(QUndoCommand):
 
 
 class Edits:
-    """Undoable edits of a recording. A drag is one step in the history."""
+    """Undoable edits of a recording.
+
+    A drag is one step in the history. Another edit ends it first; it ends without a step where
+    another recording is opened.
+    """
 
     def __init__(self, document: DocumentModel, sensor: SensorModel) -> None:
         self._document = document
         self._sensor = sensor
-        self.dragging = False  # something is held, and is no step yet
+        # Of what is held: name of the step, what assigns it and what reads it, and what was before.
+        self._held: tuple[str, Callable[[Any], None], Callable[[], Any]] | None = None
         self._before: Any = None
         self._dragged: Thing | Body | None = None
         self._planned_before: tuple[Recording, Placements | None] | None = None
+        document.opened.connect(self._forget)
+
+    # --- drags ----------------------------------------------------------------------------
+
+    @property
+    def dragging(self) -> bool:
+        """True while something is held, and is no step yet."""
+        return self._held is not None
+
+    def _begin_drag(
+        self, text: str, assign: Callable[[Any], None], read: Callable[[], Any]
+    ) -> None:
+        self.end_drag()
+        self._held, self._before = (text, assign, read), read()
+
+    def end_drag(self) -> None:
+        """End the drag, if there is one; it becomes one step in the history."""
+        held, self._held = self._held, None
+        self._sensor.set_dragging(False)
+        if held is not None:
+            text, assign, read = held
+            self._push(text, assign, self._before, read())
+
+    def _forget(self) -> None:
+        """Let go of what belongs to the recording before."""
+        if not self._document.same_recording:
+            self._held = None
+            self._sensor.set_dragging(False)
 
     # --- sensor ---------------------------------------------------------------------------
 
@@ -85,18 +118,13 @@ class Edits:
 
     def begin_sensor_drag(self) -> None:
         """Begin a drag of the sensor."""
-        self._before, self.dragging = self._sensor.sensor, True
+        self._begin_drag("Move sensor", self._assign_sensor, lambda: self._sensor.sensor)
         self._sensor.set_dragging(True)
 
     def drag_sensor(self, position_m: Vector) -> None:
         """Move the sensor during a drag."""
-        self._assign_sensor(replace(self._sensor.sensor, position_m=position_m))
-
-    def end_sensor_drag(self) -> None:
-        """End the drag; it becomes one step in the history."""
-        self.dragging = False
-        self._sensor.set_dragging(False)
-        self._push("Move sensor", self._assign_sensor, self._before, self._sensor.sensor)
+        if self.dragging:
+            self._assign_sensor(replace(self._sensor.sensor, position_m=position_m))
 
     def _assign_sensor(self, sensor: VirtualSensor) -> None:
         self._sensor.set_sensor(sensor)
@@ -174,24 +202,16 @@ class Edits:
         assert mesh is not None
         things = () if mesh.surroundings is None else mesh.surroundings.things
         movable = [*things, *(other.placed for other in mesh.others)]
-        self._dragged = movable[number]
-        self._before = self._fields(["things" if number < len(things) else "bodies"])
-        self.dragging = True
+        one = self._dragged = movable[number]
+        assert one is not None
+        fields = ["things" if number < len(things) else "bodies"]
+        self._begin_drag(f"Move {one.name}", self._document.assign, lambda: self._fields(fields))
         self._sensor.set_dragging(True)
 
     def drag_in_scene(self, by_m: Vector) -> None:
         """Move a thing or body from where it was when the drag began."""
-        if self._dragged is not None:
+        if self.dragging:
             self._document.assign(self._moved(by_m))
-
-    def end_scene_drag(self, by_m: Vector) -> None:
-        """End the drag of a thing or body; it becomes one step in the history."""
-        self.dragging = False
-        self._sensor.set_dragging(False)
-        self.drag_in_scene(by_m)
-        if self._dragged is not None:
-            self._push_change(f"Move {self._dragged.name}", self._before)
-            self._dragged = None
 
     def _moved(self, by_m: Vector) -> dict[str, tuple[Any, ...]]:
         """All that is like what is dragged, with that elsewhere."""
@@ -275,17 +295,13 @@ class Edits:
     def begin_offset_drag(self, name: Offset = "radar_offset_s") -> None:
         """Begin to drag what was measured in time."""
         if self._document.recording is not None:
-            self._before, self.dragging = self._fields([name]), True
+            self._begin_drag(_ALIGNED[name], self._document.assign, lambda: self._fields([name]))
 
     def drag_offset(self, seconds: float) -> None:
         """Shift it by ``seconds`` since the drag began."""
-        shifted = {name: round(before + seconds, 3) for name, before in self._before.items()}
-        self._document.assign(shifted)
-
-    def end_offset_drag(self) -> None:
-        """End the drag; it becomes one step in the history."""
-        self.dragging = False
-        self._push_change(_ALIGNED[next(iter(self._before))], self._before)
+        if self.dragging:
+            shifted = {name: round(before + seconds, 3) for name, before in self._before.items()}
+            self._document.assign(shifted)
 
     # --- synthesis ------------------------------------------------------------------------
 
@@ -312,6 +328,7 @@ class Edits:
 
     def change(self, text: str, fields: Mapping[str, object]) -> None:
         """Change fields of the recording as one step."""
+        self.end_drag()
         before = self._fields(fields)
         self._document.assign(fields)
         self._push_change(text, before)
@@ -327,6 +344,7 @@ class Edits:
         self, text: str, assign: Callable[[Any], None], before: object, after: object
     ) -> None:
         """Assign a value, as a step in the history where it is another one."""
+        self.end_drag()
         assign(after)
         if before != after and self._document.content is not None:
             self._document.undo_stack.push(Assign(text, assign, before, after))

@@ -297,7 +297,7 @@ def test_while_dragging_both_maps_are_of_one_place(context, models, qtbot, ball)
         assert not np.array_equal(context.denoised.map.values, here)
     assert all(together)
     assert any(thread.startswith("postprocess") for _, thread in models.asked)
-    context.edits.end_sensor_drag()
+    context.edits.end_drag()
     rest(context, qtbot)
     assert is_of(context, 2.0)
 
@@ -341,7 +341,7 @@ def test_a_model_too_slow_for_a_hand_waits_for_it(context, models, qtbot, ball, 
     # Nothing of an earlier place is shown as if it were of this one.
     assert not context.denoised.covered.any()
     assert "follows when the sensor rests" in context.denoised.status
-    context.edits.end_sensor_drag()
+    context.edits.end_drag()
     rest(context, qtbot)
     assert context.denoised.covered is None
     assert is_of(context, 2.0)
@@ -476,7 +476,7 @@ def test_the_model_before_can_be_shown_beside_this_one(context, models, qtbot, b
     qtbot.waitUntil(lambda: not context.synthesis.busy, timeout=10_000)
     expected = fading(context.synthetic.map.values, np.float32(2.0))
     np.testing.assert_allclose(context.before.map.values, expected, rtol=1e-5, atol=1e-9)
-    context.edits.end_sensor_drag()
+    context.edits.end_drag()
     context.denoise.set_comparing(False)
     assert context.before.map is None
 
@@ -544,6 +544,6 @@ def test_a_real_model_gives_the_map_that_the_library_gives(
         context.denoised.map.values, moved, rtol=1e-4, atol=1e-6 * moved.max()
     )
     assert not np.allclose(moved, expected)
-    context.edits.end_sensor_drag()
+    context.edits.end_drag()
     context.close()
     parent.deleteLater()

@@ -232,7 +232,7 @@ def test_sensors_are_saved_with_the_recording(desk: Desk, walk: Path, tmp_path: 
     desk.session.edits.begin_offset_drag("imu_offset_s")
     desk.session.edits.drag_offset(0.1)
     desk.session.edits.drag_offset(-0.125)
-    desk.session.edits.end_offset_drag()
+    desk.session.edits.end_drag()
     assert desk.history.undoText() == "Inertial sensor offset"
     desk.session.document.save()
     again = open_recording(walk)

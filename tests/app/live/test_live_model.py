@@ -126,7 +126,7 @@ def test_edits_while_listening_stay_and_can_be_taken_back(session, endless, tmp_
     model = heard(session, request, qtbot, 3)
     session.edits.begin_offset_drag()
     session.edits.drag_offset(0.25)
-    session.edits.end_offset_drag()
+    session.edits.end_drag()
     stopped(model, qtbot)
     document = session.document
     assert document.modified

@@ -111,7 +111,7 @@ def test_every_sweep_of_a_fast_hand_is_for_one_placement(context, qtbot, ball):
     assert len(places) > 10
     assert places == sorted(places)
     assert places[-1] == pytest.approx(199 * 0.005)
-    context.edits.end_sensor_drag()
+    context.edits.end_drag()
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
     assert context.document.undo_stack.count() == 1
 
@@ -143,7 +143,7 @@ def test_a_sweep_need_not_wait_for_what_is_made_of_the_one_before(
     answer.set()
     qtbot.waitUntil(lambda: not context.synthesis.busy, timeout=10_000)
     assert [(x_m, part.more[2]) for x_m, part in shown] == [(0.1, 0.1), (0.2, 0.2)]
-    context.edits.end_sensor_drag()
+    context.edits.end_drag()
 
 
 def test_a_hand_that_holds_still_gets_the_exact_map(context, qtbot, ball):
@@ -156,7 +156,7 @@ def test_a_hand_that_holds_still_gets_the_exact_map(context, qtbot, ball):
     assert context.sensor.dragging
     context.edits.drag_sensor((0.3, 0.0, 0.0))
     qtbot.waitUntil(lambda: not context.synthesis.complete, timeout=5_000)
-    context.edits.end_sensor_drag()
+    context.edits.end_drag()
 
 
 def test_another_recording_replaces_work_under_way(context, qtbot, ball, tmp_path):
@@ -215,7 +215,7 @@ def test_levels_keep_their_reference_until_asked(context, qtbot, ball):
     assert reference > 0
     context.edits.begin_sensor_drag()
     context.edits.drag_sensor((0.0, 0.0, -5.0))
-    context.edits.end_sensor_drag()
+    context.edits.end_drag()
     qtbot.waitUntil(lambda: context.synthesis.complete, timeout=10_000)
     assert context.synthetic.reference == reference
     context.edits.set_references(context.session.maps.strongest(), by_hand=False)
@@ -402,7 +402,7 @@ def test_a_hand_gets_the_plan_for_dragging(context, fake, qtbot, ball):
     np.testing.assert_allclose(
         context.synthetic.map.values, of_plan(ball, fake.dragging, moved), atol=1e-7
     )
-    context.edits.end_sensor_drag()
+    context.edits.end_drag()
     wait_until_done(context, qtbot)
     assert not context.synthesis.moving
 
@@ -416,7 +416,7 @@ def test_masks_are_kept_within_their_reach_and_not_beyond(context, fake, qtbot, 
     for x_m, words in ((0.05, "while dragging: ±13 %"), (0.15, "facing the sensor")):
         context.edits.drag_sensor((x_m, 0.0, 0.0))
         qtbot.waitUntil(lambda words=words: words in context.synthetic.status, timeout=5_000)
-    context.edits.end_sensor_drag()
+    context.edits.end_drag()
 
 
 def test_a_hand_interrupts_the_choosing(context, fake, qtbot, ball):
@@ -433,7 +433,7 @@ def test_a_hand_interrupts_the_choosing(context, fake, qtbot, ball):
     context.edits.drag_sensor((0.35, 0.0, 0.0))
     qtbot.waitUntil(lambda: bool(fake.cancelled), timeout=60_000)
     fake.gate.set()
-    context.edits.end_sensor_drag()
+    context.edits.end_drag()
     wait_until_done(context, qtbot)
     assert fake.asked[-1][2] == context.sensor.sensor
 

@@ -45,7 +45,7 @@ class Hand:
         self.log.append("drag")
         self.scene.set_sensor(replace(self.scene.sensor, position_m=position_m))
 
-    def end_sensor_drag(self) -> None:
+    def end_drag(self) -> None:
         self.log.append("end")
 
     @property

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,6 +12,7 @@ from sd2app.session.document import DocumentModel
 from sd2app.session.sensor import SensorModel
 from sd2app.session.tasks import TaskList
 from sd2app.session.undo import Edits
+from sd2core.mesh.things import Thing
 from sd2core.sensor import VirtualSensor
 
 
@@ -47,7 +50,7 @@ def test_a_drag_is_one_step(document):
     for x in (0.1, 0.2, 0.3):
         assert sensor.dragging
         edits.drag_sensor((x, 0.0, 0.0))
-    edits.end_sensor_drag()
+    edits.end_drag()
     assert not sensor.dragging
     assert len(seen) == 3
     assert document.undo_stack.count() == 1
@@ -64,8 +67,39 @@ def test_a_drag_back_to_the_start_is_no_step(document):
     edits.begin_sensor_drag()
     edits.drag_sensor((1.0, 0.0, 0.0))
     edits.drag_sensor((0.0, 0.0, 0.0))
-    edits.end_sensor_drag()
+    edits.end_drag()
     assert document.undo_stack.count() == 0
+
+
+def test_an_edit_in_the_middle_of_a_drag_is_a_step_after_it(document):
+    sensor = SensorModel()
+    edits = Edits(document, sensor)
+    edits.begin_sensor_drag()
+    edits.drag_sensor((1.0, 0.0, 0.0))
+    edits.place_sensor(VirtualSensor(position_m=(0.0, 0.0, 2.0)))
+    edits.drag_sensor((3.0, 0.0, 0.0))  # of what is held no more
+    edits.end_drag()
+    states = [sensor.sensor.position_m]
+    while document.undo_stack.canUndo():
+        document.undo_stack.undo()
+        states.append(sensor.sensor.position_m)
+    assert states == [(0.0, 0.0, 2.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)]
+
+
+def test_a_thing_that_comes_while_another_is_dragged_stays(document):
+    one, other = (Thing("box", (x, 0.3, 1.0)) for x in (1.0, -1.0))
+    moved = replace(one, position_m=(1.5, 0.3, 1.0))
+    edits = Edits(document, SensorModel())
+    edits.add_to_scene(one)
+    edits.begin_scene_drag(0)
+    edits.drag_in_scene((0.5, 0.0, 0.0))
+    edits.add_to_scene(other)
+    edits.drag_in_scene((2.0, 0.0, 0.0))
+    edits.end_drag()
+    assert document.recording.things == (moved, other)
+    for before in ((moved,), (one,), ()):
+        document.undo_stack.undo()
+        assert document.recording.things == before
 
 
 @settings(max_examples=20)
@@ -107,12 +141,34 @@ def test_the_history_ends_with_the_recording(document, qtbot, tmp_path):
     assert not document.modified
 
 
+@pytest.mark.parametrize("what", ["sensor", "offset"])
+def test_what_is_held_is_let_go_of_where_another_recording_is_opened(
+    document, what, qtbot, tmp_path
+):
+    edits = Edits(document, SensorModel())
+    if what == "sensor":
+        edits.begin_sensor_drag()
+        edits.drag_sensor((1.0, 0.0, 0.0))
+    else:
+        edits.begin_offset_drag()
+        edits.drag_offset(0.5)
+    with qtbot.waitSignal(document.opened):
+        document.open([write_points(tmp_path / "others.npz")])
+    assert not edits.dragging
+    edits.drag_sensor((2.0, 0.0, 0.0))
+    edits.drag_offset(0.75)
+    edits.end_drag()
+    assert document.recording.sensor == VirtualSensor()
+    assert document.recording.radar_offset_s == 0.0
+    assert document.undo_stack.count() == 0
+
+
 def test_aligning_by_drag_is_one_step(document):
     edits = Edits(document, SensorModel())
     edits.begin_offset_drag()
     edits.drag_offset(0.1)
     edits.drag_offset(0.25)
-    edits.end_offset_drag()
+    edits.end_drag()
     assert document.recording.radar_offset_s == 0.25
     assert document.undo_stack.count() == 1
     document.undo_stack.undo()

@@ -344,7 +344,7 @@ def test_the_status_line_says_how_exact_the_map_is_and_a_click_says_why(window, 
     assert shown() == "±0 % · how?"
     c.edits.drag_sensor((0.1, 0.0, 0.0))
     assert shown() == "while dragging ±13 % · how?"
-    c.edits.end_sensor_drag()
+    c.edits.end_drag()
     assert shown() == "±0 % · how?"
     QTest.mouseClick(button, Qt.MouseButton.LeftButton)
     assert window.side.shown == "Accuracy"

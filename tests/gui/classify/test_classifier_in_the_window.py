@@ -127,7 +127,7 @@ def test_what_belongs_to_another_sensor_is_not_shown_as_current(classified, fake
     c.edits.drag_sensor((position[0] + 0.5, position[1], position[2]))
     qtbot.waitUntil(lambda: c.synthesis.moving, timeout=10_000)
     assert readout.text == ""
-    c.edits.end_sensor_drag()
+    c.edits.end_drag()
     fake_classes.gate.set()
     qtbot.waitUntil(
         lambda: c.synthesis.complete and c.classify.track.complete and not c.classify.busy,

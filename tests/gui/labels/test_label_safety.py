@@ -382,12 +382,12 @@ class TestOtherEditsAfterACrash:
         c = models_of(window)
         c.edits.begin_sensor_drag()
         c.edits.drag_sensor((0.5, 0.2, 0.0))
-        c.edits.end_sensor_drag()
+        c.edits.end_drag()
         qtbot.keyClick(window, Qt.Key.Key_A)
         c.edits.plan_placements(PlacementGrid((2.0,), azimuths_deg=(0.0, 45.0)))
         c.edits.begin_offset_drag()
         c.edits.drag_offset(0.25)
-        c.edits.end_offset_drag()
+        c.edits.end_drag()
         return window, self.state(window)
 
     def state(self, window) -> tuple:

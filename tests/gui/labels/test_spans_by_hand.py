@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 from itertools import pairwise
 
 import pytest
@@ -178,6 +180,21 @@ def test_an_edit_ends_the_drag_and_escape_cancels_it(labelled) -> None:
     QTest.mouseRelease(hand, LEFT, NONE, at(labelled, 0.3))
     assert spans(labelled) == [THERE, BACK]
     assert labelled.action("undo").isEnabled() is False
+
+
+def test_another_recording_takes_nothing_of_a_drag_that_is_held(labelled, qtbot, tmp_path) -> None:
+    c, hand = models_of(labelled), timeline(labelled)
+    other = shutil.copytree(c.document.recording.folder, tmp_path / "other.sd2")
+    description = json.loads((other / "recording.json").read_text())
+    description["spans"] = description["spans"][1:]
+    (other / "recording.json").write_text(json.dumps(description))
+    pull(hand, at(labelled, 0.9), at(labelled, 0.95), ALT, release=False)
+    with qtbot.waitSignal(c.document.opened, timeout=30_000):
+        labelled.open_paths([other])
+    QTest.mouseMove(hand, at(labelled, 0.98))
+    QTest.mouseRelease(hand, LEFT, NONE, at(labelled, 0.98))
+    assert spans(labelled) == [BACK]
+    assert steps(labelled) == []
 
 
 # --- reaction time ----------------------------------------------------------------------------

@@ -124,7 +124,7 @@ class Drag:
         self._log.append("drag")
         self._sensor.set_sensor(replace(self._sensor.sensor, position_m=position_m))
 
-    def end_sensor_drag(self) -> None:
+    def end_drag(self) -> None:
         self._log.append("end")
         self._sensor.set_dragging(False)
 
@@ -133,9 +133,6 @@ class Drag:
 
     def drag_in_scene(self, by_m: tuple[float, float, float]) -> None:
         self._log.append("move")
-
-    def end_scene_drag(self, by_m: tuple[float, float, float]) -> None:
-        self._log.append(f"put by {by_m}")
 
 
 @dataclass

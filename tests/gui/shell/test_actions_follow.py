@@ -47,7 +47,7 @@ def test_every_action_follows_what_it_depends_on(labelled, fake_models, qtbot) -
         "fold": lambda: labelled.fold_side(True),
         "unfold": lambda: labelled.fold_side(False),
         "drag": lambda: (c.edits.begin_sensor_drag(), c.edits.drag_sensor(near["position_m"])),
-        "drop": c.edits.end_sensor_drag,
+        "drop": c.edits.end_drag,
         "no real map": lambda: c.real.set_map(None),
         "another count": lambda: c.edits.choose_count("plain"),
         "difference": lambda: c.session.maps.denoised.set_map(c.synthetic.map),

@@ -45,7 +45,7 @@ def test_the_sensor_drag_is_followed(walk, qtbot):
         c.edits.drag_sensor((0.08 * step, 0.0, 0.0))
         qtbot.wait(5)
     qtbot.waitUntil(lambda: not np.array_equal(before, c.synthetic.map.values), timeout=5_000)
-    c.edits.end_sensor_drag()
+    c.edits.end_drag()
     qtbot.waitUntil(lambda: c.synthesis.complete, timeout=60_000)
     assert c.document.undo_stack.count() == 1
     assert walk.messages.text == ""

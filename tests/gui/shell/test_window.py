@@ -402,7 +402,7 @@ def test_a_drag_shows_a_preview_and_becomes_exact(window, qtbot):
     c.edits.drag_sensor((0.1, 0.0, 0.0))
     qtbot.waitUntil(lambda: c.synthetic.status.startswith("while"), timeout=5_000)
     c.edits.drag_sensor((0.2, 0.0, 0.0))
-    c.edits.end_sensor_drag()
+    c.edits.end_drag()
     qtbot.waitUntil(lambda: c.synthesis.complete, timeout=10_000)
     assert c.synthetic.status == "±0 %"
     assert seen[0] == "while dragging: ±13 %"
@@ -531,7 +531,8 @@ def test_a_thing_whose_file_is_gone_is_named_left_out_and_found_again(
     edits = models_of(empty_window).edits
     edits.begin_scene_drag(0)  # of those that are there
     edits.drag_in_scene((0.25, 0.0, 0.0))
-    edits.end_scene_drag((0.5, 0.0, 0.0))
+    edits.drag_in_scene((0.5, 0.0, 0.0))
+    edits.end_drag()
     assert document.recording.things[1].position_m == (1.5, 0.3, 1.0)
     edits.relink(tmp_path / "store")
     assert [one.name for one in document.mesh.surroundings.things] == ["chair.obj", "box"]

@@ -70,7 +70,7 @@ def test_a_moved_sensor_and_its_undoing_are_seen(touring, qtbot) -> None:
     edits.drag_sensor((0.5, 0.0, 0.5))
     qtbot.wait(400)
     assert at(touring) == 2  # the hand still holds it
-    edits.end_sensor_drag()
+    edits.end_drag()
     qtbot.waitUntil(lambda: at(touring) == 3)
 
     key(touring, "Z", Qt.KeyboardModifier.ControlModifier)
