@@ -69,7 +69,7 @@ class LabelTimeline(ZoomedPlot):
         self.buttons = buttons
         self._pressed: QAction | None = None
         self._target: HitTarget | None = None
-        self._pointer_px = 0.0
+        self._pressed_s = self._pointer_px = 0.0
         self._within_s, self._cutting = 0.0, False
         self._scroll = QTimer(self, interval=_SCROLL_MS)
         self._scroll.timeout.connect(self._scroll_on)
@@ -171,6 +171,7 @@ class LabelTimeline(ZoomedPlot):
             if self._pressed is not None:
                 return
             self._target = self.target_at(event.position().x(), event.position().y())
+            self._pressed_s = self.scale.time_of(event.position().x())
             self._cutting = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
@@ -245,7 +246,8 @@ class LabelTimeline(ZoomedPlot):
         assert target is not None
         scale = self.scale
         within_s = self._within_s
-        time_s, pressed_s = scale.time_of(self._pointer_px), scale.time_of(target.x_px)
+        # The axis may have been zoomed, or turned a page, since it was pressed.
+        time_s, pressed_s = scale.time_of(self._pointer_px), self._pressed_s
         if target.span is None or self._cutting:
             known = {one.name for one in self._labels.targets}
             track = target.track if target.track in known else self._labels.track
@@ -260,11 +262,7 @@ class LabelTimeline(ZoomedPlot):
     def _scroll_on(self) -> None:
         """Scroll the axis while the mouse is beyond its end."""
         step_s = _SCROLL_SHARE * self._span.duration_s
-        before_s = self._span.start_s
         self._span.pan(step_s if self._pointer_px > GUTTER_PX else -step_s)
-        assert self._target is not None
-        moved_px = (self._span.start_s - before_s) / self.scale.seconds_per_px
-        self._target = self._target._replace(x_px=self._target.x_px - moved_px)
         self._drag()
 
     def _show_target(self, target: HitTarget | None, button: QAction | None) -> None:

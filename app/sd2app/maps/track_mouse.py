@@ -42,7 +42,7 @@ class TimePlot(Canvas):
         self._session, self._overlays = session, tuple(overlays)
         self._span, self._playback, self._pointer = session.span, session.playback, session.pointer
         self._display = session.display
-        self._grab: tuple[str, float] | None = None  # what is dragged, and from which pixel
+        self._grab: tuple[str, float] | None = None  # what is dragged, and from where
         self._dragged_px = 0.0  # how far a grip is from the middle
         self.follow(self._playback.frame_changed, session.aligning.changed)
         self._display.theme_changed.connect(self.redraw)
@@ -159,17 +159,18 @@ class TrackMouse(ZoomedPlot):
         if self._grab is not None:
             return
         place = event.position()
+        time_s = self.scale.time_of(place.x())
         if event.button() == Qt.MouseButton.MiddleButton:
-            self._grab = ("pan", place.x())
+            self._grab = ("pan", time_s)
         elif event.button() == Qt.MouseButton.LeftButton:
             use = self.use_of(place)
             if use == "seek":
-                self._session.playback.seek(self.scale.time_of(place.x()))
+                self._session.playback.seek(time_s)
             elif use == "offset":
                 self._session.edits.begin_offset_drag(self.OFFSET)
             else:
                 return
-            self._grab = (use, place.x())
+            self._grab = (use, time_s)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Drag what is held, and read what is under the pointer."""
@@ -178,15 +179,15 @@ class TrackMouse(ZoomedPlot):
         if self._grab is None:
             self.setCursor(_CURSORS[self.use_of(place)])
             return
-        what, start_x = self._grab
+        what, start_s = self._grab
+        time_s = self.scale.time_of(place.x())
         if what == "seek":
-            self._session.playback.seek(self.scale.time_of(place.x()))
+            self._session.playback.seek(time_s)
         elif what == "pan":
-            self._session.span.pan((start_x - place.x()) * self.scale.seconds_per_px)
-            self._grab = ("pan", place.x())
+            self._session.span.pan(start_s - time_s)
         else:
-            self._dragged_px = place.x() - start_x
-            self._session.edits.drag_offset(self._dragged_px * self.scale.seconds_per_px)
+            self._dragged_px = place.x() - self.scale.x_of(start_s)
+            self._session.edits.drag_offset(time_s - start_s)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """End the drag."""

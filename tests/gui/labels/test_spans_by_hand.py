@@ -197,6 +197,15 @@ def test_another_recording_takes_nothing_of_a_drag_that_is_held(labelled, qtbot,
     assert steps(labelled) == []
 
 
+def test_a_new_span_begins_where_it_was_pressed_whatever_the_axis_does(labelled) -> None:
+    c, hand = models_of(labelled), timeline(labelled)
+    pull(hand, at(labelled, 0.85), at(labelled, 0.9), ALT, release=False)
+    c.span.set_span(0.5, 1.5)  # as a page that turns, or the wheel
+    QTest.mouseMove(hand, at(labelled, 0.95))
+    QTest.mouseRelease(hand, LEFT, NONE, at(labelled, 0.95))
+    assert spans(labelled)[1][1:] == (26, 28)
+
+
 # --- reaction time ----------------------------------------------------------------------------
 
 
