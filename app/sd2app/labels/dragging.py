@@ -151,6 +151,8 @@ class SpanDragger(QObject):
             if self._pressed_px is not None and abs(place.x() - self._pressed_px) >= MOVED_PX:
                 self._pressed_px = None
             return False
+        if not event.buttons():  # a menu or a dialog took the release
+            return self._release(place)
         if self._dragging.dragging or self._dragging.begin_drag():
             within_s = attraction_s(event, self._view.scale)
             self._dragging.drag_edge(*self._edge, self._time_s(place), within_s)

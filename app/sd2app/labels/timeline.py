@@ -177,6 +177,8 @@ class LabelTimeline(ZoomedPlot):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Drag, or show by the cursor what could be dragged."""
         x = event.position().x()
+        if self._target is not None and not event.buttons():
+            self.mouseReleaseEvent(event)  # a menu or a dialog took it
         if self._target is None:
             if not event.buttons():
                 button = self._button_at(event.position())

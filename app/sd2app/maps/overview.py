@@ -90,7 +90,7 @@ class Overview(MapWidget):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Drag the frame or the edge."""
         x = event.position().x()
-        if self._grab is None:
+        if self._grab is None or not event.buttons():
             edge = self._handle_at(x) in ("left", "right")
             self.setCursor(
                 Qt.CursorShape.SizeHorCursor if edge else Qt.CursorShape.PointingHandCursor

@@ -281,6 +281,8 @@ class _Hands(QObject):
         return bool(self._held)
 
     def _move(self, place: QPointF, event: QMouseEvent) -> bool:
+        if not event.buttons():
+            self._held = ""  # a menu or a dialog may have taken the release
         part = self._held or ("" if event.buttons() else self._part_at(place))
         if part == "height":
             self._view.setCursor(Qt.CursorShape.SizeVerCursor)

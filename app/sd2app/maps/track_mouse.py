@@ -176,6 +176,8 @@ class TrackMouse(ZoomedPlot):
         """Drag what is held, and read what is under the pointer."""
         place = event.position()
         self.point_at(place)
+        if not event.buttons():
+            self.mouseReleaseEvent(event)  # a menu or a dialog may have taken it
         if self._grab is None:
             self.setCursor(_CURSORS[self.use_of(place)])
             return

@@ -179,6 +179,8 @@ class SceneView(QWidget):
     def _handle_mouse(self, event: QMouseEvent) -> None:
         kind, place = event.type(), _place(event)
         if kind == QEvent.Type.MouseMove:
+            if not event.buttons():
+                self.navigator.let_go()  # a menu or a dialog may have taken the release
             self.navigator.move(*place, event.modifiers())
             at_body = not event.buttons() and not self._at_something
             part = self.limb_hand.part_at(*place) if at_body else None

@@ -23,7 +23,7 @@ from label_hands import (
     timeline,
 )
 from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QWheelEvent
+from PySide6.QtGui import QMouseEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolButton
 from window_models import models_of
@@ -31,6 +31,7 @@ from window_models import models_of
 from sd2app.labels.marking import REACTION
 from sd2app.playback.views import TimeRuler
 
+NO_BUTTON = Qt.MouseButton.NoButton
 THERE, BACK = ("there", 6, 24), ("back", 30, 60)
 
 
@@ -204,6 +205,18 @@ def test_a_new_span_begins_where_it_was_pressed_whatever_the_axis_does(labelled)
     QTest.mouseMove(hand, at(labelled, 0.95))
     QTest.mouseRelease(hand, LEFT, NONE, at(labelled, 0.95))
     assert spans(labelled)[1][1:] == (26, 28)
+
+
+def test_a_drag_whose_release_went_elsewhere_ends_at_the_next_move(labelled) -> None:
+    hand = timeline(labelled)
+    pull(hand, at(labelled, 0.5), at(labelled, 0.4), ALT, release=False)
+    there = QPointF(at(labelled, 0.3))
+    move = QMouseEvent(QMouseEvent.Type.MouseMove, there, there, NO_BUTTON, NO_BUTTON, NONE)
+    QApplication.sendEvent(hand, move)
+    assert not models_of(labelled).label_dragging.dragging
+    assert steps(labelled) == ["Move span"]
+    assert spans(labelled) == [("there", 3, 21), BACK]
+    QTest.mouseRelease(hand, LEFT, NONE, at(labelled, 0.3))
 
 
 # --- reaction time ----------------------------------------------------------------------------
