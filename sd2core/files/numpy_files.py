@@ -93,6 +93,19 @@ def open_npy_file(path: Path, expected: str, remedy: str = "") -> NDArray[Any]:
         raise Sd2Error(found, expected, remedy) from error
 
 
+def read_words(path: Path, kind: np.dtype[Any], place: slice) -> NDArray[Any]:
+    """Read the numbers from one to another of a file; Sd2Error where it is shorter by now.
+
+    Of a file that is mapped instead, what is cut off, or is on a disk that is pulled out, ends the
+    process once it is looked at.
+    """
+    count = place.stop - place.start
+    words: NDArray[Any] = np.fromfile(path, kind, count, offset=place.start * kind.itemsize)
+    if len(words) != count:
+        raise Sd2Error(f"{path} has become shorter", "all that was there at first", "Open it again")
+    return words
+
+
 def npz_names(path: Path) -> set[str]:
     """Names of the arrays in an ``.npz``; none in a damaged one, which its reader refuses."""
     try:

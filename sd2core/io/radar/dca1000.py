@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular
+from sd2core.files.numpy_files import read_words
 from sd2core.io.radar.capture import (
     LazySamples,
     RadarCapture,
@@ -177,12 +178,9 @@ class _Words:
         for part, first, end in zip(self._parts, self._edges, self._edges[1:], strict=False):
             low, high = max(start, int(first)), min(stop, int(end))
             if low < high:
-                skipped = (low - int(first)) * _WORD.itemsize
-                pieces.append(np.fromfile(part, _WORD, high - low, offset=skipped))
-        words = np.concatenate(pieces)
-        if len(words) != stop - start:
-            raise Sd2Error(f"{self._parts[0]} has become shorter", _EXPECTED, "Open it again")
-        return words.astype(np.int16, copy=False)
+                place = slice(low - int(first), high - int(first))
+                pieces.append(read_words(part, _WORD, place))
+        return np.concatenate(pieces).astype(np.int16, copy=False)
 
 
 def _refuse_firmware(path: Path) -> None:

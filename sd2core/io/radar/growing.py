@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import check_regular
+from sd2core.files.numpy_files import read_words
 from sd2core.files.texts import errors_in, faults_in, read_json
 from sd2core.io.radar.capture import LazySamples, RadarCapture
 from sd2core.radar_config import RadarConfig
@@ -192,12 +193,8 @@ def load_growing(path: Path) -> RadarCapture:
 
     def read(some: slice) -> NDArray[Any]:
         start, stop, _ = some.indices(frames)
-        values = np.fromfile(
-            samples, head.word_type, (stop - start) * words, offset=start * head.frame_bytes
-        )
-        if len(values) != (stop - start) * words:
-            raise Sd2Error(f"{samples} has become shorter", _EXPECTED, "Open it again")
-        return head.as_samples(values)
+        place = slice(start * words, stop * words)
+        return head.as_samples(read_words(samples, head.word_type, place))
 
     shape = (frames, *head.frame_shape[:3])
     return RadarCapture(

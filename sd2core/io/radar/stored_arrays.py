@@ -21,7 +21,7 @@ from pydantic import AliasPath, BaseModel, Field
 from sd2core.errors import Sd2Error
 from sd2core.files.hdf5_files import member_of, open_hdf5_file, refusing_damage
 from sd2core.files.limits import check_regular, check_size
-from sd2core.files.numpy_files import open_npy_file
+from sd2core.files.numpy_files import open_npy_file, read_words
 from sd2core.files.texts import faults_in, read_json
 
 META, DATA = ".sigmf-meta", ".sigmf-data"
@@ -236,9 +236,7 @@ def _sigmf(path: Path) -> StoredArray:
 
     def read(place: tuple[slice, ...]) -> NDArray[Any]:
         start, stop, _ = place[0].indices(count)
-        words = np.fromfile(
-            data, meta.word, (stop - start) * each, offset=start * each * meta.word.itemsize
-        )
+        words = read_words(data, meta.word, slice(start * each, stop * each))
         if meta.is_complex:
             parts = words.reshape(-1, 2).astype(np.float32)
             words = parts[:, 0] + np.complex64(1j) * parts[:, 1]

@@ -60,8 +60,7 @@ def test_what_is_written_is_read_back_from_any_of_its_paths(
     capture = load_capture(folder.parent / given)
     assert capture.config == CONFIG
     assert capture.config.name == CONFIG.name
-    np.testing.assert_array_equal(capture.samples, cube)
-    assert isinstance(capture.samples, np.memmap)
+    np.testing.assert_array_equal(capture.samples[:], cube)
     np.testing.assert_allclose(
         capture.timebase.times_s, np.arange(FRAMES) / 30.0, atol=5e-7, rtol=0
     )
@@ -74,6 +73,13 @@ def test_what_is_written_is_read_back_from_any_of_its_paths(
 def test_samples_are_read_relative_to_full_scale(folder: Path, cube: np.ndarray) -> None:
     values = load_capture(folder).read(2, 4)
     np.testing.assert_array_equal(values, (cube[2:4].astype(np.float32) - 2048) / 2048)
+
+
+def test_a_cube_that_is_cut_off_while_it_is_open_is_refused(folder: Path, cube: np.ndarray) -> None:
+    capture = load_capture(folder)
+    os.truncate(folder / "radar.npy", 300)
+    with pytest.raises(Sd2Error, match=r"radar\.npy has become shorter"):
+        capture.read(FRAMES - 1, FRAMES)
 
 
 def test_real_capture(shared_data: Path) -> None:
@@ -433,4 +439,4 @@ def test_transmitters_that_send_together_are_one(folder: Path, cube: np.ndarray)
     edit_config(folder, lambda shape: shape.update(tx_antennas=[1, 2]))
     capture = load_capture(folder)
     assert capture.config == CONFIG
-    np.testing.assert_array_equal(capture.samples, cube)
+    np.testing.assert_array_equal(capture.samples[:], cube)
