@@ -75,7 +75,7 @@ class PlacementFields(QObject):
 
     def end(self) -> None:
         """End typing: one step in the history."""
-        self._placements.edits.end_typing_placements()
+        self._placements.edits.end_drag()
 
     def _follow(self) -> None:
         plan = self._placements.plan

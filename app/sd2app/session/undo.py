@@ -22,12 +22,12 @@ from sd2core.options.synthesis import HowCounted
 from sd2core.placements.placements import Placements
 from sd2core.radar_config import Clutter
 from sd2core.recording.divergence import WORDS
-from sd2core.recording.recording import Recording
 from sd2core.recording.relinking import ROLES, Relinked
 from sd2core.sensor import Vector, VirtualSensor, aimed_at
 
 Offset = Literal["radar_offset_s", "imu_offset_s"]
 """Time on the recording's clock at which something measured begins."""
+_PLANNED = "Plan placements"
 _ALIGNED: Mapping[str, str] = {
     "radar_offset_s": "Radar offset",
     "imu_offset_s": "Inertial sensor offset",
@@ -71,7 +71,6 @@ class Edits:
         self._held: tuple[str, Callable[[Any], None], Callable[[], Any]] | None = None
         self._before: Any = None
         self._dragged: Thing | Body | None = None
-        self._planned_before: tuple[Recording, Placements | None] | None = None
         document.opened.connect(self._forget)
 
     # --- drags ----------------------------------------------------------------------------
@@ -136,24 +135,13 @@ class Edits:
     def plan_placements(self, placements: Placements | None) -> None:
         """Plan other places for sensors around the body, or none."""
         self.type_placements(placements)
-        self.end_typing_placements()
+        self.end_drag()
 
     def type_placements(self, placements: Placements | None) -> None:
         """Plan other places while they are typed: all until the end is one step."""
-        recording = self._document.recording
-        if recording is None:
-            return
-        if self._planned_before is None or self._planned_before[0] is not recording:
-            self._planned_before = (recording, recording.placements)
+        if self._held is None or self._held[0] != _PLANNED:
+            self._begin_drag(_PLANNED, self._document.assign, lambda: self._fields(["placements"]))
         self._document.assign({"placements": placements})
-
-    def end_typing_placements(self) -> None:
-        """End typing: all of it is one step in the history."""
-        recording, before = self._document.recording, self._planned_before
-        self._planned_before = None
-        # Another recording may have been opened while the user typed.
-        if recording is not None and before is not None and before[0] is recording:
-            self._push_change("Plan placements", {"placements": before[1]})
 
     def restore(self, fields: Mapping[str, Any]) -> None:
         """Take over fields of an earlier session, or that were saved elsewhere."""

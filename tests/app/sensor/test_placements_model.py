@@ -57,13 +57,13 @@ class Edits:
 
     def plan_placements(self, plan):
         self.type_placements(plan)
-        self.end_typing_placements()
+        self.end_drag()
 
     def type_placements(self, plan):
         self.document.recording.placements = plan
         self.document.changed.emit()
 
-    def end_typing_placements(self):
+    def end_drag(self):
         self.steps.append(self.document.recording.placements)
 
     def place_sensor(self, sensor, text):
