@@ -106,16 +106,6 @@ class Settings:
     def tolerance(self, tolerance: float) -> None:
         self._store.setValue("tolerance", tolerance)
 
-    @property
-    def unfinished_fit(self) -> Path | None:
-        """Folder in which a body was being fitted."""
-        value = self._store.value("unfinished_fit")
-        return Path(value) if value else None
-
-    def set_unfinished_fit(self, folder: Path | None) -> None:
-        """Remember where a body is being fitted, or that none is."""
-        self._store.setValue("unfinished_fit", "" if folder is None else str(folder))
-
     def layout(self, name: str) -> QByteArray | None:
         """Saved geometry of a part of the window."""
         value = self._store.value(f"layout/{name}")

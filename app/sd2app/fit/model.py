@@ -16,6 +16,8 @@ from sd2app.settings import Settings
 from sd2core.errors import Sd2Error
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER, CommandFolder
 
+UNFINISHED = "unfinished_fit"
+"""Name in the settings of the folder in which a body is being fitted."""
 State = Literal["idle", "running", "cancelling", "stopped", "failed", "finished"]
 
 
@@ -82,7 +84,7 @@ class FitModel(QObject):
                 remedy="Wait for it, or save elsewhere",
             )
         request.save()
-        self._settings.set_unfinished_fit(request.folder)
+        self._settings.set_paths(UNFINISHED, [request.folder])
         if request != self.request:
             # Otherwise what was found before it was stopped is still so.
             self._landmarks = {}
@@ -117,7 +119,7 @@ class FitModel(QObject):
             request = self.request
             if self.state == "failed" and request and not any(map(Path.exists, request.partials)):
                 request.discard()
-            self._settings.set_unfinished_fit(None)
+            self._settings.set_paths(UNFINISHED, [])
             self._set_state("idle")
 
     def report_failure(self, text: str) -> None:
@@ -127,8 +129,7 @@ class FitModel(QObject):
 
     def look_for_runs(self) -> None:
         """Take up what was under way when the program last ended."""
-        folder = self._settings.unfinished_fit
-        if folder is not None:
+        for folder in self._settings.paths(UNFINISHED):
             self.take_up(folder)
 
     def take_up(self, folder: Path) -> bool:
@@ -201,7 +202,7 @@ class FitModel(QObject):
             self.report_failure(run.text or silent)
 
     def _complete(self) -> None:
-        self._settings.set_unfinished_fit(None)
+        self._settings.set_paths(UNFINISHED, [])
         self._set_state("finished")
         self.finished.emit(self.request)
 

@@ -11,7 +11,7 @@ import pytest
 from PySide6.QtCore import QLockFile
 
 from sd2app.command_line import main
-from sd2app.fit.model import FitModel
+from sd2app.fit.model import UNFINISHED, FitModel
 from sd2app.fit.on_screen import make_recording
 from sd2app.fit.request import LOCK_NAME, FitRequest, Person, read_request, settled
 from sd2app.settings import Settings
@@ -59,7 +59,7 @@ def test_a_fit_from_beginning_to_end(made, qtbot, request_, settings) -> None:
     model.finished.connect(finished.append)
     model.start(request_)
     assert model.busy
-    assert settings.unfinished_fit == request_.folder
+    assert settings.paths(UNFINISHED) == [request_.folder]
     until(qtbot, model, "finished")
     assert finished == [request_]
     assert request_.mesh.exists()
@@ -68,7 +68,7 @@ def test_a_fit_from_beginning_to_end(made, qtbot, request_, settings) -> None:
     assert model.progress.stage == "write"
     assert model.landmarks_at(7)[0].tolist() == pytest.approx([75.0, 10.0, 1.0])
     assert model.landmarks_at(21) is None
-    assert settings.unfinished_fit is None
+    assert settings.paths(UNFINISHED) == []
     assert not (request_.folder / LOCK_NAME).exists()
 
 
@@ -92,7 +92,7 @@ def test_cancelled_says_so_at_once_and_is_continued(made, qtbot, request_, setti
     until(qtbot, model, "stopped")
     assert request_.partials[0].read_text() == "13"
     assert not request_.mesh.exists()
-    assert settings.unfinished_fit == request_.folder
+    assert settings.paths(UNFINISHED) == [request_.folder]
     model.resume()
     until(qtbot, model, "finished")
     assert model.progress.resumed
@@ -144,7 +144,7 @@ def test_discarding_leaves_nothing(made, qtbot, request_, settings) -> None:
     model.discard()
     assert model.state == "idle"
     assert not request_.folder.exists()
-    assert settings.unfinished_fit is None
+    assert settings.paths(UNFINISHED) == []
 
 
 def test_a_refusal_is_shown_as_it_is(made, qtbot, request_) -> None:
