@@ -36,8 +36,6 @@ class ImageBackend(QWidget):
     supersampling.
     """
 
-    name = "image"
-
     def __init__(self, parent: QWidget | None = None) -> None:
         # Before the widget: one that was made half must not remain in its parent.
         library = missing_library("image")

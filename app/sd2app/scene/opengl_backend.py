@@ -26,8 +26,6 @@ class InteractorBackend:
     and not with the module.
     """
 
-    name = "gl"
-
     def __init__(self, parent: QWidget) -> None:
         library = missing_library("gl")
         if library is not None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 from PySide6.QtCore import QEvent, QObject, QPointF, QSize, Qt
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QMouseEvent, QResizeEvent, QWheelEvent
-from PySide6.QtWidgets import QLabel, QMenu, QWidget
+from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.scene.backend import NoOpenGL, chosen_backend
 from sd2app.scene.camera import Preset
@@ -22,6 +22,7 @@ from sd2app.scene.overlay import Overlay
 from sd2app.scene.scene import Scene
 from sd2app.session.maps import part_words
 from sd2app.widgets.canvas import MenuPart
+from sd2app.widgets.panel import sentence
 from sd2app.widgets.picture import picture_menu
 from sd2core.errors import Sd2Error
 
@@ -114,11 +115,6 @@ class SceneView(QWidget):
             slot()
         self._lay_out()
         self._backend.start(self._prepare)
-
-    @property
-    def backend_name(self) -> str | None:
-        """``gl``, ``image``, or None when there is no OpenGL."""
-        return self._backend.name if self._backend is not None else None
 
     def sizeHint(self) -> QSize:
         """A comfortable size."""
@@ -406,9 +402,8 @@ class SceneView(QWidget):
             self._backend.widget.setCursor(shape)
 
     def _explain(self, problem: str) -> None:
-        label = QLabel(problem, self)
-        label.setObjectName("muted")
-        label.setWordWrap(True)
+        label = sentence(problem)
+        label.setParent(self)
         label.setAlignment(Qt.AlignmentFlag.AlignCenter)
         label.setMargin(24)
 

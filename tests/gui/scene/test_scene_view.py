@@ -385,7 +385,7 @@ def test_when_the_window_cannot_be_drawn_into_the_picture_is_painted(
 ) -> None:
     monkeypatch.setattr(choose, "_has_no_window", lambda: False)
     monkeypatch.setitem(sys.modules, "pyvistaqt", None)
-    assert make_stage("gl").view.backend_name == "image"
+    assert isinstance(make_stage("gl").view._backend, image_backend.ImageBackend)
 
 
 def test_an_unknown_view_is_an_error(stage: Stage) -> None:
@@ -405,7 +405,7 @@ def test_without_opengl_the_view_says_what_to_install(
     else:
         monkeypatch.setattr(image_backend, "_answers", lambda _: False)
     made = make_stage("image")
-    assert made.view.backend_name is None
+    assert made.view._backend is None
     text = made.view.findChild(QLabel).text()
     assert "OpenGL" in text
     assert "apt-get install" in text
