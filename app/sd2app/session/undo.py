@@ -198,20 +198,14 @@ class Edits:
 
     def drag_in_scene(self, by_m: Vector) -> None:
         """Move a thing or body from where it was when the drag began."""
-        if self.dragging:
-            self._document.assign(self._moved(by_m))
-
-    def _moved(self, by_m: Vector) -> dict[str, tuple[Any, ...]]:
-        """All that is like what is dragged, with that elsewhere."""
         one = self._dragged
-        assert one is not None
-        place = "position_m" if isinstance(one, Thing) else "moved_m"
-        at_m = tuple(round(a + b, 3) for a, b in zip(getattr(one, place), by_m, strict=True))
-        moved = replace(one, **{place: at_m})  # type: ignore[arg-type]
-        return {
-            name: tuple(moved if this is one else this for this in before)
-            for name, before in self._before.items()
-        }
+        if self.dragging and one is not None:
+            place = "position_m" if isinstance(one, Thing) else "moved_m"
+            at_m = tuple(round(a + b, 3) for a, b in zip(getattr(one, place), by_m, strict=True))
+            moved = replace(one, **{place: at_m})  # type: ignore[arg-type]
+            for name, before in self._before.items():
+                now = tuple(moved if this is one else this for this in before)
+                self._document.assign({name: now})
 
     def remove_from_scene(self, number: int, one: Thing | Body | Wall) -> None:
         """Take a thing, body or wall out of the scene."""
