@@ -50,7 +50,6 @@ class _HeldThing:
     number: int  # of those that are shown, bodies after things
     at_m: Vector  # where it was taken hold of
     moved_m: Vector
-    start_px: tuple[float, float]
 
 
 class Navigator:
@@ -74,7 +73,7 @@ class Navigator:
         self._held_thing: _HeldThing | None = None
         self._moving: Literal["orbit", "pan"] | None = None
         self._last_px = (0.0, 0.0)
-        self._clicking: tuple[int, float, float] | None = None
+        self._pressed_px: tuple[float, float] | None = None  # until it is no click any more
 
     @property
     def busy(self) -> bool:
@@ -127,7 +126,7 @@ class Navigator:
         left = button == Qt.MouseButton.LeftButton
         target = self.target_at(x_px, y_px) if left else None
         self._button = button
-        self._last_px = (x_px, y_px)
+        self._last_px = self._pressed_px = (x_px, y_px)
         if target is not None and target.kind == "sensor":
             start = np.asarray(self._scene.sensor.position_m)
             x, y, _ = self._scene.pose.project(start)[0]
@@ -135,23 +134,21 @@ class Navigator:
             self._edits.begin_sensor_drag()
             self._show_hot()
         elif target is not None and target.place_m is not None:
-            at_m, start_px = target.place_m, (x_px, y_px)
-            self._held_thing = _HeldThing(target.number, at_m, np.zeros(3), start_px)
+            self._held_thing = _HeldThing(target.number, target.place_m, np.zeros(3))
             self._edits.begin_scene_drag(target.number)
             self._show_hot()
         elif left and not keys & Qt.KeyboardModifier.ShiftModifier:
-            self._clicking = None if target is None else (target.number, x_px, y_px)
             self._moving = "orbit"
         else:
             self._moving = "pan"
 
     def move(self, x_px: float, y_px: float, keys: Qt.KeyboardModifier) -> None:
         """Handle a move of the pointer, with a button or without."""
-        if self._clicking is not None:
-            _, x, y = self._clicking
-            if math.hypot(x_px - x, y_px - y) < _CLICK_PX:
+        if self._pressed_px is not None:
+            if math.dist(self._pressed_px, (x_px, y_px)) >= _CLICK_PX:
+                self._pressed_px = None
+            elif self._held is None:
                 return
-            self._clicking = None
         dx, dy = x_px - self._last_px[0], y_px - self._last_px[1]
         self._last_px = (x_px, y_px)
         if self._held is not None:
@@ -167,18 +164,20 @@ class Navigator:
         else:
             self._hover(self.target_at(x_px, y_px))
 
-    def release(self, x_px: float, y_px: float, button: Qt.MouseButton) -> None:
-        """Handle a released button."""
-        if button == self._button:
-            clicked = self._clicking
-            self.let_go()
-            if clicked is not None:
-                self._pick(clicked[0])
-            self._hover(self.target_at(x_px, y_px))
+    def release(self, x_px: float, y_px: float, button: Qt.MouseButton) -> bool:
+        """Handle a released button; True for a click."""
+        if button != self._button:
+            return False
+        clicked, turned = self._pressed_px is not None, self._moving == "orbit"
+        self.let_go()
+        self._hover(self.target_at(x_px, y_px))
+        if clicked and turned and self.target is not None and self.target.kind == "marker":
+            self._pick(self.target.number)
+        return clicked
 
     def let_go(self) -> None:
         """End whatever is going on, e.g. because the view is hidden."""
-        self._button = self._moving = self._clicking = None
+        self._button = self._moving = self._pressed_px = None
         if self._held is not None or self._held_thing is not None:
             self._held = self._held_thing = None
             self._edits.end_drag()
@@ -218,8 +217,6 @@ class Navigator:
     def _drag_thing(
         self, held: _HeldThing, x_px: float, y_px: float, constraint: Constraint
     ) -> None:
-        if not held.moved_m.any() and math.dist(held.start_px, (x_px, y_px)) < _CLICK_PX:
-            return
         pose, now = self._scene.pose, held.at_m + held.moved_m
         if constraint == "vertical":
             at = drag_along(now, np.array([0.0, 1.0, 0.0]), pose, x_px, y_px)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -48,7 +47,6 @@ _MOUSE = (
 )
 _REACH_PX = 8.0
 """Distance from the pointer within which vertices are looked for."""
-_CLICK_PX = 4.0
 _NOTCH = 120.0
 """Angle of one notch of the wheel in Qt's units."""
 
@@ -86,7 +84,6 @@ class SceneView(QWidget):
         self.overlay = Overlay(self.scene, self.navigator, session.display, self)
         self.inertial_hand = InertialHand(self.scene, session, inertial)
         self.limb_hand = LimbHand(self.scene, self.navigator, self.inertial_hand, limbs)
-        self._pressed_px = (0.0, 0.0)
         self.setAccessibleName("Scene")
         self._frame: int | None = None
         self._stale_scattering = True
@@ -184,8 +181,7 @@ class SceneView(QWidget):
             if not self.inertial_hand.placing:
                 self.overlay.hint = "" if part is None else LIMB_HINT
         elif kind == QEvent.Type.MouseButtonRelease:
-            self.navigator.release(*place, event.button())
-            if math.dist(place, self._pressed_px) >= _CLICK_PX:
+            if not self.navigator.release(*place, event.button()):
                 return  # a drag
             if event.button() == Qt.MouseButton.LeftButton:
                 if self.inertial_hand.placing:
@@ -196,11 +192,9 @@ class SceneView(QWidget):
                 menu = picture_menu(self, self.menu_parts, QPointF(*place))
                 menu.popup(event.globalPosition().toPoint())
         elif kind == QEvent.Type.MouseButtonDblClick and self.navigator.target is None:
-            self._pressed_px = (math.inf, math.inf)  # its release is no click
             self.set_view("overview")
         else:
             # Also the second press of a double click: a hurried hand takes the sensor.
-            self._pressed_px = place
             self.navigator.press(*place, event.button(), event.modifiers())
 
     def _words_at(self, place: tuple[float, float], part: str | None) -> str:

@@ -595,6 +595,10 @@ def test_a_right_click_offers_the_picture_and_a_drag_does_not(stage: Stage) -> N
     QTest.mouseMove(widget, start + QPoint(40, 0))
     QTest.mouseRelease(widget, button, pos=start + QPoint(40, 0))
     assert not menus()
+    QTest.mousePress(widget, Qt.MouseButton.LeftButton, pos=start)
+    QTest.mouseClick(widget, button, pos=start)  # while the other one is held
+    assert not menus()
+    QTest.mouseRelease(widget, Qt.MouseButton.LeftButton, pos=start)
     QTest.mouseClick(widget, button, pos=start)
     assert texts_of(menus()[0]) == ["Copy picture", "Copy as SVG", "Save picture…"]
     pick(menus()[0], "Copy picture")
@@ -633,6 +637,7 @@ def test_a_click_picks_a_part_and_with_keys_several(limbed: Stage) -> None:
     several = [("forearm.R", True)] * 2
     assert limbed.limbs.picked == [("trunk", False), *several, (None, False)]
     drag(limbed, left, left + QPoint(30, 0))  # turns the view
+    drag(limbed, left, left + QPoint(30, 0), left)  # there and back is no click either
     assert len(limbed.limbs.picked) == 4
     limbed.view.set_view("overview")
     limbed.view.grab()
