@@ -246,10 +246,9 @@ class LabelTimeline(ZoomedPlot):
     def _drag(self) -> None:
         target = self._target
         assert target is not None
-        scale = self.scale
-        within_s = self._within_s
         # The axis may have been zoomed, or turned a page, since it was pressed.
-        time_s, pressed_s = scale.time_of(self._pointer_px), self._pressed_s
+        time_s, pressed_s = self.scale.time_of(self._pointer_px), self._pressed_s
+        within_s = self._within_s
         if target.span is None or self._cutting:
             known = {one.name for one in self._labels.targets}
             track = target.track if target.track in known else self._labels.track

@@ -134,8 +134,7 @@ class Edits:
 
     def plan_placements(self, placements: Placements | None) -> None:
         """Plan other places for sensors around the body, or none."""
-        self.type_placements(placements)
-        self.end_drag()
+        self.change(_PLANNED, {"placements": placements})
 
     def type_placements(self, placements: Placements | None) -> None:
         """Plan other places while they are typed: all until the end is one step."""
