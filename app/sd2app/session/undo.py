@@ -275,8 +275,7 @@ class Edits:
 
     def begin_offset_drag(self, name: Offset = "radar_offset_s") -> None:
         """Begin to drag what was measured in time."""
-        if self._document.recording is not None:
-            self._begin_drag(_ALIGNED[name], self._document.assign, lambda: self._fields([name]))
+        self._begin_drag(_ALIGNED[name], self._document.assign, lambda: self._fields([name]))
 
     def drag_offset(self, seconds: float) -> None:
         """Shift it by ``seconds`` since the drag began."""

@@ -266,6 +266,7 @@ class FilesFeature(Feature):
 
     def save(self) -> bool:
         """Save in place, or ask where; ask what is kept where it was saved elsewhere as well."""
+        self._session.edits.end_drag()  # what is held, or is being typed, is saved as well
         content = self._document.content
         if content is None:
             return True
@@ -314,6 +315,7 @@ class FilesFeature(Feature):
 
     def save_as(self) -> bool:
         """Ask for a new recording folder and save there."""
+        self._session.edits.end_drag()
         start = self._document.file_name(".sd2")
         path = ask_new(self._shell.dialog_parent, "Save recording as", start)
         if path is None:
@@ -322,6 +324,7 @@ class FilesFeature(Feature):
 
     def may_discard(self) -> bool:
         """True once unsaved edits are saved or given up by the user's decision."""
+        self._session.edits.end_drag()
         if not self._document.modified:
             return True
         buttons = QMessageBox.StandardButton
@@ -336,9 +339,7 @@ class FilesFeature(Feature):
             return self.save()
         return answer == buttons.Discard
 
-    def may_close(self) -> bool:
-        """Ask what becomes of unsaved edits."""
-        return self.may_discard()
+    may_close = may_discard
 
 
 class MeshOffer(Notice):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QToolButton
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QMessageBox, QToolButton
 from window_models import models_of
 
 from sd2app.scene.navigation import Target
@@ -96,6 +96,21 @@ def test_escape_takes_back_what_was_typed(window, page, qtbot):
     QTest.keyClick(field, Qt.Key.Key_Escape)
     assert models_of(window).placements.plan == GRID
     assert stack.count() == count
+
+
+def test_what_is_being_typed_is_asked_about_before_the_window_closes(window, page, monkeypatch):
+    stack = models_of(window).document.undo_stack
+    models_of(window).edits.plan_placements(GRID)
+    stack.setClean()
+    write(line(page, "Ranges, m"), "5")
+    asked: list[str] = []
+    cancel = QMessageBox.StandardButton.Cancel
+    monkeypatch.setattr(QMessageBox, "question", lambda *given: (asked.append(given[2]), cancel)[1])
+    window.close()
+    assert window.isVisible()
+    assert len(asked) == 1
+    assert stack.undoText() == "Plan placements"
+    assert not stack.isClean()
 
 
 @pytest.mark.slow
