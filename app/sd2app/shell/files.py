@@ -315,7 +315,6 @@ class FilesFeature(Feature):
 
     def save_as(self) -> bool:
         """Ask for a new recording folder and save there."""
-        self._session.edits.end_drag()
         start = self._document.file_name(".sd2")
         path = ask_new(self._shell.dialog_parent, "Save recording as", start)
         if path is None:
@@ -324,7 +323,8 @@ class FilesFeature(Feature):
 
     def may_discard(self) -> bool:
         """True once unsaved edits are saved or given up by the user's decision."""
-        self._session.edits.end_drag()
+        if (typing := self._shell.dialog_parent.focusWidget()) is not None:
+            typing.clearFocus()  # which takes what was typed
         if not self._document.modified:
             return True
         buttons = QMessageBox.StandardButton

@@ -9,7 +9,7 @@ from finding import splitter_around
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLineEdit, QTableView, QToolButton
+from PySide6.QtWidgets import QApplication, QLineEdit, QMessageBox, QTableView, QToolButton
 from window_models import models_of
 
 from sd2app.labels.label_set_page import LabelSetTable
@@ -157,6 +157,17 @@ def test_the_column_of_persons_is_there_where_there_are_several(labelled, qtbot)
     c.document.undo_stack.undo()
     c.document.undo_stack.undo()
     assert table(labelled).isColumnHidden(AT["person"])
+
+
+def test_a_note_that_is_being_typed_is_asked_about_before_the_window_closes(
+    labelled, monkeypatch
+) -> None:
+    cancel = QMessageBox.StandardButton.Cancel
+    monkeypatch.setattr(QMessageBox, "question", lambda *_: cancel)
+    QTest.keyClicks(edit(labelled, 0, "note"), "slow")
+    labelled.close()
+    assert labelled.isVisible()
+    assert models_of(labelled).labels.labels.spans[0].note == "slow"
 
 
 def test_keys_of_the_window_work_beside_the_table_and_not_in_its_cells(labelled) -> None:
