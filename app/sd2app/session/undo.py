@@ -27,6 +27,8 @@ from sd2core.sensor import Vector, VirtualSensor, aimed_at
 
 Offset = Literal["radar_offset_s", "imu_offset_s"]
 """Time on the recording's clock at which something measured begins."""
+Assigning = Callable[[Any], None]
+"""Gives something of the recording a value."""
 _PLANNED = "Plan placements"
 _ALIGNED: Mapping[str, str] = {
     "radar_offset_s": "Radar offset",
@@ -42,9 +44,7 @@ def _assign_references(references: Mapping[MapModel, tuple[float, bool]]) -> Non
 class Assign(QUndoCommand):
     """Sets one value of a model; models ignore a value that they have already."""
 
-    def __init__(
-        self, text: str, assign: Callable[[Any], None], before: object, after: object
-    ) -> None:
+    def __init__(self, text: str, assign: Assigning, before: object, after: object) -> None:
         super().__init__(text)
         self._assign, self._before, self._after = assign, before, after
 
@@ -68,7 +68,7 @@ class Edits:
         self._document = document
         self._sensor = sensor
         # Of what is held: name of the step, what assigns it and what reads it, and what was before.
-        self._held: tuple[str, Callable[[Any], None], Callable[[], Any]] | None = None
+        self._held: tuple[str, Assigning, Callable[[], Any]] | None = None
         self._before: Any = None
         self._dragged: Thing | Body | None = None
         document.opened.connect(self._forget)
@@ -80,9 +80,7 @@ class Edits:
         """True while something is held, and is no step yet."""
         return self._held is not None
 
-    def _begin_drag(
-        self, text: str, assign: Callable[[Any], None], read: Callable[[], Any]
-    ) -> None:
+    def _begin_drag(self, text: str, assign: Assigning, read: Callable[[], Any]) -> None:
         self.end_drag()
         self._held, self._before = (text, assign, read), read()
 
@@ -320,9 +318,7 @@ class Edits:
     def _fields(self, names: Iterable[str]) -> dict[str, object]:
         return {name: getattr(self._document.recording, name, None) for name in names}
 
-    def _push(
-        self, text: str, assign: Callable[[Any], None], before: object, after: object
-    ) -> None:
+    def _push(self, text: str, assign: Assigning, before: object, after: object) -> None:
         """Assign a value, as a step in the history where it is another one."""
         self.end_drag()
         assign(after)
