@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -209,6 +209,7 @@ class LabelsModel(QObject):
         """Show another recording's labels; selection and marks are cleared."""
         self.marks = ()
         self.selected_ids = frozenset()
+        self._assign(replace(labels, spans=()))  # spans of the same number are others
         self._assign(labels)
         self.selection_changed.emit()
         self.marks_changed.emit()

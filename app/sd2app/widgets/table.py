@@ -11,6 +11,7 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QComboBox,
     QHeaderView,
+    QLineEdit,
     QStyle,
     QStyledItemDelegate,
     QStyleOptionViewItem,
@@ -121,10 +122,10 @@ class FramedCells(QStyledItemDelegate):
         editor.setGeometry(place)
 
     def setEditorData(self, editor: QWidget, index: QModelIndex) -> None:
-        """Show the value of the cell."""
+        """Show the value of the cell, unless another one is being typed."""
         if isinstance(editor, ListedEditor):
             editor.setCurrentIndex(editor.findData(index.data(Qt.ItemDataRole.EditRole)))
-        else:
+        elif not (isinstance(editor, QLineEdit) and editor.isModified()):
             super().setEditorData(editor, index)
 
     def setModelData(self, editor: QWidget, model: QAbstractItemModel, index: QModelIndex) -> None:

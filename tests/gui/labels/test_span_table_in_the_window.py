@@ -159,6 +159,26 @@ def test_the_column_of_persons_is_there_where_there_are_several(labelled, qtbot)
     assert table(labelled).isColumnHidden(AT["person"])
 
 
+def test_a_note_that_is_being_typed_stays_where_something_else_is_labelled(labelled) -> None:
+    c = models_of(labelled)
+    QTest.keyClicks(edit(labelled, 0, "note"), "slow")
+    c.label_edits.apply(lambda now: now.create("Gestures", 0.85, 0.95, "there"))
+    QApplication.processEvents()
+    assert c.labels.labels.spans[0].note == "slow"
+
+
+def test_a_note_that_is_being_typed_is_not_of_another_recording(
+    labelled, qtbot, recording_copy
+) -> None:
+    c = models_of(labelled)
+    QTest.keyClicks(edit(labelled, 0, "note"), "slow")
+    with qtbot.waitSignal(c.document.opened, timeout=20_000):
+        labelled.open_paths([recording_copy])
+    press(labelled, "Return")
+    assert [span.note for span in c.labels.labels.spans] == ["", ""]
+    assert c.document.undo_stack.count() == 0
+
+
 def test_a_note_that_is_being_typed_is_asked_about_before_the_window_closes(
     labelled, monkeypatch
 ) -> None:
