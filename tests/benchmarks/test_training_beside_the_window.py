@@ -76,7 +76,7 @@ def test_an_update_of_the_panel(benchmark, sample_window, qtbot, tmp_path):
     """
     from PySide6.QtWidgets import QApplication
 
-    from sd2app.training.panel import TrainingPanel
+    from sd2app.training.feature import TrainingPanel
     from sd2app.training.run import EpochPoint, StepPoint
     from sd2app.widgets.chart import ChartView
 

@@ -10,8 +10,7 @@ from PySide6.QtCore import QObject
 
 from sd2app.background.latest import LatestRunner, delayed
 from sd2app.background.runs import Runs
-from sd2app.batch.results import BatchResults
-from sd2app.batch.run import BatchMonitor, plan_of
+from sd2app.batch.run import BatchMonitor, BatchResults, plan_of
 from sd2app.batch.setup import BatchSetupModel
 from sd2app.settings import Settings
 from sd2app.widgets.text import counted

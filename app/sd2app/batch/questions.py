@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 
 from sd2app.background.quoting import quoted
 from sd2app.batch.model import BatchModel
-from sd2app.batch.results import Result
+from sd2app.batch.run import Result
 from sd2app.denoise.model import DenoiseModel
 from sd2app.feature import Shell
 from sd2app.sensor.placements import PlacementsModel

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_setup import RunSetup, Source
+from sd2app.background.runs import RunSetup, Source
 from sd2app.settings import Settings, StoredChoices
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path

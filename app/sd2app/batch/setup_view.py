@@ -19,8 +19,8 @@ from PySide6.QtWidgets import (
 
 from sd2app.batch.model import BatchModel
 from sd2app.batch.questions import BatchQuestions
+from sd2app.batch.run import entry_text, estimate_facts, estimate_headline, unusable_text
 from sd2app.batch.setup import Accuracy, OptionalStep, most_workers
-from sd2app.batch.text import entry_text, estimate_facts, estimate_headline, unusable_text
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox
 from sd2app.widgets.layouts import STRETCH, column_of, form_of, row_of
 from sd2app.widgets.panel import (

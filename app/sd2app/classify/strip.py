@@ -8,8 +8,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QBrush, QColor, QFont, QFontMetrics, QImage, QPainter
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from sd2app.classify.model import ClassifyModel
-from sd2app.classify.text import ago_text, delay_text, reading_text
+from sd2app.classify.model import ClassifyModel, ago_text, delay_text, reading_text
 from sd2app.classify.track import ClassReading
 from sd2app.labels.model import LabelsModel
 from sd2app.maps.track_mouse import SeekingPlot, ZoomedPlot

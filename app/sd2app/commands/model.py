@@ -1,4 +1,4 @@
-"""Forms of commands: what is typed into them, and the runs that they start."""
+"""Forms of commands: what is typed into them, the runs that they start, and a mesh made smooth."""
 
 from __future__ import annotations
 
@@ -16,12 +16,17 @@ from PySide6.QtCore import QObject
 from sd2app.background.quoting import quoted
 from sd2app.background.run_monitor import CommandRun
 from sd2app.background.runs import Runs, free_folder
+from sd2app.session.session import Session
 from sd2app.settings import Settings
 from sd2core.cli import build_parser
 from sd2core.cli.command_parser import Command, commands_of
+from sd2core.cli.refine import Refine
 from sd2core.errors import Sd2Error
-from sd2core.files.paths import plain_path, user_data
+from sd2core.files.paths import free_path, plain_path, user_data
+from sd2core.files.recording_json import MeshReading
+from sd2core.files.resources import is_bundled
 from sd2core.files.tables import capitalised
+from sd2core.io.mesh_models import is_estimate
 from sd2core.options.records import Option, OptionRecord, typed_options, words_of
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER, last_output
 
@@ -197,3 +202,65 @@ def _read(option: Option, text: str) -> Any:
     except (ArgumentTypeError, ValueError) as error:
         raise Sd2Error(f"{name_of(option)}: {error}") from None
     return values if option.place.many else values[0]
+
+
+_ENDING = "-smooth.zarr"
+
+
+class MeshRefining:
+    """Fills in the form of ``sd2 refine``, and puts what it made in the place of the mesh."""
+
+    def __init__(self, session: Session, forms: CommandForms) -> None:
+        self.document, self._edits, self._forms = session.document, session.edits, forms
+        forms.ended.connect(self.take)
+
+    @property
+    def why_not(self) -> str:
+        """Reason why there is nothing to make smooth; empty where there is a mesh."""
+        mesh = self.document.mesh
+        if mesh is None:
+            return "There is no mesh to make smooth: add one first (File → Add to this recording…)"
+        if mesh.uncertainty is not None:
+            return "This mesh is smooth already: of `sd2 fit`, or made smooth before"
+        return ""
+
+    def fill(self) -> None:
+        """Show the form with the mesh as it is read now."""
+        content = self.document.content
+        assert content is not None
+        recording, mesh = content.recording, content.recording.mesh
+        assert mesh is not None
+        read = recording.mesh_reading.options()
+        folder = recording.folder if content.saved else mesh.parent
+        folder = Path.home() if is_bundled(folder) else folder
+        estimated = is_estimate(mesh)
+        rate = read.pop("frames_per_s", None)
+        if not estimated:  # the command refuses what would change nothing
+            read.pop("focal_px", None)
+        self._forms.fill(
+            Refine(
+                mesh=plain_path(mesh),
+                out=free_path(folder, f"{mesh.stem}{_ENDING}", "again", reserved=""),
+                video=recording.video if estimated else None,
+                faces=recording.faces,
+                fps=rate,
+                **read,
+            )
+        )
+
+    def can_take(self, run: AnyCommandRun) -> bool:
+        """True for a mesh that was made smooth from the one that is open."""
+        recording, made = self.document.recording, run.about
+        if run.phase != "finished" or made.get("what") != "refine" or recording is None:
+            return False
+        return recording.mesh is not None and made.get("mesh") == str(plain_path(recording.mesh))
+
+    def take(self, run: AnyCommandRun) -> None:
+        """Put the smooth mesh in the place of the open one, as a step of the history."""
+        recording = self.document.recording
+        if recording is None or not self.can_take(run):
+            return
+        # Smooth vertices are placed already; the focal length lays them over the video.
+        reading = MeshReading(focal_px=recording.mesh_reading.focal_px)
+        smooth = {"mesh": Path(run.about["out"]), "faces": None, "mesh_reading": reading}
+        self._edits.read_mesh("Make mesh smooth", smooth)

@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from sd2app.background.quoting import quoted
-from sd2app.classify.setup import ClassSetup
+from sd2app.classify.run import ClassSetup
 from sd2app.feature import Action, Feature, Shell, report
 from sd2app.session.session import Session
 from sd2app.study.runs import SWITCHES, TABLE_NAME, StudyRun, StudyRuns

@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject
 
 from sd2app.background.run_monitor import CommandRun
 from sd2app.background.runs import Runs, free_folder
-from sd2app.classify.setup import ClassSetup
+from sd2app.classify.run import ClassSetup
 from sd2app.settings import Settings, StoredChoices
 from sd2app.training.run import StepHistory
 from sd2core.classify.files import user_classifiers_folder

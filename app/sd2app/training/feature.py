@@ -1,19 +1,340 @@
-"""Training of denoisers in a background process."""
+"""Training of denoisers in a background process: the panel."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Collection, Sequence
+from functools import partial
+from pathlib import Path
 
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QCheckBox, QMessageBox, QWidget
 
 from sd2app.denoise.model import DenoiseModel
 from sd2app.feature import Action, Feature, Shell, report
+from sd2app.session.display import DisplayModel
+from sd2app.session.document import DocumentModel
 from sd2app.session.session import Session
 from sd2app.training.model import COMMAND, TrainingModel
-from sd2app.training.panel import TrainingPanel
-from sd2app.training.result import ModelAdoption
+from sd2app.training.result import ModelAdoption, gain_rows, gain_summary
+from sd2app.training.run import (
+    INPUT_WORDS,
+    MODEL_WORDS,
+    TrainingHistory,
+    TrainingMonitor,
+    about_text,
+    division_text,
+    headline,
+    metric_rows,
+    model_name,
+    point_text,
+    remedy_text,
+)
+from sd2app.widgets.canvas import tick_text
+from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale
+from sd2app.widgets.dialogs import ask_folder
+from sd2app.widgets.inputs import CheckBox, Choice
+from sd2app.widgets.layouts import STRETCH, column_of, grid_of, pane, row_of
+from sd2app.widgets.model_page import model_title
+from sd2app.widgets.panel import ElidedLabel, FactRows, Fold, ProgressBar, outlined, sentence, title
+from sd2app.widgets.run_panel import Button, Field, RunPanel, RunView, RunWords, TrainingForm
+from sd2app.widgets.text import counted
 from sd2core.denoise.files import user_models_folder
+from sd2core.denoise.registry import DENOISERS
+from sd2core.files.resources import is_bundled
+from sd2core.options.training import DataConfig, TrainingConfig
+
+_FIELDS = (
+    Field(TrainingConfig, "epochs", "Epochs", 50),
+    Field(TrainingConfig, "batch_size", "Batch", 16),
+)
+_MORE = (
+    Field(TrainingConfig, "early_stopping_epochs", "Stop early after", 10, suffix=" epochs"),
+    Field(TrainingConfig, "learning_rate", "Learning rate", 5e-4, decimals=8),
+    Field(DataConfig, "range_factor", "Range factor", 0.5, decimals=1),
+    Field(TrainingConfig, "seed", "Seed", 1),
+)
+
+
+class TrainingSetupView(TrainingForm):
+    """A form over :class:`TrainingSetupModel`."""
+
+    def __init__(self, training: TrainingModel, document: DocumentModel, shell: Shell) -> None:
+        super().__init__(training.setup, shell)
+        self._training, self._pairs, self._document = training, training.setup, document
+        self._menu = self.add_data(
+            "Pairs",
+            "Add pairs",
+            "Choose pairs of synthetic and radar Doppler",
+            "A denoiser learns from pairs: a synthetic map, and what a radar saw of the same"
+            " movement. Make them of recordings that have a mesh and a radar capture, or with"
+            " sd2 simulate campaign, and add their folder.",
+        )
+        self._menu.aboutToShow.connect(self._fill_menu)
+        self.column.addWidget(self._making_part())
+        names = {name: model_name(name) for name in (*MODEL_WORDS, *DENOISERS.names())}
+        self._kind = self.choice("model", "Kind of model", names)
+        self._about = sentence("")
+        self._inputs = self.choice(
+            "inputs", "What it learns from; all but the map need pairs with --limbs", INPUT_WORDS
+        )
+        starts = {name: model_title(card) for name, card in self._pairs.starts.items()}
+        start = self.choice(
+            "start",
+            "Go on from a model with pairs of your own: fewer are enough",
+            {"": "New", **starts},
+        )
+        rows = ("Model", self._kind), ("Input", self._inputs), ("Start", start)
+        lines = ((title(name), one) for name, one in rows)
+        self.column.addLayout(grid_of(*lines, gaps_px=(8, 6)))
+        self.column.addWidget(self._about)
+        self._add_settings()
+        self.add_start(training.start, lambda: training.command)
+        training.changed.connect(self._refresh)
+        self._refresh()
+
+    def _making_part(self) -> QWidget:
+        stop = partial(self._training.pair_maker.tell, "stop")
+        self._making_text = ElidedLabel(self, "muted")
+        bar = ProgressBar("Pairs are being made", width_px=64)
+        bar.show_share(None)
+        self._making_cancel = outlined("Cancel", "Make no pairs", stop, self)
+        self._making = pane(row_of((self._making_text, 1), bar, self._making_cancel))
+        return self._making
+
+    def _add_settings(self) -> None:
+        # Labels to the left; several boxes share what room there is.
+        first = (part for field in _FIELDS for part in self.number(field))
+        grid = grid_of([*first], gaps_px=(8, 0), wide=(1, 3))
+        tip = "Put all settings back to the paper's"
+        self._reset = outlined("Reset", tip, self._pairs.reset, self)
+        rest = [self.number(field) for field in _MORE]
+        boxes = [box for _, box in rest]
+        for box in boxes:
+            box.setMinimumWidth(112)
+        boxes[0].setSpecialValueText("never")
+        boxes[2].setPrefix("× ")
+        hidden = pane(grid_of(*rest, gaps_px=(8, 4), wide=(0,)))
+        more = Fold("More settings", "Learning rate, early stopping, range, seed", hidden, self)
+        self.column.addLayout(grid)
+        self.column.addLayout(row_of(more, STRETCH, self._reset))
+        self.column.addWidget(hidden)
+
+    def _refresh(self) -> None:
+        training, setup, maker = self._training, self._pairs, self._training.pair_maker
+        if training.run is not None:
+            return
+        division = setup.division if not setup.problem else None
+        self.show_setup(division_text(division) if division is not None else "")
+        self._making.setVisible(maker.run is not None)
+        if maker.run is not None:
+            self.nothing.hide()
+            cancelling = maker.run.phase == "stopping"
+            doing = "Cancelling…" if cancelling else "Making"
+            self._making_text.setText(f"{doing} {maker.run.out.name}")
+            self._making_cancel.setEnabled(not cancelling)
+        card = setup.start
+        for one in (self._kind, self._inputs):
+            one.setEnabled(card is None)
+        self._about.setText(
+            MODEL_WORDS.get(setup.value("model"), ("", "Of a plug-in."))[1]
+            if card is None
+            else f"Goes on from {model_title(card)}, with its kind and its input."
+        )
+        self._reset.setVisible(setup.differs)
+        estimate = setup.estimate
+        count = f"{estimate.segments:,} segments, {counted(estimate.steps, 'step')}"
+        self.show_estimate(count, estimate.steps, estimate.step_s)
+        self.show_start(training.why_not_start, can_copy=not setup.problem)
+
+    def _fill_menu(self) -> None:
+        menu = self._menu
+        menu.clear()
+        for path in self._pairs.known:
+            action = menu.addAction(path.name)
+            action.setToolTip(str(path))
+            action.triggered.connect(lambda _=False, path=path: self._pairs.add(path))
+        if not menu.isEmpty():
+            menu.addSeparator()
+        menu.addAction("Folder of pairs…", self._ask_store)
+        one = menu.addAction("Make of this recording", self._make_of_this)
+        one.setToolTip(self._why_not_this or "Its mesh and its radar, as it was saved")
+        one.setEnabled(not self._why_not_this)
+        make = menu.addAction("Make of recordings…", self._ask_recordings)
+        make.setToolTip("Of one recording, or of all in a folder, that have a mesh and a radar")
+        make.setEnabled(self._training.pair_maker.out is None)
+
+    def _ask_store(self) -> None:
+        if path := ask_folder(self._shell.dialog_parent, "Folder of pairs to learn from"):
+            self._pairs.add(path)
+
+    @property
+    def _why_not_this(self) -> str:
+        """Reason why no pairs can be made of the open recording; empty where they can."""
+        recording = self._document.recording
+        if self._training.pair_maker.out is not None:
+            return "Pairs are being made"
+        if recording is None or recording.mesh is None or recording.radar is None:
+            return "It takes a recording with a mesh and a radar capture"
+        # What comes with the program is learnt from as it came.
+        unsaved = self._document.modified and not is_bundled(recording.folder)
+        return "Save the recording first" if unsaved else ""
+
+    def _make_of_this(self) -> None:
+        if (recording := self._document.recording) is not None:
+            self._make_of(recording.folder)
+
+    def _ask_recordings(self) -> None:
+        if path := ask_folder(self._shell.dialog_parent, "A recording, or a folder of some"):
+            self._make_of(path)
+
+    def _make_of(self, place: Path) -> None:
+        """Make pairs of a recording, or of those in a folder, for the input that is set up."""
+        limbs = bool(self._pairs.parts)
+        self._shell.attempt(lambda: self._training.pair_maker.make(place, limbs=limbs))
+
+
+_CLOSING_TEXT = {"ask": "ask", "keep": "keep training", "stop": "stop, keep the best"}
+_PAD = 1.12
+_MIN_RATIO = 1.6
+
+
+class TrainingPanel(RunPanel):
+    """Panel of the trainings of denoisers."""
+
+    def __init__(
+        self,
+        training: TrainingModel,
+        adoption: ModelAdoption,
+        display: DisplayModel,
+        document: DocumentModel,
+        shell: Shell,
+    ) -> None:
+        def open_run() -> None:
+            if path := ask_folder(shell.dialog_parent, "Folder of a run"):
+                shell.attempt(lambda: training.open_run(path))
+
+        super().__init__(
+            training,
+            TrainingSetupView(training, document, shell),
+            TrainingRunView(training, adoption, display, shell),
+            "Runs: those under way, and those that have ended",
+            ("Open a run…", open_run),
+        )
+
+
+class TrainingRunView(RunView[TrainingMonitor]):
+    """Curves and figures of a training, and what its model gains while it is in use."""
+
+    def __init__(
+        self, training: TrainingModel, adoption: ModelAdoption, display: DisplayModel, shell: Shell
+    ) -> None:
+        pause, go_on = partial(training.tell, "pause"), partial(training.tell, "run")
+        resume = partial(shell.attempt, training.resume)
+        buttons = (
+            Button(
+                "use", "Use this model", "Denoise with it, and compare with what was there before",
+                adoption.use,
+                lambda run: not run.under_way and run.facts.has_model and adoption.run != run.path,
+                primary=True,
+            ),
+            Button("pause", "Pause", "Rest, and give the processor back", pause, _can_pause),
+            Button(
+                "go_on", "Continue", "Go on training", go_on,
+                lambda run: run.phase in ("pausing", "paused"),
+            ),
+            Button(
+                "resume", "Resume", "Go on where it ended", resume, lambda run: run.resumable
+            ),
+        )  # fmt: skip
+        super().__init__(training, shell, RunWords(headline, remedy_text), buttons)
+        self._training, self._adoption = training, adoption
+        self._gain = TrainingGainView(adoption)
+        empty = training_chart(TrainingHistory())
+        self._curves = ChartView(display, "Errors over the epochs", empty)
+        self._metrics = FactRows(3, at_the_edge=False, parent=self)
+        self._about = sentence("")
+        tip = "What happens to the training when the window is closed"
+        self._choice = Choice(tip, self, _CLOSING_TEXT, training.set_closing)
+        self._closing = pane(row_of(sentence("When closing:"), (self._choice, 1), spacing_px=8))
+        adoption.changed.connect(self.refresh)
+        self.add(self._gain, self._curves, self._metrics, self._about, self._closing)
+
+    def show_made(self, run: TrainingMonitor) -> None:
+        """Follow curves and figures."""
+        history = run.history
+        self._gain.setVisible(self._adoption.run == run.path)
+        self._curves.show_chart(training_chart(history))
+        self._curves.setVisible(bool(history.epoch_points or history.step_points))
+        self._metrics.show_facts(metric_rows(history))
+        self._about.setText(about_text(run))
+        self._closing.setVisible(run.under_way)
+        self._choice.show_value(self._training.closing)
+
+
+def _can_pause(run: TrainingMonitor) -> bool:
+    return run.under_way and run.phase not in ("starting", "pausing", "paused")
+
+
+class TrainingGainView(QWidget):
+    """A view of :class:`ModelAdoption`."""
+
+    def __init__(self, adoption: ModelAdoption) -> None:
+        super().__init__()
+        self._adoption = adoption
+        self._summary = sentence("")
+        self._table = FactRows(3, at_the_edge=True, parent=self)
+        self._both = CheckBox(
+            "Show the map from before",
+            self,
+            adoption.denoise.set_comparing,
+            "Draw the map of the model before under that of this one",
+        )
+        back = outlined("Go back", "Denoise with what was in use before", adoption.go_back, self)
+        buttons = row_of(self._both, STRETCH, back)
+        parts = title("In use"), self._summary, self._table, buttons
+        self.setLayout(column_of(*parts, spacing_px=4, margins_px=0))
+        adoption.changed.connect(self._refresh)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        use = self._adoption
+        self._summary.setText(gain_summary(use.gain, use.has_radar, is_old=use.is_old))
+        self._table.show_facts(gain_rows(use.gain) if use.gain is not None else [])
+        self._both.show_checked(use.denoise.comparing)
+        self._both.setVisible(use.previous is not None)
+
+
+def training_chart(history: TrainingHistory) -> Chart:
+    """Errors over the epochs, on a logarithmic axis; the best epoch is marked."""
+    epochs = history.epoch_points
+    trained = [(one.epoch, one.train_rmse) for one in epochs]
+    validated = [(one.epoch, one.validation_rmse) for one in epochs]
+    curves = [
+        Curve("", "synthetic", _drawable(history.step_points), width_px=1, alpha=80),
+        Curve("training", "synthetic", _drawable(trained)),
+        Curve("validation", "real", _drawable(validated)),
+    ]
+    # Steps scatter: they set the range only while there is little else.
+    shown = [y for curve in curves[len(epochs) >= 2 :] for _, y in curve.points] or [0.1, 1.0]
+    last = max((at for at, _ in [*trained[-1:], *history.step_points[-1:]]), default=0.0)
+    marks = [Mark(one.epoch, one.validation_rmse, point_text(one)) for one in epochs]
+    best = next(
+        (mark for mark, one in zip(marks, epochs, strict=True) if one is history.best), None
+    )
+    return Chart(
+        Scale(0.0, last or 1.0, whole=last >= 2),
+        Scale.around(shown, _PAD, _MIN_RATIO, tick_text),
+        "epochs",
+        "RMSE",
+        curves,
+        marks,
+        best,
+    )
+
+
+def _drawable(points: Collection[tuple[float, float]]) -> list[tuple[float, float]]:
+    return [(x, y) for x, y in points if math.isfinite(y) and y > 0]
 
 
 def may_leave(training: TrainingModel, parent: QWidget) -> bool:

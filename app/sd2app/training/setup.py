@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.run_setup import RunSetup, Source
+from sd2app.background.runs import RunSetup, Source
 from sd2app.settings import Settings, StoredChoices
 from sd2app.widgets.text import counted, duration_text
 from sd2core.denoise.card import PARTS_OF, ModelCard

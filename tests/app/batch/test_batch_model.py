@@ -15,17 +15,18 @@ import pytest
 
 from sd2app.background import run_monitor
 from sd2app.batch.model import BatchModel
-from sd2app.batch.run import BatchMonitor, plan_of
-from sd2app.batch.setup import FORMATS, BatchSetupModel
-from sd2app.batch.text import (
+from sd2app.batch.run import (
+    BatchMonitor,
     batch_time_text,
     estimate_facts,
     estimate_headline,
     failure_text,
     headline,
+    plan_of,
     step_facts,
     unusable_text,
 )
+from sd2app.batch.setup import FORMATS, BatchSetupModel
 from sd2app.settings import Settings
 from sd2core.batch.estimate import BatchEstimate, StepEstimate
 from sd2core.batch.folder import BatchFolder

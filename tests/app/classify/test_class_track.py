@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fake_classifiers import CLASSES, FakeClassifier, FakeClassifiers, class_card, expected
 
-from sd2app.classify.text import reading_text
+from sd2app.classify.model import reading_text
 from sd2app.classify.track import ClassTrack
 from sd2app.denoise.map import AT_ONCE
 from sd2app.session.maps import MapModel

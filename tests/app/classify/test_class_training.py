@@ -14,12 +14,12 @@ import pytest
 from scenes_of_people import scene
 from small_pairs import write_pairs
 
-from sd2app.classify.panel import recall_text
-from sd2app.classify.text import note, run_headline
-from sd2app.classify.training import ClassTraining
+from sd2app.classify.feature import recall_text
+from sd2app.classify.model import note, run_headline
+from sd2app.classify.run import ClassTraining
 from sd2app.command_line import full_parser, main
 from sd2app.settings import Settings
-from sd2app.training.text import division_text
+from sd2app.training.run import division_text
 from sd2app.widgets.run_text import time_text
 from sd2core.classify.defaults import WIDTH, pace_kind
 from sd2core.cli.classify.comparison import Table

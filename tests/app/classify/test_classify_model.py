@@ -9,8 +9,7 @@ import pytest
 from fake_classifiers import FakeClassifiers, expected
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.classify.model import ClassifyModel
-from sd2app.classify.text import classifier_page, reading_text
+from sd2app.classify.model import ClassifyModel, classifier_page, reading_text
 from sd2app.labels.model import LabelsModel
 from sd2app.session.session import Session
 from sd2app.settings import Settings

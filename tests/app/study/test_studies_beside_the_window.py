@@ -10,7 +10,7 @@ import fake_class_command
 import pytest
 from small_pairs import write_pairs
 
-from sd2app.classify.setup import ClassSetup
+from sd2app.classify.run import ClassSetup
 from sd2app.settings import Settings
 from sd2app.study.runs import SWITCHES, StudyRuns
 from sd2core.errors import Sd2Error

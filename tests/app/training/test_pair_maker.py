@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sd2app.training.pair_maker import PairMaker, PairRun, usable_recordings
+from sd2app.training.model import PairMaker, PairRun, usable_recordings
 from sd2core.errors import Sd2Error
 from sd2core.recording.recording import Recording
 

@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sd2app.background.run_monitor import Phase, _Status
-from sd2app.training.run import TrainingHistory, TrainingMonitor
-from sd2app.training.text import metric_rows
+from sd2app.training.run import TrainingHistory, TrainingMonitor, metric_rows
 from sd2app.widgets.chart import log_ticks
 from sd2app.widgets.text import duration_text
 

@@ -17,7 +17,7 @@ from sd2app.background import run_monitor
 from sd2app.command_line import full_parser
 from sd2app.settings import Settings
 from sd2app.training.model import TrainingModel
-from sd2app.training.text import division_text
+from sd2app.training.run import division_text
 from sd2core.cli.command_parser import record_of
 from sd2core.cli.train import _config
 from sd2core.errors import Sd2Error

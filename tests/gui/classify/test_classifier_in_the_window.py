@@ -18,7 +18,7 @@ from PySide6.QtWidgets import QFileDialog, QLabel, QToolButton
 from small_pairs import write_pairs
 from window_models import models_of
 
-from sd2app.classify.panel import ClassSetupView
+from sd2app.classify.feature import ClassSetupView
 from sd2app.classify.strip import ClassPlot, ClassReadout, ClassStrip, stacked_image
 from sd2app.labels.timeline import LabelTimeline
 from sd2app.shell.side_panel import RailButton

@@ -20,8 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.commands.feature import CommandWindow
-from sd2app.commands.model import CommandForms
-from sd2app.commands.refining import MeshRefining
+from sd2app.commands.model import CommandForms, MeshRefining
 from sd2app.session.session import Session
 from sd2app.settings import Settings
 from sd2app.widgets.panel import Fold

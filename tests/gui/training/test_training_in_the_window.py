@@ -18,8 +18,8 @@ from sd2app.background import run_monitor
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
-from sd2app.training.pair_maker import PairMaker
-from sd2app.training.panel import TrainingPanel
+from sd2app.training.feature import TrainingPanel
+from sd2app.training.model import PairMaker
 from sd2core.pairs.store import read_pairs
 from sd2core.train.folder import TrainingFolder
 

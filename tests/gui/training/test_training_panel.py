@@ -32,9 +32,8 @@ from sd2app.session.maps import MapModel
 from sd2app.session.session import Maps
 from sd2app.settings import Settings
 from sd2app.shell.side_panel import SidePanel
-from sd2app.training.feature import may_leave
+from sd2app.training.feature import TrainingPanel, TrainingRunView, may_leave
 from sd2app.training.model import TrainingModel
-from sd2app.training.panel import TrainingPanel, TrainingRunView
 from sd2app.training.result import ModelAdoption
 from sd2app.widgets.chart import ChartView
 from sd2app.widgets.inputs import Choice, NumberBox
