@@ -19,7 +19,7 @@ from typing import Any
 
 from sd2app.background.runs import Runs
 from sd2app.batch.feature import BatchWindow
-from sd2app.dataset_export.dialog import ExportDialog
+from sd2app.dataset_export.feature import ExportDialog
 from sd2app.fit.request import FitRequest
 from sd2app.live.setup import ListenRequest
 from sd2app.mesh_comparison.window import ComparisonWindow

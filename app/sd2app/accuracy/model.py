@@ -6,8 +6,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.accuracy.measurements import Library, MeasuredModel, cheapest_within, serves_at_rest
-from sd2app.accuracy.text import InUse
+from sd2app.accuracy.measurements import (
+    InUse,
+    Library,
+    MeasuredModel,
+    cheapest_within,
+    serves_at_rest,
+)
 from sd2app.background.latest import Emit, ReportingModel
 from sd2app.session.tasks import ListedRunner, TaskList
 from sd2app.settings import Settings

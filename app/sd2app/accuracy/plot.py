@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, ClassVar
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPen, QPolygonF
 
-from sd2app.accuracy.measurements import cheapest_within, front_at_rest, serves_at_rest
+from sd2app.accuracy.measurements import cheapest_within, front_at_rest, point_text, serves_at_rest
 from sd2app.accuracy.model import AccuracyModel
-from sd2app.accuracy.text import point_text
 from sd2app.session.display import DisplayModel
 from sd2app.widgets.canvas import faint, tick_text
 from sd2app.widgets.chart import Chart, ChartView, Curve, Mark, Scale

@@ -16,7 +16,7 @@ from sd2app.denoise.model import DenoiseModel
 from sd2app.labels.model import LabelsModel
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
-from sd2app.suggestions.finders import SearchResult, SpanFinder, Threshold
+from sd2app.suggestions.model import SearchResult, SpanFinder, Threshold
 from sd2app.widgets.model_page import ModelPage, about_sections, map_and_file_rows, model_title
 from sd2app.widgets.run_text import PHASES
 from sd2core.classify.card import ClassifierCard

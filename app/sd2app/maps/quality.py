@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2app.accuracy.text import InUse
+from sd2app.accuracy.measurements import InUse
 from sd2app.background.latest import Emit
 from sd2app.maps.partial_map import FINAL, ROUGH, Part, View, pieces
 from sd2app.session.tasks import ListedRunner

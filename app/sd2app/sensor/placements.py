@@ -1,4 +1,4 @@
-"""Planned placements of further sensors: positions, coverage, cost of their maps; in words."""
+"""Planned placements of further sensors: positions, coverage, cost of maps, fields of a form."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 
+from sd2app.accuracy.measurements import InUse
 from sd2app.accuracy.model import AccuracyModel
-from sd2app.accuracy.text import InUse
 from sd2app.background.latest import Emit, LatestRunner, ReportingModel
 from sd2app.session.session import Session
 from sd2app.widgets.text import bytes_text, counted, duration_text, seconds

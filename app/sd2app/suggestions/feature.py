@@ -12,8 +12,7 @@ from sd2app.feature import Action, Feature, Shell
 from sd2app.labels.actions import editing
 from sd2app.labels.edits import LabelEdits
 from sd2app.session.session import Session
-from sd2app.suggestions.finders import MotionFinder, SpanFinder
-from sd2app.suggestions.model import SuggestionsModel
+from sd2app.suggestions.model import MotionFinder, SpanFinder, SuggestionsModel
 from sd2app.widgets.inputs import Choice, NumberBox, action_button
 from sd2app.widgets.layouts import STRETCH, row_of
 from sd2app.widgets.panel import ElidedLabel, copy_button, outlined

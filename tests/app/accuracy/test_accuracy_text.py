@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from fake_accuracy import FACING, result_of
 
-from sd2app.accuracy.text import InUse, chosen_sentence, point_text, short
+from sd2app.accuracy.measurements import InUse, chosen_sentence, point_text, short
 from sd2app.widgets.text import milliseconds, seconds
 from sd2core.accuracy.plans import AccuracyPlan
 from sd2core.numerics.map_accuracy import percent

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from sd2app.agreement.feature import facts, label_facts, verdict, where
 from sd2app.agreement.model import AgreementModel
-from sd2app.agreement.panel import facts, label_facts, verdict, where
 from sd2app.labels.model import LabelsModel
 from sd2app.session.playback import PlaybackModel
 from sd2app.session.time_window import TimeWindow

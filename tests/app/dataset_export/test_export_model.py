@@ -14,7 +14,7 @@ from PySide6.QtCore import QObject
 from swinging_recordings import recording
 from turning_bodies import turning_body
 
-from sd2app.dataset_export.dialog import (
+from sd2app.dataset_export.feature import (
     inertial_words,
     label_words,
     size_words,

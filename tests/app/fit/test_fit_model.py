@@ -11,8 +11,8 @@ import pytest
 from PySide6.QtCore import QLockFile
 
 from sd2app.command_line import main
+from sd2app.fit.feature import make_recording
 from sd2app.fit.model import UNFINISHED, FitModel
-from sd2app.fit.on_screen import make_recording
 from sd2app.fit.request import LOCK_NAME, FitRequest, Person, read_request, settled
 from sd2app.settings import Settings
 from sd2core.cli import build_parser

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from sd2app.fit.run import FitProgress
+from sd2app.fit.model import FitProgress
 from sd2app.widgets.text import about
 from sd2core.runs.progress import read_events
 

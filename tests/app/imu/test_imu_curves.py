@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.imu.track import curve_lines, extent, scale_marks
+from sd2app.imu.feature import curve_lines, extent, scale_marks
 from sd2core.imu.signals import InertialSignals
 
 

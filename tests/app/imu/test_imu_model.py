@@ -14,8 +14,7 @@ from PySide6.QtCore import QObject
 from turning_bodies import turning_body
 
 from sd2app.imu import model as module
-from sd2app.imu.model import ImuModel, place_words
-from sd2app.imu.text import reading_lines, status_parts
+from sd2app.imu.model import ImuModel, place_words, reading_lines, status_parts
 from sd2app.session.content import recording_of
 from sd2app.session.session import Session
 from sd2app.settings import Settings

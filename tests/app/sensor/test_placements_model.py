@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.accuracy.text import InUse
+from sd2app.accuracy.measurements import InUse
 from sd2app.sensor.placement_fields import PlacementFields
 from sd2app.sensor.placements import (
     PlacementsModel,

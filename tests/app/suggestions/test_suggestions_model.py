@@ -10,8 +10,7 @@ from label_edits import label_edits
 
 from sd2app.labels.dragging import LabelDragging
 from sd2app.session.maps import MapModel
-from sd2app.suggestions.finders import MotionFinder, SearchResult, Threshold
-from sd2app.suggestions.model import SuggestionsModel
+from sd2app.suggestions.model import MotionFinder, SearchResult, SuggestionsModel, Threshold
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.maps import DopplerMap
 from sd2core.sensor import VelocityAxis

@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QToolButton, QToolTip
 from window_models import models_of
 
-from sd2app.accuracy.panel import AccuracyPanel, ReasonList, ToleranceRow
+from sd2app.accuracy.feature import AccuracyPanel, ReasonList, ToleranceRow
 from sd2app.accuracy.plot import AccuracyPlot
 from sd2app.shell.status_bar import StatusLine
 from sd2app.widgets.inputs import Choice as ChoiceBox

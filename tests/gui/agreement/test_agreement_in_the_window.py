@@ -12,7 +12,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QToolButton
 from window_models import models_of
 
-from sd2app.agreement.panel import AgreementPanel, OtherTimeline
+from sd2app.agreement.feature import AgreementPanel, OtherTimeline
 from sd2core.labels.formats import write_labels
 from sd2core.labels.spans import Labels, LabelTrack, Span
 

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 )
 from window_models import models_of
 
-from sd2app.dataset_export.dialog import ExportDialog
+from sd2app.dataset_export.feature import ExportDialog
 from sd2app.widgets.inputs import NumberBox
 from sd2core.datasets.reading import open_dataset
 

@@ -16,7 +16,7 @@ from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QPushButton
 from window_models import models_of
 
-from sd2app.figures.dialogs import MapFigureDialog
+from sd2app.figures.feature import MapFigureDialog
 from sd2app.maps.feature import MapExportDialog
 from sd2app.maps.readout import reading_lines
 from sd2app.maps.spectrum import SpectrumView

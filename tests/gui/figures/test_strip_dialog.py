@@ -14,7 +14,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QPushButton
 from window_models import models_of
 
-from sd2app.figures.dialogs import StripDialog
+from sd2app.figures.feature import StripDialog
 from sd2app.figures.model import StripModel
 
 

@@ -29,7 +29,7 @@ from PySide6.QtWidgets import (
 from window_models import models_of
 
 from sd2app.commands.feature import CommandWindow
-from sd2app.foreign_mesh.dialog import MeshDialog
+from sd2app.foreign_mesh.feature import MeshDialog
 from sd2app.foreign_mesh.model import MeshPreview, is_foreign
 from sd2app.palette import palette_for
 from sd2app.widgets.inputs import NumberBox

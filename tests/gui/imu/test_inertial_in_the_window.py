@@ -15,9 +15,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QCheckBox, QFileDialog, QMenu
 from window_models import models_of
 
-from sd2app.dataset_export.dialog import ExportDialog
-from sd2app.imu.text import reading_lines
-from sd2app.imu.track import LANES, InertialTrack
+from sd2app.dataset_export.feature import ExportDialog
+from sd2app.imu.feature import LANES, InertialTrack
+from sd2app.imu.model import reading_lines
 from sd2app.maps.arrangement import HEADER_PX
 from sd2app.scene.inertial import PLACING_HINT
 from sd2app.shell import files

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QListView, Q
 from window_models import menu_of, models_of
 
 from sd2app.fit.request import FitRequest
-from sd2app.foreign_mesh.dialog import MeshDialog
+from sd2app.foreign_mesh.feature import MeshDialog
 from sd2app.settings import Settings
 from sd2app.shell.open_dialog import OpenDialog, can_be_opened
 
