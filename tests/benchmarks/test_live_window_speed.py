@@ -14,7 +14,7 @@ from PySide6.QtCore import QEvent, QObject
 from window_models import models_of
 from window_on_sample import window_on_sample
 
-from sd2app.live.setup import ListenRequest
+from sd2app.live.process import ListenRequest
 from sd2core.files.resources import resource_path
 
 FRAMES_PER_S = 30

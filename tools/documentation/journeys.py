@@ -84,7 +84,7 @@ video, body, mesh, map
 window, models, library, disk
 0 sd2app/labels/actions.py LabelActions: the action that has the key
 0 sd2app/labels/feature.py LabelsFeature._use_label: mark, or relabel?
-1 sd2app/labels/marking.py LabelMarking.mark: begins; pressed again, ends
+1 sd2app/labels/edits.py LabelMarking.mark: begins; pressed again, ends
 1 sd2app/labels/edits.py LabelEdits.apply: refused where read-only
 2 sd2core/labels/edits.py Edits.create: old labels to new ones, pure
 1 sd2app/labels/edits.py LabelEdits.make: a step of the undo history

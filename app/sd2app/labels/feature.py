@@ -10,23 +10,19 @@ from PySide6.QtCore import QObject, QPointF
 from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
 from sd2app.feature import Action, Drop, Feature, Shell, report
-from sd2app.labels.actions import LabelActions, editing
+from sd2app.labels.actions import LabelActions, LabelTracks, editing, offer_tracks
 from sd2app.labels.autosave import LabelAutosave
-from sd2app.labels.cut_out import CutOutModel, ask_about_others, ask_for_cut_outs
 from sd2app.labels.dragging import LabelDragging, SpanDragger
-from sd2app.labels.edits import LabelEdits
-from sd2app.labels.export_dialog import export_labels
+from sd2app.labels.edits import LabelEdits, LabelMarking
+from sd2app.labels.exports import CutOutModel, ask_about_others, ask_for_cut_outs, export_labels
 from sd2app.labels.import_dialog import import_labels, is_label_file
 from sd2app.labels.loop import SpanLoop
-from sd2app.labels.marking import LabelMarking
 from sd2app.labels.model import LabelsModel
-from sd2app.labels.painting import map_overlay, strip_overlay
+from sd2app.labels.painting import SpanButtons, map_overlay, strip_overlay
 from sd2app.labels.panel import LabelsPanel
 from sd2app.labels.recovery import LabelNotice, recover
-from sd2app.labels.span_buttons import SpanButtons
 from sd2app.labels.table import SpanTable
 from sd2app.labels.timeline import LabelArea, LabelTimeline, TargetLine
-from sd2app.labels.tracks import LabelTracks, offer_tracks
 from sd2app.maps.model import SynthesisModel
 from sd2app.maps.track_mouse import TimePlot
 from sd2app.session.session import Session

@@ -12,8 +12,14 @@ from sd2app.labels.dragging import MOVED_PX, LabelDragging, attraction_s
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.loop import SpanLoop
 from sd2app.labels.model import LabelsModel
-from sd2app.labels.painting import ROW_PX, LabelRows, lane_box, paint_span, paint_tracks
-from sd2app.labels.span_buttons import SpanButtons
+from sd2app.labels.painting import (
+    ROW_PX,
+    LabelRows,
+    SpanButtons,
+    lane_box,
+    paint_span,
+    paint_tracks,
+)
 from sd2app.maps.track_mouse import ZoomedPlot
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import AT_LEFT

@@ -9,11 +9,9 @@ from PySide6.QtWidgets import QLabel, QWidget
 
 from sd2app.feature import Action, Feature, Shell
 from sd2app.live.dialog import ListenDialog
-from sd2app.live.guided import GuidedModel
 from sd2app.live.model import LiveModel
-from sd2app.live.process import COMMAND
-from sd2app.live.prompt_window import PromptWindow
-from sd2app.live.setup import ListenRequest, ListenSetup
+from sd2app.live.process import COMMAND, ListenRequest, ListenSetup
+from sd2app.live.prompt_window import GuidedModel, PromptWindow
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import Answer, accepted, confirmed
 from sd2app.widgets.panel import ElidedLabel, StateBar, say, sentence

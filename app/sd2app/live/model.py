@@ -12,8 +12,7 @@ import numpy as np
 from PySide6.QtCore import QObject
 
 from sd2app.background.latest import delayed
-from sd2app.live.process import COMMAND, SteeredCommand, picture_in
-from sd2app.live.setup import ListenRequest
+from sd2app.live.process import COMMAND, ListenRequest, SteeredCommand, picture_in
 from sd2app.session.content import Content
 from sd2app.session.session import Session
 from sd2core.errors import Sd2Error

@@ -1,4 +1,4 @@
-"""What concerns the program as a whole: undo, theme, preferences, keys, about, quit."""
+"""What concerns the program as a whole: undo, theme, keys, finding an action, about, quit."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from functools import partial
 from PySide6.QtWidgets import QMainWindow, QMessageBox
 
 from sd2app.feature import Action, Feature, Shell
+from sd2app.labels.edits import LONGEST_MS, REACTION, reaction_ms
 from sd2app.labels.feature import LabelsFeature
-from sd2app.labels.marking import LONGEST_MS, REACTION, reaction_ms
-from sd2app.manual.help import with_help
+from sd2app.manual.help import ManualOpener, with_help
 from sd2app.manual.pages import FIRST_FIVE_MINUTES, INDEX
-from sd2app.manual.window import ManualOpener
 from sd2app.session.display import LAYOUTS
 from sd2app.session.session import Session
 from sd2app.shell.action_search import ActionSearch

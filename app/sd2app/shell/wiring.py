@@ -23,7 +23,7 @@ from sd2app.foreign_mesh.feature import ForeignMeshFeature
 from sd2app.imu.feature import ImuFeature
 from sd2app.labels.feature import LabelsFeature
 from sd2app.live.feature import LiveFeature
-from sd2app.manual.window import ManualOpener
+from sd2app.manual.help import ManualOpener
 from sd2app.maps.feature import MapsFeature
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.stack import MapStack

@@ -17,8 +17,7 @@ from PySide6.QtCore import QTimer
 
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.dragging import LabelDragging
-from sd2app.labels.edits import LabelEdits
-from sd2app.labels.marking import LabelMarking
+from sd2app.labels.edits import LabelEdits, LabelMarking
 from sd2app.labels.model import LabelsModel
 from sd2app.session.document import DocumentModel
 from sd2app.session.playback import PlaybackModel

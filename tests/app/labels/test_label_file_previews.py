@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from finding import named
 
-from sd2app.labels.export_dialog import LabelExportDialog
+from sd2app.labels.exports import LabelExportDialog
 from sd2app.labels.import_dialog import LabelImportDialog, is_label_file
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2core.labels.formats import read_labels, write_labels

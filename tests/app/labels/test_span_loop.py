@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 from PySide6.QtCore import QTimer
 
+from sd2app.labels.edits import LONGEST_MS, REACTION, reaction_ms
 from sd2app.labels.loop import SpanLoop
-from sd2app.labels.marking import LONGEST_MS, REACTION, reaction_ms
 from sd2app.labels.model import LabelsModel
 from sd2app.session import playback as playback_module
 from sd2app.session.playback import PlaybackModel

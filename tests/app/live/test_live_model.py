@@ -13,7 +13,7 @@ from PySide6.QtCore import QObject
 
 from sd2app.live.feature import frames_text, level_text
 from sd2app.live.model import LiveModel
-from sd2app.live.setup import ListenRequest, ListenSetup
+from sd2app.live.process import ListenRequest, ListenSetup
 from sd2app.session.session import Session
 from sd2app.settings import Settings
 from sd2core.files.resources import resource_path

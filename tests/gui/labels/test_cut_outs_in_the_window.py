@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication, QCheckBox, QComboBox, QFileDialog, Q
 from window_models import models_of
 
 from sd2app.command_line import main
-from sd2app.labels.cut_out import CutOutDialog
+from sd2app.labels.exports import CutOutDialog
 from sd2core.io.video import open_video
 from sd2core.maps import DopplerMap
 

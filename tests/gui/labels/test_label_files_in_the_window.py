@@ -13,7 +13,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QComboBox, QFileDialog, QPushButton
 from window_models import models_of
 
-from sd2app.labels.export_dialog import LabelExportDialog
+from sd2app.labels.exports import LabelExportDialog
 from sd2app.labels.import_dialog import LabelImportDialog, import_labels
 from sd2app.widgets.inputs import Choice
 from sd2core.cli.labels import Convert

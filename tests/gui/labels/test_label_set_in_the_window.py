@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 from window_models import models_of
 
 from sd2app.labels.label_set_model import COLOUR, KEY, NAME
-from sd2app.labels.label_set_page import LabelSetPage
+from sd2app.labels.panel import LabelSetPage
 from sd2app.widgets.table import ListedEditor
 from sd2core.labels.label_set import GESTURES
 

@@ -23,8 +23,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QCheckBox, QInputDialog, QLineEdit
 from window_models import menu_of, models_of
 
+from sd2app.labels.actions import TrackDialog
 from sd2app.labels.timeline import LabelArea
-from sd2app.labels.tracks import TrackDialog
 
 THERE, BACK = ("there", 6, 24), ("back", 30, 60)
 

@@ -12,8 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QMessageBox, QTableView, QToolButton
 from window_models import models_of
 
-from sd2app.labels.label_set_page import LabelSetTable
-from sd2app.labels.panel import LabelsPanel, StatisticsPage
+from sd2app.labels.panel import LabelSetTable, LabelsPanel, StatisticsPage
 from sd2app.labels.table import SpanTable
 from sd2app.labels.table_model import COLUMNS
 from sd2app.labels.timeline import ROW_PX, LabelTimeline

@@ -28,7 +28,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolButton
 from window_models import models_of
 
-from sd2app.labels.marking import REACTION
+from sd2app.labels.edits import REACTION
 from sd2app.playback.views import TimeRuler
 
 NO_BUTTON = Qt.MouseButton.NoButton

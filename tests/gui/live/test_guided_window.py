@@ -12,16 +12,17 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QScrollArea, QToolButton
 
 from sd2app.live.dialog import ListenDialog
-from sd2app.live.guided import (
+from sd2app.live.process import ListenRequest, ListenSetup
+from sd2app.live.prompt_window import (
     GuidedModel,
+    PromptWindow,
     Step,
     count_text,
     detail,
+    has_picture,
     headline,
     progress_text,
 )
-from sd2app.live.prompt_window import PromptWindow, has_picture
-from sd2app.live.setup import ListenRequest, ListenSetup
 from sd2app.settings import Settings
 from sd2app.widgets.inputs import Choice
 from sd2core.labels.label_set import GESTURES

@@ -14,7 +14,7 @@ from window_models import models_of
 
 from sd2app.live.dialog import ListenDialog
 from sd2app.live.feature import LiveBar
-from sd2app.live.setup import ListenRequest
+from sd2app.live.process import ListenRequest
 from sd2app.video.view import VideoView
 from sd2app.widgets.inputs import Choice
 from sd2core.io.radar.infineon import write_capture

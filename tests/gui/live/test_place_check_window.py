@@ -13,10 +13,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QDialogButtonBox, QLabel, QToolButton, QWidget
 
-from sd2app.live.check_dialog import CheckDialog
-from sd2app.live.dialog import ListenDialog
-from sd2app.live.process import PlaceCheck
-from sd2app.live.setup import ListenRequest, ListenSetup
+from sd2app.live.dialog import CheckDialog, ListenDialog
+from sd2app.live.process import ListenRequest, ListenSetup, PlaceCheck
 from sd2app.settings import Settings
 from sd2core.cli.listen import Listen
 from sd2core.cli.record import Record

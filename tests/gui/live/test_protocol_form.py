@@ -21,9 +21,8 @@ from PySide6.QtWidgets import (
 )
 
 from sd2app.live.dialog import ListenDialog
-from sd2app.live.protocol_dialog import ProtocolDialog
-from sd2app.live.protocol_draft import ProtocolDraft
-from sd2app.live.setup import ListenSetup
+from sd2app.live.process import ListenSetup
+from sd2app.live.protocol_dialog import ProtocolDialog, ProtocolDraft
 from sd2app.settings import Settings
 from sd2app.widgets.inputs import Choice, NumberBox, TypedLine
 from sd2app.widgets.table import CellTable

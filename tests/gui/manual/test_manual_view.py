@@ -11,9 +11,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolButton
 
 from sd2app.command_line import full_parser
+from sd2app.manual.help import ManualWindow
 from sd2app.manual.pages import Manual, manual_folder
 from sd2app.manual.view import address
-from sd2app.manual.window import ManualWindow
 from sd2app.palette import DARK, LIGHT
 from sd2app.settings import Settings
 from sd2app.widgets.theme import apply_theme

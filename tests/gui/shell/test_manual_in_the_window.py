@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialogButtonBox, QToolButton
 from window_models import menu_of
 
-from sd2app.labels.cut_out import CutOutDialog, SpanGroup
+from sd2app.labels.exports import CutOutDialog, SpanGroup
 from sd2app.manual.help import HELP
 from sd2app.shell.program import ProgramFeature
 from sd2app.shell.side_panel import RailButton
@@ -63,7 +63,7 @@ def test_a_key_and_the_menu_open_it_in_one_window(window, manual) -> None:
 
 
 def test_without_its_pages_it_says_so(window, manual, monkeypatch, tmp_path) -> None:
-    monkeypatch.setattr("sd2app.manual.window.manual_folder", lambda: tmp_path)
+    monkeypatch.setattr("sd2app.manual.help.manual_folder", lambda: tmp_path)
     told: list[str] = []
     window.warn = told.append
     QTest.keyClick(window, Qt.Key.Key_F1)

@@ -10,7 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from window_models import all_actions, menu_of, models_of
 
-from sd2app.labels.marking import reaction_ms
+from sd2app.labels.edits import reaction_ms
 from sd2app.settings import MAX_RECENT
 from sd2app.shell.menus import ELSEWHERE, LAYOUT, menus_in
 from sd2app.widgets.inputs import Choice, NumberBox
