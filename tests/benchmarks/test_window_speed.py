@@ -106,7 +106,7 @@ def sample_window(qtbot):
 def play(window, qtbot, every_tick=lambda: None):
     from sd2app.maps.heatmap import HeatmapView
     from sd2app.scene.offscreen_backend import ImageBackend
-    from sd2app.video.view import VideoView
+    from sd2app.video.feature import VideoView
 
     heatmaps = [view for view in window.findChildren(HeatmapView) if view.isVisible()]
     views = [window.findChild(VideoView), *heatmaps]

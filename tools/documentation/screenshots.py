@@ -22,7 +22,7 @@ from sd2app.batch.feature import BatchWindow
 from sd2app.dataset_export.feature import ExportDialog
 from sd2app.fit.request import FitRequest
 from sd2app.live.process import ListenRequest
-from sd2app.mesh_comparison.window import ComparisonWindow
+from sd2app.mesh_comparison.feature import ComparisonWindow
 from sd2app.shell.window import MainWindow
 from sd2app.study.result_dialog import ClassResultDialog
 from sd2core.figures.strip import plot_strip

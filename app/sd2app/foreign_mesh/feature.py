@@ -14,7 +14,7 @@ from sd2app.feature import Action, Feature, Shell
 from sd2app.foreign_mesh.model import MeshPreview
 from sd2app.manual.help import with_help
 from sd2app.palette import Palette
-from sd2app.session.mesh_reading import ReadMesh
+from sd2app.session.content import ReadMesh
 from sd2app.session.session import Session
 from sd2app.widgets.canvas import Canvas
 from sd2app.widgets.dialogs import Dialog, accepted, accepting, ask_file

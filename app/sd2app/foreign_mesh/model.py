@@ -10,8 +10,7 @@ import numpy as np
 from PySide6.QtCore import QObject
 
 from sd2app.background.latest import LatestRunner
-from sd2app.session.content import OfferedCure, camera_of, notes_of
-from sd2app.session.mesh_reading import ReadMesh, read_mesh
+from sd2app.session.content import OfferedCure, ReadMesh, camera_of, notes_of, read_mesh
 from sd2app.session.video_frames import VideoFrames
 from sd2core.body.camera import PinholeCamera
 from sd2core.errors import Cure

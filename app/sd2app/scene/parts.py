@@ -15,8 +15,8 @@ from vtkmodules.vtkFiltersSources import vtkSphereSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
 from sd2app.scene import shapes
-from sd2app.scene.body import coarse_faces, is_closed_outward
 from sd2app.scene.colours import SceneColours, fractions, marker_colours, mixed
+from sd2app.scene.shapes import coarse_faces, is_closed_outward
 from sd2core.figures.colours import rgb
 from sd2core.scattering.beam import half_power_rim, sensor_axes
 from sd2core.sensor import Beam, VirtualSensor

@@ -11,12 +11,11 @@ from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer
 
 from sd2app.palette import palette_for
 from sd2app.scene import shapes
-from sd2app.scene.body import Extent
 from sd2app.scene.camera import EyePose, Margins, Preset, triple
 from sd2app.scene.colours import Colouring, SceneColours, fractions, mesh_colours, range_limits
 from sd2app.scene.parts import Body, GroundGrid, InertialMarkers, Markers, SensorGlyph, Shape
-from sd2app.scene.people import Walls
-from sd2app.scene.things import Movables
+from sd2app.scene.shapes import Extent
+from sd2app.scene.things import Movables, Walls
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.things import Surroundings
 from sd2core.sensor import VirtualSensor

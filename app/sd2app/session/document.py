@@ -17,15 +17,17 @@ from sd2app.session.content import (
     PARTS,
     UNTITLED,
     Content,
+    MeshReader,
     OfferedCure,
+    ReadMesh,
     camera_of,
     clock_of,
     load_content,
+    mesh_fields,
     offers_of,
     recording_of,
     words_of,
 )
-from sd2app.session.mesh_reading import MeshReader, ReadMesh, mesh_fields
 from sd2app.session.tasks import Job, ListedRunner, TaskList
 from sd2core.body.camera import PinholeCamera
 from sd2core.doppler.options import PRESETS

@@ -10,9 +10,9 @@ from typing import Any, Literal
 
 from PySide6.QtGui import QUndoCommand
 
+from sd2app.session.content import ReadMesh
 from sd2app.session.document import DocumentModel
 from sd2app.session.maps import MapModel
-from sd2app.session.mesh_reading import ReadMesh
 from sd2app.session.sensor import SensorModel
 from sd2core.errors import Cure
 from sd2core.mesh.bodies import Body, renamed

@@ -14,9 +14,8 @@ from sd2app.fit.model import FitModel
 from sd2app.fit.request import read_request
 from sd2app.foreign_mesh.model import is_foreign
 from sd2app.labels.edits import LabelEdits
-from sd2app.session.content import UNTITLED, recording_of
+from sd2app.session.content import UNTITLED, ReadMesh, recording_of
 from sd2app.session.document import DocumentModel
-from sd2app.session.mesh_reading import ReadMesh
 from sd2app.session.session import Session
 from sd2app.session.undo import Edits
 from sd2app.shell.mesh_readings import keep_reading, kept_reading

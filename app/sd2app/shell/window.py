@@ -134,7 +134,7 @@ class MainWindow(QMainWindow):
         leave_unstyled(_application())
         # Imported here so that the skeleton is on screen before NumPy, PyAV,
         # numba and VTK are loaded.
-        from sd2app.playback.views import TransportBar
+        from sd2app.playback.feature import TransportBar
         from sd2app.session.session import Session
         from sd2app.shell.keys.bindings import KeyBindings
         from sd2app.shell.menus import Menus, in_order

@@ -28,8 +28,7 @@ from sd2app.maps.feature import MapsFeature
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.stack import MapStack
 from sd2app.mesh_comparison.feature import MeshComparisonFeature
-from sd2app.playback.feature import PlaybackFeature
-from sd2app.playback.views import TimeRuler
+from sd2app.playback.feature import PlaybackFeature, TimeRuler
 from sd2app.scene.feature import SceneFeature
 from sd2app.sensor.feature import SensorFeature
 from sd2app.session.session import Session

@@ -7,12 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from sd2app.scene.body import coarse_faces, is_closed_outward
 from sd2app.scene.shapes import (
     PYRAMID_POINTS,
+    coarse_faces,
     cone,
     grid_rectangle,
     ground,
+    is_closed_outward,
     pyramids,
     rotation_to,
 )

@@ -9,8 +9,8 @@ import pytest
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.accuracy.measurements import InUse
-from sd2app.sensor.placement_fields import PlacementFields
 from sd2app.sensor.placements import (
+    PlacementFields,
     PlacementsModel,
     cost_text,
     count_text,

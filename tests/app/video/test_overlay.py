@@ -8,7 +8,7 @@ import trimesh
 from PySide6.QtGui import QColor, QImage, QPainter
 
 from sd2app.settings import Settings
-from sd2app.video.overlay_settings import OverlayModel, OverlayStyle
+from sd2app.video.feature import OverlayModel, OverlayStyle
 from sd2app.widgets.mesh_painting import tinted
 from sd2core.body.camera import PinholeCamera
 from sd2core.figures.surface import Frame, shade_mesh

@@ -33,7 +33,7 @@ from sd2app.fit.setup import PICTURE_PX, FitSetupModel, Portrait
 from sd2app.settings import Settings
 from sd2app.shell.parts import Parts
 from sd2app.shell.window import MainWindow
-from sd2app.video.view import VideoView, bones
+from sd2app.video.feature import VideoView, bones
 from sd2core.body.shape import DEFAULT_STATURE_M
 from sd2core.body.track import LANDMARKS, MIRRORED
 from sd2core.recording.recording import Recording, open_recording

@@ -29,7 +29,7 @@ from PySide6.QtWidgets import QApplication, QToolButton
 from window_models import models_of
 
 from sd2app.labels.edits import REACTION
-from sd2app.playback.views import TimeRuler
+from sd2app.playback.feature import TimeRuler
 
 NO_BUTTON = Qt.MouseButton.NoButton
 THERE, BACK = ("there", 6, 24), ("back", 30, 60)

@@ -15,7 +15,7 @@ from window_models import models_of
 from sd2app.live.dialog import ListenDialog
 from sd2app.live.feature import LiveBar
 from sd2app.live.process import ListenRequest
-from sd2app.video.view import VideoView
+from sd2app.video.feature import VideoView
 from sd2app.widgets.inputs import Choice
 from sd2core.io.radar.infineon import write_capture
 from sd2core.recording.recording import open_recording

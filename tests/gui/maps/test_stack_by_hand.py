@@ -18,7 +18,7 @@ from window_models import models_of
 from sd2app.maps.arrangement import HEADER_PX, MIN_PX
 from sd2app.maps.feature import RadarPlaceBadge
 from sd2app.maps.spectrum import SpectrumView
-from sd2app.video.view import VideoView
+from sd2app.video.feature import VideoView
 from sd2app.widgets.picture import copy_drawing, pixmap_of, write_picture
 from sd2core.errors import Sd2Error
 from sd2core.sensor import VirtualSensor

@@ -13,10 +13,14 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QComboBox, QFileDialog, QToolButton
 from window_models import models_of
 
-from sd2app.mesh_comparison.feature import mesh_of
+from sd2app.mesh_comparison.feature import (
+    ComparedPicture,
+    ComparisonWindow,
+    JointCurves,
+    JointTable,
+    mesh_of,
+)
 from sd2app.mesh_comparison.model import joint_words, name_of
-from sd2app.mesh_comparison.views import ComparedPicture, JointCurves, JointTable
-from sd2app.mesh_comparison.window import ComparisonWindow
 from sd2core.body.model import Body
 from sd2core.body.rotations import about
 from sd2core.io.mesh import save_mesh

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QLabel, QPushButton, QToolButton
 from window_models import menu_of, models_of
 
 from sd2app.sensor import alignment
-from sd2app.sensor.alignment_dialog import AlignmentDialog
+from sd2app.sensor.alignment import AlignmentDialog
 from sd2app.sensor.panel import SensorPanel
 from sd2app.widgets.chart import ChartView
 from sd2app.widgets.inputs import NumberBox

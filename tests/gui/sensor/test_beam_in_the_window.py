@@ -10,8 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
 from window_models import models_of
 
-from sd2app.sensor.beam import BeamForm
-from sd2app.sensor.panel import SensorPanel
+from sd2app.sensor.panel import BeamForm, SensorPanel
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import Beam, VirtualSensor
@@ -89,7 +88,7 @@ def test_a_table_is_read_and_one_that_is_none_leaves_the_beam(
     sensor = models_of(window).sensor
     table = tmp_path / "antenna.csv"
     table.write_text("-90,-20,-30\n0,0,0\n90,-20,-30\n")
-    monkeypatch.setattr("sd2app.sensor.beam.ask_file", lambda *_: table)
+    monkeypatch.setattr("sd2app.sensor.panel.ask_file", lambda *_: table)
     choose(window, "from")
     beam = sensor.sensor.beam
     assert len(beam.cuts) == 3

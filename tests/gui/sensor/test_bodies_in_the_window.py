@@ -16,7 +16,7 @@ from sd2app.maps.feature import LimbMenu
 from sd2app.maps.partial_map import FINAL
 from sd2app.scene.navigation import Target
 from sd2app.scene.view import SceneView
-from sd2app.sensor.bodies_page import BodiesPage
+from sd2app.sensor.scene_pages import BodiesPage
 from sd2app.widgets.inputs import NumberBox
 from sd2core.doppler import Synthesizer
 from sd2core.io import bodies as bodies_of_files

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QMessageBox, QTool
 from window_models import models_of
 
 from sd2app.scene.navigation import Target
-from sd2app.sensor.placements_page import PlacementsPage
+from sd2app.sensor.feature import PlacementsPage
 from sd2app.widgets.inputs import Choice, TypedLine
 from sd2core.placements.placements import (
     PlacementCloud,

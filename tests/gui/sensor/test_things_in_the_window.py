@@ -11,7 +11,7 @@ from window_models import models_of
 
 from sd2app.scene.navigation import Target
 from sd2app.scene.view import SceneView
-from sd2app.sensor.things_page import ThingsPage
+from sd2app.sensor.scene_pages import ThingsPage
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2core.doppler import Synthesizer
 from sd2core.mesh.things import Thing

@@ -11,7 +11,7 @@ from window_models import models_of
 
 from sd2app.scene.view import SceneView
 from sd2app.sensor.panel import SensorPanel
-from sd2app.sensor.placement_fields import PlacementFields
+from sd2app.sensor.placements import PlacementFields
 from sd2app.widgets.inputs import NumberBox, TypedLine
 
 

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QToolButton
 from window_models import models_of
 
 from sd2app.scene.view import SceneView
-from sd2app.sensor.things_page import WallsSection
+from sd2app.sensor.scene_pages import WallsSection
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2core.doppler import Synthesizer
 from sd2core.mesh.walls import Wall

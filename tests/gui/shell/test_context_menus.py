@@ -13,10 +13,10 @@ from PySide6.QtWidgets import QMenu
 from window_models import models_of
 
 from sd2app.maps.overview import Overview
-from sd2app.playback.views import TimeRuler
+from sd2app.playback.feature import TimeRuler
 from sd2app.scene.offscreen_backend import ImageBackend
 from sd2app.scene.view import SceneView
-from sd2app.video.view import VideoView
+from sd2app.video.feature import VideoView
 
 PICTURE = ["Copy picture", "Copy as SVG", "Save picture…"]
 FRAME = ["Label from here", "Export strip of frames…"]

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QPushButton
 from window_models import models_of
 
 from sd2app.maps.feature import MapExportDialog
-from sd2app.sensor.placements_page import PlacementsPage
+from sd2app.sensor.feature import PlacementsPage
 from sd2core.cli.synth import Synth
 from sd2core.maps import DopplerMap
 from sd2core.placements.placements import PlacementGrid

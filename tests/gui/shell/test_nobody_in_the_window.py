@@ -13,7 +13,7 @@ from sd2app.maps.heatmap import HeatmapView
 from sd2app.maps.overview import Overview
 from sd2app.maps.readout import reading_lines
 from sd2app.maps.spectrum import SpectrumView
-from sd2app.video.view import VideoView
+from sd2app.video.feature import VideoView
 from sd2core.io.mesh import load_mesh, save_mesh
 
 GONE = (25, 40)

@@ -17,8 +17,8 @@ from PySide6.QtWidgets import (
 from window_models import all_actions, models_of
 
 from sd2app.maps.overview import Overview
-from sd2app.playback.views import TimeRuler
-from sd2app.sensor.things_page import ThingsPage
+from sd2app.playback.feature import TimeRuler
+from sd2app.sensor.scene_pages import ThingsPage
 from sd2app.shell.keys.dialog import KeysDialog
 from sd2app.widgets.dialogs import controls_of
 from sd2app.widgets.inputs import Choice

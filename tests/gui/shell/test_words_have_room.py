@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 )
 from whole_window import opened
 
-from sd2app.playback.views import TransportBar
+from sd2app.playback.feature import TransportBar
 from sd2app.session.display import LAYOUTS
 from sd2app.widgets.panel import InnerPages
 

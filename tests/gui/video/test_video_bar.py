@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QSlider, QToolButton
 from whole_window import opened
 from window_models import models_of
 
-from sd2app.video.view import VideoBar, VideoView
+from sd2app.video.feature import VideoBar, VideoView
 from sd2core.recording.recording import open_recording
 
 
@@ -40,7 +40,7 @@ def test_mesh_dots_and_opacity(window, qtbot):
 
 @pytest.mark.slow
 def test_the_video_shows_the_mesh_as_strongly_as_asked(window, qtbot):
-    from sd2app.video.view import VideoView
+    from sd2app.video.feature import VideoView
 
     view = window.findChild(VideoView)
     models_of(window).playback.seek_frame(0)
