@@ -9,10 +9,10 @@ from typing import Literal
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import Emit, LatestRunner, ReportingModel
-from sd2app.background.quoting import quoted
 from sd2app.labels.model import LabelsModel
 from sd2app.session.content import folder_for_command
 from sd2app.session.session import Session
+from sd2app.widgets.text import quoted
 from sd2core.cli.labels.agree import Agree
 from sd2core.labels.agreement import Agreement, Disagreement, agreement, disagreements
 from sd2core.labels.formats import LabelReading, read_label_file

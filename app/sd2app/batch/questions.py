@@ -10,7 +10,6 @@ from typing import TypeVar
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 
-from sd2app.background.quoting import quoted
 from sd2app.batch.model import BatchModel
 from sd2app.batch.run import Result
 from sd2app.denoise.model import DenoiseModel
@@ -19,7 +18,7 @@ from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.saving import saved_first
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import Answer, ask_file, ask_folder, ask_new, confirmed, show_in_files
-from sd2app.widgets.text import counted
+from sd2app.widgets.text import counted, quoted
 from sd2core.denoise.card import ModelCard
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import plain_path

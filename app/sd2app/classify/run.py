@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, get_args
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.quoting import quoted
 from sd2app.background.run_monitor import CommandRun
 from sd2app.background.runs import Runs, RunSetup, Source, free_folder
 from sd2app.settings import Settings, StoredChoices
 from sd2app.training.run import StepHistory
-from sd2app.widgets.text import counted, duration_text
+from sd2app.widgets.text import counted, duration_text, quoted
 from sd2core.classify.defaults import CLASSIFIERS, DELAYS_S, MODELS, FeatureKind, pace_kind
 from sd2core.classify.files import user_classifiers_folder
 from sd2core.cli.classify.comparison import Table

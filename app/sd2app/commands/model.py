@@ -13,11 +13,11 @@ from typing import Any
 
 from PySide6.QtCore import QObject
 
-from sd2app.background.quoting import quoted
 from sd2app.background.run_monitor import CommandRun
 from sd2app.background.runs import Runs, free_folder
 from sd2app.session.session import Session
 from sd2app.settings import Settings
+from sd2app.widgets.text import quoted
 from sd2core.cli import build_parser
 from sd2core.cli.command_parser import Command, commands_of
 from sd2core.cli.refine import Refine

@@ -13,12 +13,11 @@ from pydantic import TypeAdapter
 from PySide6.QtCore import QObject
 
 from sd2app.background.latest import Emit, LatestRunner
-from sd2app.background.quoting import quoted
 from sd2app.background.run_monitor import CommandRun, History
 from sd2app.background.runs import Runs, free_folder
 from sd2app.session.tasks import Job, TaskList
 from sd2app.settings import Settings
-from sd2app.widgets.text import about, counted
+from sd2app.widgets.text import about, counted, quoted
 from sd2core.cli.export import Export, dataset_and_making
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import user_data

@@ -10,7 +10,6 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import LatestRunner, ReportingModel, delayed
 from sd2app.background.model_worker.client import DenoiserLibrary, RemoteDenoiser
-from sd2app.background.quoting import quoted
 from sd2app.denoise.map import TEXTURE_SEED, DenoisedMap
 from sd2app.denoise.text import origin_words, track_words
 from sd2app.maps.model import SynthesisModel
@@ -18,6 +17,7 @@ from sd2app.maps.partial_map import Part
 from sd2app.maps.quality import Postprocess
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
+from sd2app.widgets.text import quoted
 from sd2core.cli.denoise import Denoise
 from sd2core.denoise.files import default_name
 from sd2core.errors import Sd2Error

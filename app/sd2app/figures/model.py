@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import Emit, LatestRunner, ProblemModel
-from sd2app.background.quoting import quoted
 from sd2app.maps.difference import DifferenceModel
 from sd2app.session.content import UNTITLED, Content, folder_for_command
 from sd2app.session.session import Session
+from sd2app.widgets.text import quoted
 from sd2core.cli.labels.recording import DrawnLabels
 from sd2core.cli.strip import Strip
 from sd2core.errors import Sd2Error

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject
 
 from sd2app.background.latest import Emit, LatestRunner
-from sd2app.background.quoting import quoted
 from sd2app.fit.request import FitRequest, Person, read_request
 from sd2app.session.video_frames import VideoFrames
+from sd2app.widgets.text import quoted
 from sd2core.body.camera import DEFAULT_FIELD_OF_VIEW_DEG
 from sd2core.body.shape import DEFAULT_STATURE_M as DEFAULT_STATURE_M
 from sd2core.options.bounds import FIELD_OF_VIEW_DEG, STATURE_M

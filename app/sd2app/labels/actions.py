@@ -14,8 +14,7 @@ from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
 from sd2app.widgets.dialogs import Dialog, accepted, accepting
 from sd2app.widgets.icons import swatch_icon
-from sd2app.widgets.key_text import canonical, native
-from sd2app.widgets.text import counted
+from sd2app.widgets.text import canonical, counted, native
 from sd2core.labels import field_edits
 from sd2core.labels.label_set import Label, LabelSet
 from sd2core.labels.spans import Overlap

@@ -1,4 +1,4 @@
-"""Export of labels to another program's format, with its losses shown beforehand."""
+"""Labels written for other programs, and cut-outs of their spans: dialogs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QMessageBox, QWidget
 
 from sd2app.background.latest import Emit, LatestRunner, ReportingModel
-from sd2app.background.quoting import quoted
 from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.manual.help import with_help
@@ -31,7 +30,7 @@ from sd2app.widgets.dialogs import (
 from sd2app.widgets.inputs import CheckBox, Choice
 from sd2app.widgets.layouts import STRETCH, column_of, form_of
 from sd2app.widgets.panel import copy_button, rule, say, sentence, side_by_side
-from sd2app.widgets.text import counted
+from sd2app.widgets.text import counted, quoted
 from sd2core.cli.labels import Convert
 from sd2core.cli.labels.recording import Cut as CutCommand
 from sd2core.cutouts.cutting import Cut, cut_out, plan_cuts

@@ -11,7 +11,6 @@ from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QLabel, QWidget
 
 from sd2app.background.latest import Emit, LatestRunner
-from sd2app.background.quoting import quoted
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
 from sd2app.manual.help import with_help
@@ -20,7 +19,7 @@ from sd2app.widgets.dialogs import Dialog, accepted, accepting, ask_file
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import column_of, form_of
 from sd2app.widgets.panel import FactRows, copy_button, rule, say, sentence, title
-from sd2app.widgets.text import counted
+from sd2app.widgets.text import counted, quoted
 from sd2core.cli.labels import Convert
 from sd2core.io.imu_columns import holds_inertial_signals
 from sd2core.labels.formats import (

@@ -12,8 +12,8 @@ from PySide6.QtGui import QIcon
 from sd2app.feature import Keys
 from sd2app.labels.edits import LabelEdits
 from sd2app.widgets.icons import swatch_icon
-from sd2app.widgets.key_text import canonical, native
 from sd2app.widgets.record_table import Heading, Index, RecordTableModel
+from sd2app.widgets.text import canonical, native
 from sd2core.labels.colours import OFFERED, Alike, alike
 from sd2core.labels.edits import Edit, Edits
 from sd2core.labels.field_edits import (

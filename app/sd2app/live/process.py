@@ -18,8 +18,8 @@ from PySide6.QtCore import QObject, QProcess, QProcessEnvironment, Signal
 from PySide6.QtGui import QImage
 
 from sd2app.background.latest import ClosingModel
-from sd2app.background.quoting import quoted
 from sd2app.settings import Settings, StoredChoices
+from sd2app.widgets.text import quoted
 from sd2core.cli.listen import Listen
 from sd2core.cli.record import Record
 from sd2core.errors import Sd2Error

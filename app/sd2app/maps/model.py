@@ -18,7 +18,6 @@ from PySide6.QtCore import QObject, Signal, SignalInstance
 
 from sd2app.accuracy.model import AccuracyModel
 from sd2app.background.latest import Emit, LatestRunner, ReportingModel, delayed
-from sd2app.background.quoting import quoted
 from sd2app.maps.partial_map import FINAL, PREVIEW, Part, PartialMap, View, empty_map
 from sd2app.maps.quality import (
     ALL_WORDS,
@@ -37,6 +36,7 @@ from sd2app.maps.readout import FrameReader, Readout
 from sd2app.session.content import UNTITLED, folder_for_command
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
+from sd2app.widgets.text import quoted
 from sd2core.cli.synth import Synth
 from sd2core.doppler.body_error import body_error
 from sd2core.doppler.options import PRESETS

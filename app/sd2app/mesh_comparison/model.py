@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2app.background.latest import Emit, ProblemModel
-from sd2app.background.quoting import quoted
 from sd2app.session.content import UNTITLED, reference_of
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
 from sd2app.session.tasks import ListedRunner
+from sd2app.widgets.text import quoted
 from sd2core.cli.compare_meshes import CompareMeshes
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import is_there

@@ -8,7 +8,6 @@ from PySide6.QtCore import QObject, Qt
 from PySide6.QtWidgets import QWidget
 
 from sd2app.background.latest import LatestRunner, ProblemModel
-from sd2app.background.quoting import quoted
 from sd2app.manual.help import with_help
 from sd2app.maps.model import SynthesisModel
 from sd2app.session.content import folder_for_command
@@ -19,6 +18,7 @@ from sd2app.widgets.dialogs import Dialog, accepting
 from sd2app.widgets.inputs import option_box
 from sd2app.widgets.layouts import column_of, form_of
 from sd2app.widgets.panel import copy_button, sentence, show_words, side_by_side
+from sd2app.widgets.text import quoted
 from sd2core.cli.align import Align
 from sd2core.doppler.alignment import WITHIN_S, Alignment, align
 from sd2core.options.records import words_of

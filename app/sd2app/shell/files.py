@@ -18,8 +18,7 @@ from sd2app.session.content import UNTITLED, ReadMesh, recording_of
 from sd2app.session.document import DocumentModel
 from sd2app.session.session import Session
 from sd2app.session.undo import Edits
-from sd2app.shell.mesh_readings import keep_reading, kept_reading
-from sd2app.shell.open_dialog import ask_to_open
+from sd2app.shell.open_dialog import ask_to_open, keep_reading, kept_reading
 from sd2app.widgets.dialogs import Answer, ask_folder, ask_new, confirmed
 from sd2app.widgets.notices import Notice
 from sd2core.errors import Sd2Error

@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QMainWindow, QMenu, QWidget
 
 from sd2app.feature import Action
 from sd2app.session.session import Session
-from sd2app.shell.keys.bindings import KeyBindings
+from sd2app.shell.keys.model import KeyBindings
 from sd2app.widgets.icons import transport_icon
-from sd2app.widgets.key_text import native
+from sd2app.widgets.text import native
 
 _LINE = "-"
 _FILLED = "@"

@@ -15,9 +15,8 @@ from sd2app.manual.pages import FIRST_FIVE_MINUTES, INDEX
 from sd2app.session.display import LAYOUTS
 from sd2app.session.session import Session
 from sd2app.shell.action_search import ActionSearch
-from sd2app.shell.keys.bindings import KeyBindings
 from sd2app.shell.keys.dialog import KeysDialog
-from sd2app.shell.keys.model import KeyList
+from sd2app.shell.keys.model import KeyBindings, KeyList
 from sd2app.widgets.dialogs import Dialog, accepted, closing
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import column_of, form_of

@@ -27,11 +27,9 @@ from sd2app.background.latest import LatestRunner, delayed
 from sd2app.session.display import LAYOUTS, Layouts
 from sd2app.settings import Settings
 from sd2app.shell.loading import DropOverlay, LoadingCover
-from sd2app.shell.messages.model import MessagesModel
-from sd2app.shell.messages.views import MessageNotice, MessagesDialog
+from sd2app.shell.messages import MessageNotice, MessagesDialog, MessagesModel
 from sd2app.shell.parts import Parts
-from sd2app.shell.side_dock import SideDock
-from sd2app.shell.side_panel import SidePanel
+from sd2app.shell.side_panel import SideDock, SidePanel
 from sd2app.widgets.dialogs import accepted, tab_to
 from sd2app.widgets.inputs import claims
 from sd2app.widgets.layouts import column_of, pane, row_of
@@ -44,7 +42,7 @@ if TYPE_CHECKING:
     from sd2app.feature import Feature
     from sd2app.maps.stack import MapStack
     from sd2app.session.session import Session
-    from sd2app.shell.keys.bindings import KeyBindings
+    from sd2app.shell.keys.model import KeyBindings
     from sd2app.shell.wiring import Features
 
 T = TypeVar("T")
@@ -136,7 +134,7 @@ class MainWindow(QMainWindow):
         # numba and VTK are loaded.
         from sd2app.playback.feature import TransportBar
         from sd2app.session.session import Session
-        from sd2app.shell.keys.bindings import KeyBindings
+        from sd2app.shell.keys.model import KeyBindings
         from sd2app.shell.menus import Menus, in_order
         from sd2app.shell.status_bar import StatusLine
         from sd2app.shell.wiring import Features

@@ -40,7 +40,7 @@ from sd2app.suggestions.feature import SuggestionsFeature
 from sd2app.training.feature import TrainingFeature
 from sd2app.video.feature import VideoFeature
 from sd2app.welcome.feature import WelcomeFeature
-from sd2app.welcome.steps import tour_steps
+from sd2app.welcome.tour import tour_steps
 from sd2app.widgets.layouts import pane
 from sd2app.widgets.panel import InnerPages, LatePage
 from sd2core.cli import build_parser

@@ -9,7 +9,6 @@ from pathlib import Path
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
-from sd2app.background.quoting import quoted
 from sd2app.classify.run import ClassSetup
 from sd2app.feature import Action, Feature, Shell, report
 from sd2app.session.session import Session
@@ -29,7 +28,7 @@ from sd2app.widgets.panel import (
 )
 from sd2app.widgets.run_panel import Button, RunPanel, RunView, RunWords
 from sd2app.widgets.run_text import PHASES
-from sd2app.widgets.text import counted
+from sd2app.widgets.text import counted, quoted
 from sd2core.runs.command_folder import COMMAND_IN_FOLDER
 
 _ABOUT = (

@@ -10,11 +10,10 @@ import numpy as np
 from PySide6.QtCore import QObject, SignalInstance
 
 from sd2app.background.latest import LatestRunner, ProblemModel
-from sd2app.background.quoting import quoted
 from sd2app.labels.edits import LabelEdits
 from sd2app.session.content import folder_for_command
 from sd2app.session.maps import MapModel
-from sd2app.widgets.text import counted
+from sd2app.widgets.text import counted, quoted
 from sd2core.cli.labels.suggest import Suggest
 from sd2core.labels.field_edits import offer, pending, reject, take
 from sd2core.labels.spans import Labels, Span

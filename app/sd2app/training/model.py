@@ -8,12 +8,12 @@ from typing import Any, ClassVar, Literal
 
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.quoting import quoted
 from sd2app.background.run_monitor import CommandRun
 from sd2app.background.runs import Runs, free_folder
 from sd2app.settings import Settings
 from sd2app.training.run import TrainingMonitor, model_name
 from sd2app.training.setup import TrainingSetupModel
+from sd2app.widgets.text import quoted
 from sd2core.cli.pairs import Recordings
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import remove, user_data

@@ -1,8 +1,14 @@
-"""Durations, times and errors as texts."""
+"""Durations, times, errors, keys and command lines as texts."""
 
 from __future__ import annotations
 
+import functools
+import shlex
+import subprocess
+import sys
 import time
+
+from PySide6.QtGui import QKeySequence
 
 from sd2core.files.tables import counted as counted
 
@@ -71,3 +77,22 @@ def bytes_text(count: int) -> str:
             value = count / size
             return f"{value:.0f} {unit}" if value >= 100 else f"{value:.2g} {unit}"
     return f"{count} bytes"
+
+
+def canonical(key: str) -> str:
+    """A key as Qt writes it, the same on every machine; empty where it is none."""
+    sequence = QKeySequence(key)
+    one = sequence.count() == 1
+    return sequence.toString(QKeySequence.SequenceFormat.PortableText) if one else ""
+
+
+@functools.lru_cache
+def native(key: str) -> str:
+    """A key as it is written on this machine."""
+    return QKeySequence(key).toString(QKeySequence.SequenceFormat.NativeText)
+
+
+def quoted(arguments: list[str]) -> str:
+    """Command line for a terminal."""
+    words = ["sd2", *arguments]
+    return subprocess.list2cmdline(words) if sys.platform == "win32" else shlex.join(words)

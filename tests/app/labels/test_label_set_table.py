@@ -17,7 +17,7 @@ from sd2app.labels.label_set_model import (
     LabelSetModel,
 )
 from sd2app.settings import Settings
-from sd2app.shell.keys.bindings import KeyBindings
+from sd2app.shell.keys.model import KeyBindings
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.timebase import Timebase

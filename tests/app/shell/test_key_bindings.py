@@ -14,10 +14,9 @@ from window_models import all_actions
 
 from sd2app.labels.model import LabelsModel
 from sd2app.settings import Settings
-from sd2app.shell.keys.bindings import KeyBindings
-from sd2app.shell.keys.model import KeyList, KeyRow
+from sd2app.shell.keys.model import KeyBindings, KeyList, KeyRow
 from sd2app.shell.program import MOUSE
-from sd2app.widgets.key_text import canonical
+from sd2app.widgets.text import canonical
 from sd2core.errors import Sd2Error
 from sd2core.labels.edits import Edits
 from sd2core.labels.label_set import Label, LabelSet

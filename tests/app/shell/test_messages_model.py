@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.shell.messages.model import MessagesModel
+from sd2app.shell.messages import MessagesModel
 
 STEPS = st.lists(
     st.tuples(st.sampled_from(("warn", "note", "dismiss")), st.text("abc\n", min_size=1)),

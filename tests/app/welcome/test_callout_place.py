@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PySide6.QtCore import QRect, QSize
 
-from sd2app.welcome.callout import beside
+from sd2app.welcome.feature import beside
 
 ROOM, SIZE = QRect(12, 12, 1256, 696), QSize(340, 120)
 

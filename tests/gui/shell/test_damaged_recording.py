@@ -7,7 +7,7 @@ import shutil
 import pytest
 from window_models import models_of
 
-from sd2app.shell.messages.views import MessageNotice
+from sd2app.shell.messages import MessageNotice
 from sd2core.files.resources import resource_path
 from tests.damaged_files import change, cut, lose
 

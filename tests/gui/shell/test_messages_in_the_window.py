@@ -16,7 +16,7 @@ from window_models import models_of
 
 from sd2app.fit.feature import FitOffer
 from sd2app.labels.recovery import LabelNotice
-from sd2app.shell.messages.views import MessageNotice, MessagesDialog
+from sd2app.shell.messages import MessageNotice, MessagesDialog
 from sd2app.widgets.notices import Notice, NoticeStack
 
 PANELS = ("video", "scene", "tracks", "spectrum", "side")

@@ -18,10 +18,10 @@ from PySide6.QtWidgets import QApplication, QComboBox, QInputDialog, QToolButton
 from whole_window import opened
 from window_models import models_of
 
-from sd2app.background.quoting import quoted
 from sd2app.labels.painting import lane_box, text_on
 from sd2app.labels.timeline import TargetLine
 from sd2app.suggestions.feature import SuggestionBar
+from sd2app.widgets.text import quoted
 from sd2core.cli.classify.trained import Apply
 from sd2core.cli.labels.suggest import Suggest
 from sd2core.maps import DopplerMap

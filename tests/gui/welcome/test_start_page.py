@@ -14,7 +14,7 @@ from window_models import models_of
 
 from sd2app.live.dialog import ListenDialog
 from sd2app.shell.open_dialog import OpenDialog
-from sd2app.welcome.cards import Card, RecentCard
+from sd2app.welcome.start_page import Card, RecentCard
 
 LEFT = Qt.MouseButton.LeftButton
 

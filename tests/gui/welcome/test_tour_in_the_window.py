@@ -11,7 +11,7 @@ from window_models import models_of
 
 from sd2app.maps.heatmap import HeatmapView
 from sd2app.welcome import feature
-from sd2app.welcome.callout import Ring
+from sd2app.welcome.feature import Ring
 
 
 @pytest.fixture
