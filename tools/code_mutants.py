@@ -17,7 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from tools.documentation.places import REPOSITORY
+from tools.documentation.measured import REPOSITORY
 
 LIST = Path(__file__).with_suffix(".toml")
 

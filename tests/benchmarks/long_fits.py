@@ -44,7 +44,7 @@ from sd2core.files.resources import resource_path
 from sd2core.io.video import VideoReader, open_video
 from sd2core.io.video_writing import write_video
 from sd2core.processes import ONE_THREAD
-from tools.fitting.whole_fit import fit_body, mesh_of
+from tools.fitting.error_measurement import fit_body, mesh_of
 
 _RATE_HZ = 30
 _STRETCH_FRAMES = 256

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tools.code_mutants import Mutant, mutants
-from tools.documentation.places import REPOSITORY
+from tools.documentation.measured import REPOSITORY
 
 
 @pytest.mark.parametrize("mutant", mutants(), ids=lambda one: f"{one.file}: {one.becomes.strip()}")

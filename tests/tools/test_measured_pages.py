@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.documentation.measured import OLD, PAGES, changed, digest, marked, stamped
-from tools.documentation.places import DOCS
+from tools.documentation.measured import DOCS, OLD, PAGES, changed, digest, marked, stamped
 
 NAME = "real-gestures.md"
 

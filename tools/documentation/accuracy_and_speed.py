@@ -19,8 +19,15 @@ from sd2core.accuracy.results import Measurement, plot_cost_and_error
 from sd2core.accuracy.survey import survey_scene
 from sd2core.files.figure_files import save_figure
 from sd2core.numerics.compiled import warm_up
-from tools.documentation.pages import filled, table, write_filled
-from tools.documentation.places import BENCHMARKS, IMAGES, SAMPLE, SHARED
+from tools.documentation.measured import (
+    BENCHMARKS,
+    IMAGES,
+    SAMPLE,
+    SHARED,
+    filled,
+    table,
+    write_filled,
+)
 
 sys.path.insert(0, str(BENCHMARKS.parent))
 sys.path.insert(0, str(BENCHMARKS))

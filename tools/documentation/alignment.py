@@ -26,7 +26,7 @@ from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.pairs.store import PairSet, Take, read_pairs
 from sd2core.timebase import Timebase
-from tools.documentation.pages import table
+from tools.documentation.measured import table
 
 OFFSETS_S = (-3.0, -2.25, -1.5, -0.75, 0.0, 0.75, 1.5, 2.25, 3.0)
 

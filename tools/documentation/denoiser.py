@@ -32,8 +32,7 @@ from sd2core.simulate.campaign.radar import TargetOptions, radar_target
 from sd2core.simulate.campaign.takes import OPTIONS
 from sd2core.train.evaluation import Evaluation, Group, Score, evaluate
 from tools.documentation.long_sequences import long_sequences
-from tools.documentation.pages import spread, table, write_filled
-from tools.documentation.places import BUILD, SAMPLE, SHARED
+from tools.documentation.measured import BUILD, SAMPLE, SHARED, spread, table, write_filled
 from tools.documentation.runs import (
     ERRORS,
     Job,

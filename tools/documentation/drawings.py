@@ -28,7 +28,7 @@ from sd2core.files.figure_files import save_figure
 from sd2core.files.resources import resource_path
 from sd2core.fmcw.options import SignalOptions
 from sd2core.fmcw.simulation import simulate_radar
-from tools.documentation.places import IMAGES, REPOSITORY, SAMPLE
+from tools.documentation.measured import IMAGES, REPOSITORY, SAMPLE
 from tools.documentation.runs import run
 from tools.fitting.clip_score import speed_mps
 

@@ -16,8 +16,7 @@ from matplotlib.figure import Figure
 from sd2core.files.figure_files import save_figure
 from sd2core.io.video import open_video
 from sd2core.numerics.compiled import warm_up
-from tools.documentation.pages import write_filled
-from tools.documentation.places import BUILD, DOCS, IMAGES, SHARED
+from tools.documentation.measured import BUILD, DOCS, IMAGES, SHARED, write_filled
 from tools.documentation.runs import run, sd2
 
 REAL = ("walk.mkv", "help.mkv", "again.mkv")

@@ -30,7 +30,7 @@ from sd2core.imu.mounting import mounted
 from sd2core.imu.signals import GRAVITY_MPS2, InertialSignals, RigidPath, imu_signals, low_pass
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.timebase import Timebase
-from tools.documentation.pages import table
+from tools.documentation.measured import table
 
 Floats = NDArray[np.float64]
 

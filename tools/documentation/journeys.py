@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from sd2core.files.figure_files import save_figure
-from tools.documentation.places import IMAGES, REPOSITORY
+from tools.documentation.measured import IMAGES, REPOSITORY
 
 HOUSE = IMAGES / "house"
 MAX_STATIONS = 12

@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from sd2core.denoise.files import load_model
 from sd2core.files.figure_files import save_figure
 from sd2core.pairs.store import read_pairs
-from tools.documentation.pages import filled, table
-from tools.documentation.places import IMAGES
+from tools.documentation.measured import IMAGES, filled, table
 from tools.documentation.runs import MEMORY, Job, evaluated, sd2, settings, train
 
 LENGTHS = (72, 288, 1152, 4608)

@@ -1,4 +1,4 @@
-"""Pages of measurements: what each was made from, and whether that has changed since.
+"""Pages of measurements: their texts and tables, what each was made from, and if that has changed.
 
 ``python -m tools.documentation.measured`` says it of every page; ``--mark`` also writes it at the
 head of the pages. The test suite fails where a page does not say what is true of it, or is older
@@ -11,15 +11,33 @@ import argparse
 import ast
 import datetime
 import hashlib
+import os
 import re
 import subprocess
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from sd2core.accuracy.cache import this_machine
 from sd2core.files.atomic import atomic_write_text
-from tools.documentation.places import DOCS, REPOSITORY
+from sd2core.files.resources import resource_path
+from sd2core.files.tables import markdown_table
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+DOCS = REPOSITORY / "docs"
+IMAGES = DOCS / "images"
+BUILD = REPOSITORY / "build"
+"""Campaigns, fits and runs that a page is measured on; what is there is not made again."""
+
+SAMPLE = resource_path("swipes.sd2")
+BENCHMARKS = REPOSITORY / "tests" / "benchmarks"
+SHARED = Path(os.environ.get("SD2_SHARED_DATA", REPOSITORY.parent / "shared" / "data"))
+"""Real recordings; pages leave out what needs them where they are missing."""
+
 
 _HOURS = "hours of training, due with the next denoisers"
 OLD = {
@@ -177,3 +195,33 @@ def main() -> None:
 
 if __name__ == "__main__":
     main()
+
+
+TEXTS = Path(__file__).with_name("texts")
+
+
+def filled(name: str, **values: object) -> str:
+    """A text of ``texts/`` with the values in place of their names."""
+    return (TEXTS / name).read_text("utf-8").format(**values)
+
+
+def write_filled(name: str, **values: object) -> None:
+    """Write a page of ``docs/`` whose text has the same name; the machine is this one."""
+    write_page(name, filled(name, machine=this_machine(), **values))
+
+
+def table(rows: Iterable[Sequence[str]], names: int = 1) -> str:
+    """Rows in Markdown; the first is the heading, the first ``names`` columns are of words."""
+    return "\n".join(markdown_table(list(rows), names))
+
+
+def spread(values: Mapping[str, Any], digits: int = 3) -> str:
+    """Mean over trainings, and their standard deviation where there are several."""
+    sd = values["sd"]
+    return f"{values['mean']:.{digits}f}" + (f" ± {sd:.{digits}f}" if sd is not None else "")
+
+
+def spread_of(values: Sequence[float] | np.ndarray, digits: int) -> str:
+    """The same of the values themselves."""
+    sd = np.std(values, ddof=1) if len(values) > 1 else None
+    return spread({"mean": np.mean(values), "sd": sd}, digits)

@@ -12,7 +12,7 @@ from PIL import Image
 from PySide6.QtGui import QImage
 
 from sd2app.shell.window import MainWindow
-from tools.documentation.places import IMAGES, REPOSITORY, SAMPLE
+from tools.documentation.measured import IMAGES, REPOSITORY, SAMPLE
 from tools.documentation.windows import opened, wait_for
 
 SIZE = (1280, 720)

@@ -34,9 +34,18 @@ from sd2core.pairs.store import PairSet, Take, read_pairs
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
 from sd2core.timebase import Timebase
-from tools.documentation.measured import write_page
-from tools.documentation.pages import filled, spread, spread_of, table
-from tools.documentation.places import BUILD, DOCS, IMAGES, REPOSITORY, SAMPLE
+from tools.documentation.measured import (
+    BUILD,
+    DOCS,
+    IMAGES,
+    REPOSITORY,
+    SAMPLE,
+    filled,
+    spread,
+    spread_of,
+    table,
+    write_page,
+)
 from tools.documentation.runs import Job, campaign_of, epochs_in, evaluated, settings, train
 
 FOLDER, STUDY = BUILD / "paper", BUILD / "classifier" / "to-and-fro"

@@ -11,8 +11,7 @@ from itertools import chain
 from typing import Any
 
 from sd2core.pairs.store import read_pairs
-from tools.documentation.pages import table, write_filled
-from tools.documentation.places import BUILD
+from tools.documentation.measured import BUILD, table, write_filled
 from tools.documentation.runs import ERRORS, Job, campaign_of, errors_of, evaluated, settings, train
 
 FOLDER = BUILD / "range-synthesis"

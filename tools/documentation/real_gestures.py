@@ -30,8 +30,7 @@ from sd2core.labels.matching import match_spans
 from sd2core.labels.suggest import suggest_spans
 from sd2core.options.suggesting import PredictedSpans, SuggestOptions
 from sd2core.study.plan import Learner
-from tools.documentation.pages import spread_of, table, write_filled
-from tools.documentation.places import BUILD, SHARED
+from tools.documentation.measured import BUILD, SHARED, spread_of, table, write_filled
 from tools.documentation.runs import sd2
 
 FOLDER = BUILD / "real-gestures"

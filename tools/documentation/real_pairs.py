@@ -29,8 +29,7 @@ from sd2core.mocap.mars_pairs import (
 )
 from sd2core.mocap.radar_place import RadarPlace, estimate_place
 from sd2core.pairs.store import PairSet, read_pairs
-from tools.documentation.pages import table, write_filled
-from tools.documentation.places import BUILD, SHARED
+from tools.documentation.measured import BUILD, SHARED, table, write_filled
 from tools.documentation.runs import sd2
 
 Maps = list[NDArray[np.float32]]

@@ -16,7 +16,7 @@ from typing import Any
 from sd2core.files.atomic import atomic_write_text
 from sd2core.runs.progress import effective, read_events
 from sd2core.train.folder import TrainingFolder
-from tools.documentation.pages import spread
+from tools.documentation.measured import spread
 
 PILOT_EPOCHS = 4
 MEMORY = "memory.txt"

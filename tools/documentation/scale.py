@@ -27,8 +27,7 @@ from sd2core.files.limits import size_bytes
 from sd2core.numerics.compiled import warm_up
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
-from tools.documentation.pages import table, write_filled
-from tools.documentation.places import BENCHMARKS, SAMPLE
+from tools.documentation.measured import BENCHMARKS, SAMPLE, table, write_filled
 
 sys.path.insert(0, str(BENCHMARKS))
 from batches import (

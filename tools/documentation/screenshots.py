@@ -33,7 +33,7 @@ from sd2core.placements.placements import PlacementCloud, PlacementGrid
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import Beam, VirtualSensor, aimed_at
 from sd2core.simulate.two_people import two_people
-from tools.documentation.places import IMAGES, REPOSITORY, SAMPLE, SHARED
+from tools.documentation.measured import IMAGES, REPOSITORY, SAMPLE, SHARED
 from tools.documentation.runs import sd2
 from tools.documentation.windows import application, opened, save, settle, wait_for
 

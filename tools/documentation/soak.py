@@ -30,7 +30,7 @@ from PySide6.QtWidgets import QApplication
 from sd2app.shell.window import MainWindow
 from sd2core.files.tables import markdown_table
 from sd2core.processes import keep_little_free_memory
-from tools.documentation.places import SAMPLE
+from tools.documentation.measured import SAMPLE
 from tools.documentation.windows import opened
 
 LIMIT_S = 120.0

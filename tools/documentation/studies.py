@@ -20,8 +20,7 @@ from sd2core.study.plan import StudyPlan, read_study
 from sd2core.study.report import TITLES, findings_of
 from sd2core.study.run import run_study
 from tools.documentation.denoiser import MARS
-from tools.documentation.pages import table, write_filled
-from tools.documentation.places import BUILD, IMAGES, REPOSITORY
+from tools.documentation.measured import BUILD, IMAGES, REPOSITORY, table, write_filled
 from tools.documentation.runs import sd2
 from tools.studies.hand_gestures import make_pairs
 

@@ -15,7 +15,7 @@ from sd2app.settings import Settings
 from sd2app.shell.app import wait_until_settled
 from sd2app.shell.window import MainWindow
 from sd2app.widgets.theme import apply_theme
-from tools.documentation.places import IMAGES, REPOSITORY
+from tools.documentation.measured import IMAGES, REPOSITORY
 
 _LIMIT_S = 120.0
 

@@ -32,7 +32,7 @@ from tools.build_sample.sample import write_compact_mesh
 from tools.fitting.cast import PEOPLE, ROOMS
 from tools.fitting.motions import Action, duration_s, perform
 from tools.fitting.truth import FORMAT, VERSION, read_truth
-from tools.motion_capture.bodies import moved_transforms
+from tools.motion_capture.catalogue import moved_transforms
 
 _REMEDY = "Make it: python -m tools.motion_capture drive DATA/motion MOTIONS"
 

@@ -14,8 +14,7 @@ from sd2core.mocap.body_motion import load_motions
 from sd2core.options.kinds import Count
 from sd2core.options.records import ARGUMENT, ARGUMENTS, OptionRecord, Place
 from tools.command_line import tool
-from tools.train_lifter.fits import fit_law, repaired
-from tools.train_lifter.pairs import Pairs, make_pairs
+from tools.train_lifter.fits import Pairs, fit_law, make_pairs, repaired
 from tools.train_lifter.swaps import score_sides
 from tools.train_lifter.takes import Data, load_takes, make_lifter_data
 

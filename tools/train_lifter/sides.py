@@ -12,7 +12,7 @@ from sd2core.body.lifter_features import features
 from sd2core.body.network import Network
 from sd2core.body.sides import FORMAT, SIDED_PARTS, VERSION, free_of_place
 from sd2core.progress import Progress, silent
-from tools.train_lifter.examples import emulated
+from tools.train_lifter.emulate import emulated
 from tools.train_lifter.network import TemporalNetwork, random_network, trained
 from tools.train_lifter.swaps import Known, known_of, spoilt, varied
 from tools.train_lifter.training import TrainingArrays

@@ -12,7 +12,7 @@ from sd2core.body.lifter_features import RATE_HZ, Seen, apparent_size, resampled
 from sd2core.body.raw_track import RawTrack
 from sd2core.body.sides import SIDED_PARTS, undo_side_swaps
 from sd2core.body.track import LANDMARK, MIRRORED
-from tools.train_lifter.examples import another_view, example
+from tools.train_lifter.emulate import another_view, example
 from tools.train_lifter.takes import Take
 
 Singles = NDArray[np.float32]

@@ -46,8 +46,7 @@ from tools.train_lifter.crops import (
     random_look,
     random_wardrobe,
 )
-from tools.train_lifter.deeds import Manner, random_deed
-from tools.train_lifter.view import View, random_view, random_view_around
+from tools.train_lifter.deeds import Manner, View, random_deed, random_view, random_view_around
 
 FRAMES = 96
 

@@ -29,8 +29,18 @@ from sd2core.body.network import Network
 from sd2core.body.track import LANDMARKS
 from sd2core.mocap.body_motion import BodyMotion
 from sd2core.progress import Progress, silent
-from tools.train_lifter.emulate import Emulator, Walk, captured_walks, random_walks
-from tools.train_lifter.examples import Batch, Example, batch, emulated, example, varied
+from tools.train_lifter.emulate import (
+    Batch,
+    Emulator,
+    Example,
+    Walk,
+    batch,
+    captured_walks,
+    emulated,
+    example,
+    random_walks,
+    varied,
+)
 from tools.train_lifter.fits import repaired
 from tools.train_lifter.network import (
     TemporalNetwork,

@@ -35,7 +35,7 @@ from sd2core.body.track import LANDMARKS, PER_FRAME, LandmarkTrack
 from sd2core.errors import Sd2Error
 from sd2core.timebase import Timebase
 from tools.build_sample.swipes import swipes
-from tools.fitting.whole_fit import fit_body, mesh_of
+from tools.fitting.error_measurement import fit_body, mesh_of
 
 CAMERA = PinholeCamera()
 HIPS = [LANDMARKS.index(f"hip.{side}") for side in "LR"]

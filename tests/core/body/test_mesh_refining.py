@@ -20,7 +20,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.velocity_uncertainty import VelocityUncertainty
-from tools.motion_capture.refining import Floats, facing, jittering
+from tools.motion_capture.__main__ import Floats, facing, jittering
 
 
 @lru_cache

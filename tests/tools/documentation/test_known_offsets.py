@@ -12,7 +12,7 @@ from sd2core.pairs.store import PairSet, read_pairs
 from sd2core.simulate.campaign.making import make_campaign
 from sd2core.simulate.campaign.takes import Campaign
 from tools.documentation.alignment import OFFSETS_S, Tried, tried
-from tools.documentation.places import BUILD
+from tools.documentation.measured import BUILD
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from sd2core.denoise.metrics import VelocityError
-from tools.documentation.pages import TEXTS
+from tools.documentation.measured import TEXTS
 from tools.documentation.paper import findings, linked, table_1
 
 LINES = TEXTS / "paper.md"

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from tools.documentation.places import REPOSITORY
+from tools.documentation.measured import REPOSITORY
 
 
 @pytest.mark.gl

@@ -9,8 +9,7 @@ from sd2core.body.rig import JOINTS, KeypointSpace, Rig
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.track import LANDMARK
 from sd2core.mocap.body_motion import BodyMotion, load_motions
-from tools.motion_capture.bodies import drive_bodies
-from tools.motion_capture.catalogue import trials
+from tools.motion_capture.catalogue import drive_bodies, trials
 
 SPACE = ShapeSpace()
 KEYPOINTS = KeypointSpace(SPACE)

@@ -8,7 +8,7 @@ import pytest
 
 from sd2core.errors import Sd2Error
 from tools.motion_capture.catalogue import CALIBRATED, MEASURED, Trial, trials
-from tools.motion_capture.points import POINTS
+from tools.motion_capture.skeletons import POINTS
 
 
 @pytest.fixture(scope="module")

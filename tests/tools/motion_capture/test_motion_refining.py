@@ -10,7 +10,7 @@ from sd2core.body.rig import JOINTS
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.errors import Sd2Error
 from sd2core.mocap.body_motion import BodyMotion
-from tools.motion_capture.refining import measure_refining
+from tools.motion_capture.__main__ import measure_refining
 
 
 def test_a_calm_motion_of_another_person_is_measured(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from sd2core.errors import Sd2Error
 from sd2core.mesh.vertex_parts import QUANTITIES
 from sd2core.pairs.store import read_pairs
-from tools.train_lifter.pairs import Pairs, make_pairs
+from tools.train_lifter.fits import Pairs, make_pairs
 from tools.train_lifter.takes import Take, take_path
 
 

@@ -18,8 +18,15 @@ from sd2core.mocap.body_motion import BodyMotion
 from sd2core.simulate.people.arms import STYLES
 from tools.train_lifter.crops import CropPainter, Look, Wardrobe, random_furniture
 from tools.train_lifter.deeds import GESTURE_STYLES, HELD_OUT_STYLES, random_deed
-from tools.train_lifter.emulate import Emulator, Walk, random_walks
-from tools.train_lifter.examples import batch, emulated, example, varied
+from tools.train_lifter.emulate import (
+    Emulator,
+    Walk,
+    batch,
+    emulated,
+    example,
+    random_walks,
+    varied,
+)
 from tools.train_lifter.takes import Stage, Take
 
 TIMES = np.arange(45) / 30.0
