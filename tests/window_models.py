@@ -30,7 +30,7 @@ def build_models(parent: QObject, settings: Settings, parts: Parts | None = None
     """Models without a window."""
     session, shell = Session(parent, settings), NoShell()
     parts = replace(parts or Parts(), pictures=Path(os.devnull))  # keeps none
-    features = Features(session, shell, parts, parent)
+    features = Features(session, shell, parts)
     return _named(session, features, shell=shell)
 
 
@@ -38,7 +38,7 @@ def all_actions() -> tuple[Action, ...]:
     """Actions of all features in the order of the menus; they belong to nothing that is open."""
     parent = QObject()
     session = Session(parent, Settings.forgetful())
-    features = Features(session, NoShell(), Parts(), parent)
+    features = Features(session, NoShell(), Parts())
     return in_order(action for feature in features for action in feature.actions())
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QShowEvent
 from PySide6.QtWidgets import QLabel, QSizePolicy, QToolButton, QWidget
 
@@ -254,11 +254,11 @@ class ToleranceRow(QWidget):
 class AccuracyFeature(Feature):
     """Choice and measurement of accuracy plans."""
 
-    def __init__(
-        self, session: Session, shell: Shell, library: Library | None, parent: QObject
-    ) -> None:
+    def __init__(self, session: Session, shell: Shell, library: Library | None) -> None:
         self._session, self._shell = session, shell
-        self.model = AccuracyModel(session.jobs, session.settings, library or core_accuracy, parent)
+        self.model = AccuracyModel(
+            session.jobs, session.settings, library or core_accuracy, session.parent
+        )
         report(shell, self.model)
         self.changing = (self.model.plan_changed, self.model.measured.changed)
         self.closing = (self.model,)

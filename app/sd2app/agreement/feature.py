@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from statistics import median
 
-from PySide6.QtCore import QObject, QRectF, QSize, Qt
+from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QAction, QColor, QMouseEvent, QPainter
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
@@ -231,11 +231,9 @@ class OtherTimeline(TimePlot):
 class AgreementFeature(Feature):
     """Another person's labels below these, and how far the two agree."""
 
-    def __init__(
-        self, session: Session, shell: Shell, labels: LabelsModel, parent: QObject
-    ) -> None:
+    def __init__(self, session: Session, shell: Shell, labels: LabelsModel) -> None:
         self._session, self._shell = session, shell
-        self.model = AgreementModel(session, labels, parent)
+        self.model = AgreementModel(session, labels, session.parent)
         self.changing = (self.model.changed,)
         self.closing = (self.model,)
         self.model.failed.connect(shell.warn)

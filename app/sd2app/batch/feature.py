@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import QObject, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QGridLayout,
@@ -205,9 +205,8 @@ class BatchFeature(Feature):
         placements: PlacementsModel,
         denoiser: DenoiseModel,
         command: Sequence[str] | None,
-        parent: QObject,
     ) -> None:
-        self.model = BatchModel(session.settings, parent, command or COMMAND)
+        self.model = BatchModel(session.settings, session.parent, command or COMMAND)
         self.running = (self.model,)
         report(shell, self.model)
         self._shell = shell

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QLabel, QMenu, QWidget
 
 from sd2app.background.model_worker.client import ClassifierLibrary
@@ -252,13 +251,12 @@ class ClassifyFeature(Feature):
         library: ClassifierLibrary,
         suggest: Callable[[ClassifyModel], object],
         command: Sequence[str] | None,
-        parent: QObject,
     ) -> None:
         self._session, self._shell, self._suggest = session, shell, suggest
         self._labels, self._edits = labels, edits
-        self.model = ClassifyModel(session, denoise, labels, library, parent)
+        self.model = ClassifyModel(session, denoise, labels, library, session.parent)
         self.training = ClassTraining(
-            session.settings, self.model.use, parent, command=command or COMMAND_IN_FOLDER
+            session.settings, self.model.use, session.parent, command=command or COMMAND_IN_FOLDER
         )
         self.model.failed.connect(shell.warn)
         report(shell, self.training)

@@ -8,7 +8,7 @@ from dataclasses import MISSING
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontDatabase
 from PySide6.QtWidgets import QFileDialog, QPlainTextEdit, QScrollArea, QWidget
 
@@ -192,9 +192,9 @@ class CommandWindow(Dialog):
 class CommandsFeature(Feature):
     """Window in which any command is set up, started and followed."""
 
-    def __init__(self, session: Session, shell: Shell, parent: QObject) -> None:
+    def __init__(self, session: Session, shell: Shell) -> None:
         self._session, self._shell = session, shell
-        self.forms = CommandForms(session.settings, parent)
+        self.forms = CommandForms(session.settings, session.parent)
         self.refining = MeshRefining(session, self.forms)
         report(shell, self.forms)
         self.closing, self.running = (self.forms,), (self.forms,)  # runs go on

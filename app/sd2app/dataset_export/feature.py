@@ -8,7 +8,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QFileDialog, QLabel, QLineEdit, QProgressBar, QScrollArea, QWidget
 
@@ -334,9 +334,9 @@ def _named(people: tuple[str, ...]) -> str:
 class DatasetExportFeature(Feature):
     """Segments with labels to learn from, of the open recording or a folder."""
 
-    def __init__(self, session: Session, shell: Shell, parent: QObject) -> None:
+    def __init__(self, session: Session, shell: Shell) -> None:
         self._session, self._shell = session, shell
-        self.model = ExportModel(session.jobs, parent)
+        self.model = ExportModel(session.jobs, session.parent)
         report(shell, self.model)
         self.closing = self.running = (self.model,)  # an export goes on
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 
-from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QMenu
 
 from sd2app.background.model_worker.client import DenoiserLibrary
@@ -36,15 +35,10 @@ class DenoiseFeature(Feature):
     """The synthetic map denoised by a model of the user's choice."""
 
     def __init__(
-        self,
-        session: Session,
-        shell: Shell,
-        synthesis: SynthesisModel,
-        library: DenoiserLibrary,
-        parent: QObject,
+        self, session: Session, shell: Shell, synthesis: SynthesisModel, library: DenoiserLibrary
     ) -> None:
         self._session, self._shell = session, shell
-        self.model = DenoiseModel(session, synthesis, library, parent)
+        self.model = DenoiseModel(session, synthesis, library, session.parent)
         report(shell, self.model)
         self.changing = self.model.changed, *synthesis.completeness
         self.closing = self.working = (self.model,)

@@ -297,12 +297,10 @@ class FitBar(StateBar):
 class FitFeature(Feature):
     """A fit in a background process, from the question for its video to its recording."""
 
-    def __init__(
-        self, session: Session, shell: Shell, command: Sequence[str] | None, parent: QObject
-    ) -> None:
+    def __init__(self, session: Session, shell: Shell, command: Sequence[str] | None) -> None:
         self._session, self._shell = session, shell
-        self.model = FitModel(session.settings, parent, command or COMMAND_IN_FOLDER)
-        self.on_screen = FitOnScreen(session, self.model, parent)
+        self.model = FitModel(session.settings, session.parent, command or COMMAND_IN_FOLDER)
+        self.on_screen = FitOnScreen(session, self.model, session.parent)
         self.on_screen.noted.connect(shell.note)
         self.changing = (self.model.state_changed,)
         self.closing = self.running = (self.model,)  # a fit stops, and can be continued

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QLineF, QObject, QPointF, QRectF, Qt
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QMouseEvent, QPainter, QPen
 from PySide6.QtWidgets import QMenu
 
@@ -349,9 +349,9 @@ _FILES = "Table (*.csv);;OpenSim (*.sto);;NumPy (*.npz)"
 class ImuFeature(Feature):
     """Virtual sensors on the body, of which one is shown, and a real one's samples."""
 
-    def __init__(self, session: Session, shell: Shell, parent: QObject) -> None:
+    def __init__(self, session: Session, shell: Shell) -> None:
         self._session, self._shell = session, shell
-        self.model = ImuModel(session, parent)
+        self.model = ImuModel(session, session.parent)
         report(shell, self.model)
         self.changing = (self.model.changed, session.placing.changed)
         self.closing = self.working = (self.model,)

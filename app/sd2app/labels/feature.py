@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QPointF
+from PySide6.QtCore import QPointF
 from PySide6.QtWidgets import QApplication, QMenu, QWidget
 
 from sd2app.feature import Action, Drop, Feature, Shell, report
@@ -44,18 +44,19 @@ class LabelsFeature(Feature):
         synthesis: SynthesisModel,
         recovery: Path,
         accept: Callable[[str], object],
-        parent: QObject,
     ) -> None:
         self._session, self._shell, self._accept = session, shell, accept
-        self.model = labels = LabelsModel(parent)
-        self.autosave = LabelAutosave(session.document, labels, recovery, parent)
-        self.edits = LabelEdits(session.document, labels, session.playback, self.autosave, parent)
-        self.dragging = LabelDragging(self.edits, parent)
+        self.model = labels = LabelsModel(session.parent)
+        self.autosave = LabelAutosave(session.document, labels, recovery, session.parent)
+        self.edits = LabelEdits(
+            session.document, labels, session.playback, self.autosave, session.parent
+        )
+        self.dragging = LabelDragging(self.edits, session.parent)
         self.marking = LabelMarking(self.edits, session.settings)
         self.tracks = LabelTracks(shell, self.edits)
-        self.loop = SpanLoop(labels, session.playback, parent)
+        self.loop = SpanLoop(labels, session.playback, session.parent)
         self.over_maps, self.over_all = map_overlay(labels), strip_overlay(labels)
-        self.cut_out = CutOutModel(session, synthesis, parent)
+        self.cut_out = CutOutModel(session, synthesis, session.parent)
         self.cut_out.asked.connect(
             lambda *others: ask_about_others(shell.dialog_parent, self.cut_out, *others)
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QObject, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QWidget
 
 from sd2app.feature import Action, Feature, Shell
@@ -70,13 +70,11 @@ class LiveBar(StateBar):
 class LiveFeature(Feature):
     """A radar, or a capture that is replayed, as it comes."""
 
-    def __init__(
-        self, session: Session, shell: Shell, command: Sequence[str] | None, parent: QObject
-    ) -> None:
+    def __init__(self, session: Session, shell: Shell, command: Sequence[str] | None) -> None:
         self._session, self._shell = session, shell
-        self.model = LiveModel(session, parent, command or COMMAND)
+        self.model = LiveModel(session, session.parent, command or COMMAND)
         self.model.warned.connect(shell.warn)
-        self.guided = GuidedModel(parent, command or COMMAND)
+        self.guided = GuidedModel(session.parent, command or COMMAND)
         self.guided.warned.connect(shell.warn)
         self.changing = (self.model.state_changed, self.guided.state_changed)
         self.closing = (self.model, self.guided)

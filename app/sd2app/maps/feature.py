@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QPointF, QSize, Qt
+from PySide6.QtCore import QPointF, QSize, Qt
 from PySide6.QtGui import QAction, QColor, QGuiApplication, QIcon, QPixmap, QResizeEvent
 from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
@@ -177,14 +177,12 @@ class LimbMenu(QMenu):
 class MapsFeature(Feature):
     """The synthetic map follows sensor and accuracy; all maps share time axis and levels."""
 
-    def __init__(
-        self, session: Session, shell: Shell, accuracy: AccuracyModel, parent: QObject
-    ) -> None:
+    def __init__(self, session: Session, shell: Shell, accuracy: AccuracyModel) -> None:
         self._session, self._shell = session, shell
-        self.synthesis = SynthesisModel(session, accuracy, parent)
-        self.uncertainty = UncertaintyModel(session, self.synthesis, accuracy, parent)
-        self.difference = DifferenceModel(session, parent)
-        self.limbs = LimbsModel(session, self.synthesis, parent)
+        self.synthesis = SynthesisModel(session, accuracy, session.parent)
+        self.uncertainty = UncertaintyModel(session, self.synthesis, accuracy, session.parent)
+        self.difference = DifferenceModel(session, session.parent)
+        self.limbs = LimbsModel(session, self.synthesis, session.parent)
         session.document.changed.connect(session.follow_capture)
         for model in (self.synthesis, self.uncertainty, self.limbs):
             model.failed.connect(shell.warn)

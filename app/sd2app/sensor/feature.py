@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from PySide6.QtCore import QObject, QRectF, QSize
+from PySide6.QtCore import QRectF, QSize
 from PySide6.QtGui import QColor, QImage, QPainter
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
@@ -237,16 +237,15 @@ class SensorFeature(Feature):
         accuracy: AccuracyModel,
         synthesis: SynthesisModel,
         make_batch: Callable[[], None],
-        parent: QObject,
     ) -> None:
         self._session, self._shell, self._accuracy = session, shell, accuracy
         self._synthesis, self._make_batch = synthesis, make_batch
-        self.placements = PlacementsModel(session, accuracy, parent)
+        self.placements = PlacementsModel(session, accuracy, session.parent)
         self.placements.failed.connect(shell.warn)
         came = session.maps.real.came_or_went
         align = session.aligning.changed
         self.changing = self.placements.changed, came, align, *synthesis.completeness
-        self.alignment = AlignmentModel(session, synthesis, parent)
+        self.alignment = AlignmentModel(session, synthesis, session.parent)
         self.closing = self.working = (self.placements, self.alignment)
 
     def actions(self) -> Sequence[Action]:

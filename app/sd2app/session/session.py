@@ -75,7 +75,7 @@ class Session:
     """
 
     def __init__(self, parent: QObject, settings: Settings) -> None:
-        self.settings = settings
+        self.parent, self.settings = parent, settings  # parent of all models
         self.jobs = TaskList(parent)
         self.document = DocumentModel(self.jobs, parent)
         self.playback = PlaybackModel(parent)

@@ -144,7 +144,7 @@ class MainWindow(QMainWindow):
         self.note, self.warn = self.messages.note, self.messages.warn
         self.session = s = Session(self, self._settings)
         s.display.set_dark(is_dark(self._settings.dark))
-        self.features = Features(s, self, self._parts, self)
+        self.features = Features(s, self, self._parts)
         files = self.features.files
         self.save, self.may_discard, self.open_paths = files.save, files.may_discard, files.open
         self._offered = {feature: feature.actions() for feature in self.features}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from sd2app.accuracy.feature import AccuracyFeature
@@ -56,13 +55,13 @@ class Features:
     suggestions: SuggestionsFeature
     batch: BatchFeature
 
-    def __init__(self, session: Session, shell: Shell, parts: Parts, parent: QObject) -> None:
+    def __init__(self, session: Session, shell: Shell, parts: Parts) -> None:
         process = ModelProcess()
-        self.accuracy = accuracy = AccuracyFeature(session, shell, parts.accuracy, parent)
-        self.maps = maps = MapsFeature(session, shell, accuracy.model, parent)
+        self.accuracy = accuracy = AccuracyFeature(session, shell, parts.accuracy)
+        self.maps = maps = MapsFeature(session, shell, accuracy.model)
         denoisers = parts.denoisers or core_denoisers(process)
-        self.denoise = denoise = DenoiseFeature(session, shell, maps.synthesis, denoisers, parent)
-        self.fit = FitFeature(session, shell, parts.fit_command, parent)
+        self.denoise = denoise = DenoiseFeature(session, shell, maps.synthesis, denoisers)
+        self.fit = FitFeature(session, shell, parts.fit_command)
         self.foreign_mesh = ForeignMeshFeature(session, shell)
         self.video = VideoFeature(
             session,
@@ -70,16 +69,14 @@ class Features:
             self.fit.landmarks_at,
             (self.fit.model.advanced, self.fit.model.changed),
             lambda menu, place: self.labels.offer_frame(menu, place),
-            parent,
         )
-        self.training = TrainingFeature(session, shell, denoise.model, parts.train_command, parent)
+        self.training = TrainingFeature(session, shell, denoise.model, parts.train_command)
         self.labels = labels = LabelsFeature(
             session,
             shell,
             maps.synthesis,
             parts.recovery or recovery_folder(),
             lambda label: self.suggestions.model.accept(label),
-            parent,
         )
         self.sensor = SensorFeature(
             session,
@@ -87,7 +84,6 @@ class Features:
             accuracy.model,
             maps.synthesis,
             lambda: self.batch.show_with_placements(),
-            parent,
         )
         self.classify = ClassifyFeature(
             session,
@@ -98,25 +94,22 @@ class Features:
             parts.classifiers or core_classifiers(process),
             lambda finder: self.suggestions.model.start(finder),
             parts.learn_command,
-            parent,
         )
-        self.study = StudyFeature(
-            session, shell, self.classify.training.setup, parts.learn_command, parent
-        )
+        self.study = StudyFeature(session, shell, self.classify.training.setup, parts.learn_command)
         finders = (self.classify.model,)
-        self.suggestions = SuggestionsFeature(session, shell, labels.edits, finders, parent)
-        self.agreement = AgreementFeature(session, shell, labels.model, parent)
+        self.suggestions = SuggestionsFeature(session, shell, labels.edits, finders)
+        self.agreement = AgreementFeature(session, shell, labels.model)
         self.mesh_comparison = MeshComparisonFeature(
             session,
             shell,
             self.video.overlay,
             lambda track: HeatmapView(track, session, (labels.over_maps,)),
         )
-        self.dataset_export = DatasetExportFeature(session, shell, parent)
+        self.dataset_export = DatasetExportFeature(session, shell)
         self.batch = BatchFeature(
-            session, shell, self.sensor.placements, denoise.model, parts.batch_command, parent
+            session, shell, self.sensor.placements, denoise.model, parts.batch_command
         )
-        self.commands = CommandsFeature(session, shell, parent)
+        self.commands = CommandsFeature(session, shell)
         self.figures = FiguresFeature(
             session,
             shell,
@@ -124,11 +117,12 @@ class Features:
             lambda: labels.model.labels,
             lambda: track_words(denoise.model.card),
         )
-        self.live = LiveFeature(session, shell, parts.listen_command, parent)
+        self.live = LiveFeature(session, shell, parts.listen_command)
         self.playback = PlaybackFeature(session)
-        manual = ManualOpener(parts.parser or (lambda: build_parser()[0]), session.settings, parent)
+        parser = parts.parser or (lambda: build_parser()[0])
+        manual = ManualOpener(parser, session.settings, session.parent)
         self.program = ProgramFeature(session, shell, labels, manual)
-        self.imu = ImuFeature(session, shell, parent)
+        self.imu = ImuFeature(session, shell)
         self.files = FilesFeature(
             session,
             shell,
@@ -152,7 +146,6 @@ class Features:
             self.files.open_sample,
             self.files.reopen,
             parts.pictures or user_cache("pictures"),
-            parent,
         )
         self.scene = SceneFeature(
             session,

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
 from sd2app.classify.run import ClassSetup
@@ -137,15 +136,12 @@ class StudyFeature(Feature):
     """Runs of studies, on the labelled data of the classifiers or by plans."""
 
     def __init__(
-        self,
-        session: Session,
-        shell: Shell,
-        data: ClassSetup,
-        command: Sequence[str] | None,
-        parent: QObject,
+        self, session: Session, shell: Shell, data: ClassSetup, command: Sequence[str] | None
     ) -> None:
         self._session, self.shell = session, shell
-        self.runs = StudyRuns(session.settings, data, parent, command=command or COMMAND_IN_FOLDER)
+        self.runs = StudyRuns(
+            session.settings, data, session.parent, command=command or COMMAND_IN_FOLDER
+        )
         report(shell, self.runs)
         self.closing, self.running = (self.runs,), (self.runs,)  # runs go on
 

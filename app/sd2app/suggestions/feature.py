@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt
+from PySide6.QtCore import QEvent, QSignalBlocker, Qt
 from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QInputDialog, QWidget
 
@@ -122,18 +122,13 @@ class SuggestionsFeature(Feature):
     """Spans found by motion in a map, or by another finder."""
 
     def __init__(
-        self,
-        session: Session,
-        shell: Shell,
-        edits: LabelEdits,
-        others: Sequence[SpanFinder],
-        parent: QObject,
+        self, session: Session, shell: Shell, edits: LabelEdits, others: Sequence[SpanFinder]
     ) -> None:
         self._shell, self._edits, self._document = shell, edits, session.document
         maps = session.maps
         searched = maps.synthetic, maps.denoised, maps.real
         finders = (MotionFinder(searched), *others)
-        self.model = SuggestionsModel(edits, finders, parent)
+        self.model = SuggestionsModel(edits, finders, session.parent)
         self.changing = self.model.changed, *(track.came_or_went for track in searched)
         self.closing = (self.model,)
 

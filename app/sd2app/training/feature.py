@@ -7,7 +7,6 @@ from collections.abc import Collection, Sequence
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QCheckBox, QMessageBox, QWidget
 
 from sd2app.denoise.model import DenoiseModel
@@ -385,16 +384,13 @@ class TrainingFeature(Feature):
     """Runs that train denoisers, and the use of what they made."""
 
     def __init__(
-        self,
-        session: Session,
-        shell: Shell,
-        denoise: DenoiseModel,
-        command: Sequence[str] | None,
-        parent: QObject,
+        self, session: Session, shell: Shell, denoise: DenoiseModel, command: Sequence[str] | None
     ) -> None:
         self._session, self._shell = session, shell
-        self.model = TrainingModel(session.settings, parent, command or COMMAND)
-        self.adoption = ModelAdoption(self.model, denoise, session.maps, user_models_folder, parent)
+        self.model = TrainingModel(session.settings, session.parent, command or COMMAND)
+        self.adoption = ModelAdoption(
+            self.model, denoise, session.maps, user_models_folder, session.parent
+        )
         report(shell, self.model, self.adoption)
         self.closing, self.running = (self.adoption, self.model), (self.model,)  # runs go on
 

@@ -259,12 +259,11 @@ class VideoFeature(Feature):
         landmarks_at: LandmarksAt,
         fit_signals: Sequence[SignalInstance],
         offer_frame: MenuPart,
-        parent: QObject,
     ) -> None:
         self._session, self._shell = session, shell
         self._landmarks_at, self._fit_signals = landmarks_at, fit_signals
         self._offer_frame = offer_frame
-        self.overlay = OverlayModel(session.settings, parent)
+        self.overlay = OverlayModel(session.settings, session.parent)
         session.video.failed.connect(shell.warn)
         self.changing = (self.overlay.changed,)
         self.closing = self.working = (session.video,)

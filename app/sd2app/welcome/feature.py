@@ -205,7 +205,6 @@ class WelcomeFeature(Feature):
         Opens what was open together.
     pictures : Path
         Folder of the pictures of recordings.
-    parent : QObject
     """
 
     def __init__(
@@ -216,11 +215,12 @@ class WelcomeFeature(Feature):
         open_sample: Callable[[], object],
         open_recent: Callable[[Sequence[Path]], object],
         pictures: Path,
-        parent: QObject,
     ) -> None:
         self._session, self._shell, self._open_recent = session, shell, open_recent
-        self.pictures = RecordingPictures(session, pictures, parent)
-        self.tour = TourModel(steps, session.settings, self._sample_is_open, open_sample, parent)
+        self.pictures = RecordingPictures(session, pictures, session.parent)
+        self.tour = TourModel(
+            steps, session.settings, self._sample_is_open, open_sample, session.parent
+        )
         self.changing, self.closing = (self.tour.changed,), (self.pictures,)
 
     def actions(self) -> Sequence[Action]:
