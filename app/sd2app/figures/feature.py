@@ -60,12 +60,14 @@ class FigureDialog(Dialog):
     TITLE: ClassVar[str]
     USUAL_PX: ClassVar[tuple[int, int]]
     """Width and height at first."""
+    COPY_TIP = "The same as a command for a terminal"
 
     def __init__(self, model: Any, palette: Palette, name: str, parent: QWidget) -> None:
         super().__init__(self.TITLE, parent)
         self._model, self._name = model, name
         self._buttons = ExportButtons(self, self._ask)
-        foot = with_help("Export figure", self._buttons, *self._more())
+        copy = copy_button(lambda: self._model.line, self, self.COPY_TIP)
+        foot = with_help("Export figure", self._buttons, copy)
         parts = ((FigurePreview(model, palette, self), 1), self._choices(), foot)
         self.setLayout(column_of(*parts, spacing_px=16, margins_px=16))
         model.changed.connect(self._refresh)
@@ -76,10 +78,6 @@ class FigureDialog(Dialog):
 
     def _choices(self) -> QLayout:
         raise NotImplementedError
-
-    def _more(self) -> tuple[QWidget, ...]:
-        """Buttons beside those that end the dialog."""
-        return (copy_button(lambda: self._model.line, self),)
 
     def _refresh(self) -> None:
         model = self._model
@@ -95,13 +93,9 @@ class MapFigureDialog(FigureDialog):
 
     TITLE = "Export figure of the maps"
     USUAL_PX = 900, 720
-
-    def _more(self) -> tuple[QWidget, ...]:
-        tip = (
-            "These maps as a command for a terminal: with all labels, at the usual levels and"
-            " accuracy"
-        )
-        return (copy_button(lambda: self._model.line, self, tip),)
+    COPY_TIP = (
+        "These maps as a command for a terminal: with all labels, at the usual levels and accuracy"
+    )
 
     def _choices(self) -> QLayout:
         model = self._model

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRect, QRectF, QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QAction, QBrush, QCloseEvent, QColor, QPainter, QPen
+from PySide6.QtGui import QBrush, QCloseEvent, QColor, QPainter, QPen
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
@@ -221,26 +221,22 @@ class ComparisonWindow(QWidget):
         self,
         model: ComparisonModel,
         session: Session,
+        shell: Shell,
         overlay: OverlayModel,
-        *,
         map_view: Callable[[MapModel], QWidget],
-        ruler: QWidget,
-        keys: list[QAction],
-        attempt: Callable[[Callable[[], None]], object],
-        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent, Qt.WindowType.Window)
-        self.model, self._attempt, self._session = model, attempt, session
+        super().__init__(shell.dialog_parent, Qt.WindowType.Window)
+        self.model, self._shell, self._session = model, shell, session
         model.setParent(self)
         simulated = " (simulated)" if session.document.simulated else ""
         self.setWindowTitle(f"{session.document.title}{simulated}: compare meshes")
-        self.addActions(keys)
+        self.addActions([shell.action(name) for name in _SHARED_KEYS])
         head = self._head()
         pictures = [ComparedPicture(number, model, session, overlay) for number in (0, 1)]
         tracks = [*map(map_view, model.tracks), JointCurves(model, session)]
         panels = {name: panel(name) for name in ("pictures", "tracks", "joints")}
         fill(panels["pictures"], row_of(*((one, 1) for one in pictures)))
-        fill(panels["tracks"], column_of(*((one, 1) for one in tracks), ruler))
+        fill(panels["tracks"], column_of(*((one, 1) for one in tracks), TimeRuler(session)))
         fill(panels["joints"], JointTable(model, session.display))
         parts = [panels["pictures"], panels["tracks"]]
         left = splitter(Qt.Orientation.Vertical, parts, (320, 420))
@@ -297,7 +293,7 @@ class ComparisonWindow(QWidget):
     def _ask(self) -> None:
         name = self._session.document.file_name("-comparison")
         if path := ask_figure(self, "Export comparison", name):
-            self._attempt(lambda: self.model.save_figure(path))
+            self._shell.attempt(lambda: self.model.save_figure(path))
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Stop comparing, and discard the results."""
@@ -354,16 +350,8 @@ class MeshComparisonFeature(Feature):
         if path is None or not s.has_mesh():
             return
         self.close()
-        window = ComparisonWindow(
-            ComparisonModel(s, path),
-            s,
-            self._overlay,
-            map_view=self._map_view,
-            ruler=TimeRuler(s),
-            keys=[shell.action(name) for name in _SHARED_KEYS],
-            attempt=shell.attempt,
-            parent=shell.dialog_parent,
-        )
+        model = ComparisonModel(s, path)
+        window = ComparisonWindow(model, s, shell, self._overlay, self._map_view)
         window.closed.connect(self._forget)
         # It is about the recording that was open.
         s.document.opened.connect(window.close)

@@ -313,11 +313,7 @@ class SensorFeature(Feature):
     def panels(self) -> Mapping[str, QWidget]:
         """The panel at the side, of two pages."""
         shell = self._shell
-        to_camera, aim = shell.action("sensor_to_camera"), shell.action("aim_sensor")
-        align, radar = shell.action("align"), lambda: self.placements.radar
-        sensor = SensorPanel(
-            self._session, self._synthesis, radar, to_camera, aim, align, shell.warn
-        )
+        sensor = SensorPanel(self._session, self._synthesis, self.placements, shell)
         placements = LatePage(
             lambda: PlacementsPage(self.placements, self._accuracy, shell, self._make_batch)
         )

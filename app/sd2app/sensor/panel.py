@@ -9,10 +9,11 @@ from typing import Any, Literal
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QComboBox, QFormLayout, QGridLayout, QLabel, QWidget
 
+from sd2app.feature import Shell
 from sd2app.maps.model import SynthesisModel
+from sd2app.sensor.placements import PlacementsModel
 from sd2app.session.session import Session
 from sd2app.widgets.dialogs import ask_file
 from sd2app.widgets.inputs import CheckBox, Choice, NumberBox, action_button, option_box
@@ -145,24 +146,19 @@ class SensorPanel(QWidget):
     """Type a placement; read range, visible share and limits."""
 
     def __init__(
-        self,
-        session: Session,
-        synthesis: SynthesisModel,
-        radar: Callable[[], RadarConfig],
-        to_camera: QAction,
-        aim: QAction,
-        align: QAction,
-        warn: Callable[[str], None],
+        self, session: Session, synthesis: SynthesisModel, placements: PlacementsModel, shell: Shell
     ) -> None:
         super().__init__()
         self.setObjectName("page")
-        self._session, self._synthesis, self._radar = session, synthesis, radar
+        self._session, self._synthesis, self._placements = session, synthesis, placements
         self._too_far = sentence("", "warning")
-        self._capture = self._capture_part(action_button(align, "Find…", outlined=True))
-        short = (aim, "Aim at body"), (to_camera, "To camera")
-        buttons = [action_button(action, text, outlined=True) for action, text in short]
+        short = ("align", "Find…"), ("aim_sensor", "Aim at body"), ("sensor_to_camera", "To camera")
+        find, *buttons = (
+            action_button(shell.action(name), text, outlined=True) for name, text in short
+        )
+        self._capture = self._capture_part(find)
         head = row_of(title("Placement"), STRETCH, *buttons)
-        placement = head, self._placement_form(), self._too_far, BeamForm(session, warn)
+        placement = head, self._placement_form(), self._too_far, BeamForm(session, shell.warn)
         seen = title("What it sees"), self._readout_form()
         parts = *placement, rule(), *seen, self._capture, STRETCH
         self.setLayout(column_of(*parts, spacing_px=5, margins_px=(8, 4, 8, 4)))
@@ -297,7 +293,7 @@ class SensorPanel(QWidget):
 
     def _mark_range(self, range_m: float) -> None:
         """Mark a range at which the radar in use sees the body elsewhere."""
-        radar = self._radar()
+        radar = self._placements.radar
         too_far = range_m > radar.range_max_m
         self._spherical[0].mark(too_far)
         words = (
