@@ -38,7 +38,7 @@ _ROUNDS = 4
 _LIVELY = 1.15
 """Standard deviation of a jerk over what was found around it, which jitter's removal lessened."""
 _LEAST_MPS3 = 1.0
-"""Limit at rest. These four were chosen on the same motion (tools/motion_capture/refining.py)."""
+"""Limit at rest. These four were chosen on the same motion (tools.motion_capture)."""
 _JERK_S = 1.0 / 30.0
 """Time for which a jerk lasts: seen more often, it is not another one each time."""
 _QUICK = 3.0
