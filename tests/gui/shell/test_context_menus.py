@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMenu
 from window_models import models_of
 
-from sd2app.maps.overview import Overview
+from sd2app.maps.heatmap_image import Overview
 from sd2app.playback.feature import TimeRuler
 from sd2app.scene.offscreen_backend import ImageBackend
 from sd2app.scene.view import SceneView

@@ -10,7 +10,7 @@ from PySide6.QtCore import QPoint
 from window_models import models_of
 
 from sd2app.maps.heatmap import HeatmapView
-from sd2app.maps.overview import Overview
+from sd2app.maps.heatmap_image import Overview
 from sd2app.maps.readout import reading_lines
 from sd2app.maps.spectrum import SpectrumView
 from sd2app.video.feature import VideoView

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 )
 from window_models import all_actions, models_of
 
-from sd2app.maps.overview import Overview
+from sd2app.maps.heatmap_image import Overview
 from sd2app.playback.feature import TimeRuler
 from sd2app.sensor.scene_pages import ThingsPage
 from sd2app.shell.keys.dialog import KeysDialog
