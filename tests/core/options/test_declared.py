@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -123,9 +124,17 @@ def test_sources_of_data_sets(tmp_path: Path, change: dict[str, Any]) -> None:
 )  # fmt: skip
 def test_metadata_of_maps(tmp_path: Path, meta: dict[str, Any]) -> None:
     path = tmp_path / "map.npz"
-    values = np.zeros((4, 3), np.float32)
-    clock = Timebase.regular(3, 10.0)
-    DopplerMap(values, VelocityAxis(4), clock, "synthetic", meta={"more": [1]} | meta).save(path)
+    values, clock = np.zeros((4, 3), np.float32), Timebase.regular(3, 10.0)
+    plain = DopplerMap(values, VelocityAxis(4), clock, "synthetic", meta={"more": [1]})
+    with pytest.raises(Sd2Error, match=rf"map\.npz: {next(iter(meta))}"):
+        replace(plain, meta=plain.meta | meta).save(path)
+    plain.save(path)
+    assert DopplerMap.load(path).meta == plain.meta
+
+    def told(text: np.ndarray) -> np.ndarray:
+        return np.array(json.dumps(json.loads(str(text)) | {"provenance": plain.meta | meta}))
+
+    changed(path, meta=told)
     with pytest.raises(Sd2Error, match=rf"map\.npz: its provenance: {next(iter(meta))}"):
         DopplerMap.load(path)
 
