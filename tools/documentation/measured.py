@@ -95,6 +95,7 @@ PAGES = {
     "paper.md": Measured("make paper", _CLASSIFIERS),
 }
 
+TEXTS = Path(__file__).with_name("texts")
 _STAMP = re.compile(r"\n*<!-- measured (\S+) at (\S+) of: (.*?) -->\s*\Z", re.DOTALL)
 _NOTE = re.compile(r"\n> \*\*Older than the program\.\*\*.*?\n(?=\n)", re.DOTALL)
 
@@ -178,28 +179,6 @@ def _git(*arguments: str) -> str:
     return done.stdout.strip()
 
 
-def main() -> None:
-    """Say of each page whether it is as new as the program; with ``--mark`` in the page too."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--mark", action="store_true", help="write it at the head of the pages")
-    options = parser.parse_args()
-    for name in PAGES:
-        text = (DOCS / name).read_text("utf-8")
-        parts = changed(text, name)
-        print(
-            f"{name}: {'changed since: ' + ', '.join(parts) if parts else 'as new as the program'}"
-        )
-        if options.mark and (new := marked(text, name)) != text:
-            atomic_write_text(DOCS / name, new)
-
-
-if __name__ == "__main__":
-    main()
-
-
-TEXTS = Path(__file__).with_name("texts")
-
-
 def filled(name: str, **values: object) -> str:
     """A text of ``texts/`` with the values in place of their names."""
     return (TEXTS / name).read_text("utf-8").format(**values)
@@ -225,3 +204,22 @@ def spread_of(values: Sequence[float] | np.ndarray, digits: int) -> str:
     """The same of the values themselves."""
     sd = np.std(values, ddof=1) if len(values) > 1 else None
     return spread({"mean": np.mean(values), "sd": sd}, digits)
+
+
+def main() -> None:
+    """Say of each page whether it is as new as the program; with ``--mark`` in the page too."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--mark", action="store_true", help="write it at the head of the pages")
+    options = parser.parse_args()
+    for name in PAGES:
+        text = (DOCS / name).read_text("utf-8")
+        parts = changed(text, name)
+        print(
+            f"{name}: {'changed since: ' + ', '.join(parts) if parts else 'as new as the program'}"
+        )
+        if options.mark and (new := marked(text, name)) != text:
+            atomic_write_text(DOCS / name, new)
+
+
+if __name__ == "__main__":
+    main()
