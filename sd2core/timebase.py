@@ -14,8 +14,9 @@ from sd2core.errors import Sd2Error
 _TOLERANCE_S = 1e-6
 """Arithmetic on presentation times loses less than this; no camera is that fast."""
 _LONGEST_FRAMES = 5
-_USUAL = 0.45
-"""Logarithm of a step over the usual one from which on it is a pause, or left by one."""
+_USUAL = 0.51, 1.51
+"""Steps of these shares of the usual one leave no frame out. As far below it as above: of times
+that jitter, the mean would be longer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +103,8 @@ class Timebase:
         steps_s = np.diff(self.times_s)
         # A clock that ticks coarsely gives steps of two lengths, of which neither is the rate.
         usual_s = np.quantile(steps_s, 0.5, method="lower")
-        return float(steps_s[np.abs(np.log(steps_s) - np.log(usual_s)) < _USUAL].mean())
+        least_s, most_s = np.multiply(_USUAL, usual_s)
+        return float(steps_s[(steps_s > least_s) & (steps_s < most_s)].mean())
 
     @property
     def longest_s(self) -> float:

@@ -83,6 +83,14 @@ def test_a_coarse_clock_keeps_the_rate(tick_s):
     assert Timebase(times_s).frame_duration_s == pytest.approx(true_s[1], rel=0.01)
 
 
+@pytest.mark.parametrize("jitter_s", [0.002, 0.005, 0.008])
+def test_jitter_of_times_keeps_the_rate(jitter_s):
+    """As of a radar or a camera whose frames are timed when the computer takes them."""
+    off_s = np.random.default_rng(0).normal(0.0, jitter_s, 3000)
+    times_s = np.sort(np.arange(3000) / 30 + off_s)
+    assert Timebase(times_s).frames_per_s == pytest.approx(30.0, rel=0.01)
+
+
 @given(starts, steps)
 def test_every_frame_goes_from_edge_to_edge(start_s, steps_s):
     timebase = timebase_of(start_s, steps_s)
