@@ -129,8 +129,8 @@ def _texts(path: Path, lines: Iterable[bytes]) -> Iterator[tuple[int, str]]:
             text = "\0"
         if "\0" in text:
             raise Sd2Error(f"{path}: line {number} is no text in UTF-8", EXPECTED)
-        if text.strip():
-            yield number, text
+        if bare := text.strip():
+            yield number, bare if bare.startswith("#") else text
 
 
 def _columns_of(path: Path, titles: Sequence[str]) -> list[Column]:

@@ -60,6 +60,7 @@ class Column:
 
 def titles_of(heading: str) -> tuple[str | None, list[str]]:
     """Separator of a heading, None where it is spaces, and the titles between."""
+    heading = heading.rstrip()  # a tab at its end begins no column
     separator = max(",;\t", key=heading.count)
     if separator not in heading:
         return None, [cell_text(title) for title in heading.split()]

@@ -125,6 +125,15 @@ def test_the_first_and_the_last_cell_may_be_empty(tmp_path: Path, separator: str
     np.testing.assert_allclose(signals.turn_rate_radps, [[4, 5, 6], [4, 5, np.nan]])
 
 
+def test_tabs_that_fill_a_line_up_belong_to_no_remark(tmp_path: Path) -> None:
+    """As spreadsheets write them."""
+    rows = HEADING.split(",")[1:], list("123456")
+    table = "\n".join("\t".join([*row, ""]) for row in rows)
+    signals = read(tmp_path, f"\t# rate_hz: 50\n# place: left-wrist\t\t\t\n{table}\n")
+    assert (signals.meta["rate_hz"], signals.meta["place"]) == (50, "left-wrist")
+    assert signals.turn_rate_radps.tolist() == [[4, 5, 6]]
+
+
 def test_a_rate_stands_for_times_and_options_for_units(tmp_path: Path) -> None:
     text = "acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z\n" + "1,2,3,4,5,6\n" * 4
     units = {"acceleration_unit": "g", "turn_rate_unit": "°/s"}

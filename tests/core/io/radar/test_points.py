@@ -102,11 +102,14 @@ def test_arrays_with_names_are_read_alike(tmp_path: Path) -> None:
         assert is_the_walk(path)
 
 
-@pytest.mark.parametrize("suffix", [".npy", ".mat", ".csv"])
+@pytest.mark.parametrize("suffix", [".npy", ".mat", ".csv", ".tsv"])
 def test_without_names_numbers_tell_where_they_can(tmp_path: Path, suffix: str) -> None:
     path, table = tmp_path / f"a{suffix}", walk()
     if suffix == ".csv":
         write_csv(path, table, ())
+    elif suffix == ".tsv":  # with a tab at the end of each row
+        text = write_csv(path, table, (), "\t").read_text()
+        path.write_text(text.replace("\n", "\t\n"))
     elif suffix == ".mat":
         savemat(path, {"cloud": table})
     else:
