@@ -156,8 +156,8 @@ class MeshScene:
         """Interpolate vertices and velocity at some times, on a smooth path through the frames.
 
         Cubic Hermite with the central differences of the frames (Catmull-Rom);
-        still before the first and after the last frame of the stretch with a person in
-        it that the middle of the times lies in.
+        straight on before the first and after the last frame of the stretch with a person
+        in it that the middle of the times lies in.
         """
         times = self.mesh.times_s
         if len(times) == 1:
@@ -165,7 +165,8 @@ class MeshScene:
             yield from ((still, np.zeros_like(still)) for _ in times_s)
             return
         first, last = self._stretch(0.5 * float(times_s[0] + times_s[-1]))
-        for time_s in np.clip(times_s, times[first], times[last]):
+        known_s = np.clip(times_s, times[first], times[last])
+        for time_s, beyond_s in zip(known_s, times_s - known_s, strict=True):
             left = int(np.clip(np.searchsorted(times, time_s) - 1, first, last - 1))
             step_s = times[left + 1] - times[left]
             u = (time_s - times[left]) / step_s
@@ -175,7 +176,8 @@ class MeshScene:
             bend = slope_a + slope_b - 2.0 * change
             turn = change - slope_a - bend
             position = a + u * (slope_a + u * (turn + u * bend))
-            yield position, (slope_a + u * (2.0 * turn + 3.0 * u * bend)) / step_s
+            velocity = (slope_a + u * (2.0 * turn + 3.0 * u * bend)) / step_s
+            yield position + beyond_s * velocity, velocity
 
     def _slope(self, index: int) -> NDArray[np.float64]:
         """Central difference of the frames around one, one-sided at the ends."""

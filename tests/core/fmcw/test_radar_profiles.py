@@ -23,6 +23,7 @@ from sd2core.fmcw import (
     simulate_radar,
 )
 from sd2core.fmcw.chain import taper
+from sd2core.fmcw.options import Motion
 from sd2core.io.radar import load_capture, named_radar
 from sd2core.io.radar.described import write_described
 from sd2core.mesh.sequence import MeshSequence
@@ -137,6 +138,18 @@ def test_a_rough_ball_before_the_sensor_fits_into_the_converter(name: str) -> No
     capture = simulate_radar(mesh, RADARS[name], sensor=sensor, wave=wave, options=link)
     assert capture.meta["simulation"]["clipped_share"] == 0.0
     assert np.abs(capture.read(0, 1)).max() > 0.01
+
+
+@pytest.mark.parametrize("motion", ["constant", "interpolated"])
+def test_frames_that_reach_beyond_a_mesh_go_straight_on(motion: Motion) -> None:
+    """Their middles are within it: of a body that stood still there velocities would be torn."""
+    whole, wave = plate(0.9), replace(SMOOTH, motion=motion)
+    times_s = whole.times_s[[14, 26]]
+    columns = [
+        frame_spectra(mesh, RADARS["wifi-5ghz"], times_s, wave=wave)
+        for mesh in (whole, whole.between(14, 27))
+    ]
+    np.testing.assert_allclose(columns[1], columns[0], rtol=0.01, atol=1e-3 * columns[0].max())
 
 
 def test_a_name_that_is_none_is_refused_with_those_that_are() -> None:
