@@ -20,6 +20,7 @@ from sd2core.files.paths import check_distinct
 from sd2core.fmcw.processing import doppler_map
 from sd2core.io.stored_vertices import damaged_frames
 from sd2core.labels.per_frame import BACKGROUND, label_per_frame, plain_name
+from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.pairs.rows import agreed
 from sd2core.pairs.store import PairWriter, Take
@@ -232,7 +233,7 @@ def _takes(
     """Stretches with a person and a radar frame, cut into takes; and the time left out."""
     times_s = synthetic.timebase.times_s
     seen = on_clock(radar, synthetic.timebase).present_mask & synthetic.present_mask
-    rate_hz = synthetic.timebase.frames_per_s
+    rate_hz, own = synthetic.timebase.frames_per_s, recording.effective_labels()
     takes: list[Take] = []
     kept = 0
     for start, stop in take_frames(times_s, seen, rate_hz):
@@ -247,7 +248,7 @@ def _takes(
                 synthetic=np.ascontiguousarray(part.values.T),
                 radar=target,
                 times_s=part.times_s - part.times_s[0],
-                label=frame_labels(recording, labels, part.times_s),
+                label=frame_labels(own, labels, part.times_s),
                 sensor_position_m=np.asarray(recording.sensor.position_m, np.float64),
                 limbs=part.limbs,
             )
@@ -306,10 +307,9 @@ def label_names(recordings: Iterable[Recording]) -> tuple[str, ...]:
 
 
 def frame_labels(
-    recording: Recording, names: tuple[str, ...], times_s: NDArray[np.float64]
+    labels: Labels, names: tuple[str, ...], times_s: NDArray[np.float64]
 ) -> NDArray[np.int8]:
     """Return the number of the label at some times; see :func:`~sd2core.pairs.rows.agreed`."""
-    labels = recording.effective_labels()
     of_person = [labels.of_person(person) for person in labels.persons] or [labels]
     return agreed([label_per_frame(one, names, times_s) for one in of_person])
 

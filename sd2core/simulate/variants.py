@@ -124,7 +124,7 @@ def vary_recordings(
 def _of_recording(
     recording: Recording, names: tuple[str, ...], subject: str, mesh: MeshSequence
 ) -> Iterator[_Movement]:
-    labels = [*names, ""]  # the last is that of UNKNOWN
+    labels, own = [*names, ""], recording.effective_labels()  # the last is that of UNKNOWN
     seen, rate_hz = mesh.presence.present, mesh.timebase.frames_per_s
     stretches = take_frames(mesh.times_s, seen, rate_hz)
     for number, (start, stop) in enumerate(stretches):
@@ -132,7 +132,7 @@ def _of_recording(
             TakeKey(subject, f"{recording.folder.stem}-{number:03d}", 0),
             mesh.between(start, stop),
             recording.sensor.position_m,
-            [labels[one] for one in frame_labels(recording, names, mesh.times_s[start:stop])],
+            [labels[one] for one in frame_labels(own, names, mesh.times_s[start:stop])],
         )
 
 

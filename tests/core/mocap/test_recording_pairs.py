@@ -86,6 +86,21 @@ def test_a_radars_own_map_brings_its_axis_and_its_labels(tmp_path: Path) -> None
     assert 4 * FRAME_S <= labelled_s[0] < labelled_s[-1] < 9 * FRAME_S
 
 
+def test_a_radars_own_file_is_not_read_for_every_take(tmp_path: Path, monkeypatch) -> None:
+    mesh = recording(tmp_path / "anna.sd2", radar=False).mesh
+    bare = Recording(tmp_path / "own.sd2", mesh=mesh, radar=write_kkt(tmp_path / "wave.h5", 90))
+    one = bare.save_as(bare.folder)
+    read, reads = Recording.load_radar_map, []
+    monkeypatch.setattr(
+        Recording, "load_radar_map", lambda *given: (reads.append(given), read(*given))[1]
+    )
+    monkeypatch.setattr("sd2core.mocap.recording_pairs.TAKE_S", 1.5)
+    own = replace(PRESETS["paper"], axis=VelocityAxis(31, 1.9375), null_bins=())
+    make_recording_pairs([one.folder], tmp_path / "pairs.zarr", own)
+    assert len(read_pairs(tmp_path / "pairs.zarr").takes) > 1
+    assert len(reads) <= 3  # for the names of labels, for the map, and for labels of frames
+
+
 def test_long_recordings_are_cut_and_several_are_several_people(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("sd2core.mocap.recording_pairs.TAKE_S", 1.5)
     folders = [recording(tmp_path / name).folder for name in ("anna.sd2", "benjamin.sd2")]
