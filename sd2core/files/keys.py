@@ -57,7 +57,18 @@ _CODE: dict[str, tuple[str, ...]] = {
         "maps.py",
         "timebase.py",
     ),
-    "export": ("batch/exporting.py", "datasets", "imu", "labels", "pairs/segments.py", "maps.py"),
+    "export": (
+        "batch/exporting.py",
+        "datasets",
+        "fmcw",
+        "imu",
+        "io",
+        "labels",
+        "mocap/recording_pairs.py",
+        "pairs/segments.py",
+        "maps.py",
+        "timebase.py",
+    ),
 }
 """Modules that a step's results depend on, within sd2core."""
 

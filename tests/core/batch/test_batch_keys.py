@@ -93,7 +93,15 @@ def test_every_step_has_code_of_its_own() -> None:
     assert all_code_digest() not in digests
 
 
-@pytest.mark.parametrize(("step", "source"), [("fit", "body/solve.py"), ("synthesise", "maps.py")])
+@pytest.mark.parametrize(
+    ("step", "source"),
+    [
+        ("fit", "body/solve.py"),
+        ("synthesise", "maps.py"),
+        ("export", "fmcw/chain.py"),  # of a real radar's map, which is in data sets
+        ("export", "mocap/recording_pairs.py"),
+    ],
+)
 def test_changed_code_makes_results_anew(step: Any, source: str, tmp_path, monkeypatch) -> None:
     copy = tmp_path / "sd2core"
     package = Path(keys.__file__).parent.parent
