@@ -11,6 +11,18 @@ from typing import Any
 
 from sd2core.files.resources import resource_path
 
+_MAPS = (
+    "batch/synthesis.py",
+    "io",
+    "maps.py",
+    "mesh",
+    "plausibility/clock.py",
+    "scattering",
+    "sensor.py",
+    "timebase.py",
+)
+"""Modules that all maps depend on."""
+
 _CODE: dict[str, tuple[str, ...]] = {
     "inspect": (
         "batch/inputs.py",
@@ -22,21 +34,7 @@ _CODE: dict[str, tuple[str, ...]] = {
         "plausibility/clock.py",
     ),
     "fit": ("batch/fitting.py", "body", "io", "mesh", "timebase.py"),
-    "synthesise": (
-        "batch/synthesis.py",
-        "body/limbs.py",
-        "body/parts.py",
-        "doppler",
-        "io",
-        "accuracy",
-        "mesh",
-        "numerics",
-        "plausibility/clock.py",
-        "scattering",
-        "sensor.py",
-        "maps.py",
-        "timebase.py",
-    ),
+    "synthesise": (*_MAPS, "body/limbs.py", "body/parts.py", "doppler", "accuracy", "numerics"),
     "denoise": (
         "batch/denoising.py",
         "denoise",
@@ -44,30 +42,16 @@ _CODE: dict[str, tuple[str, ...]] = {
         "pairs/segments.py",
         "maps.py",
     ),
-    "simulate": (
-        "batch/synthesis.py",
-        "datasets/simulating.py",
-        "fmcw",
-        "io",
-        "mesh",
-        "mocap/recording_pairs.py",
-        "plausibility/clock.py",
-        "scattering",
-        "sensor.py",
-        "maps.py",
-        "timebase.py",
-    ),
+    "simulate": (*_MAPS, "datasets/simulating.py", "fmcw", "mocap/recording_pairs.py"),
     "export": (
+        *_MAPS,
         "batch/exporting.py",
         "datasets",
         "fmcw",
         "imu",
-        "io",
         "labels",
         "mocap/recording_pairs.py",
         "pairs/segments.py",
-        "maps.py",
-        "timebase.py",
     ),
 }
 """Modules that a step's results depend on, within sd2core."""
