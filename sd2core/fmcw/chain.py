@@ -169,6 +169,12 @@ class Chain(FrameChain):
         frames = min(self.options.clutter_window_s / frame_s, 2.0 * self.capture.frame_count)
         return round(0.5 * frames)
 
+    @cached_property
+    def _stretches(self) -> Presence:
+        """Frames between gaps in time, over which what stands still may have been moved."""
+        times_s = self.capture.timebase.times_s
+        return Presence.of(None, len(times_s), gaps_between(times_s))
+
     def blocks(self) -> Iterator[tuple[int, int]]:
         """Half-open runs of frames that fit into a few megabytes."""
         config = self.capture.config
@@ -211,11 +217,8 @@ class Chain(FrameChain):
         total = np.cumsum(chirps, axis=0, dtype=np.result_type(chirps, np.float64))
         total = np.concatenate([np.zeros_like(total[:1]), total])  # (frames + 1, rx, samples)
         frames = np.arange(start, stop)
-        # Over a gap in time what stands still may have been moved.
-        gaps = gaps_between(self.capture.timebase.times_s)
-        stretch = Presence.of(None, self.capture.frame_count, gaps)
-        low = np.maximum(frames - self._reach, stretch.first[frames]) - first
-        high = np.minimum(frames + self._reach, stretch.last[frames]) + 1 - first
+        low = np.maximum(frames - self._reach, self._stretches.first[frames]) - first
+        high = np.minimum(frames + self._reach, self._stretches.last[frames]) + 1 - first
         mean = (total[high] - total[low]) / (high - low)[:, None, None]
         signal -= mean[:, :, None, :].astype(signal.dtype)
         return signal

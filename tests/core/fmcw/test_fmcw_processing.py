@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -238,6 +239,16 @@ def test_the_moving_average_ends_where_frames_are_missing() -> None:
     paused = replace(capture, timebase=Timebase(times_s))
     assert doppler_map(capture, clutter="moving").values.max() > 1e-3
     assert doppler_map(paused, clutter="moving").values.max() < 1e-9
+
+
+def test_a_long_capture_is_not_gone_through_for_every_frame(monkeypatch) -> None:
+    looking = Mock(wraps=chain.gaps_between)
+    monkeypatch.setattr(chain, "gaps_between", looking)
+    capture = capture_of(FINE, 0.4 * tone(FINE, 3.6, 0.0, frames=5))
+    processing = chain.Chain(capture, ProcessingOptions("moving"))
+    for frame in range(5):
+        processing.cell_power(frame)
+    looking.assert_called_once()
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
