@@ -138,6 +138,8 @@ def _clock(
         moments_s, frame_s = _in_seconds(first, steps, points.time_unit_s, notes)
     if frame_s is None:
         frame_s = USUAL_FRAME_S
+        if points.time is not None and "frame" not in points.columns:  # numbers are of times, too
+            steps = np.minimum(steps, LONGEST_GAP_FRAMES + 1)
         why = "The table tells no times" if points.time is None else "Its times tell no frame rate"
         notes.append(
             f"{why}: a frame is taken every {1e3 * frame_s:g} ms."

@@ -124,6 +124,21 @@ def test_frames_of_points_filled_up_with_zeros(tmp_path: Path) -> None:
     cloud[:, :POINTS] = table[:, 1:].reshape(FRAMES, POINTS, 5)
     np.save(tmp_path / "a.npy", cloud)
     assert is_the_walk(tmp_path / "a.npy")
+    cloud[20:60] = 0.0
+    np.save(tmp_path / "a.npy", cloud)
+    times_s = load_recorded_map(tmp_path / "a.npy").timebase.times_s
+    assert np.diff(times_s).max() == pytest.approx(41 * FRAME_S)
+
+
+def test_times_that_tell_no_frame_rate_make_no_hours(tmp_path: Path) -> None:
+    """Each point has its own, in no unit that is named, and between bursts lies a day."""
+    table = walk()
+    table[:, 0] = 1e-6 * np.arange(len(table)) + 86_400.0 * (table[:, 0] > 20)
+    path = tmp_path / "a.npy"
+    np.save(path, np.rec.fromarrays(table.T, names=["time", *NAMES[1:]]))
+    recorded = load_recorded_map(path)
+    assert any("no frame rate" in note for note in recorded.notes)
+    assert recorded.timebase.duration_s < 0.2 * len(table)
 
 
 def test_a_description_says_what_numbers_do_not(tmp_path: Path) -> None:
