@@ -16,6 +16,7 @@ from sd2core.accuracy.results import Machine, Measurement
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import keep_text
+from sd2core.files.keys import code_digest
 from sd2core.files.paths import user_cache
 from sd2core.files.texts import read_text
 from sd2core.mesh.sequence import MeshSequence
@@ -43,7 +44,7 @@ def clip_fingerprint(mesh: MeshSequence, frames: Iterable[int] = ()) -> str:
 def scene_fingerprint(
     mesh: MeshSequence, sensor: VirtualSensor, options: SynthesisOptions, family: Family
 ) -> str:
-    """Fingerprint of everything that errors depend on.
+    """Fingerprint of everything that errors depend on, the code too.
 
     Parameters
     ----------
@@ -66,6 +67,7 @@ def scene_fingerprint(
         "sensor": sensor.as_dict(),
         "options": asdict(options),
         "family": family,
+        "code": [code_digest(step) for step in ("synthesise", "simulate")],
     }
     if mesh.surroundings is not None:
         what["surroundings"] = mesh.surroundings.digest

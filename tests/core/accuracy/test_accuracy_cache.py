@@ -82,6 +82,14 @@ def test_another_place_or_option_makes_it_stale(mesh: MeshSequence) -> None:
         assert found.stale
 
 
+def test_other_code_makes_it_stale(mesh: MeshSequence, monkeypatch: pytest.MonkeyPatch) -> None:
+    store_measurement(mesh, measured(mesh))
+    monkeypatch.setattr(cache, "code_digest", lambda step: "mended")
+    found = cached_measurement(mesh, CAMERA, PAPER)
+    assert found is not None
+    assert found.stale
+
+
 def test_another_machine_makes_it_stale(
     mesh: MeshSequence, monkeypatch: pytest.MonkeyPatch
 ) -> None:
