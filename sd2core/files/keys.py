@@ -11,7 +11,7 @@ from typing import Any
 
 from sd2core.files.resources import resource_path
 
-_MAPS = (
+_MAP = (
     "batch/synthesis.py",
     "io",
     "maps.py",
@@ -21,20 +21,12 @@ _MAPS = (
     "sensor.py",
     "timebase.py",
 )
-"""Modules that all maps depend on."""
+"""Modules that any map depends on."""
 
 _CODE: dict[str, tuple[str, ...]] = {
-    "inspect": (
-        "batch/inputs.py",
-        "datasets/kept_maps.py",
-        "files/digests.py",
-        "io",
-        "recording",
-        "mesh",
-        "plausibility/clock.py",
-    ),
+    "inspect": (*_MAP, "batch/inputs.py", "datasets/kept_maps.py", "files/digests.py", "recording"),
     "fit": ("batch/fitting.py", "body", "io", "mesh", "timebase.py"),
-    "synthesise": (*_MAPS, "body/limbs.py", "body/parts.py", "doppler", "accuracy", "numerics"),
+    "synthesise": (*_MAP, "body/limbs.py", "body/parts.py", "doppler", "accuracy", "numerics"),
     "denoise": (
         "batch/denoising.py",
         "denoise",
@@ -42,9 +34,9 @@ _CODE: dict[str, tuple[str, ...]] = {
         "pairs/segments.py",
         "maps.py",
     ),
-    "simulate": (*_MAPS, "datasets/simulating.py", "fmcw", "mocap/recording_pairs.py"),
+    "simulate": (*_MAP, "datasets/simulating.py", "fmcw", "mocap/recording_pairs.py"),
     "export": (
-        *_MAPS,
+        *_MAP,
         "batch/exporting.py",
         "datasets",
         "fmcw",

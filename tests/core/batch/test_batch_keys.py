@@ -97,6 +97,7 @@ def test_every_step_has_code_of_its_own() -> None:
     ("step", "source"),
     [
         ("fit", "body/solve.py"),
+        ("inspect", "timebase.py"),  # rates of frames
         ("synthesise", "maps.py"),
         ("export", "fmcw/chain.py"),  # of a real radar's map, which is in data sets
         ("export", "mocap/recording_pairs.py"),
