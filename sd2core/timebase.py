@@ -102,9 +102,8 @@ class Timebase:
             return 1.0 / 30.0
         steps_s = np.diff(self.times_s)
         # A clock that ticks coarsely gives steps of two lengths, of which neither is the rate.
-        usual_s = np.quantile(steps_s, 0.5, method="lower")
-        least_s, most_s = np.multiply(_USUAL, usual_s)
-        return float(steps_s[(steps_s > least_s) & (steps_s < most_s)].mean())
+        share = steps_s / np.quantile(steps_s, 0.5, method="lower")
+        return float(steps_s[(_USUAL[0] < share) & (share < _USUAL[1])].mean())
 
     @property
     def longest_s(self) -> float:
