@@ -36,6 +36,7 @@ from sd2core.datasets.recording_sources import (
 from sd2core.denoise.resample_to_model import SAME_RATE
 from sd2core.doppler import PRESETS
 from sd2core.errors import Sd2Error
+from sd2core.files.keys import all_code_digest
 from sd2core.files.paths import make_folder
 from sd2core.io.kinds import kind_of
 from sd2core.io.radar import holds_map
@@ -188,9 +189,9 @@ def _sources(
 
 
 def _made_pairs(out: Path, paths: Sequence[Path], names: Sequence[str]) -> Path:
-    """Pairs of recordings, made anew where these are others or have changed."""
+    """Pairs of recordings, made anew where these are others, or they or the code have changed."""
     sources = recording_sources(paths, names, Making(("synthetic", "simulated", "real")))
-    content = json.dumps([[*one.key, one.fingerprint()] for one in sources])
+    content = json.dumps([all_code_digest(), *([*one.key, one.fingerprint()] for one in sources)])
     made = out / f"pairs-{hashlib.blake2b(content.encode(), digest_size=8).hexdigest()}.zarr"
     if not made.exists():
         make_folder(out)

@@ -62,6 +62,15 @@ def test_recordings_are_read_as_they_are_now(tmp_path: Path) -> None:
     assert [one.clip.subject for one in others] == ["ben", "carla"]
 
 
+def test_pairs_of_recordings_are_made_anew_by_other_code(tmp_path: Path, monkeypatch) -> None:
+    folders = tuple(str(recording(tmp_path / f"{name}.sd2").folder) for name in ("anna", "ben"))
+    for number, code in enumerate(("of before", "mended", "mended"), start=1):
+        monkeypatch.setattr("sd2core.study.data.all_code_digest", lambda code=code: code)
+        plan = plan_of(tmp_path / "unused").model_copy(update={"data": folders})
+        study_data_of(plan.model_copy(update={"title": f"study {number}"}))
+    assert len(list((tmp_path / "out").glob("pairs-*.zarr"))) == 2
+
+
 def test_recordings_have_the_classes_of_their_label_sets(tmp_path: Path) -> None:
     """As for `sd2 classify`: pairs, which are made of them, hold labels alone."""
     for name in ("anna", "ben"):
