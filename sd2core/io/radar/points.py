@@ -211,8 +211,9 @@ def _sorted(
             raise Sd2Error(f"{path} has columns {', '.join(columns)}", "a frame or a time")
         moments, of_point = np.unique(time, return_inverse=True)
         steps = np.diff(moments)
-        usual = np.median(steps) if len(steps) else 1.0
-        passed = np.maximum(np.round(steps / usual), 1.0)  # frames without a point have no row
+        known = np.isfinite(steps)  # points without a time are in one more frame
+        usual = np.median(steps[known]) if known.any() else 1.0
+        passed = np.where(known, np.maximum(np.round(steps / usual), 1.0), 1.0)  # empty: no rows
         numbers["frame"] = np.append(0.0, np.cumsum(passed))[of_point]
     frame = numbers["frame"]
     if not (np.isfinite(frame).all() and (frame == np.round(frame)).all()):

@@ -141,6 +141,17 @@ def test_times_that_tell_no_frame_rate_make_no_hours(tmp_path: Path) -> None:
     assert recorded.timebase.duration_s < 0.2 * len(table)
 
 
+@pytest.mark.parametrize("lost", [np.nan, np.inf])
+def test_a_time_that_is_lost_keeps_no_points_from_being_read(tmp_path: Path, lost: float) -> None:
+    table = walk()
+    table[:, 0] *= FRAME_S
+    table[-1, 0] = lost
+    np.save(tmp_path / "a.npy", np.rec.fromarrays(table.T, names=["time", *NAMES[1:]]))
+    recorded = load_recorded_map(tmp_path / "a.npy")
+    assert recorded.doppler.values.shape == (32, FRAMES + 1)
+    assert any("no frame rate" in note for note in recorded.notes)
+
+
 def test_a_description_says_what_numbers_do_not(tmp_path: Path) -> None:
     path, table = tmp_path / "a.npy", walk()
     table = np.column_stack([table[:, 4], table[:, 0] // 2, table[:, 0]])
