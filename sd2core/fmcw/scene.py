@@ -161,8 +161,7 @@ class MeshScene:
         """
         times = self.mesh.times_s
         if len(times) == 1:
-            still = self._frame(0)
-            yield from ((still, np.zeros_like(still)) for _ in times_s)
+            yield from map(self.moving, times_s)
             return
         first, last = self._stretch(0.5 * float(times_s[0] + times_s[-1]))
         known_s = np.clip(times_s, times[first], times[last])
