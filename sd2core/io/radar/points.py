@@ -34,6 +34,7 @@ from sd2core.io.radar.point_tables import (
     speed_unit_mps,
     time_unit_s,
 )
+from sd2core.timebase import Timebase
 
 COLUMNS_OPTION = "--columns frame,x,y,z,doppler,intensity (- for others)"
 """How the user names the columns, for messages."""
@@ -210,10 +211,10 @@ def _sorted(
         if time is None:
             raise Sd2Error(f"{path} has columns {', '.join(columns)}", "a frame or a time")
         moments, of_point = np.unique(time, return_inverse=True)
-        steps = np.diff(moments)
-        known = np.isfinite(steps)  # points without a time are in one more frame
-        usual = np.median(steps[known]) if known.any() else 1.0
-        passed = np.where(known, np.maximum(np.round(steps / usual), 1.0), 1.0)  # empty: no rows
+        finite = moments[np.isfinite(moments)]
+        steps = np.diff(moments) / Timebase(finite if len(finite) else [0.0]).frame_duration_s
+        # Frames without a point have no row; points without a time are in one more frame.
+        passed = np.where(np.isfinite(steps), np.maximum(np.round(steps), 1.0), 1.0)
         numbers["frame"] = np.append(0.0, np.cumsum(passed))[of_point]
     frame = numbers["frame"]
     if not (np.isfinite(frame).all() and (frame == np.round(frame)).all()):

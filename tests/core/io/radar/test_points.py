@@ -141,6 +141,14 @@ def test_times_that_tell_no_frame_rate_make_no_hours(tmp_path: Path) -> None:
     assert recorded.timebase.duration_s < 0.2 * len(table)
 
 
+def test_times_of_a_coarse_clock_leave_no_frame_out(tmp_path: Path) -> None:
+    """A step of three ticks beside many of two is none in which a frame is missing."""
+    table = walk()
+    table[:, 0] = np.floor(table[:, 0] / 30.0 / 0.015625) * 0.015625
+    path = write_csv(tmp_path / "a.csv", table, ("time", *NAMES[1:]))
+    assert load_recorded_map(path).doppler.values.any(axis=0).all()
+
+
 @pytest.mark.parametrize("lost", [np.nan, np.inf])
 def test_a_time_that_is_lost_keeps_no_points_from_being_read(tmp_path: Path, lost: float) -> None:
     table = walk()
