@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from sd2core.sensor import Vector, VirtualSensor
 _SAMPLED_FRAMES = 100
 _SAMPLED_VERTICES = 200
 _FASTEST_SHARE = 0.01
+_PROBED_BYTES = 16 << 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +45,15 @@ class SensorCoverage:
 
 @dataclass(frozen=True, eq=False)
 class BodyExtent:
-    """Position and motion of a body in up to 100 frames with a person, spread over the clip."""
+    """Places of a body in up to 100 frames with a person, spread over the clip, and its motion."""
 
     target_m: Vector
     """Point at which sensors aim: the mean over time of the median vertex, which lies in the torso
     however the limbs move."""
     low_m: NDArray[np.float64]  # (n, 3), corners of the box around the body
     high_m: NDArray[np.float64]
-    points_m: NDArray[np.float32]  # up to 200 vertices of each frame, shape (n, k, 3)
-    velocity_mps: NDArray[np.float32]
-    """Their motion to the next frame; zero where that one has no person."""
+    mesh: MeshSequence
+    frames: NDArray[np.intp]  # (n,), in which it is there
 
     @classmethod
     def of(cls, mesh: MeshSequence) -> BodyExtent:
@@ -67,22 +68,36 @@ class BodyExtent:
                 "a person to place sensors around",
             )
         picked = valid[np.linspace(0, len(valid) - 1, min(len(valid), _SAMPLED_FRAMES)).astype(int)]
-        stride = -(-mesh.vertex_count // _SAMPLED_VERTICES)
         middle, low, high = np.empty((3, len(picked), 3))
-        sampled = len(range(0, mesh.vertex_count, stride))
-        points = np.empty((len(picked), sampled, 3), np.float32)
-        velocity = np.zeros_like(points)
         for row, frame in enumerate(picked.tolist()):
-            following = min(frame + 1, int(mesh.presence.last[frame]))
-            vertices = mesh.read(frame, following + 1)
-            middle[row] = np.median(vertices[0], axis=0)
-            low[row], high[row] = vertices[0].min(axis=0), vertices[0].max(axis=0)
-            points[row] = vertices[0, ::stride]
-            if following > frame:
-                passed_s = mesh.times_s[following] - mesh.times_s[frame]
-                velocity[row] = (vertices[1, ::stride] - points[row]) / passed_s
+            vertices = mesh.frame(frame)
+            middle[row] = np.median(vertices, axis=0)
+            low[row], high[row] = vertices.min(axis=0), vertices.max(axis=0)
         x, y, z = middle.mean(axis=0).tolist()
-        return cls((x, y, z), low, high, points, velocity)
+        return cls((x, y, z), low, high, mesh, picked)
+
+    @cached_property
+    def _motion(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Up to 200 vertices and their velocities, (n, k, 3), in these frames and the fastest."""
+        mesh = self.mesh
+        some = slice(None, None, -(-mesh.vertex_count // _SAMPLED_VERTICES))
+        speed_mps = np.zeros(mesh.frame_count)
+        at_once = max(1, _PROBED_BYTES // (12 * mesh.vertex_count))
+        for start in range(0, mesh.frame_count - 1, at_once):
+            stop = min(start + at_once, mesh.frame_count - 1)
+            step_m = np.linalg.norm(np.diff(mesh.read(start, stop + 1)[:, some], axis=0), axis=2)
+            passed_s = np.diff(mesh.times_s[start : stop + 1])
+            speed_mps[start:stop] = _all_but_fastest(step_m) / passed_s
+        moving = np.flatnonzero(mesh.presence.last > np.arange(mesh.frame_count))
+        fastest = moving[np.argsort(-speed_mps[moving], kind="stable")[:_SAMPLED_FRAMES]]
+        frames = np.union1d(self.frames, fastest)
+        following = np.minimum(frames + 1, mesh.presence.last[frames])
+        points, then = (
+            np.array([mesh.frame(frame)[some] for frame in numbers.tolist()], np.float32)
+            for numbers in (frames, following)
+        )
+        passed_s = np.where(following > frames, mesh.times_s[following] - mesh.times_s[frames], 1.0)
+        return points, ((then - points) / passed_s[:, None, None]).astype(np.float32)
 
     def coverage(
         self, sensors: Sequence[VirtualSensor], progress: Progress = silent
@@ -90,8 +105,7 @@ class BodyExtent:
         """Coverage of the body by sensors; takes less than a millisecond for each."""
         inside = np.zeros(len(sensors), dtype=bool)
         farthest_m, fastest_mps = np.zeros((2, len(sensors)))
-        # Index of the vertex that 1 % of a frame's vertices are faster than.
-        rank = int(np.ceil((1.0 - _FASTEST_SHARE) * self.points_m.shape[1])) - 1
+        points_m, velocity_mps = self._motion
         for number, sensor in enumerate(sensors):
             progress(number, len(sensors))
             position = np.asarray(sensor.position_m)
@@ -99,13 +113,19 @@ class BodyExtent:
             inside[number] = within.all(axis=1).any()
             corner = np.maximum(np.abs(self.low_m - position), np.abs(self.high_m - position))
             farthest_m[number] = np.linalg.norm(corner, axis=1).max()
-            sight_m = self.points_m - position.astype(np.float32)
+            sight_m = points_m - position.astype(np.float32)
             range_m = np.sqrt(np.einsum("nki,nki->nk", sight_m, sight_m))
-            radial_mps = np.abs(np.einsum("nki,nki->nk", self.velocity_mps, sight_m))
+            radial_mps = np.abs(np.einsum("nki,nki->nk", velocity_mps, sight_m))
             radial_mps /= np.maximum(range_m, 1e-9)
-            fastest_mps[number] = np.partition(radial_mps, rank, axis=1)[:, rank].max()
+            fastest_mps[number] = _all_but_fastest(radial_mps).max()
         progress(len(sensors), len(sensors))
         return SensorCoverage(inside, farthest_m, fastest_mps)
+
+
+def _all_but_fastest(speed: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Of each frame's vertices (n, k) the speed that 1 % are above, (n,)."""
+    rank = int(np.ceil((1.0 - _FASTEST_SHARE) * speed.shape[1])) - 1
+    return np.partition(speed, rank, axis=1)[:, rank]
 
 
 def notes_on(
