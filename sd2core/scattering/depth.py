@@ -25,6 +25,7 @@ from sd2core.scattering.exact import (
     exact_visibility_kernel,
     search_scratch,
     search_view,
+    surface_size,
 )
 
 SMOOTH_PIXELS = 8.0
@@ -51,17 +52,16 @@ ALMOST_ONE = 1.0 - 1e-9
 
 
 @compiled
-def _project(positions, sensor, centre, axes, picture) -> float:  # type: ignore[no-untyped-def]
+def _project(positions, sensor, centre, axes, picture) -> bool:  # type: ignore[no-untyped-def]
     """Image coordinates and depth of one frame's vertices, in metres at the body.
 
     ``picture`` (4, V) receives right, up, the projective depth and the ratio of the
     distance of the body's centre to the vertex's own depth. The projective depth is
     the depth behind the centre times that ratio: linear over the image, free of
-    cancellation for far sensors. Returns the size of the body, or −1 when one plane
-    does not serve.
+    cancellation for far sensors. Returns whether one plane serves.
     """
     low, high = np.empty(3, np.float64), np.empty(3, np.float64)
-    distance = size = 0.0
+    distance = 0.0
     for axis in range(3):
         row = positions[axis]
         least = most = row[0]
@@ -70,10 +70,9 @@ def _project(positions, sensor, centre, axes, picture) -> float:  # type: ignore
         low[axis], high[axis] = least, most
         centre[axis] = 0.5 * (low[axis] + high[axis])
         distance += (centre[axis] - sensor[axis]) ** 2
-        size += (high[axis] - low[axis]) ** 2
     distance = np.sqrt(distance)
     if distance == 0:
-        return -1.0
+        return False
     axes_along(
         (centre[0] - sensor[0]) / distance,
         (centre[1] - sensor[1]) / distance,
@@ -93,7 +92,7 @@ def _project(positions, sensor, centre, axes, picture) -> float:  # type: ignore
         scale = distance / (distance + behind)
         picture[0, v], picture[1, v] = right * scale, up * scale
         picture[2, v], picture[3, v] = behind * scale, scale
-    return np.sqrt(size) if widest <= 0 and nearest > 0 else -1.0
+    return widest <= 0 and nearest > 0
 
 
 @compiled
@@ -264,8 +263,7 @@ def depth_visibility_kernel(
             wanted |= needed[t, v] != 0
         if not wanted:
             continue
-        size = _project(positions[t], sensor, centre, axes, picture)
-        if size < 0:
+        if not _project(positions[t], sensor, centre, axes, picture):
             exact_visibility_kernel(positions, faces, sensor, needed, t, t + 1, visible)
             continue
         x, y = picture[0], picture[1]
@@ -290,9 +288,11 @@ def depth_visibility_kernel(
             image[0, v], image[1, v], depth[v] = x[v], y[v], picture[2, v]
             for axis in range(3):
                 towards[axis, v] = sensor[axis] - positions[t, axis, v]
+        px, py, pz = positions[t, 0], positions[t, 1], positions[t, 2]
+        contact = CONTACT * surface_size(px, py, pz, faces)
         search_view(
-            positions[t, 0], positions[t, 1], positions[t, 2], drawn[:triangles], towards, axes,
-            np.float32(-np.inf), CONTACT * size, doubtful, count, image, depth, scratch,
+            px, py, pz, drawn[:triangles], towards, axes,
+            np.float32(-np.inf), contact, doubtful, count, image, depth, scratch,
             visible[t],
         )  # fmt: skip
 

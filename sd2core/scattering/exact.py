@@ -327,6 +327,22 @@ def frame_scratch(vertices):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def surface_size(x, y, z, faces) -> float:  # type: ignore[no-untyped-def]
+    """Diagonal of the box around a surface; a vertex of no triangle may be anywhere."""
+    used = np.zeros(x.shape[0], np.uint8)
+    for f in range(faces.shape[0]):
+        used[faces[f, 0]] = used[faces[f, 1]] = used[faces[f, 2]] = 1
+    squared = 0.0
+    for p in (x, y, z):
+        low, high = np.inf, -np.inf
+        for v in range(p.shape[0]):
+            if used[v]:
+                low, high = min(low, np.float64(p[v])), max(high, np.float64(p[v]))
+        squared += (high - low) ** 2 if high >= low else 0.0
+    return float(np.sqrt(squared))
+
+
+@compiled
 def see_frame(x, y, z, faces, sensor, needed, count, scratch, visible) -> None:  # type: ignore[no-untyped-def]
     """Set ``visible`` of the needed vertices of one frame that no triangle hides.
 
@@ -350,7 +366,6 @@ def see_frame(x, y, z, faces, sensor, needed, count, scratch, visible) -> None: 
     vertices = x.shape[0]
     g, image, depths, owned, searched, axes = scratch
     depth = depths[:vertices]
-    size = 0.0
     away = np.empty(3, np.float64)
     for axis in range(3):
         p = x if axis == 0 else (y if axis == 1 else z)
@@ -358,10 +373,8 @@ def see_frame(x, y, z, faces, sensor, needed, count, scratch, visible) -> None: 
         for v in range(vertices):
             g[axis, v] = sensor[axis] - p[v]
             low, high = min(low, p[v]), max(high, p[v])
-        size += (np.float64(high) - low) ** 2
         away[axis] = 0.5 * (np.float64(low) + high) - sensor[axis]
-    size = np.sqrt(size)
-    contact = CONTACT * size
+    contact = CONTACT * surface_size(x, y, z, faces)
     distance = np.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
     for v in range(vertices):
         if needed[v]:

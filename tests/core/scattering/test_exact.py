@@ -235,6 +235,13 @@ def test_sensor_on_a_vertex_sees_that_vertex(form) -> None:  # type: ignore[no-u
     assert seen.mean() > 0.9
 
 
+def test_a_loose_vertex_far_off_changes_nothing() -> None:
+    vertices, faces = together(BALL, plate(1.0, 6, 1.0001))
+    lone = np.vstack([vertices, [[3e5, 2e5, 4e5]]])
+    for sensor in ((0.3, -0.2, -2.2), (0.0123, 0.0345, 3.0)):
+        assert np.array_equal(look(lone, faces, sensor)[:-1], look(vertices, faces, sensor))
+
+
 def test_all_points_in_one_place_are_visible() -> None:
     vertices, faces = np.full((4, 3), 1.5), np.array([[0, 1, 2], [1, 2, 3]], np.int32)
     for sensor in ((0.0, 0.0, 0.0), (1.5, 1.5, 1.5)):
