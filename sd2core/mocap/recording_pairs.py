@@ -238,7 +238,7 @@ def _takes(
     kept = 0
     for start, stop in take_frames(times_s, seen, rate_hz):
         kept += stop - start
-        part = _evenly(synthetic.between(start, stop), rate_hz)
+        part = evenly(synthetic.between(start, stop), rate_hz)
         target = on_clock(radar, part.timebase).values.T.copy()  # (frames, bins)
         target[:, list(synthetic.null_bins)] = 0.0
         takes.append(
@@ -256,8 +256,8 @@ def _takes(
     return takes, float((len(times_s) - kept) / rate_hz)
 
 
-def _evenly(doppler: DopplerMap, rate_hz: float) -> DopplerMap:
-    """The map as a model takes it, at an even rate, where frames of it were lost."""
+def evenly(doppler: DopplerMap, rate_hz: float) -> DopplerMap:
+    """Return the map as a model takes it, at an even rate, where frames of it were lost."""
     if is_regular(doppler.times_s, rate_hz):
         return doppler
     even_s = even_times(doppler.times_s, rate_hz)

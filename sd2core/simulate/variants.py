@@ -11,21 +11,25 @@ from typing import Any, Literal
 
 import numpy as np
 
+from sd2core.accuracy.cache import clip_fingerprint
 from sd2core.body.parts import synthetic_map
 from sd2core.body.reshaping import coarser, reshaped
 from sd2core.body.shape import ShapeSpace
 from sd2core.doppler import SynthesisOptions, Synthesizer
 from sd2core.io.radar.mars import FRAMES_PER_S, MarsStretch, mars_parts, read_mars
 from sd2core.labels.per_frame import BACKGROUND
+from sd2core.maps import DopplerMap
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.mesh.vertex_parts import PARTS
 from sd2core.mocap.mars_pairs import driven_clips, takes_of
 from sd2core.mocap.recording_pairs import (
     check_rates,
     check_there,
+    evenly,
     frame_labels,
     label_names,
     named_recordings,
+    on_clock,
     scenes_of,
     take_frames,
 )
@@ -110,9 +114,17 @@ def vary_recordings(
     rates_hz = [mesh.timebase.frames_per_s for mesh in meshes]
     check_rates({one.folder: rate for (one, _), rate in zip(named, rates_hz, strict=True)})
     _, *labels = label_names(recording for recording, _ in named)
-    sources = {"sources": [one.folder.name for one, _ in named]}
+    sources: dict[str, Any] = {"sources": [one.folder.name for one, _ in named]}
     sources |= scenes_of(recording for recording, _ in named)
     names = (BACKGROUND, *sorted({*labels, *map(mirrored_label, labels)}))
+    sources["movements"] = [
+        [
+            *map(clip_fingerprint, mesh.bodies),
+            zlib.crc32(frame_labels(one, names, mesh.times_s).tobytes()),
+            *one.sensor.position_m,
+        ]
+        for (one, _), mesh in zip(named, meshes, strict=True)
+    ]
     writer = _writer(out, options, round(rates_hz[0], 3), names, sources)
     for number, ((recording, subject), mesh) in enumerate(zip(named, meshes, strict=True)):
         progress(number, len(named))
@@ -223,7 +235,7 @@ def _take(
     sensor = aimed_at(VirtualSensor(movement.position_m), _middle_m(mesh))
     doppler = synthetic_map(Synthesizer(mesh, synthesis), sensor, limbs=options.limbs)
     # Echoes of a rough surface depend little on how finely it is cut (decision 26).
-    radar = radar_target(
+    target = radar_target(
         coarser(mesh),
         radar_at(mesh.timebase.frames_per_s, synthesis.axis.bins, options.radar),
         sensor,
@@ -231,16 +243,19 @@ def _take(
         synthesis.null_bins,
         seed=rng.integers(2**31, size=2).tolist(),
     )
+    part = evenly(doppler, mesh.timebase.frames_per_s)
+    radar = DopplerMap(target.T, synthesis.axis, mesh.timebase, "simulated")
+    named = [movement.labels[mesh.timebase.nearest_frame(time)] for time in part.times_s]
     return Take(
         movement.key.subject,
         movement.key.name,
-        np.ascontiguousarray(doppler.values.T),
-        radar,
-        mesh.times_s - mesh.times_s[0],
-        np.array([labels.index(one) if one else UNKNOWN for one in movement.labels], np.int8),
+        np.ascontiguousarray(part.values.T),
+        np.ascontiguousarray(on_clock(radar, part.timebase).values.T),
+        part.times_s - part.times_s[0],
+        np.array([labels.index(one) if one else UNKNOWN for one in named], np.int8),
         np.array(movement.position_m),
         0,
-        doppler.limbs,
+        part.limbs,
     )
 
 

@@ -131,6 +131,26 @@ def test_what_is_there_is_not_made_again(tmp_path: Path, monkeypatch) -> None:
     assert len(read_pairs(tmp_path / "made.zarr").takes) == 1
 
 
+def test_a_movement_whose_frames_were_lost_is_at_an_even_rate(tmp_path: Path) -> None:
+    one = swaying(tmp_path / "anna.sd2")
+    (whole,) = vary(one, tmp_path / "whole.zarr", "mirrored").takes
+    mesh = one.load_mesh()
+    kept = np.flatnonzero(np.arange(mesh.frame_count) % 5 != 3)
+    fewer = replace(mesh, vertices=mesh.vertices[kept], timebase=Timebase(mesh.times_s[kept]))
+    save_mesh(fewer, one.folder / "mesh.npz")
+    pairs = vary(one, tmp_path / "fewer.zarr", "mirrored")
+    (take,) = pairs.takes
+    np.testing.assert_allclose(take.times_s, whole.times_s, atol=1e-6)
+    assert np.array_equal(take.label, whole.label)
+    assert take.radar.shape == take.synthetic.shape == whole.radar.shape
+    for name in ("synthetic", "radar"):
+        both = means(pairs, getattr(take, name)), means(pairs, getattr(whole, name))
+        assert np.corrcoef(*both)[0, 1] > 0.95
+    # What was made of the mesh before is not taken for what this one would give.
+    with pytest.raises(Sd2Error, match="movements"):
+        vary(one, tmp_path / "whole.zarr", "mirrored")
+
+
 def test_what_cannot_be_varied_is_refused(tmp_path: Path) -> None:
     folder = recording(tmp_path / "ball.sd2").folder
     with pytest.raises(Sd2Error, match="another surface than the bundled body"):
