@@ -71,8 +71,7 @@ def digitise(
     middle = 2 ** (config.adc_bits - 1)
     gain = options.peak_share * middle / peak if peak > 0 else 1.0
     if options.link is not None:
-        # Echoes of rough surfaces grow with the wavelength.
-        gain = middle / (options.link.full_scale * max(1.0, config.wavelength_m / 5e-3))
+        gain = middle / options.link.full_scale_of(config)
         noise = gain * options.link.noise_rms(config)
     elif math.isinf(options.snr_db) and options.snr_db > 0:
         noise = 0.0

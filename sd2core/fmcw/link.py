@@ -34,6 +34,10 @@ class LinkBudget:
     losses_db: float = 3.0
     full_scale: float = 0.02
 
+    def full_scale_of(self, config: RadarConfig) -> float:
+        """Amplitude that fills a radar's converter; echoes of rough surfaces grow with waves."""
+        return self.full_scale * max(1.0, config.wavelength_m / 5e-3)
+
     def noise_rms(self, config: RadarConfig) -> float:
         """Thermal noise of one real sample, or of I and Q each, in the unit of amplitudes.
 

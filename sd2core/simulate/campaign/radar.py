@@ -26,7 +26,6 @@ from sd2core.fmcw.kernels import facet_echoes
 from sd2core.fmcw.link import LinkBudget
 from sd2core.fmcw.options import Reflector
 from sd2core.fmcw.processing import rebinning
-from sd2core.fmcw.scene import MeshScene
 from sd2core.fmcw.sums import Echoes, turns_of
 from sd2core.fmcw.wave import WaveScene
 from sd2core.mesh.sequence import MeshSequence
@@ -127,13 +126,13 @@ def radar_target(
     """
     options = options or TargetOptions()
     rng = np.random.default_rng(seed)
-    scene = MeshScene(mesh, config, sensor)
-    assert mesh.faces is not None  # MeshScene refuses a mesh without
+    scene = WaveScene(mesh, config, sensor)
+    assert mesh.faces is not None  # WaveScene refuses a mesh without
     phases = np.exp(2j * np.pi * rng.random((options.looks, len(mesh.faces))))
     if options.smooth:
         phases[:] = 1.0
     phases = phases.astype(np.complex64)
-    static = WaveScene(mesh, config, sensor).static(reflectors)[0]  # (chirps, samples)
+    static = scene.static(reflectors)[0]  # (chirps, samples)
     chain = FrameChain(config, PROCESSING)
     weights = rebinning(config, axis, chain.doppler_bins).astype(np.float32)
     unit = 0.25 * config.wavelength_m**2 / REFERENCE_RANGE_M**4
@@ -143,7 +142,7 @@ def radar_target(
         signals = []
         for frame in range(start, stop):
             on_frame()
-            signals.append(_looks(scene, frame, phases) + static)
+            signals.append(_looks(scene, float(mesh.times_s[frame]), phases) + static)
         samples, full_scale = _received(np.array(signals), config, options.link, rng)
         values[start:stop] = _power(samples, chain, weights) * (full_scale**2 / options.looks)
     if options.link is not None:
@@ -173,8 +172,23 @@ def _noise(
     return power.mean(axis=0), power.std(axis=0)
 
 
-def _looks(scene: MeshScene, frame: int, phases: NDArray[np.complex64]) -> Samples:
-    """Beat signals of one frame, (looks, chirps, samples).
+def _looks(scene: WaveScene, time_s: float, phases: NDArray[np.complex64]) -> Samples:
+    """Beat signals of the frame around a time, (looks, chirps, samples)."""
+    rows: list[Any] = [
+        _burst(scene, position, velocity, chirps, phases)
+        for (position, velocity), chirps in scene.bursts(time_s)
+    ]
+    return rows[0] if len(rows) == 1 else np.concatenate(rows, axis=1)
+
+
+def _burst(
+    scene: WaveScene,
+    position_m: Floats,
+    velocity_mps: Floats,
+    chirps: int,
+    phases: NDArray[np.complex64],
+) -> Samples:
+    """Beat signals of chirps that vertices move evenly in, (looks, chirps, samples).
 
     The sum over facets is separable in chirps and samples when migration through range
     within a frame is left out (decision 11: 2e-3 of the signal), so it is a product of
@@ -182,9 +196,9 @@ def _looks(scene: MeshScene, frame: int, phases: NDArray[np.complex64]) -> Sampl
     non-uniform FFT.
     """
     config = scene.config
-    echoes, rows = _echoes(scene, frame)
+    echoes, rows = _echoes(scene, position_m, velocity_mps)
     turns = turns_of(echoes, config)
-    chirps, samples = config.chirps_per_frame, config.samples_per_chirp
+    samples = config.samples_per_chirp
     first = turns.start - 0.5 * (chirps - 1) * turns.chirp - 0.5 * samples * turns.sample
     slow = _phasors(turns.chirp, chirps, first) * echoes.terms[0]
     fast = _phasors(turns.sample, samples, np.zeros_like(first))
@@ -203,21 +217,21 @@ def _looks(scene: MeshScene, frame: int, phases: NDArray[np.complex64]) -> Sampl
     return np.ascontiguousarray(signal.reshape(chirps, len(phases), samples).transpose(1, 0, 2))
 
 
-def _echoes(scene: MeshScene, frame: int) -> tuple[Echoes, NDArray[np.int32]]:
+def _echoes(
+    scene: WaveScene, position_m: Floats, velocity_mps: Floats
+) -> tuple[Echoes, NDArray[np.int32]]:
     """Echoes of the visible facets of a rough surface, and which facets they are."""
-    config, mesh = scene.config, scene.mesh
-    assert mesh.faces is not None
-    position, velocity = scene.moving(float(mesh.times_s[frame]))
-    visible = visible_facets(position, mesh.faces, scene.sensor.position_m)
+    config, sensor = scene.config, scene.scene.sensor
+    visible = visible_facets(position_m, scene.faces, sensor.position_m)
     count = int(np.count_nonzero(visible))
     rows, amplitude = np.empty(count, np.int32), np.empty((1, count), np.complex128)
     range_m, rate_mps = np.empty(count), np.empty(count)
-    antenna = np.vstack([scene.sensor.position_m, sensor_axes(scene.sensor)])
-    beam = beam_tables(scene.sensor)
+    antenna = np.vstack([sensor.position_m, sensor_axes(sensor)])
+    beam = beam_tables(sensor)
     size = facet_echoes(
-        position,
-        velocity,
-        mesh.faces,
+        position_m,
+        velocity_mps,
+        scene.faces,
         visible,
         antenna,
         antenna,
@@ -256,7 +270,7 @@ def _received(
         return signals, 1.0
     parts = signals.view(np.float32)  # I and Q, where there are both
     noise = rng.standard_normal(parts.shape, np.float32) * np.float32(link.noise_rms(config))
-    counts = 2.0 ** (config.adc_bits - 1)
-    samples = (parts + noise) * np.float32(counts / link.full_scale)
+    counts, full_scale = 2.0 ** (config.adc_bits - 1), link.full_scale_of(config)
+    samples = (parts + noise) * np.float32(counts / full_scale)
     np.clip(np.rint(samples, out=samples), -counts, counts - 1.0, out=samples)
-    return (samples / counts).astype(np.float32).view(kind), link.full_scale
+    return (samples / counts).astype(np.float32).view(kind), full_scale

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sd2core.fmcw import ProcessingOptions
+from sd2core.fmcw import ProcessingOptions, WaveOptions
 from sd2core.fmcw.options import Reflector
-from sd2core.fmcw.scene import MeshScene
 from sd2core.fmcw.sums import Echoes, nufft
+from sd2core.fmcw.wave import WaveScene
+from sd2core.io.radar import named_radar
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import CLUTTER, PAPER_RADAR, Clutter, RadarConfig, Sampling
 from sd2core.sensor import VelocityAxis, VirtualSensor
@@ -127,17 +128,38 @@ def test_the_link_budget_is_the_radar_equation() -> None:
 
 def test_a_look_is_the_sum_that_the_nufft_makes() -> None:
     mesh = plate(0.9, 2.4, side_m=0.6, cells=6)
-    scene = MeshScene(mesh, PAPER_RADAR, SENSOR)
+    scene, time_s = WaveScene(mesh, PAPER_RADAR, SENSOR), float(mesh.times_s[2])
     assert mesh.faces is not None
     turns = np.random.default_rng(1).random((2, len(mesh.faces)))
     phases = np.exp(2j * np.pi * turns).astype(np.complex64)
-    found = radar._looks(scene, 2, phases)
-    echoes, rows = radar._echoes(scene, 2)
+    found = radar._looks(scene, time_s, phases)
+    echoes, rows = radar._echoes(scene, *scene.scene.moving(time_s))
     assert len(rows) == len(mesh.faces)
     for look, phase in zip(found, phases, strict=True):
         turned = Echoes(echoes.range_m, echoes.rate_mps, echoes.terms * phase[rows])
         expected = nufft(turned, PAPER_RADAR).real
         np.testing.assert_allclose(look, expected, atol=2e-5 * np.abs(expected).max())
+
+
+def test_a_long_frame_shows_how_velocities_change_in_it_and_is_not_clipped() -> None:
+    """Of Wi-Fi's 0.1 s: a hand that turns round in them is seen coming and going."""
+    wifi = named_radar("wifi-5ghz")
+    times_s = np.arange(16) * 0.02
+    still = plate(0.0, 1.5, side_m=0.3)
+    sway_m = 0.1 * np.cos(2.0 * np.pi * (times_s - times_s[8]) / 0.25)
+    vertices = still.vertices[:1] + np.stack([0 * sway_m, 0 * sway_m, sway_m], axis=1)[:, None]
+    mesh = MeshSequence(vertices.astype(np.float32), still.faces, Timebase(times_s))
+    scene = WaveScene(mesh, wifi, SENSOR)
+    phases = np.ones((1, len(scene.faces)), np.complex64)
+    found = radar._looks(scene, float(times_s[8]), phases)[0]
+    rough = WaveScene(mesh, wifi, SENSOR, wave=WaveOptions(coherent=False))
+    rough._random = phases[0].astype(np.complex128)
+    expected = rough.frame(float(times_s[8]))[0]
+    np.testing.assert_allclose(found, expected, atol=1e-3 * np.abs(expected).max())
+    link = LinkBudget()
+    samples, full_scale = radar._received(found[None], wifi, link, np.random.default_rng(0))
+    assert full_scale == pytest.approx(link.full_scale * wifi.wavelength_m / 5e-3)
+    assert np.abs(samples).max() < 1.0
 
 
 def test_what_is_hidden_does_not_echo() -> None:
