@@ -132,7 +132,8 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
             entries["axes"] = axes
     _ask(entries)
     with suppress(Sd2Error):  # there is none, or write_description refuses it
-        entries["simulated"] = read_description(description_of(path)).simulated
+        before = read_description(description_of(path))
+        entries |= {"simulated": before.simulated, "image_band": before.image_band}
     with faults_in(f"The description of {path}", "all that its radar needs"):
         description = RadarDescription.model_validate(entries)
     capture = capture_of(path, description)

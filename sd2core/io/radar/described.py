@@ -31,7 +31,7 @@ from sd2core.io.radar.stored_arrays import (
     StoredArray,
     open_stored,
 )
-from sd2core.radar_config import RadarConfig
+from sd2core.radar_config import RadarConfig, Sampling
 from sd2core.timebase import Timebase
 
 DATA_NAME = "radar.npy"
@@ -64,6 +64,7 @@ class RadarDescription(BaseModel):
     version: Literal[1] = 1
     name: str = Field(default="", max_length=200)
     simulated: bool = False
+    image_band: bool = False  # of complex samples: half of the beat frequencies hold no echoes
     dataset: str | None = None
     axes: tuple[Axis, ...]
     carrier_hz: float = Field(gt=0, le=1e15)  # middle of the samples of a chirp
@@ -156,6 +157,7 @@ def write_described(
     description = RadarDescription(
         name=config.name,
         simulated=simulated,
+        image_band=config.sampling == "complex with image band",
         axes=(*_PLAIN[4], "iq"),
         carrier_hz=config.centre_frequency_hz,
         bandwidth_hz=config.bandwidth_hz,
@@ -404,6 +406,9 @@ def _config(
     bits = 24
     if radar.full_scale is not None and stored.dtype.kind in "iu":
         bits = max(1, round(math.log2(radar.full_scale)) + 1)
+    sampling: Sampling = "complex" if is_complex else "real"
+    if is_complex and radar.image_band:
+        sampling = "complex with image band"
     config = RadarConfig(
         start_frequency_hz=radar.carrier_hz - 0.5 * bandwidth_hz,
         end_frequency_hz=radar.carrier_hz + 0.5 * bandwidth_hz,
@@ -415,7 +420,7 @@ def _config(
         receivers=sizes["receiver"],
         adc_bits=bits,
         name=radar.name or f"{radar.carrier_hz / 1e9:.4g} GHz radar",
-        sampling="complex" if is_complex else "real",
+        sampling=sampling,
         transmitters=sizes["transmitter"],
         ranges_m=ranges_m,
     )

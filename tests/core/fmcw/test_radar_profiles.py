@@ -196,8 +196,10 @@ def test_noise_of_complex_samples_is_that_of_both_parts(snr_db: float) -> None:
     assert 10.0 * np.log10(np.mean(np.abs(signal) ** 2) / noise) == pytest.approx(snr_db, abs=0.2)
 
 
-def test_a_simulated_carrier_is_written_and_read_back(tmp_path: Path) -> None:
-    config = RADARS["wifi-5ghz"]
+@pytest.mark.parametrize(
+    "config", [RADARS["wifi-5ghz"], replace(PAPER_RADAR, sampling="complex with image band")]
+)
+def test_a_simulated_carrier_is_written_and_read_back(tmp_path: Path, config: RadarConfig) -> None:
     capture = simulate_radar(plate(0.9), config, options=QUIET)
     folder = write_described(
         tmp_path / "made",
