@@ -45,8 +45,10 @@ class VelocityAxis:
     v_max_mps: float = 2.0
 
     def __post_init__(self) -> None:
-        if not 2 <= self.bins <= MAX_BINS:
-            raise Sd2Error(f"The velocity axis has {self.bins} bins", f"2 to {MAX_BINS:,}")
+        if not (hasattr(self.bins, "__index__") and 2 <= self.bins <= MAX_BINS):
+            raise Sd2Error(
+                f"The velocity axis has {self.bins} bins", f"2 to {MAX_BINS:,}, a whole number"
+            )
         if not (math.isfinite(self.v_max_mps) and self.v_max_mps > 0):
             raise Sd2Error(
                 f"The velocity axis ends at {self.v_max_mps} m/s", "a positive velocity in m/s"
