@@ -15,6 +15,7 @@ from oracles.plain_maps import plainly
 from sd2core.accuracy.cache import scene_fingerprint
 from sd2core.doppler import PRESETS, Synthesizer, masks
 from sd2core.doppler.reference import reference_stretch
+from sd2core.errors import Sd2Error
 from sd2core.io.things import with_things
 from sd2core.mesh.decimation import decimate
 from sd2core.mesh.sequence import MeshSequence
@@ -206,3 +207,9 @@ def test_of_things_that_move_only_what_they_hide_is_found_again(
     assert made.meta["visibility"] == "frozen"
     np.testing.assert_array_equal(made.values, expected)
     assert not np.array_equal(expected, first.map(SENSOR).values)
+
+
+@pytest.mark.parametrize("parts", ["beam", ("wall",)])
+def test_a_part_of_the_scene_that_is_none_is_refused(parts: Any) -> None:
+    with pytest.raises(Sd2Error, match="beam, things, walls"):
+        Synthesizer(approaching(), left_out=parts)
