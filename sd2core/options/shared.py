@@ -224,7 +224,9 @@ class SegmentFrames(OptionRecord):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.overlap_frames >= self.segment_frames:
+        # Data sets may have a segment of each span, which share nothing.
+        of_spans = getattr(self, "spans", None) or getattr(self, "segments", "") == "spans"
+        if self.overlap_frames >= self.segment_frames and not of_spans:
             raise OptionError(
                 f"overlap_frames is {self.overlap_frames}",
                 f"less than segment_frames, which is {self.segment_frames}",

@@ -268,3 +268,14 @@ def test_inertial_sensors_need_a_body(sd2: Sd2, tmp_path: Path) -> None:
     assert "has no mesh" in told.err
     told = sd2("export", radar, "--out", tmp_path / "b.zarr", "--imu", "knee")
     assert "some of head" in told.err
+
+
+def test_spans_of_ten_frames_need_no_overlap(sd2: Sd2, people: Path, tmp_path: Path) -> None:
+    few = ("export", people / "anna.sd2", "--kinds", "synthetic", "--segment-frames", 10)
+    refused = sd2(*few, "--out", tmp_path / "windows.zarr")
+    assert "overlap_frames is 10" in refused.err
+    how = ("--segments", "spans", "--span-length", "resampled")
+    told = sd2(*few, *how, "--out", tmp_path / "spans.zarr")
+    assert told.code == 0, told.err
+    with open_dataset(tmp_path / "spans.zarr") as dataset:
+        assert dataset["synthetic"].shape[1] == 10
