@@ -31,7 +31,7 @@ from sd2core.io.video_writing import write_video
 from sd2core.labels.spans import ShownFrames, Span
 from sd2core.progress import Progress, silent
 
-State = Literal["new", "same", "other"]
+State = Literal["new", "same", "other", "empty"]  # The last has no frame.
 _DETAILS = "span.json"
 _UNFINISHED = ".sd2-cut-"
 _LOCK = ".sd2-lock"
@@ -54,18 +54,24 @@ class Cut:
 def plan_cuts(source: CutSource, spans: Iterable[Span], folder: Path) -> list[Cut]:
     """List the cut-outs of spans in the order of time, compared with a folder's content.
 
-    Raises Sd2Error when there are no spans, or one has no frame of the recording.
+    Raises Sd2Error when there are no spans, or none has a frame of the recording.
     """
-    cuts = []
+    cuts: list[Cut] = []
     for span in sorted(spans, key=lambda one: (one.start_s, one.end_s, one.id)):
         first, stop = source.frames_of(span)
-        if stop <= first:
-            raise Sd2Error(f"{span.words()} has no frame of {source.title}", "one at least")
         path = folder / folder_name(span)
-        cuts.append(Cut(span, path, _state(path, source.described(span))))
+        state: State = _state(path, source.described(span)) if stop > first else "empty"
+        cuts.append(Cut(span, path, state))
     if not cuts:
         raise Sd2Error("There are no spans to cut out", "one at least")
+    if all(one.state == "empty" for one in cuts):
+        raise Sd2Error(f"{cuts[0].span.words()} has no frame of {source.title}", "one at least")
     return cuts
+
+
+def without_frame(cuts: Iterable[Cut]) -> str:
+    """Sentences on spans that are not cut out, each after a blank; "" for none."""
+    return "".join(f" {one.span.words()} has no frame." for one in cuts if one.state == "empty")
 
 
 def cut_out(

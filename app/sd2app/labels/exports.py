@@ -33,7 +33,7 @@ from sd2app.widgets.panel import copy_button, rule, say, sentence, side_by_side
 from sd2app.widgets.text import counted, quoted
 from sd2core.cli.labels import Convert
 from sd2core.cli.labels.recording import Cut as CutCommand
-from sd2core.cutouts.cutting import Cut, cut_out, plan_cuts
+from sd2core.cutouts.cutting import Cut, cut_out, plan_cuts, without_frame
 from sd2core.cutouts.source import CutSource, Part
 from sd2core.errors import Sd2Error
 from sd2core.labels.formats import LabelFormat, Loss, all_formats, would_lose, write_labels
@@ -271,8 +271,9 @@ class CutOutModel(ReportingModel):
                 progress=lambda done, total: emit((done, total)),
             )
             words = f"{counted(len(written), 'span')} cut out into {plan.folder}."
-            same = len(plan.cuts) - len(written)
-            return words + (f" {same} stayed as they were." if same else "")
+            same = sum(one.state != "empty" for one in plan.cuts) - len(written)
+            words += f" {same} stayed as they were." if same else ""
+            return words + without_frame(plan.cuts)
 
         self._runner.submit(cut, _title(len(plan.cuts)))
 

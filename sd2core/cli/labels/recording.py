@@ -171,7 +171,7 @@ def _cut(options: Cut) -> None:
       sd2 labels cut walk.sd2 --out cuts
       sd2 labels cut walk.sd2 --out swipes --label up-to-down --label down-to-up --parts video,maps
     """
-    from sd2core.cutouts.cutting import cut_out, plan_cuts
+    from sd2core.cutouts.cutting import cut_out, plan_cuts, without_frame
     from sd2core.recording.recording import open_recording
 
     recording = open_recording(options.recording)
@@ -201,13 +201,15 @@ def _cut(options: Cut) -> None:
                 "folder": str(options.out),
                 "written": [path.name for path in written],
                 "same": [cut.path.name for cut in cuts if cut.state == "same"],
+                "without_frame": [cut.span.id for cut in cuts if cut.state == "empty"],
             }
         )
         return
-    same = len(cuts) - len(written)
+    same = sum(cut.state == "same" for cut in cuts)
     print(
         f"{options.out}: {counted(len(written), 'span')} cut out"
         + (f", {same} were there already" if same else "")
+        + ("." + left_out if (left_out := without_frame(cuts)) else "")
     )
 
 

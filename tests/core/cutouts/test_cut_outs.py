@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sd2core.cutouts.cutting import cut_out, plan_cuts
+from sd2core.cutouts.cutting import cut_out, plan_cuts, without_frame
 from sd2core.cutouts.source import CutSource, folder_name
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh
@@ -185,6 +185,10 @@ def test_refusals(source, tmp_path) -> None:
     outside = replace(WAVE, start_s=90.0, end_s=91.0)
     with pytest.raises(Sd2Error, match="has no frame of walk"):
         plan_cuts(source, [outside], tmp_path)
+    cuts = plan_cuts(source, [outside, WAVE], tmp_path)
+    assert [one.state for one in cuts] == ["new", "empty"]
+    assert without_frame(cuts).startswith(f" {outside.words()}")
+    assert len(cut_out(source, cuts, tmp_path)) == 1
     with pytest.raises(Sd2Error, match="no spans to cut out"):
         plan_cuts(source, [], tmp_path)
     with pytest.raises(Sd2Error, match="nothing to cut out"):
