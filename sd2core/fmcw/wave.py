@@ -183,7 +183,7 @@ class WaveScene:
         assert faces is None or self._random is None
         faces = self.faces if faces is None else faces
         parts = [
-            self._facets(position_m, velocity_mps, faces, visible, out, back, self._random)
+            self.facets(position_m, velocity_mps, faces, visible, out, back, self._random)[0]
             for out, back in self.paths[receiver][wall]
         ]
         return _joined(parts)
@@ -245,7 +245,7 @@ class WaveScene:
         still = np.zeros_like(corners)
         for receiver, ways in enumerate(self.paths):
             parts = [
-                self._facets(corners, still, faces, chosen & pieces.seen[wall], out, back, phases)
+                self.facets(corners, still, faces, chosen & pieces.seen[wall], out, back, phases)[0]
                 for wall, pairs in ways.items()
                 for out, back in pairs
             ]
@@ -277,7 +277,7 @@ class WaveScene:
             signal[receiver] = self.sampled(total)
         return signal
 
-    def _facets(
+    def facets(
         self,
         position_m: NDArray[np.float64],
         velocity_mps: NDArray[np.float64],
@@ -286,8 +286,11 @@ class WaveScene:
         out: Antenna,
         back: Antenna,
         phases: NDArray[np.complex128] | None,
-    ) -> Echoes:
-        """Echoes on one path, of a rough surface with the phases of its facets, or a smooth one."""
+    ) -> tuple[Echoes, NDArray[np.int32]]:
+        """Echoes on one path, and of which facets.
+
+        A rough surface has the ``phases`` of its facets, a smooth one none.
+        """
         visible = np.ones(len(faces), np.bool_) if visible is None else visible
         count = int(np.count_nonzero(visible))
         index = np.empty(count, np.int32)
@@ -317,7 +320,7 @@ class WaveScene:
         strength = amplitude[:, :facing] * (out.gain * back.gain)
         if phases is not None:
             strength *= phases[index[:facing]]
-        return Echoes(range_m[:facing], rate_mps[:facing], strength)
+        return Echoes(range_m[:facing], rate_mps[:facing], strength), index[:facing]
 
     def _points(self, reflectors: tuple[Reflector, ...], out: Antenna, back: Antenna) -> Echoes:
         position = np.array([reflector.position_m for reflector in reflectors])

@@ -22,7 +22,6 @@ from threadpoolctl import threadpool_limits
 
 from sd2core.body.rotations import Floats
 from sd2core.fmcw.chain import FrameChain, ProcessingOptions
-from sd2core.fmcw.kernels import facet_echoes
 from sd2core.fmcw.link import LinkBudget
 from sd2core.fmcw.options import Reflector
 from sd2core.fmcw.processing import rebinning
@@ -30,8 +29,6 @@ from sd2core.fmcw.sums import Echoes, turns_of
 from sd2core.fmcw.wave import WaveScene
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import CLUTTER, PAPER_RADAR, RadarConfig
-from sd2core.scattering.beam import sensor_axes
-from sd2core.scattering.beam_kernels import beam_tables
 from sd2core.scattering.facets import visible_facets
 from sd2core.sensor import VelocityAxis, VirtualSensor
 
@@ -43,7 +40,6 @@ PROCESSING = ProcessingOptions(clutter=CLUTTER)
 
 Samples = NDArray[np.float32] | NDArray[np.complex64]
 
-_NO_PLANE = np.array([0.0, 0.0, 0.0, 1.0])
 _BLOCK_FRAMES = 16
 _SMOOTH, _LOOKS = 0.25, (1, 2, 4, 8, 12)
 _EMPTY_FRAMES, _EMPTY_ROOM = 128, 2026
@@ -221,33 +217,9 @@ def _echoes(
     scene: WaveScene, position_m: Floats, velocity_mps: Floats
 ) -> tuple[Echoes, NDArray[np.int32]]:
     """Echoes of the visible facets of a rough surface, and which facets they are."""
-    config, sensor = scene.config, scene.scene.sensor
-    visible = visible_facets(position_m, scene.faces, sensor.position_m)
-    count = int(np.count_nonzero(visible))
-    rows, amplitude = np.empty(count, np.int32), np.empty((1, count), np.complex128)
-    range_m, rate_mps = np.empty(count), np.empty(count)
-    antenna = np.vstack([sensor.position_m, sensor_axes(sensor)])
-    beam = beam_tables(sensor)
-    size = facet_echoes(
-        position_m,
-        velocity_mps,
-        scene.faces,
-        visible,
-        antenna,
-        antenna,
-        _NO_PLANE,
-        4.0 * np.pi / config.wavelength_m,
-        0.0,
-        beam.across,
-        beam.up,
-        False,
-        0.5 * config.chirps_per_frame * config.chirp_repetition_s,
-        rows,
-        range_m,
-        rate_mps,
-        amplitude,
-    )
-    return Echoes(range_m[:size], rate_mps[:size], amplitude[:, :size]), rows[:size]
+    visible = visible_facets(position_m, scene.faces, scene.scene.sensor.position_m)
+    antenna, alike = scene.paths[0][None][0][0], np.ones(len(scene.faces), np.complex128)
+    return scene.facets(position_m, velocity_mps, scene.faces, visible, antenna, antenna, alike)
 
 
 def _phasors(turns: Floats, count: int, first: Floats) -> NDArray[np.complex128]:
