@@ -25,7 +25,7 @@ from sd2core.scattering.exact import (
     exact_visibility_kernel,
     search_scratch,
     search_view,
-    surface_size,
+    surface_box,
 )
 
 SMOOTH_PIXELS = 8.0
@@ -52,34 +52,27 @@ ALMOST_ONE = 1.0 - 1e-9
 
 
 @compiled
-def _project(positions, sensor, centre, axes, picture) -> bool:  # type: ignore[no-untyped-def]
+def _project(positions, faces, sensor, centre, axes, picture) -> float:  # type: ignore[no-untyped-def]
     """Image coordinates and depth of one frame's vertices, in metres at the body.
 
     ``picture`` (4, V) receives right, up, the projective depth and the ratio of the
     distance of the body's centre to the vertex's own depth. The projective depth is
     the depth behind the centre times that ratio: linear over the image, free of
-    cancellation for far sensors. Returns whether one plane serves.
+    cancellation for far sensors. Returns the size of the surface, or −1 when one plane
+    does not serve.
     """
-    low, high = np.empty(3, np.float64), np.empty(3, np.float64)
-    distance = 0.0
-    for axis in range(3):
-        row = positions[axis]
-        least = most = row[0]
-        for v in range(row.shape[0]):
-            least, most = min(least, row[v]), max(most, row[v])
-        low[axis], high[axis] = least, most
-        centre[axis] = 0.5 * (low[axis] + high[axis])
-        distance += (centre[axis] - sensor[axis]) ** 2
-    distance = np.sqrt(distance)
+    x, y, z = positions[0], positions[1], positions[2]
+    low, high = surface_box(x, y, z, faces)
+    centre[:] = 0.5 * (low + high)
+    distance = np.sqrt(((centre - sensor) ** 2).sum())
     if distance == 0:
-        return False
+        return -1.0
     axes_along(
         (centre[0] - sensor[0]) / distance,
         (centre[1] - sensor[1]) / distance,
         (centre[2] - sensor[2]) / distance,
         axes,
     )
-    x, y, z = positions[0], positions[1], positions[2]
     widest = -np.inf
     nearest = np.inf
     for v in range(x.shape[0]):
@@ -92,7 +85,7 @@ def _project(positions, sensor, centre, axes, picture) -> bool:  # type: ignore[
         scale = distance / (distance + behind)
         picture[0, v], picture[1, v] = right * scale, up * scale
         picture[2, v], picture[3, v] = behind * scale, scale
-    return widest <= 0 and nearest > 0
+    return np.sqrt(((high - low) ** 2).sum()) if widest <= 0 and nearest > 0 else -1.0
 
 
 @compiled
@@ -263,7 +256,8 @@ def depth_visibility_kernel(
             wanted |= needed[t, v] != 0
         if not wanted:
             continue
-        if not _project(positions[t], sensor, centre, axes, picture):
+        size = _project(positions[t], faces, sensor, centre, axes, picture)
+        if size < 0:
             exact_visibility_kernel(positions, faces, sensor, needed, t, t + 1, visible)
             continue
         x, y = picture[0], picture[1]
@@ -288,11 +282,9 @@ def depth_visibility_kernel(
             image[0, v], image[1, v], depth[v] = x[v], y[v], picture[2, v]
             for axis in range(3):
                 towards[axis, v] = sensor[axis] - positions[t, axis, v]
-        px, py, pz = positions[t, 0], positions[t, 1], positions[t, 2]
-        contact = CONTACT * surface_size(px, py, pz, faces)
         search_view(
-            px, py, pz, drawn[:triangles], towards, axes,
-            np.float32(-np.inf), contact, doubtful, count, image, depth, scratch,
+            positions[t, 0], positions[t, 1], positions[t, 2], drawn[:triangles], towards, axes,
+            np.float32(-np.inf), CONTACT * size, doubtful, count, image, depth, scratch,
             visible[t],
         )  # fmt: skip
 

@@ -327,19 +327,18 @@ def frame_scratch(vertices):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def surface_size(x, y, z, faces) -> float:  # type: ignore[no-untyped-def]
-    """Diagonal of the box around a surface; a vertex of no triangle may be anywhere."""
+def surface_box(x, y, z, faces):  # type: ignore[no-untyped-def]
+    """Lowest and highest corner of a surface, (3,) each; a loose vertex may be anywhere."""
     used = np.zeros(x.shape[0], np.uint8)
     for f in range(faces.shape[0]):
         used[faces[f, 0]] = used[faces[f, 1]] = used[faces[f, 2]] = 1
-    squared = 0.0
-    for p in (x, y, z):
-        low, high = np.inf, -np.inf
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for axis in range(3):
+        p = x if axis == 0 else (y if axis == 1 else z)
         for v in range(p.shape[0]):
             if used[v]:
-                low, high = min(low, np.float64(p[v])), max(high, np.float64(p[v]))
-        squared += (high - low) ** 2 if high >= low else 0.0
-    return float(np.sqrt(squared))
+                low[axis], high[axis] = min(low[axis], p[v]), max(high[axis], p[v])
+    return low, high
 
 
 @compiled
@@ -366,19 +365,16 @@ def see_frame(x, y, z, faces, sensor, needed, count, scratch, visible) -> None: 
     vertices = x.shape[0]
     g, image, depths, owned, searched, axes = scratch
     depth = depths[:vertices]
-    away = np.empty(3, np.float64)
-    for axis in range(3):
-        p = x if axis == 0 else (y if axis == 1 else z)
-        low = high = p[0]
-        for v in range(vertices):
-            g[axis, v] = sensor[axis] - p[v]
-            low, high = min(low, p[v]), max(high, p[v])
-        away[axis] = 0.5 * (np.float64(low) + high) - sensor[axis]
-    contact = CONTACT * surface_size(x, y, z, faces)
-    distance = np.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
     for v in range(vertices):
         if needed[v]:
             visible[v] = 1
+        g[0, v], g[1, v], g[2, v] = sensor[0] - x[v], sensor[1] - y[v], sensor[2] - z[v]
+    if faces.shape[0] == 0:
+        return
+    low, high = surface_box(x, y, z, faces)
+    contact = CONTACT * np.sqrt(((high - low) ** 2).sum())
+    away = 0.5 * (low + high) - sensor
+    distance = np.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
 
     narrow = distance > 0
     if narrow:
