@@ -25,7 +25,7 @@ from sd2core.fmcw.chain import FrameChain, ProcessingOptions
 from sd2core.fmcw.link import LinkBudget
 from sd2core.fmcw.options import Reflector
 from sd2core.fmcw.processing import rebinning
-from sd2core.fmcw.sums import Echoes, turns_of
+from sd2core.fmcw.sums import turns_of
 from sd2core.fmcw.wave import WaveScene
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.radar_config import CLUTTER, PAPER_RADAR, RadarConfig
@@ -169,57 +169,39 @@ def _noise(
 
 
 def _looks(scene: WaveScene, time_s: float, phases: NDArray[np.complex64]) -> Samples:
-    """Beat signals of the frame around a time, (looks, chirps, samples)."""
-    rows: list[Any] = [
-        _burst(scene, position, velocity, chirps, phases)
-        for (position, velocity), chirps in scene.bursts(time_s)
-    ]
-    return rows[0] if len(rows) == 1 else np.concatenate(rows, axis=1)
-
-
-def _burst(
-    scene: WaveScene,
-    position_m: Floats,
-    velocity_mps: Floats,
-    chirps: int,
-    phases: NDArray[np.complex64],
-) -> Samples:
-    """Beat signals of chirps that vertices move evenly in, (looks, chirps, samples).
+    """Beat signals of the frame around a time, (looks, chirps, samples).
 
     The sum over facets is separable in chirps and samples when migration through range
     within a frame is left out (decision 11: 2e-3 of the signal), so it is a product of
     matrices, which for a few hundred facets and several looks is cheaper than a
     non-uniform FFT.
     """
-    config = scene.config
-    echoes, rows = _echoes(scene, position_m, velocity_mps)
-    turns = turns_of(echoes, config)
-    samples = config.samples_per_chirp
-    first = turns.start - 0.5 * (chirps - 1) * turns.chirp - 0.5 * samples * turns.sample
-    slow = _phasors(turns.chirp, chirps, first) * echoes.terms[0]
-    fast = _phasors(turns.sample, samples, np.zeros_like(first))
-    # Phases go to the shorter of the two.
-    right = phases[:, None, rows] * fast.astype(np.complex64)  # (looks, samples, facets)
-    right = right.reshape(-1, len(rows))
-    if config.sampling != "real":
-        signal = slow.astype(np.complex64) @ right.T
-    else:
-        # Re(a b) is the product of conj(a) and b as pairs of real numbers.
-        pairs = [
-            np.ascontiguousarray(x).view(np.float32)
-            for x in (slow.conj().astype(np.complex64), right)
-        ]
-        signal = pairs[0] @ pairs[1].T
-    return np.ascontiguousarray(signal.reshape(chirps, len(phases), samples).transpose(1, 0, 2))
-
-
-def _echoes(
-    scene: WaveScene, position_m: Floats, velocity_mps: Floats
-) -> tuple[Echoes, NDArray[np.int32]]:
-    """Echoes of the visible facets of a rough surface, and which facets they are."""
-    visible = visible_facets(position_m, scene.faces, scene.scene.sensor.position_m)
-    antenna, alike = scene.paths[0][None][0][0], np.ones(len(scene.faces), np.complex128)
-    return scene.facets(position_m, velocity_mps, scene.faces, visible, antenna, antenna, alike)
+    config, faces, antenna = scene.config, scene.faces, scene.paths[0][None][0][0]
+    samples, alike = config.samples_per_chirp, np.ones(len(faces), np.complex128)
+    bursts: list[Any] = []
+    for (position_m, velocity_mps), chirps in scene.bursts(time_s):
+        visible = visible_facets(position_m, faces, scene.scene.sensor.position_m)
+        echoes, rows = scene.facets(
+            position_m, velocity_mps, faces, visible, antenna, antenna, alike
+        )
+        turns = turns_of(echoes, config)
+        first = turns.start - 0.5 * (chirps - 1) * turns.chirp - 0.5 * samples * turns.sample
+        slow = _phasors(turns.chirp, chirps, first) * echoes.terms[0]
+        fast = _phasors(turns.sample, samples, np.zeros_like(first))
+        # Phases go to the shorter of the two.
+        right = phases[:, None, rows] * fast.astype(np.complex64)  # (looks, samples, facets)
+        right = right.reshape(-1, len(rows))
+        if config.sampling != "real":
+            signal = slow.astype(np.complex64) @ right.T
+        else:
+            # Re(a b) is the product of conj(a) and b as pairs of real numbers.
+            pairs = [
+                np.ascontiguousarray(x).view(np.float32)
+                for x in (slow.conj().astype(np.complex64), right)
+            ]
+            signal = pairs[0] @ pairs[1].T
+        bursts.append(signal.reshape(chirps, len(phases), samples).transpose(1, 0, 2))
+    return np.concatenate(bursts, axis=1)
 
 
 def _phasors(turns: Floats, count: int, first: Floats) -> NDArray[np.complex128]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sd2core.fmcw import ProcessingOptions, WaveOptions
 from sd2core.fmcw.options import Reflector
-from sd2core.fmcw.sums import Echoes, nufft
+from sd2core.fmcw.sums import nufft
 from sd2core.fmcw.wave import WaveScene
 from sd2core.io.radar import named_radar
 from sd2core.mesh.sequence import MeshSequence
@@ -133,11 +133,12 @@ def test_a_look_is_the_sum_that_the_nufft_makes() -> None:
     turns = np.random.default_rng(1).random((2, len(mesh.faces)))
     phases = np.exp(2j * np.pi * turns).astype(np.complex64)
     found = radar._looks(scene, time_s, phases)
-    echoes, rows = radar._echoes(scene, *scene.scene.moving(time_s))
-    assert len(rows) == len(mesh.faces)
-    for look, phase in zip(found, phases, strict=True):
-        turned = Echoes(echoes.range_m, echoes.rate_mps, echoes.terms * phase[rows])
-        expected = nufft(turned, PAPER_RADAR).real
+    out, back = scene.paths[0][None][0]
+    for look, phase in zip(found, phases.astype(np.complex128), strict=True):
+        moving = scene.scene.moving(time_s)
+        echoes, rows = scene.facets(*moving, mesh.faces, None, out, back, phase)
+        assert len(rows) == len(mesh.faces)
+        expected = nufft(echoes, PAPER_RADAR).real
         np.testing.assert_allclose(look, expected, atol=2e-5 * np.abs(expected).max())
 
 
