@@ -15,7 +15,7 @@ from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write
 from sd2core.files.numpy_files import open_npz_file
 from sd2core.files.texts import check_version, faults_in
-from sd2core.mesh.presence import Presence, checked, runs
+from sd2core.mesh.presence import checked, runs
 from sd2core.mesh.vertex_parts import JOINTS, KINEMATICS, PARTS, QUANTITIES, WHOLE
 from sd2core.numerics.map_accuracy import MapAccuracy
 from sd2core.options.kinds import MapKind as MapKind
@@ -669,7 +669,7 @@ def joined(maps: Sequence[DopplerMap]) -> DopplerMap:
     """Concatenate maps of one axis in time; metadata are those of the first."""
     if len(maps) == 1:
         return maps[0]
-    present = [Presence.of(one.present, len(one.timebase)).present for one in maps]
+    present = [one.present_mask for one in maps]
     limbs = [one.limbs for one in maps if one.limbs is not None]
     alike = len(limbs) == len(maps) and len({one.parts for one in limbs}) == 1
     return replace(

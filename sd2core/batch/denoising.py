@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from sd2core.denoise.resample_to_model import input_of
 from sd2core.denoise.texture import content_of
 from sd2core.maps import DopplerMap
-from sd2core.mesh.presence import Presence
 
 if TYPE_CHECKING:
     from sd2core.denoise.live import TrainedDenoiser
@@ -75,7 +74,7 @@ class _Files:
         for number in range(len(maps)):
             part = self.part(number)
             times_s.append(part.times_s)
-            present.append(Presence.of(part.present, len(part.timebase)).present)
+            present.append(part.present_mask)
         self.times_s = np.concatenate(times_s)
         self.present_mask = np.concatenate(present)
         self.edges = np.cumsum([0, *map(len, times_s)])

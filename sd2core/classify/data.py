@@ -204,13 +204,11 @@ def clips_of_map(
     label, classes = frame_labels(doppler.timebase, labels)
     clips = []
     for start, stop in matching.stretches(doppler, rate_hz):
-        energies, times_s = doppler.values.T[start:stop], doppler.times_s[start:stop]
-        own = label[start:stop]
-        if not matching.is_regular(times_s, rate_hz):
-            even_s = matching.even_times(times_s, rate_hz)
-            energies = matching.interpolated(energies, times_s, even_s)
-            own = own[np.searchsorted((times_s[1:] + times_s[:-1]) / 2.0, even_s)]  # the nearest
-        clips.append(Clip(subject, movement, doppler.kind, np.array(energies), own))
+        part, times_s = doppler.between(start, stop), doppler.times_s[start:stop]
+        even = matching.evenly(part, rate_hz)
+        nearest = np.searchsorted((times_s[1:] + times_s[:-1]) / 2.0, even.times_s)
+        own = label[start:stop][nearest]
+        clips.append(Clip(subject, movement, doppler.kind, np.array(even.values.T), own))
     return ClipSet(
         doppler.axis,
         doppler.null_bins,

@@ -17,7 +17,6 @@ from sd2core.errors import Sd2Error
 from sd2core.labels.per_frame import label_per_frame
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
-from sd2core.mesh.presence import Presence
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.recording.recording import Recording, is_recording, open_recording
 
@@ -137,9 +136,7 @@ class People:
         times_s = next(iter(maps.values())).times_s
         clear = ~self.unclear(person, names, times_s)
         return {
-            kind: one
-            if kind in FROM_A_MESH
-            else replace(one, present=Presence.of(one.present, len(times_s)).present & clear)
+            kind: one if kind in FROM_A_MESH else replace(one, present=one.present_mask & clear)
             for kind, one in maps.items()
         }
 

@@ -16,7 +16,6 @@ from sd2core.imu.signals import InertialSignals
 from sd2core.labels.per_frame import BACKGROUND, plain_name
 from sd2core.labels.spans import Labels
 from sd2core.maps import DopplerMap, MapKind
-from sd2core.mesh.presence import Presence
 from sd2core.options.exporting import KINDS as KINDS
 from sd2core.progress import Progress
 from sd2core.sensor import Vector, VirtualSensor, spherical_from_position
@@ -151,8 +150,7 @@ class Source:
     @property
     def known(self) -> dict[MapKind, NDArray[np.bool_]]:
         """Frames that each map covers, (frames,)."""
-        frames = len(self.times_s)
-        return {kind: Presence.of(one.present, frames).present for kind, one in self.maps.items()}
+        return {kind: one.present_mask for kind, one in self.maps.items()}
 
     @property
     def present(self) -> NDArray[np.bool_]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
-from sd2core.mesh.presence import Presence, runs
+from sd2core.mesh.presence import runs
 from sd2core.plausibility.clock import ROUNDING_S
 from sd2core.progress import Progress
 from sd2core.timebase import Timebase
@@ -113,8 +114,7 @@ def stretches(doppler: DopplerMap, frame_rate_hz: float) -> list[tuple[int, int]
 
     ``frame_rate_hz`` is the rate of the model.
     """
-    present = Presence.of(doppler.present, len(doppler.timebase)).present
-    return clips(doppler.times_s, present, frame_rate_hz)
+    return clips(doppler.times_s, doppler.present_mask, frame_rate_hz)
 
 
 def clips(
@@ -209,3 +209,22 @@ def interpolated(
     part = np.clip((wanted_s - times_s[after - 1]) / span_s, 0.0, 1.0)[:, None]
     between = (1 - part) * values[after - 1] + part * values[after]
     return between.astype(np.float32)
+
+
+def evenly(doppler: DopplerMap, rate_hz: float) -> DopplerMap:
+    """Return the map as a model takes it, at an even rate, where frames of it were lost."""
+    if is_regular(doppler.times_s, rate_hz):
+        return doppler
+    even_s = even_times(doppler.times_s, rate_hz)
+
+    def there(values: NDArray[np.float32]) -> NDArray[np.float32]:
+        frames = np.moveaxis(values, -1, 0)
+        made = interpolated(frames.reshape(len(frames), -1), doppler.times_s, even_s)
+        return np.moveaxis(made.reshape(len(even_s), *frames.shape[1:]), 0, -1)
+
+    limbs = doppler.limbs
+    if limbs is not None:
+        moves = None if limbs.kinematics is None else there(limbs.kinematics)
+        limbs = replace(limbs, values=there(limbs.values), kinematics=moves)
+    clock = Timebase(even_s)
+    return DopplerMap(there(doppler.values), doppler.axis, clock, doppler.kind, limbs=limbs)

@@ -61,7 +61,7 @@ def motion_energy_db(doppler: DopplerMap) -> NDArray[np.float64]:
             f"The Doppler map holds {values[bin_, frame]} in bin {bin_} of frame {frame}",
             "finite values from 0 on",
         )
-    present = Presence.of(doppler.present, values.shape[1]).present
+    present = doppler.present_mask
     energy_db = np.where(present, 0.0, np.nan)
     seen = _smoothed(values, doppler.timebase, present)[:, present]
     known_bins = np.asarray(seen.any(axis=1))  # (bins,)

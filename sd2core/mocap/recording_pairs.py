@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core.body.parts import synthetic_map
-from sd2core.denoise.resample_to_model import clips, even_times, interpolated, is_regular
+from sd2core.denoise.resample_to_model import clips, evenly
 from sd2core.doppler import PRESETS, SynthesisOptions, Synthesizer
 from sd2core.errors import Sd2Error
 from sd2core.files.paths import check_distinct
@@ -254,25 +254,6 @@ def _takes(
             )
         )
     return takes, float((len(times_s) - kept) / rate_hz)
-
-
-def evenly(doppler: DopplerMap, rate_hz: float) -> DopplerMap:
-    """Return the map as a model takes it, at an even rate, where frames of it were lost."""
-    if is_regular(doppler.times_s, rate_hz):
-        return doppler
-    even_s = even_times(doppler.times_s, rate_hz)
-
-    def there(values: NDArray[np.float32]) -> NDArray[np.float32]:
-        frames = np.moveaxis(values, -1, 0)
-        made = interpolated(frames.reshape(len(frames), -1), doppler.times_s, even_s)
-        return np.moveaxis(made.reshape(len(even_s), *frames.shape[1:]), 0, -1)
-
-    limbs = doppler.limbs
-    if limbs is not None:
-        moves = None if limbs.kinematics is None else there(limbs.kinematics)
-        limbs = replace(limbs, values=there(limbs.values), kinematics=moves)
-    clock = Timebase(even_s)
-    return DopplerMap(there(doppler.values), doppler.axis, clock, doppler.kind, limbs=limbs)
 
 
 def take_frames(

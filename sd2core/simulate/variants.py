@@ -15,6 +15,7 @@ from sd2core.accuracy.cache import clip_fingerprint
 from sd2core.body.parts import synthetic_map
 from sd2core.body.reshaping import coarser, reshaped
 from sd2core.body.shape import ShapeSpace
+from sd2core.denoise.resample_to_model import evenly
 from sd2core.doppler import SynthesisOptions, Synthesizer
 from sd2core.io.radar.mars import FRAMES_PER_S, MarsStretch, mars_parts, read_mars
 from sd2core.labels.per_frame import BACKGROUND
@@ -25,7 +26,6 @@ from sd2core.mocap.mars_pairs import driven_clips, takes_of
 from sd2core.mocap.recording_pairs import (
     check_rates,
     check_there,
-    evenly,
     frame_labels,
     label_names,
     named_recordings,
