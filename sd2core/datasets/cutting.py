@@ -287,9 +287,7 @@ def _values(
     """
     own = np.moveaxis(values, -1, 0)[clip.start : clip.stop].copy()
     if clip.resampled:
-        rows = own.reshape(len(own), -1)
-        rows = interpolated(rows, times_s[clip.start : clip.stop], clip.times_s)
-        own = rows.reshape(-1, *own.shape[1:])
+        own = interpolated(own, times_s[clip.start : clip.stop], clip.times_s)
     own[..., list(null_bins)] = 0.0
     return _filled(own, least)
 

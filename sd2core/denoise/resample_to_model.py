@@ -201,12 +201,13 @@ def even_times(times_s: NDArray[np.float64], frame_rate_hz: float) -> NDArray[np
 def interpolated(
     values: Energies, times_s: NDArray[np.float64], wanted_s: NDArray[np.float64]
 ) -> Energies:
-    """Interpolate linearly between frames, constant beyond both ends."""
+    """Interpolate linearly between frames, along the first axis; constant beyond both ends."""
     if len(times_s) == 1:
         return np.repeat(values, len(wanted_s), axis=0)
     after = np.clip(np.searchsorted(times_s, wanted_s), 1, len(times_s) - 1)
     span_s = times_s[after] - times_s[after - 1]
-    part = np.clip((wanted_s - times_s[after - 1]) / span_s, 0.0, 1.0)[:, None]
+    part = np.clip((wanted_s - times_s[after - 1]) / span_s, 0.0, 1.0)
+    part = part.reshape(-1, *[1] * (values.ndim - 1))
     between = (1 - part) * values[after - 1] + part * values[after]
     return between.astype(np.float32)
 
@@ -218,9 +219,8 @@ def evenly(doppler: DopplerMap, rate_hz: float) -> DopplerMap:
     even_s = even_times(doppler.times_s, rate_hz)
 
     def there(values: NDArray[np.float32]) -> NDArray[np.float32]:
-        frames = np.moveaxis(values, -1, 0)
-        made = interpolated(frames.reshape(len(frames), -1), doppler.times_s, even_s)
-        return np.moveaxis(made.reshape(len(even_s), *frames.shape[1:]), 0, -1)
+        made = interpolated(np.moveaxis(values, -1, 0), doppler.times_s, even_s)
+        return np.moveaxis(made, 0, -1)
 
     limbs = doppler.limbs
     if limbs is not None:
