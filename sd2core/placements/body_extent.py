@@ -18,7 +18,7 @@ from sd2core.sensor import Vector, VirtualSensor
 _SAMPLED_FRAMES = 100
 _SAMPLED_VERTICES = 200
 _FASTEST_SHARE = 0.01
-_PROBED_BYTES = 16 << 20
+_STRETCHES, _READ_BYTES = 200, 64 << 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,6 @@ class BodyExtent:
     low_m: NDArray[np.float64]  # (n, 3), corners of the box around the body
     high_m: NDArray[np.float64]
     mesh: MeshSequence
-    frames: NDArray[np.intp]  # (n,), in which it is there
 
     @classmethod
     def of(cls, mesh: MeshSequence) -> BodyExtent:
@@ -74,30 +73,25 @@ class BodyExtent:
             middle[row] = np.median(vertices, axis=0)
             low[row], high[row] = vertices.min(axis=0), vertices.max(axis=0)
         x, y, z = middle.mean(axis=0).tolist()
-        return cls((x, y, z), low, high, mesh, picked)
+        return cls((x, y, z), low, high, mesh)
 
     @cached_property
     def _motion(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Up to 200 vertices and their velocities, (n, k, 3), in these frames and the fastest."""
-        mesh = self.mesh
+        """Up to 200 vertices, (n, k, 3), of the fastest frame of each of 200 stretches or more.
+
+        Their places, and their velocities; both are 0 where nobody moves.
+        """
+        mesh, passed_s = self.mesh, np.diff(self.mesh.times_s)
         some = slice(None, None, -(-mesh.vertex_count // _SAMPLED_VERTICES))
-        speed_mps = np.zeros(mesh.frame_count)
-        at_once = max(1, _PROBED_BYTES // (12 * mesh.vertex_count))
-        for start in range(0, mesh.frame_count - 1, at_once):
-            stop = min(start + at_once, mesh.frame_count - 1)
-            step_m = np.linalg.norm(np.diff(mesh.read(start, stop + 1)[:, some], axis=0), axis=2)
-            passed_s = np.diff(mesh.times_s[start : stop + 1])
-            speed_mps[start:stop] = _all_but_fastest(step_m) / passed_s
-        moving = np.flatnonzero(mesh.presence.last > np.arange(mesh.frame_count))
-        fastest = moving[np.argsort(-speed_mps[moving], kind="stable")[:_SAMPLED_FRAMES]]
-        frames = np.union1d(self.frames, fastest)
-        following = np.minimum(frames + 1, mesh.presence.last[frames])
-        points, then = (
-            np.array([mesh.frame(frame)[some] for frame in numbers.tolist()], np.float32)
-            for numbers in (frames, following)
-        )
-        passed_s = np.where(following > frames, mesh.times_s[following] - mesh.times_s[frames], 1.0)
-        return points, ((then - points) / passed_s[:, None, None]).astype(np.float32)
+        count = max(_STRETCHES, mesh.frame_count * mesh.vertex_count * 12 // _READ_BYTES)
+        points, velocity = np.zeros((2, count, *mesh.frame(0)[some].shape), np.float32)
+        for row, part in enumerate(np.array_split(np.arange(len(passed_s)), count)):
+            if len(part := part[mesh.presence.last[part] > part]):
+                block, at = mesh.read(int(part[0]), int(part[-1]) + 2)[:, some], part - part[0]
+                moved = (block[at + 1] - block[at]) / passed_s[part, None, None]
+                fastest = _all_but_fastest(np.linalg.norm(moved, axis=2)).argmax()
+                points[row], velocity[row] = block[at[fastest]], moved[fastest]
+        return points, velocity
 
     def coverage(
         self, sensors: Sequence[VirtualSensor], progress: Progress = silent
