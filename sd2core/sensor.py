@@ -46,9 +46,7 @@ class VelocityAxis:
 
     def __post_init__(self) -> None:
         if not (hasattr(self.bins, "__index__") and 2 <= self.bins <= MAX_BINS):
-            raise Sd2Error(
-                f"The velocity axis has {self.bins} bins", f"2 to {MAX_BINS:,}, a whole number"
-            )
+            raise Sd2Error(f"The velocity axis has {self.bins} bins", f"whole, 2 to {MAX_BINS:,}")
         if not (math.isfinite(self.v_max_mps) and self.v_max_mps > 0):
             raise Sd2Error(
                 f"The velocity axis ends at {self.v_max_mps} m/s", "a positive velocity in m/s"

@@ -89,10 +89,7 @@ class SerialS4Denoiser(S4Denoiser):
         cells, state = super().chunk(self._cells(values), state)
         return cells.view(*values.shape[:2], self.bins), state
 
-    def step(self, frame: Tensor, state: State) -> tuple[Tensor, State]:
-        """Advance by one frame, a chunk of as many cells as there are bins."""
-        answer, state = self.chunk(frame[:, None], state)
-        return answer[:, 0], state
+    step = Denoiser.step  # one frame is a chunk of as many cells as there are bins
 
     def _cells(self, values: Tensor) -> Tensor:
         """Values of every cell, (batch, frames · bins, channels)."""

@@ -207,10 +207,8 @@ class Synthesizer:
             raise Sd2Error(f"threads is {threads}", "1 or more, or None for all cores")
         if block_frames is not None and block_frames < 1:
             raise Sd2Error(f"block_frames is {block_frames}", "1 or more, or None")
-        if isinstance(left_out, str) or not set(left_out) <= set(get_args(ScenePart)):
-            raise Sd2Error(
-                f"left_out is {left_out!r}", f"a list of some of {', '.join(get_args(ScenePart))}"
-            )
+        if not set(left_out) <= set(get_args(ScenePart)):  # nor is a name a list of parts
+            raise Sd2Error(f"left_out is {left_out!r}", f"some of {', '.join(get_args(ScenePart))}")
         if mesh.surroundings is not None and left_out:
             mesh = replace(mesh, surroundings=mesh.surroundings.without(left_out))
         self.mesh = mesh

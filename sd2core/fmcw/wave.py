@@ -287,10 +287,7 @@ class WaveScene:
         back: Antenna,
         phases: NDArray[np.complex128] | None,
     ) -> tuple[Echoes, NDArray[np.int32]]:
-        """Echoes on one path, and of which facets.
-
-        A rough surface has the ``phases`` of its facets, a smooth one none.
-        """
+        """Echoes on one path and their facets, of a rough surface with phases, or a smooth one."""
         visible = np.ones(len(faces), np.bool_) if visible is None else visible
         count = int(np.count_nonzero(visible))
         index = np.empty(count, np.int32)

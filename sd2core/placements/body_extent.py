@@ -77,10 +77,7 @@ class BodyExtent:
 
     @cached_property
     def _motion(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Up to 200 vertices, (n, k, 3), of the fastest frame of each of 200 stretches or more.
-
-        Their places, and their velocities; both are 0 where nobody moves.
-        """
+        """Places and velocities, (n, k, 3), in the fastest frames of 200 stretches or more."""
         mesh, passed_s = self.mesh, np.diff(self.mesh.times_s)
         some = slice(None, None, -(-mesh.vertex_count // _SAMPLED_VERTICES))
         count = max(_STRETCHES, mesh.frame_count * mesh.vertex_count * 12 // _READ_BYTES)

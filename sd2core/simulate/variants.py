@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from sd2core.accuracy.cache import clip_fingerprint
+from sd2core.accuracy.cache import scene_fingerprint
 from sd2core.body.parts import synthetic_map
 from sd2core.body.reshaping import coarser, reshaped
 from sd2core.body.shape import ShapeSpace
@@ -118,11 +118,8 @@ def vary_recordings(
     sources |= scenes_of(recording for recording, _ in named)
     names = (BACKGROUND, *sorted({*labels, *map(mirrored_label, labels)}))
     sources["movements"] = [
-        [
-            *map(clip_fingerprint, mesh.bodies),
-            zlib.crc32(frame_labels(one, names, mesh.times_s).tobytes()),
-            *one.sensor.position_m,
-        ]
+        scene_fingerprint(mesh, one.sensor, options.synthesis, "histogram")
+        + f"-{zlib.crc32(frame_labels(one, names, mesh.times_s).tobytes()):08x}"
         for (one, _), mesh in zip(named, meshes, strict=True)
     ]
     writer = _writer(out, options, round(rates_hz[0], 3), names, sources)
