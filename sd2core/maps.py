@@ -447,8 +447,7 @@ class DopplerMap:
 
     def within(self, v_mps: float) -> DopplerMap:
         """Map of the bins whose velocities are between -v and v, on an axis of its own."""
-        # NaN leaves out all.
-        left_out = int((~(self.axis.edges_mps >= -v_mps - 1e-9)).sum())
+        left_out = int((~(self.axis.edges_mps >= -v_mps - 1e-9)).sum())  # all for NaN
         bins = self.axis.bins - 2 * left_out
         if bins < 2:
             raise Sd2Error(
@@ -460,16 +459,12 @@ class DopplerMap:
         def of(numbers: Sequence[int]) -> tuple[int, ...]:
             return tuple(one - left_out for one in numbers if 0 <= one - left_out < bins)
 
-        known, meta = self.uncertainty, dict(self.meta)
-        if (beyond := meta.get("beyond_share")) is not None:
-            along = 0 if isinstance(beyond, list) else None
-            every, inside = (one.sum(along, np.float64) for one in (self.values, self.values[kept]))
-            share = np.where(every > 0, inside / np.where(every > 0, every, 1.0), 1.0)
-            meta["beyond_share"] = (1.0 - (1.0 - np.asarray(beyond)) * share).tolist()
+        known = self.uncertainty
         return replace(
             self,
             values=self.values[kept],
-            meta=meta,
+            # That is beyond the wider axis.
+            meta={name: one for name, one in self.meta.items() if name != "beyond_share"},
             axis=VelocityAxis(bins, self.axis.v_max_mps * bins / self.axis.bins),
             null_bins=of(self.null_bins),
             unseen_bins=of(self.unseen_bins),

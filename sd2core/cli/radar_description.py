@@ -133,7 +133,7 @@ def describe(path: Path, options: Description, *, as_json: bool) -> None:
     _ask(entries)
     with suppress(Sd2Error):  # there is none, or write_description refuses it
         before = read_description(description_of(path))
-        entries |= {"simulated": before.simulated, "image_band": before.image_band}
+        entries |= {"simulated": before.simulated, "sampling": before.sampling}
     with faults_in(f"The description of {path}", "all that its radar needs"):
         description = RadarDescription.model_validate(entries)
     capture = capture_of(path, description)

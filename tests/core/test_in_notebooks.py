@@ -69,16 +69,11 @@ def test_narrower_maps_keep_their_velocities(half: int, v_mps: float) -> None:
         assert found.axis.centres_mps[number] == pytest.approx(doppler.axis.centres_mps[half])
 
 
-@pytest.mark.parametrize("per_frame", [True, False])
-def test_what_a_narrower_map_leaves_out_is_beyond_it(per_frame: bool) -> None:
-    values = np.ones((8, 3), np.float32)
-    values[:, 2] = 0.0
-    axis, clock = sd2.VelocityAxis(8, 2.0), sd2.Timebase.regular(3, 30.0)
-    before = [0.0, 0.5, 1.0] if per_frame else 0.2
-    doppler = sd2.DopplerMap(values, axis, clock, "synthetic", meta={"beyond_share": before})
-    found = doppler.within(1.0).meta["beyond_share"]
-    assert found == pytest.approx([0.5, 0.75, 1.0] if per_frame else 0.6)
-    assert doppler.meta["beyond_share"] == before
+def test_a_narrower_map_does_not_say_what_is_beyond_the_wider_axis() -> None:
+    doppler = made()
+    doppler.meta["beyond_share"] = [0.0] * 60
+    doppler.meta["visible_share"] = [0.5] * 60
+    assert doppler.within(1.0).meta == {"visible_share": [0.5] * 60}
 
 
 def test_velocities_and_bins_that_are_no_numbers_of_these_are_refused() -> None:

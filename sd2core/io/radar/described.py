@@ -64,7 +64,7 @@ class RadarDescription(BaseModel):
     version: Literal[1] = 1
     name: str = Field(default="", max_length=200)
     simulated: bool = False
-    image_band: bool = False  # of complex samples: half of the beat frequencies hold no echoes
+    sampling: Sampling = "complex"  # of complex samples, with an image band or without
     dataset: str | None = None
     axes: tuple[Axis, ...]
     carrier_hz: float = Field(gt=0, le=1e15)  # middle of the samples of a chirp
@@ -157,7 +157,7 @@ def write_described(
     description = RadarDescription(
         name=config.name,
         simulated=simulated,
-        image_band=config.sampling == "complex with image band",
+        sampling=config.sampling,
         axes=(*_PLAIN[4], "iq"),
         carrier_hz=config.centre_frequency_hz,
         bandwidth_hz=config.bandwidth_hz,
@@ -406,9 +406,6 @@ def _config(
     bits = 24
     if radar.full_scale is not None and stored.dtype.kind in "iu":
         bits = max(1, round(math.log2(radar.full_scale)) + 1)
-    sampling: Sampling = "complex" if is_complex else "real"
-    if is_complex and radar.image_band:
-        sampling = "complex with image band"
     config = RadarConfig(
         start_frequency_hz=radar.carrier_hz - 0.5 * bandwidth_hz,
         end_frequency_hz=radar.carrier_hz + 0.5 * bandwidth_hz,
@@ -420,7 +417,7 @@ def _config(
         receivers=sizes["receiver"],
         adc_bits=bits,
         name=radar.name or f"{radar.carrier_hz / 1e9:.4g} GHz radar",
-        sampling=sampling,
+        sampling=radar.sampling if is_complex else "real",
         transmitters=sizes["transmitter"],
         ranges_m=ranges_m,
     )
