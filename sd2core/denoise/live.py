@@ -232,8 +232,8 @@ class TrainedDenoiser:
 
     def windows_in(self, frames: int) -> tuple[int, int]:
         """Length and overlap of the windows of a clip, for a model that looks at later frames."""
-        if self.network.window is not None:
-            return self.network.window, OVERLAP
+        if (window := self.network.window) is not None:
+            return window, OVERLAP if window > OVERLAP else window // 2
         return (frames, 0) if frames <= PIECE else (PIECE, LENGTH)
 
     def _in_windows(self, values: NDArray[np.float32], progress: Progress) -> NDArray[np.float32]:

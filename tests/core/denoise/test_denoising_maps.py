@@ -389,3 +389,14 @@ def test_a_denoised_map_is_saved_and_read(tmp_path: Path) -> None:
     assert read.kind == "denoised"
     np.testing.assert_array_equal(read.values, denoised.values)
     assert read.meta == denoised.meta
+
+
+@pytest.mark.parametrize("frames", [3, 8, 50])
+def test_windows_may_be_shorter_than_the_usual_overlap(frames: int) -> None:
+    """As of a network of another package, which learns with segments of 8 frames."""
+    model = trained("none")
+    model.network.causal, model.network.window = False, 8
+    values = energies(frames)
+    with torch.no_grad():
+        plain = model.network(torch.from_numpy(values)[None])[0].numpy()
+    np.testing.assert_allclose(model._in_windows(values, lambda *_: None), plain, atol=1e-6)
