@@ -46,7 +46,9 @@ def read_beam(path: Path) -> Beam:
     """
     rows: list[list[float]] = []
     for number, line in enumerate(read_text(path, _TABLE).splitlines(), start=1):
-        cells = line.replace(";", ",").replace("\t", ",").split(",")
+        # Between semicolons, tabs and blanks commas are decimal ones.
+        apart = next((one for one in ";\t," if one in line), None)
+        cells = (line if apart == "," else line.replace(",", ".")).split(apart)
         if not line.strip() or line.startswith("#"):
             continue
         try:

@@ -179,11 +179,9 @@ def _looks(scene: WaveScene, time_s: float, phases: NDArray[np.complex64]) -> Sa
     config, faces, antenna = scene.config, scene.faces, scene.paths[0][None][0][0]
     samples, alike = config.samples_per_chirp, np.ones(len(faces), np.complex128)
     bursts: list[Any] = []
-    for (position_m, velocity_mps), chirps in scene.bursts(time_s):
-        visible = visible_facets(position_m, faces, scene.scene.sensor.position_m)
-        echoes, rows = scene.facets(
-            position_m, velocity_mps, faces, visible, antenna, antenna, alike
-        )
+    for (position, velocity), chirps in scene.bursts(time_s):
+        visible = visible_facets(position, faces, scene.scene.sensor.position_m)
+        echoes, rows = scene.facets(position, velocity, faces, visible, antenna, antenna, alike)
         turns = turns_of(echoes, config)
         first = turns.start - 0.5 * (chirps - 1) * turns.chirp - 0.5 * samples * turns.sample
         slow = _phasors(turns.chirp, chirps, first) * echoes.terms[0]

@@ -95,6 +95,19 @@ def test_a_table_with_the_numbers_of_a_normal_curve_is_that_beam(tmp_path: Path)
 
 
 @pytest.mark.parametrize(
+    ("apart", "point"), [(",", "."), (", ", "."), (";", ","), ("\t", ","), ("  ", ".")]
+)
+def test_tables_of_beams_are_taken_as_programs_write_them(
+    tmp_path: Path, apart: str, point: str
+) -> None:
+    rows = [(-9.5, -3.5, -6.0), (0.0, 0.0, 0.0), (9.5, -3.5, -6.0)]
+    path = tmp_path / "antenna.csv"
+    lines = [apart.join(str(one).replace(".", point) for one in row) for row in rows]
+    path.write_text("\n".join([apart.join(("angle", "azimuth", "elevation")), *lines]))
+    assert read_beam(path).cuts == tuple(rows)
+
+
+@pytest.mark.parametrize(
     ("text", "says"),
     [
         ("0,-3\n", "1 is '0,-3'"),
