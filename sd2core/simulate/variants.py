@@ -119,7 +119,7 @@ def vary_recordings(
     names = (BACKGROUND, *sorted({*labels, *map(mirrored_label, labels)}))
     sources["movements"] = [
         scene_fingerprint(mesh, one.sensor, options.synthesis, "histogram")
-        + f"-{zlib.crc32(frame_labels(one, names, mesh.times_s).tobytes()):08x}"
+        + f"-{zlib.crc32(frame_labels(one.effective_labels(), names, mesh.times_s).tobytes()):08x}"
         for (one, _), mesh in zip(named, meshes, strict=True)
     ]
     writer = _writer(out, options, round(rates_hz[0], 3), names, sources)
