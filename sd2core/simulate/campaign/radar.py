@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,11 +123,10 @@ def radar_target(
     options = options or TargetOptions()
     rng = np.random.default_rng(seed)
     scene = WaveScene(mesh, config, sensor)
-    assert mesh.faces is not None  # WaveScene refuses a mesh without
-    phases = np.exp(2j * np.pi * rng.random((options.looks, len(mesh.faces))))
+    turns = [rng.random((options.looks, len(one.faces))) for one in scene.bodies]
     if options.smooth:
-        phases[:] = 1.0
-    phases = phases.astype(np.complex64)
+        turns = [np.zeros_like(one) for one in turns]
+    phases = [np.exp(2j * np.pi * one).astype(np.complex64) for one in turns]
     static = scene.static(reflectors)[0]  # (chirps, samples)
     chain = FrameChain(config, PROCESSING)
     weights = rebinning(config, axis, chain.doppler_bins).astype(np.float32)
@@ -138,7 +137,7 @@ def radar_target(
         signals = []
         for frame in range(start, stop):
             on_frame()
-            signals.append(_looks(scene, float(mesh.times_s[frame]), phases) + static)
+            signals.append(_echoes(scene, float(mesh.times_s[frame]), phases) + static)
         samples, full_scale = _received(np.array(signals), config, options.link, rng)
         values[start:stop] = _power(samples, chain, weights) * (full_scale**2 / options.looks)
     if options.link is not None:
@@ -168,8 +167,17 @@ def _noise(
     return power.mean(axis=0), power.std(axis=0)
 
 
+def _echoes(scene: WaveScene, time_s: float, phases: list[NDArray[np.complex64]]) -> Samples:
+    """Beat signals of everybody in the frame around a time, (looks, chirps, samples)."""
+    signals: Any = np.zeros((len(phases[0]), 1, 1))
+    for one, own in zip(scene.bodies, phases, strict=True):
+        if len(phases) == 1 or one.scene.is_present(time_s):
+            signals = signals + _looks(one, time_s, own)
+    return cast("Samples", signals)
+
+
 def _looks(scene: WaveScene, time_s: float, phases: NDArray[np.complex64]) -> Samples:
-    """Beat signals of the frame around a time, (looks, chirps, samples).
+    """Beat signals of one body in the frame around a time, (looks, chirps, samples).
 
     The sum over facets is separable in chirps and samples when migration through range
     within a frame is left out (decision 11: 2e-3 of the signal), so it is a product of
@@ -179,8 +187,10 @@ def _looks(scene: WaveScene, time_s: float, phases: NDArray[np.complex64]) -> Sa
     config, faces, antenna = scene.config, scene.faces, scene.paths[0][None][0][0]
     samples, alike = config.samples_per_chirp, np.ones(len(faces), np.complex128)
     bursts: list[Any] = []
+    shown = scene.scene.visible(time_s)  # before things and others
     for (position, velocity), chirps in scene.bursts(time_s):
         visible = visible_facets(position, faces, scene.scene.sensor.position_m)
+        visible &= True if shown is None else shown
         echoes, rows = scene.facets(position, velocity, faces, visible, antenna, antenna, alike)
         turns = turns_of(echoes, config)
         first = turns.start - 0.5 * (chirps - 1) * turns.chirp - 0.5 * samples * turns.sample
@@ -188,7 +198,7 @@ def _looks(scene: WaveScene, time_s: float, phases: NDArray[np.complex64]) -> Sa
         fast = _phasors(turns.sample, samples, np.zeros_like(first))
         # Phases go to the shorter of the two.
         right = phases[:, None, rows] * fast.astype(np.complex64)  # (looks, samples, facets)
-        right = right.reshape(-1, len(rows))
+        right = right.reshape(len(phases) * samples, len(rows))
         if config.sampling != "real":
             signal = slow.astype(np.complex64) @ right.T
         else:

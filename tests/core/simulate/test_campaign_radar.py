@@ -126,6 +126,18 @@ def test_the_link_budget_is_the_radar_equation() -> None:
     assert 20.0 * math.log10(found) == pytest.approx(expected_db, abs=0.02)
 
 
+def test_everybody_in_a_scene_is_seen_and_hides_who_is_behind() -> None:
+    first, second = plate(1.0, 1.5), plate(-1.0, 2.2)
+    aside = replace(second, vertices=second.vertices + np.float32([0.8, 0, 0]))
+    looks = replace(QUIET, looks=400)
+    alone, other = target(first, looks), target(aside, looks)
+    both, covered = (target(replace(first, others=(one,)), looks) for one in (aside, second))
+    np.testing.assert_allclose(both[:, 17:], alone[:, 17:], rtol=0.02, atol=1e-3 * alone.max())
+    assert both[:, :14].sum() > 10.0 * alone[:, :14].sum()
+    assert both[:, :14].sum() == pytest.approx(other[:, :14].sum(), rel=0.2)
+    np.testing.assert_allclose(covered, alone, rtol=0.02, atol=1e-3 * alone.max())
+
+
 def test_a_look_is_the_sum_that_the_nufft_makes() -> None:
     mesh = plate(0.9, 2.4, side_m=0.6, cells=6)
     scene, time_s = WaveScene(mesh, PAPER_RADAR, SENSOR), float(mesh.times_s[2])
