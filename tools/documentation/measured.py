@@ -41,15 +41,16 @@ SHARED = Path(os.environ.get("SD2_SHARED_DATA", REPOSITORY.parent / "shared" / "
 
 _HOURS = "hours of training, due with the next denoisers"
 OLD = {
-    "accuracy-and-speed.md": "since then only how maps are cut, drawn and saved has changed",
     "performance.md": "needs an idle machine for an hour",
     "fitting.md": "ten idle minutes; only its commands and how tables are written have changed",
     "range-synthesis.md": _HOURS,
     "paper.md": _HOURS,
     "denoiser.md": _HOURS,
-    "real-pairs.md": "since then only pairs of recordings, which it has none of, take radar maps",
+    "classifier.md": "since then only longer waves, several people and what lost frames changed",
+    "real-gestures.md": "since then only what lost frames has changed",
+    "real-pairs.md": "since then only pairs of recordings, which it has none of, have changed",
     "scale.md": "since then only how classes of data sets and maps of radars are read has changed",
-    "studies.md": "hours of training; how late ridge regression is was put right in it",
+    "studies.md": "since then only what lost frames, and when pairs are made anew, has changed",
 }
 """Pages that may be older than the program, and why they were not measured anew."""
 
