@@ -332,12 +332,15 @@ def surface_box(x, y, z, faces):  # type: ignore[no-untyped-def]
     used = np.zeros(x.shape[0], np.uint8)
     for f in range(faces.shape[0]):
         used[faces[f, 0]] = used[faces[f, 1]] = used[faces[f, 2]] = 1
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    low, high = np.empty(3, np.float64), np.empty(3, np.float64)
     for axis in range(3):
         p = x if axis == 0 else (y if axis == 1 else z)
+        # In registers, and of a place that is used already: no branch, so that several go at once.
+        least = most = first = p[faces[0, 0] if faces.shape[0] else 0]
         for v in range(p.shape[0]):
-            if used[v]:
-                low[axis], high[axis] = min(low[axis], p[v]), max(high[axis], p[v])
+            place = p[v] if used[v] else first
+            least, most = min(least, place), max(most, place)
+        low[axis], high[axis] = least, most
     return low, high
 
 
