@@ -107,6 +107,11 @@ class Export(Exporting, _Spans, _People, _Maps, JsonAndProgress):
     out: Path
     dry_run: bool = False
 
+    @property
+    def windowed(self) -> bool:
+        """True unless segments are spans."""
+        return self.segments == "windows"
+
 
 @command("export", Export)
 def _export(options: Export) -> int:

@@ -120,3 +120,8 @@ class Exporting(Limbs, SegmentFrames, PeopleApart, NullBins):
     min_purity: Annotated[float, UP_TO_ONE, Typed(share)] = 0.0
     spans: Annotated[SpanOptions | None, NOT_TYPED] = None
     title: str = ""
+
+    @property
+    def windowed(self) -> bool:
+        """True unless segments are spans."""
+        return self.spans is None

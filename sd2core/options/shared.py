@@ -222,11 +222,14 @@ class SegmentFrames(OptionRecord):
     segment_frames: Annotated[int, Bounds(2, 10_000, whole=True)] = 72
     overlap_frames: Annotated[int, Bounds(0, 9_999, whole=True)] = 10
 
+    @property
+    def windowed(self) -> bool:
+        """True if segments are windows, which may share frames."""
+        return True
+
     def __post_init__(self) -> None:
         super().__post_init__()
-        # Data sets may have a segment of each span, which share nothing.
-        of_spans = getattr(self, "spans", None) or getattr(self, "segments", "") == "spans"
-        if self.overlap_frames >= self.segment_frames and not of_spans:
+        if self.windowed and self.overlap_frames >= self.segment_frames:
             raise OptionError(
                 f"overlap_frames is {self.overlap_frames}",
                 f"less than segment_frames, which is {self.segment_frames}",
