@@ -199,4 +199,5 @@ class SegmentDataset(TorchDataset[Item]):
 
 def _kind_of(array: str) -> int:
     """Place of an array's kind in ``available``; limb maps are where the synthetic map is."""
-    return _POWERS.index("synthetic" if array in ("limbs", "kinematics") else array)
+    kinds: tuple[str, ...] = KINDS
+    return kinds.index("synthetic" if array in ("limbs", "kinematics") else array)
