@@ -153,6 +153,12 @@ class Timebase:
         """True if some frame is on screen at ``time_s``."""
         return self.start_s - _TOLERANCE_S <= time_s < self.end_s - _TOLERANCE_S
 
+    def shown_at(self, time_s: float) -> int | None:
+        """Frame on screen at a time; None outside, and in gaps, in which none is shown."""
+        frame = self.frame_at(time_s)
+        shown = self.covers(time_s) and time_s - self.times_s[frame] < self.longest_s
+        return frame if shown else None
+
     def time_of(self, frame: int) -> float:
         """Time of ``frame``; it must exist."""
         if not 0 <= frame < len(self):

@@ -94,10 +94,9 @@ def difference_of(
     if one.axis != other.axis:
         raise Sd2Error("The maps have different velocity axes", "the same, for their difference")
     times_s = one.times_s + minuend.offset_s - subtrahend.offset_s
-    clock = other.timebase
-    frames = np.array([clock.frame_at(time_s) for time_s in times_s])
-    covered = np.array([clock.covers(time_s) for time_s in times_s])
-    covered &= times_s - clock.times_s[frames] < clock.longest_s
+    shown = [other.timebase.shown_at(time_s) for time_s in times_s]
+    covered = np.array([frame is not None for frame in shown])
+    frames = np.array([frame or 0 for frame in shown])
     if one.present is not None:
         covered &= one.present
     if other.present is not None:

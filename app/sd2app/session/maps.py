@@ -200,11 +200,7 @@ class MapModel(QObject):
 
     def frame_at(self, time_s: float) -> int | None:
         """Frame of the map at a time of the recording, or None outside and in gaps."""
-        time_s -= self.offset_s
-        if self.map is None or not self.map.timebase.covers(time_s):
-            return None
-        frame = self.map.timebase.frame_at(time_s)
-        return frame if time_s - self.map.times_s[frame] < self.map.timebase.longest_s else None
+        return None if self.map is None else self.map.timebase.shown_at(time_s - self.offset_s)
 
     def levels_db(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Values in dB above the reference; minus infinity for zero."""
