@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import BackgroundModel, Emit, LatestRunner, delayed
 from sd2app.background.model_worker.client import RemoteClassifier, RemoteSession
-from sd2app.denoise.map import AT_ONCE, cut_out
+from sd2app.denoise.map import cut_out
 from sd2app.session.maps import MapModel
 from sd2core.classify.card import ClassifierCard
 from sd2core.denoise.resample_to_model import check_bins, is_regular, stretches
@@ -25,6 +25,9 @@ _LATE_S = 0.2
 """Largest accepted lag behind the clock while a map grows frame by frame."""
 _LATER_S = 0.5
 """Largest accepted lag in addition to the classifier's own delay; its age is shown."""
+
+_AT_ONCE = 2048
+"""Frames that are classified together."""
 
 _BETWEEN_MS = 120
 """Shortest interval between updates while a long map is painted piece by piece."""
@@ -192,7 +195,7 @@ class ClassTrack(BackgroundModel):
         self._take(source.map, source.known)
         if self._restore() or self._again:
             return
-        if np.count_nonzero(self._known & ~self.done) <= AT_ONCE:
+        if np.count_nonzero(self._known & ~self.done) <= _AT_ONCE:
             self._calm.stop()
             self._go_on()
         elif not self._calm.isActive():
@@ -334,7 +337,7 @@ def _in_order(
     if going is None or going.start != start or going.next > stop:
         going = _Going(classifier.live(), start, start, start)
     while going.next < stop:
-        end = min(going.next + AT_ONCE, stop)
+        end = min(going.next + _AT_ONCE, stop)
         shares = going.session.advance(np.ascontiguousarray(doppler.values[:, going.next : end].T))
         answered = going.answered
         going = _Going(going.session, start, end, answered + len(shares))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Hashable
-from copy import deepcopy
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -13,19 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from sd2app.background.latest import BackgroundModel, LatestRunner, delayed
+from sd2app.background.latest import BackgroundModel, Emit, delayed
 from sd2app.background.model_worker.client import RemoteDenoiser, RemoteSession
-from sd2app.maps.partial_map import FINAL, Part, PartialMap, View
+from sd2app.maps.partial_map import Part, PartialMap
 from sd2app.maps.quality import Postprocess
 from sd2app.session.maps import MapModel
 from sd2app.session.session import Session
-from sd2app.session.tasks import Job
+from sd2app.session.tasks import ListedRunner
 from sd2core.denoise.known import KnownMovements
 from sd2core.denoise.resample_to_model import input_of, is_regular
 from sd2core.denoise.texture import Texture
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap, LimbMaps
-from sd2core.pairs.segments import LENGTH, OVERLAP
 
 _TOO_SLOW_S = 0.15
 """Time limit per sweep; a slower model waits until the drag pauses."""
@@ -34,18 +32,20 @@ _TRIED = 3
 """Number of sweeps that decide if a model is too slow."""
 
 _BETWEEN_MS = 80
-"""Shortest interval between denoisings of a short clip while its map is refined."""
+"""Shortest interval between denoisings while the synthetic map is refined."""
+
+_REST = 4
+"""Interval after a denoising, as a multiple of its own time: the process serves others too."""
+
+_LISTED = 2048
+"""Frames from which a denoising is listed as a task that can be cancelled."""
 
 _JUMP_S = 1.0
 """Longest step of the clock whose skipped frames are denoised live; a jump starts again."""
 
 _WAITS = "too slow to be dragged, follows when the sensor rests"
 
-AT_ONCE = 2048
-"""Frames that are denoised together; a clip up to this length always is whole."""
 TEXTURE_SEED = 0
-CONTEXT = 288
-"""Frames around a part that its preview is made with: four windows of training."""
 
 
 class Swept(NamedTuple):
@@ -55,81 +55,56 @@ class Swept(NamedTuple):
     doppler: DopplerMap
 
 
-class _Order(NamedTuple):
-    """How far a clip whose map stands is gone through, with what the model remembers there."""
+class _Reached(NamedTuple):
+    """How far the clock has led a model through a clip, with what the model remembers there."""
 
-    next: int = 0
+    next: int
     session: RemoteSession | None = None
 
 
 class _Answer(NamedTuple):
-    """Denoised piece of the map."""
+    """Denoised stretch of the map."""
 
-    piece: View
-    values: NDArray[np.float32]  # (bins, n)
-    like: DopplerMap  # map with their unit and axis
-    order: _Order | None = None  # that it goes on with
-    session: RemoteSession | None = None  # at its end, where pieces follow in order
-    cost_s: float = 0.0  # of each frame there
+    start: int
+    doppler: DopplerMap
+    cost_s: float  # live: of each frame
+    session: RemoteSession | None = None  # live: at its end
+    known: NDArray[np.bool_] | None = None  # (n,): frames that there was an input of; None: all
 
 
 class DenoisedMap(BackgroundModel):
-    """Denoises what changed of the synthetic map, what is in view first.
+    """Denoises what is known of the synthetic map, again until nothing has changed meanwhile.
 
-    While the sensor is dragged the model is asked by the background task that sweeps the
-    map (:meth:`postprocess`), so that both are of the same place and are shown together. At
-    rest one piece after another is denoised behind the synthetic map. Pieces of a long clip
-    are a preview, where a model remembers more than is around them: when the synthetic map
-    stands, the clip is gone through in order, or denoised at once where a model looks ahead or
-    knows another frame rate (:meth:`finish`). Live it grows frame by frame.
+    All of it at once: the slowest of our models but one takes a second for ten minutes. While
+    the sensor is dragged the model is asked by the background task that sweeps the map
+    (:meth:`postprocess`), so that both are of the same place and are shown together. Live it
+    grows frame by frame.
     """
 
     failed = Signal(str)
     idle = Signal()  # everything is denoised
 
-    _stumbled = Signal(str)
+    _stumbled = Signal(Exception)
 
-    def __init__(
-        self, track: MapModel, session: Session, view: Callable[[], View], parent: QObject
-    ) -> None:
+    def __init__(self, track: MapModel, session: Session, parent: QObject) -> None:
         super().__init__(parent)
         self.track, self._synthetic = track, session.maps.synthetic
-        self._view, self._partial = view, PartialMap(track)
-        self._jobs, self._results = session.jobs, session.results
+        self._partial, self._results = PartialMap(track), session.results
         self._playback = session.playback
-        self._job: Job | None = None
         self.denoiser: RemoteDenoiser | None = None  # the model in use
         self.words = ""
         self._texture: Texture | None = None
         self._movements: KnownMovements | None = None
+        self._sensor: object = None  # placement that the synthetic map is of
+        self._stale = True  # the synthetic map has changed since the model was asked
         self._held = False  # it follows the clock
-        self._reached: _Order | None = None  # by it; None: begin where it is
-        self._stepper = LatestRunner("live", self, self._take_live)
-        self._stepper.failed.connect(lambda _: self.set_live(False))
-        session.playback.frame_changed.connect(self._step)
-        self._runner = LatestRunner("denoise", self, self._receive)
-        self._runner.failed.connect(lambda error: self._fail(str(error)))
+        self._reached: _Reached | None = None  # by it; None: begin where it is
+        self._runner = ListedRunner("denoise", session.jobs, self, self._receive, self._fail)
+        self._runner.cancelled.connect(self._give_up)
         self._stumbled.connect(self._fail)
+        session.playback.frame_changed.connect(self._step)
         self._again = delayed(self._go_on, _BETWEEN_MS, self)
         self._took_s: deque[float] = deque(maxlen=5)
-        self._forget()
-
-    def _forget(self) -> None:
-        self._sensor: object = None  # placement that the synthetic map is of
-        self._order: _Order | None = None  # once the synthetic map stands
-        self._partial.forget()
-        self._restart()
-
-    def _restart(self) -> None:
-        """Mark all frames as not denoised."""
-        frames = self._synthetic.known.size
-        self._wanted = np.ones(frames, bool)  # not asked for since the synthetic map changed there
-        if self._partial.frames == frames:
-            self._partial.quality[:] = 0  # what is on screen stays until there is better
-        else:
-            self._partial.forget()
-        if self._order is not None:
-            self._order = _Order()
 
     # --- what is known --------------------------------------------------------------------
 
@@ -179,7 +154,7 @@ class DenoisedMap(BackgroundModel):
         self.words = words
         self.track.set_status(words)
         self._partial.forget()
-        self._restart()
+        self._stale = True
         if denoiser is None:
             self.track.set_map(None)
         elif not self._restore():
@@ -188,28 +163,22 @@ class DenoisedMap(BackgroundModel):
     def clear(self) -> None:
         """Remove the map."""
         self._stop()
-        self._forget()
+        self._sensor, self._stale = None, True
+        self._partial.forget()
         self.track.set_map(None)
 
-    def take(self, sensor: object, piece: View) -> None:
-        """Follow a changed piece of the synthetic map, all of which is for a placement now."""
+    def take(self, sensor: object) -> None:
+        """Follow the synthetic map, which has changed and is for a placement now."""
         self._took_s.clear()
         if not self._held:
             self.track.set_status(self.words)
         self._follow(sensor)
-        self._wanted[touched(piece, self._wanted.size)] = True
         if not self._restore() and not self._again.isActive():
-            self._go_on()
-
-    def finish(self) -> None:
-        """Replace previews, now that the synthetic map is complete."""
-        if self._order is None:
-            self._order = _Order()
             self._go_on()
 
     def postprocess(self) -> Postprocess | None:
         """Function that denoises a preview in the background; None without a model."""
-        denoiser, source = self.denoiser, self._synthetic.map
+        denoiser, source, texture = self.denoiser, self._synthetic.map, self._texture
         if denoiser is None or source is None or self._held or not self.keeps_up:
             return None
         if self._lacks_limbs:
@@ -219,8 +188,9 @@ class DenoisedMap(BackgroundModel):
             began = time.perf_counter()
             try:
                 made = denoiser.denoise(cut_out(source, part.start, part.values, part.limbs))
+                made = _drawn(texture, made, part.start)
             except Sd2Error as error:
-                self._stumbled.emit(str(error))
+                self._stumbled.emit(error)
                 return None
             self._took_s.append(time.perf_counter() - began)
             return Swept(denoiser, made)
@@ -232,14 +202,12 @@ class DenoisedMap(BackgroundModel):
         self._runner.cancel()
         self._again.stop()
         self._follow(sensor)
-        self._wanted[:] = True
         self._partial.quality[:] = 0
         if self.denoiser is None or self._held:
             return
         if swept is not None and swept.denoiser is self.denoiser:
-            stop = start + swept.doppler.values.shape[1]
-            self._paint(swept.doppler.values, (start, stop), swept.doppler)
-            self._wanted[start:stop] = False
+            self._paint(start, swept.doppler)
+            self._stale = not self._partial.full
         else:
             self.track.set_status(f"{self.words} · {_WAITS}")
         self._publish()
@@ -271,21 +239,41 @@ class DenoisedMap(BackgroundModel):
         frame = self._synthetic.frame_at(clock.time_s)
         if not self._held or source is None or denoiser is None or frame is None:
             return
-        if self._stepper.busy or self._lacks_limbs:
+        if self._runner.busy or self._lacks_limbs:
             return
         longest = _JUMP_S * source.timebase.frames_per_s * clock.speed
         if self._reached is None or not -1 <= frame - self._reached.next <= longest:
-            self._reached = _Order(frame)
+            self._reached = _Reached(frame)
         ahead = self._synthetic.known[self._reached.next : frame + 1]
         if ahead.size and ahead.all():
-            self._stepper.submit(self._in_order(self._reached, frame + 1))
+            self._runner.submit(self._advance(self._reached, frame + 1))
+
+    def _advance(self, reached: _Reached, stop: int) -> Callable[[Emit], _Answer]:
+        """Go on to a frame, with what the model remembers of those before."""
+        source, denoiser, start = self._synthetic.map, self.denoiser, reached.next
+        texture = self._texture
+        assert source is not None
+        assert denoiser is not None
+        stretch = source.between(start, stop)
+        energies = input_of(stretch, denoiser.card.parts).copy()
+        like = replace(stretch, kind="denoised", meta={}, uncertainty=None, limbs=None)
+
+        def work(emit: Emit) -> _Answer:
+            session = reached.session or denoiser.live()
+            began = time.perf_counter()
+            answers = session.advance(energies, stretch.present_mask)
+            cost_s = (time.perf_counter() - began) / len(answers)
+            made = _drawn(texture, replace(like, values=answers.T), start)
+            return _Answer(start, made, cost_s, session)
+
+        return work
 
     def _take_live(self, answer: _Answer) -> None:
         assert self.denoiser is not None
         if self._reached is not None and self._reached.session is None:
             self._partial.quality[:] = 0  # it began here
-        self._reached = _Order(answer.piece[1], answer.session)
-        self._paint(answer.values, answer.piece, answer.like)
+        self._reached = _Reached(answer.start + len(answer.doppler.timebase), answer.session)
+        self._paint(answer.start, answer.doppler)
         self._publish()
         # A model that looks at a window of frames knows no later ones here.
         past = "" if self.denoiser.equals_batch else ", from past frames only"
@@ -304,111 +292,59 @@ class DenoisedMap(BackgroundModel):
         """Key of all that the denoised map depends on; None until the synthetic map is final."""
         return self._synthetic.key_with(self.denoiser, self._texture is not None)
 
-    @property
-    def _final(self) -> bool:
-        """True once no frame is a preview."""
-        frames = self._wanted.size
-        in_order = self._order is not None and self._order.next >= frames
-        return self._partial.full and (in_order or (frames <= AT_ONCE and not self._wanted.any()))
-
     def _restore(self) -> bool:
         """Show the map if it was made before of the same synthetic map, by the same model."""
-        kept = None if self._held or not self._wanted.any() else self._results.get(self._key)
+        kept = None if self._held else self._results.get(self._key)
         if kept is None:
             return False
         self._stop()
-        self._begin_like(kept)
-        self._partial.paint(0, kept.values, FINAL)
-        self._wanted[:] = False
-        self._order = _Order(self._wanted.size)
+        self._paint(0, kept)
+        self._stale = False
         self._publish()
         self._end()
         return True
 
     # --- denoising ------------------------------------------------------------------------
 
-    def _follow(self, sensor: object) -> None:
-        if self._wanted.size != self._synthetic.known.size:
-            self._restart()
-        if sensor != self._sensor:
-            self._sensor = sensor
+    def _restart(self) -> None:
+        """Mark all frames as not denoised; those on screen stay until there are better ones."""
+        self._stale = True
+        if self._partial.frames == self._synthetic.known.size:
             self._partial.quality[:] = 0
-            self._wanted[:] = True
-        self._order = None
+        else:
+            self._partial.forget()
+
+    def _follow(self, sensor: object) -> None:
+        if sensor != self._sensor or self._partial.frames != self._synthetic.known.size:
+            self._sensor = sensor
+            self._restart()
+        self._stale = True
 
     def _go_on(self) -> None:
         source, known, denoiser = self._synthetic.map, self._synthetic.known, self.denoiser
-        if source is None or denoiser is None or self._held or self._runner.busy:
+        texture = self._texture
+        if source is None or denoiser is None or self._held or not known.any():
             return
-        if self._lacks_limbs:
-            return  # they are on their way
-        wanted = known & self._wanted
-        piece = next_piece(wanted, self._view())
-        if piece is None:
-            if not self._go_on_in_order():
-                self._end()
+        if self._runner.busy or self._lacks_limbs:
             return
-        self._report(int(wanted.sum()))
-        first, last = piece
-        begin, end = with_context(known, piece)
-        # Copied: the values go on changing while the model works.
-        limbs = None if source.limbs is None else deepcopy(source.limbs.between(begin, end))
-        doppler = cut_out(source, begin, source.values[:, begin:end].copy(), limbs)
+        numbers = np.flatnonzero(known)
+        start, stop = int(numbers[0]), int(numbers[-1]) + 1
+        known = known[start:stop].copy()
+        self._stale = False
 
-        def work(emit: object) -> _Answer:
-            denoised = denoiser.denoise(doppler)
-            values = denoised.values[:, first - begin : last - begin]
-            return _Answer(piece, values, denoised)
-
-        self._wanted[first:last] = False
-        self._runner.submit(work)
-
-    def _go_on_in_order(self) -> bool:
-        """Denoise the next piece with what the model remembers of those before, if need be.
-
-        At another frame rate, and with a look ahead, pieces are not those of the whole: all at
-        once, as the command does.
-        """
-        source, denoiser, order = self._synthetic.map, self.denoiser, self._order
-        frames = self._wanted.size
-        if order is None or frames <= AT_ONCE or order.next >= frames:
-            return False
-        assert source is not None
-        assert denoiser is not None
-        self._report(frames - order.next)
-        if not (denoiser.equals_batch and is_regular(source.times_s, denoiser.card.frame_rate_hz)):
-            whole = cut_out(source, 0, source.values.copy(), deepcopy(source.limbs))
-
-            def at_once(emit: object) -> _Answer:
-                denoised = denoiser.denoise(whole)
-                return _Answer((0, frames), denoised.values, denoised, order)
-
-            self._runner.submit(at_once)
-            return True
-        self._runner.submit(self._in_order(order, min(order.next + AT_ONCE, frames)))
-        return True
-
-    def _in_order(self, order: _Order, stop: int) -> Callable[[object], _Answer]:
-        """Go on to a frame, with what the model remembers of those before."""
-        source, denoiser, start = self._synthetic.map, self.denoiser, order.next
-        assert source is not None
-        assert denoiser is not None
-        energies = input_of(source.between(start, stop), denoiser.card.parts).copy()
-        present = source.present_mask[start:stop]
-        like = replace(source, kind="denoised", meta={}, uncertainty=None, limbs=None)
-
-        def work(emit: object) -> _Answer:
-            session = order.session or denoiser.live()
+        def work(emit: Emit) -> _Answer:
             began = time.perf_counter()
-            answers = session.advance(energies, present)
-            cost_s = (time.perf_counter() - began) / len(answers)
-            return _Answer((start, stop), answers.T, like, order, session, cost_s)
+            # Not copied: if values change while they are read, they are read once more.
+            stretch = source.between(start, stop)
+            if not known.all():
+                stretch = replace(stretch, present=stretch.present_mask & known)
+            made = _drawn(texture, denoiser.denoise(stretch), start)
+            return _Answer(start, made, time.perf_counter() - began, known=known)
 
-        return work
+        self._runner.submit(work, "Denoising the map" if len(known) > _LISTED else "")
 
     def _end(self) -> None:
         """Everything is denoised: say which frames the model passes through."""
-        self._report(0)
         shown, key = self.track.map, self.track.key
         if shown is not None and key is not None and self._results.get(key) is None:
             kept = replace(shown, values=shown.values.copy())
@@ -423,121 +359,51 @@ class DenoisedMap(BackgroundModel):
         self.idle.emit()
 
     def _receive(self, answer: _Answer) -> None:
-        if answer.order is None:
-            self._paint(answer.values, answer.piece, answer.like)
-            self._publish()
-            # Pieces of a long clip follow each other at once; a short one begins again.
-            if self._wanted.size > AT_ONCE:
-                self.track.set_status(f"{self.words} · preview")
-                self._go_on()
-            elif (self._wanted & self._synthetic.known).any():
-                self._again.start()
-            else:
-                self._end()
+        if answer.session is not None:
+            self._take_live(answer)
             return
-        if answer.order is self._order:  # else it has begun again
-            last = answer.piece[1]
-            self._order = _Order(last, answer.session)
-            self._paint(answer.values, answer.piece, answer.like)
-            share = 100 * last // self._wanted.size
-            done = "" if share == 100 else f" · preview, {share} % final"
-            self.track.set_status(f"{self.words}{done}")
-            self._publish()
-        self._go_on()
+        self._paint(answer.start, answer.doppler, answer.known)
+        self._publish()
+        if self._stale:
+            self._again.start(max(_BETWEEN_MS, round(1e3 * _REST * answer.cost_s)))
+        else:
+            self._end()
 
-    def _begin_like(self, like: DopplerMap) -> None:
-        """Begin a map with the unit and the axis of another where there is none."""
+    def _paint(self, start: int, made: DopplerMap, known: NDArray[np.bool_] | None = None) -> None:
+        """Take over frames from ``start`` on, those that there was an input of."""
         source = self._synthetic.map
         assert source is not None
         if not self._partial.frames:
             empty, base = np.zeros_like(source.values), source.timebase
             self._partial.begin(
-                replace(like, values=empty, timebase=base, present=source.present, limbs=None)
+                replace(made, values=empty, timebase=base, present=source.present, limbs=None)
             )
-
-    def _paint(self, values: NDArray[np.float32], piece: View, like: DopplerMap) -> None:
-        """Take over a piece (bins, n)."""
-        self._begin_like(like)
-        if self._texture is not None:
-            values = self._texture.drawn(values.T, (TEXTURE_SEED,), piece[0]).T
-        known = self._synthetic.known[slice(*piece)]
-        self._partial.paint(piece[0], values, known.astype(np.uint8))
+        self._partial.paint(start, made.values, 1 if known is None else known.astype(np.uint8))
 
     def _publish(self) -> None:
-        self._partial.show(self._key if self._final else None)
-
-    def _report(self, left: int) -> None:
-        """Report a long clip as a task that can be cancelled."""
-        total = self._wanted.size
-        if left > AT_ONCE and self._job is None:
-            self._job = Job("Denoising the map", self._give_up)
-            self._jobs.start(self._job)
-        if self._job is not None:
-            self._jobs.report(self._job, total - left, total)
-            if left == 0:
-                self._end_job()
+        final = self._partial.full and not self._stale
+        self._partial.show(self._key if final else None)
 
     def _give_up(self) -> None:
-        """Cancel on the user's request; denoised frames stay."""
+        """Stay as it is, on the user's request."""
         self._stop()
-        self._order = None
-        self._wanted[:] = False
+        self._stale = False
         self.idle.emit()
 
-    def _fail(self, words: str) -> None:
+    def _fail(self, error: Exception) -> None:
+        if self._held:
+            self.set_live(False)
+            return
         self._stop()
         self.denoiser = None
         self._partial.forget()
         self.track.set_map(None)
-        self.failed.emit(words)
+        self.failed.emit(str(error))
 
     def _stop(self) -> None:
         self._runner.cancel()
-        self._stepper.cancel()
         self._reached = None
         self._again.stop()
-        self._end_job()
-
-    def _end_job(self) -> None:
-        self._jobs.finish(self._job)
-        self._job = None
-
-
-def next_piece(wanted: NDArray[np.bool_], view: View) -> View | None:
-    """Part to be denoised next, half-open; None when there is none.
-
-    ``wanted``, shape (T,), is true for known frames without an answer. Frames in ``view``
-    come first, then those that follow, then those before.
-    """
-    if len(wanted) <= AT_ONCE:
-        return (0, len(wanted)) if wanted.any() else None
-    for start, stop in (view, (view[1], len(wanted)), (0, view[0])):
-        numbers = np.flatnonzero(wanted[start:stop])
-        if numbers.size:
-            first = start + int(numbers[0])
-            last = start + int(numbers[numbers < numbers[0] + AT_ONCE][-1])
-            return first, last + 1
-    return None
-
-
-def with_context(known: NDArray[np.bool_], piece: View) -> View:
-    """Part with the known frames before and after it.
-
-    It begins where a window does that is cut from the whole clip.
-    """
-    first, last = piece[0], piece[1]
-    wanted = max(first - CONTEXT, 0)
-    before = known[wanted - wanted % (LENGTH - OVERLAP) : first][::-1]
-    after = known[last : last + CONTEXT]
-    return (
-        first - (len(before) if before.all() else int(before.argmin())),
-        last + (len(after) if after.all() else int(after.argmin())),
-    )
-
-
-def touched(piece: View, frames: int) -> slice:
-    """Range of frames whose preview depends on a stretch."""
-    return slice(max(piece[0] - CONTEXT, 0), min(piece[1] + CONTEXT, frames))
 
 
 def cut_out(
@@ -546,3 +412,10 @@ def cut_out(
     """Part of a map, with other values (bins, frames), and its split."""
     inside = replace(doppler, uncertainty=None, limbs=None).between(start, start + values.shape[1])
     return replace(inside, values=values, limbs=limbs)
+
+
+def _drawn(texture: Texture | None, made: DopplerMap, start: int) -> DopplerMap:
+    """Frames of a map from ``start`` on, with the radar's texture where one is wanted."""
+    if texture is None:
+        return made
+    return replace(made, values=texture.drawn(made.values.T, (TEXTURE_SEED,), start).T)

@@ -57,7 +57,7 @@ class DenoiseModel(ReportingModel):
         self._session, self._synthesis, self._library = session, synthesis, library
         self._document, self._synthetic = session.document, session.maps.synthetic
         self.map, self.before_map = (
-            DenoisedMap(track, session, synthesis.frames_in_view, self)
+            DenoisedMap(track, session, self)
             for track in (session.maps.denoised, session.maps.before)
         )
         self.path: Path | None = None  # of the model that is in use or being loaded
@@ -81,7 +81,7 @@ class DenoiseModel(ReportingModel):
         synthesis.postprocess = self._postprocess
         synthesis.painted.connect(self._take)
         synthesis.completed.connect(self._wake)
-        synthesis.completed.connect(self._finish)
+        synthesis.completed.connect(self._check_parts)
         self._synthetic.changed.connect(self._watch)
         for signal in (self._synthetic.changed, self.changed):
             signal.connect(self._keep_place)
@@ -335,17 +335,12 @@ class DenoiseModel(ReportingModel):
             self.failed.emit(words)
         self.changed.emit()
 
-    def _finish(self) -> None:
-        if self._synthesis.complete:
-            made = self._synthetic.map
-            known = made is not None and made.limbs is not None and made.limbs.of_everybody
-            if self.card is not None and self.card.parts and not known:
-                self._miss_parts(self.card)
-            for one in (self.map, self.before_map):
-                one.finish()
-
-    def _miss_parts(self, card: ModelCard) -> None:
-        """Take the model for the map alone, or say why the chosen one cannot be used."""
+    def _check_parts(self) -> None:
+        """Without parts of the body, take the model for the map, or say that one needs them."""
+        card, made = self.card, self._synthetic.map
+        known = made is not None and made.limbs is not None and made.limbs.of_everybody
+        if card is None or not card.parts or known or not self._synthesis.complete:
+            return
         self.map.use(None)
         self._loaded = None
         if self._choice == _UNSAID:
@@ -367,10 +362,9 @@ class DenoiseModel(ReportingModel):
         return lambda swept: [part and part(swept) for part in parts]
 
     def _take(self, part: Part) -> None:
-        piece = (part.start, part.stop)
         for number, one in enumerate((self.map, self.before_map)):
             if self._synthesis.moving:
                 made = part.more[number] if part.more is not None else None
                 one.take_sweep(part.sensor, part.start, made)
             else:
-                one.take(part.sensor, piece)
+                one.take(part.sensor)

@@ -10,8 +10,7 @@ import pytest
 from fake_classifiers import CLASSES, FakeClassifier, FakeClassifiers, class_card, expected
 
 from sd2app.classify.model import reading_text
-from sd2app.classify.track import ClassTrack
-from sd2app.denoise.map import AT_ONCE
+from sd2app.classify.track import _AT_ONCE, ClassTrack
 from sd2app.session.maps import MapModel
 from sd2core.errors import Sd2Error
 from sd2core.maps import DopplerMap
@@ -267,11 +266,11 @@ def test_another_frame_rate_is_asked_about_as_a_whole(set_up):
 
 
 def test_a_long_map_comes_piece_by_piece(set_up):
-    doppler = a_map(frames=2 * AT_ONCE + 10)
+    doppler = a_map(frames=2 * _AT_ONCE + 10)
     set_up.source.set_map(doppler)
     set_up.settle()
     assert set_up.fake.sessions == 1
-    assert set_up.fake.frames == 2 * AT_ONCE + 10
+    assert set_up.fake.frames == 2 * _AT_ONCE + 10
     assert set_up.track.complete
 
 

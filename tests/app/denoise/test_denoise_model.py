@@ -385,58 +385,48 @@ def test_a_recording_with_the_same_model_needs_no_loading(context, models, qtbot
 # --- long clips ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("rate_hz", [30.0, 25.0])
-def test_a_long_clip_is_a_preview_first_and_then_what_it_is_as_a_whole(
-    context, models, qtbot, ball, monkeypatch, rate_hz
+def test_a_clip_is_denoised_while_it_is_synthesised_and_in_the_end_as_a_whole(
+    context, models, qtbot, ball, monkeypatch
 ):
-    """At the model's frame rate piece after piece, at another one all at once."""
-    for path, card in models.cards.items():
-        models.cards[path] = replace(card, frame_rate_hz=rate_hz)
-    monkeypatch.setattr(denoised_map, "AT_ONCE", 16)
-    # Far too little for this model, which remembers half of its answer.
-    monkeypatch.setattr(denoised_map, "CONTEXT", 1)
-    monkeypatch.setattr(denoised_map, "LENGTH", denoised_map.OVERLAP + 1)
+    from sd2app.maps import model as maps_model
+    from sd2app.maps import quality
+
+    monkeypatch.setattr(quality, "AT_ONCE", 1)  # a few frames of the map after another
+    monkeypatch.setattr(maps_model, "AT_ONCE", 1)
+    monkeypatch.setattr(denoised_map, "_BETWEEN_MS", 0)
     open_it(context, qtbot, ball)
     context.span.set_span(2.0, 2.5)
-    rest(context, qtbot)
-    shown, said = [], []
-    track = context.denoised
-    track.changed.connect(
-        lambda: shown.append(np.flatnonzero(track.covered)) if track.covered is not None else None
-    )
-    track.status_changed.connect(lambda: said.append(track.status))
     context.denoise.use(next(iter(models.cards)))
     rest(context, qtbot)
-    # What is in view comes first.
-    assert next(frames for frames in shown if frames.size).tolist() == list(range(60, 75))
-    pieces = [frames for frames, _ in models.asked]
-    assert (max(pieces) <= 16 + 2) == (rate_hz == 30.0)
-    assert models.in_order == (FRAMES if rate_hz == 30.0 else 0)
-    assert is_of(context, 2.0)
-    assert context.denoised.key is not None  # it is kept
-    assert "simulated data only · preview" in said
-    assert said[-1] == "simulated data only"
-    # A hand at the sensor, and all of it is for the new place.
+    models.asked.clear()
+    track, covered, keys = context.denoised, [], []
+    track.changed.connect(lambda: covered.append(track.known.copy()))
+    track.changed.connect(lambda: keys.append(track.key))
     context.edits.place_sensor(VirtualSensor(position_m=(1.0, 0.0, 0.0)))
     rest(context, qtbot)
-    assert models.in_order == (2 * FRAMES if rate_hz == 30.0 else 0)
+    # What is in view comes first, and nothing is shown that there was no input of.
+    first = next(known for known in covered if known.any())
+    assert set(np.flatnonzero(first)) <= set(range(60, 75))
+    assert len(models.asked) > 1
+    assert models.asked[-1][0] == FRAMES
     assert is_of(context, 2.0)
+    assert track.key is not None  # it is kept
+    assert all(key is None for key, known in zip(keys, covered, strict=True) if not known.all())
 
 
-def test_pieces_begin_where_windows_of_the_whole_clip_do():
-    known = np.ones(2000, bool)
-    begin, end = denoised_map.with_context(known, (1000, 1200))
-    assert begin % 62 == 0
-    assert 1000 - 288 - 62 < begin <= 1000 - 288
-    assert end == 1200 + 288
-    known[900] = known[1300] = False
-    assert denoised_map.with_context(known, (1000, 1200)) == (901, 1300)
-    assert denoised_map.with_context(known, (0, 2000)) == (0, 2000)
+def test_a_model_of_another_frame_rate_gives_what_it_gives_the_whole_clip(
+    context, models, qtbot, ball
+):
+    for path, card in models.cards.items():
+        models.cards[path] = replace(card, frame_rate_hz=25.0)
+    open_it(context, qtbot, ball)
+    context.denoise.use(next(iter(models.cards)))
+    rest(context, qtbot)
+    assert is_of(context, 2.0)
 
 
 def test_a_long_clip_is_a_job_that_can_be_cancelled(context, models, qtbot, ball, monkeypatch):
-    monkeypatch.setattr(denoised_map, "AT_ONCE", 8)
-    monkeypatch.setattr(denoised_map, "CONTEXT", 40)
+    monkeypatch.setattr(denoised_map, "_LISTED", 8)
     open_it(context, qtbot, ball)
     models.gate.clear()
     context.denoise.use(next(iter(models.cards)))
