@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QMessageBox, QWidget
 
-from sd2app.background.latest import Emit, LatestRunner, ReportingModel
+from sd2app.background.latest import Emit, ReportingModel
 from sd2app.feature import Shell
 from sd2app.labels.model import LabelsModel
 from sd2app.manual.help import with_help
@@ -33,7 +34,8 @@ from sd2app.widgets.panel import copy_button, rule, say, sentence, side_by_side
 from sd2app.widgets.text import counted, quoted
 from sd2core.cli.labels import Convert
 from sd2core.cli.labels.recording import Cut as CutCommand
-from sd2core.cutouts.cutting import Cut, cut_out, plan_cuts, without_frame
+from sd2core.cli.running import explanation
+from sd2core.cutouts.cutting import cut_out, plan_cuts, without_frame
 from sd2core.cutouts.source import CutSource, Part
 from sd2core.errors import Sd2Error
 from sd2core.labels.formats import LabelFormat, Loss, all_formats, would_lose, write_labels
@@ -63,7 +65,7 @@ def export_labels(shell: Shell, session: Session, labels: LabelsModel) -> None:
 class LabelExportDialog(Dialog):
     """Choice of a format; accepted once the file is written.
 
-    The losses are computed by writing to a temporary folder. ``name`` is proposed for the file.
+    ``name`` is proposed for the file.
     """
 
     written = Signal(str)  # a sentence on it
@@ -79,11 +81,8 @@ class LabelExportDialog(Dialog):
         super().__init__("Export labels", parent)
         self._labels, self._timebase, self._name = labels, timebase, name
         self._recording, self._media = recording, recording.video
-        self.losses: tuple[Loss, ...] | None = None  # of the format; None while unknown
+        self.losses: tuple[Loss, ...] | None = None  # of the format; None: it cannot be written
         self.problem = ""  # why the file cannot be written
-        self.exporting = False
-        self._runner = LatestRunner("labels", self, self._receive, self._refuse)
-        self.finished.connect(lambda _: self._runner.close())
         self._format = Choice("The program that is to read the file", self)
         self._formats = all_formats()
         self._format.addItems([one.title for one in self._formats])
@@ -111,57 +110,43 @@ class LabelExportDialog(Dialog):
 
     def export(self, path: Path) -> None:
         """Write the file, with the usual suffix where the name has none."""
-        labels, base, chosen, media = self._labels, self._timebase, self.format, self._media
+        labels, chosen = self._labels, self.format
         known = [suffix for one in all_formats() for suffix in one.suffixes]
         target = with_suffix(path, chosen.suffixes[0], known)
-        if target != path and target.exists():
-            # The user was not asked about that one.
-            remedy = "Type the ending as well to replace it"
-            self._refuse(Sd2Error(f"{target} exists", "another name", remedy))
+        try:
+            if target != path and target.exists():
+                # The user was not asked about that one.
+                remedy = "Type the ending as well to replace it"
+                raise Sd2Error(f"{target} exists", "another name", remedy)
+            losses = write_labels(target, labels, self._timebase, chosen.name, media=self._media)
+        except (Sd2Error, OSError) as error:
+            self.problem = str(explanation(error))
+            self._refresh()
             return
-
-        def write(emit: Emit) -> str:
-            losses = write_labels(target, labels, base, chosen.name, media=media)
-            kept = " ".join(["Not kept:", *(f"{loss}." for loss in losses)])
-            text = f"Wrote {target} with {counted(len(labels.spans), 'span')}."
-            return f"{text} {kept if losses else 'The file holds everything.'}"
-
-        self.exporting, self.problem = True, ""
-        self._runner.submit(write)
-        self._refresh()
+        kept = " ".join(["Not kept:", *(f"{loss}." for loss in losses)])
+        text = f"Wrote {target} with {counted(len(labels.spans), 'span')}."
+        self.written.emit(f"{text} {kept if losses else 'The file holds everything.'}")
+        self.accept()
 
     def _look(self) -> None:
         self.losses, self.problem = None, ""
-        labels, base, name, media = self._labels, self._timebase, self.format.name, self._media
-        self._runner.submit(lambda emit: tuple(would_lose(labels, base, name, media=media)))
-        self._refresh()
-
-    def _receive(self, result: str | tuple[Loss, ...]) -> None:
-        if isinstance(result, str):
-            self.exporting = False
-            self.written.emit(result)
-            self.accept()
-        else:
-            self.losses = result
-            self._refresh()
-
-    def _refuse(self, error: Exception) -> None:
-        self.exporting, self.problem = False, str(error)
+        labels, base, name = self._labels, self._timebase, self.format.name
+        try:
+            self.losses = tuple(would_lose(labels, base, name, media=self._media))
+        except (Sd2Error, OSError) as error:
+            self.problem = str(explanation(error))
         self._refresh()
 
     def _refresh(self) -> None:
         chosen = self.format
         about = f"{', '.join(chosen.suffixes)}, opened by {chosen.made_for}. {chosen.remark}"
         self._about.setText(about.strip())
-        if self.losses is None:
-            text = "Computing the losses…"
-        elif not self.losses:
-            text = "It holds everything: read back, the labels are the same."
-        else:
+        text = "It holds everything: read back, the labels are the same."
+        if self.losses:
             lines = "\n".join(f"• {one}." for one in self.losses)
             text = f"It cannot hold everything:\n{lines}"
         say(self._message, self.problem or text, "warning" if self.problem else "muted")
-        self._buttons.show_state(possible=self.losses is not None, exporting=self.exporting)
+        self._buttons.show_state(possible=self.losses is not None)
 
     def _ask(self) -> None:
         chosen = self.format
@@ -185,23 +170,15 @@ class SpanGroup(NamedTuple):
     labels: tuple[str, ...] | None = ()  # for the command; None: it cannot choose just these
 
 
-class _Plan(NamedTuple):
-    source: CutSource
-    cuts: list[Cut]
-    folder: Path
-
-
 class CutOutModel(ReportingModel):
-    """Cuts spans out into folders; asks first where a folder holds something else."""
+    """Cuts spans out into folders."""
 
-    asked = Signal(int, str)  # number of occupied folders, one of them; answer: go_on or give_up
     noted = Signal(str)
 
     def __init__(self, session: Session, synthesis: SynthesisModel, parent: QObject) -> None:
         super().__init__(parent)
         self._session, self._synthesis = session, synthesis
-        self._plan: _Plan | None = None
-        self._runner = ListedRunner("cut", session.jobs, self, self._receive, self._fail)
+        self._runner = ListedRunner("cut", session.jobs, self, self.noted.emit, self._fail)
 
     def source(self, parts: Iterable[Part] = ("video", "mesh", "maps")) -> CutSource | None:
         """Return the parts of the recording, without maps that are still computed."""
@@ -247,55 +224,53 @@ class CutOutModel(ReportingModel):
         cut = CutCommand(recording=folder, out=out, label=labels, parts=shown, maps=maps)
         return quoted(words_of("labels cut", cut))
 
-    def start(self, spans: Sequence[Span], parts: Iterable[Part], folder: Path) -> None:
-        """Compare with the folder, then export."""
-        source = self.source(parts)
-        if source is not None:
-            self._runner.submit(
-                lambda emit: _Plan(source, plan_cuts(source, spans, folder), folder),
-                _title(len(spans)),
-            )
+    def start(
+        self,
+        spans: Sequence[Span],
+        parts: Iterable[Part],
+        folder: Path,
+        replaces: Callable[[Sequence[str]], bool | None],
+    ) -> None:
+        """Export in the background.
 
-    def go_on(self, *, replace_others: bool) -> None:
-        """Export; folders that hold something else are replaced or kept."""
-        plan, self._plan = self._plan, None
-        if plan is None:
+        Parameters
+        ----------
+        spans, parts : sequence of Span, iterable of Part
+            What is cut out.
+        folder : Path
+            Holds a folder per span; complete ones stay, so a stopped export goes on from there.
+        replaces : callable
+            Given the names of folders that hold something else, says if they are replaced; None:
+            nothing is exported.
+
+        Raises
+        ------
+        Sd2Error
+            When no span has a frame of the recording.
+        """
+        source = self.source(parts)
+        if source is None:
+            return
+        cuts = plan_cuts(source, spans, folder)
+        others = [cut.path.name for cut in cuts if cut.state == "other"]
+        replace_others = replaces(others) if others else False
+        if replace_others is None:
             return
 
         def cut(emit: Emit) -> str:
             written = cut_out(
-                plan.source,
-                plan.cuts,
-                plan.folder,
+                source,
+                cuts,
+                folder,
                 replace_others=replace_others,
                 progress=lambda done, total: emit((done, total)),
             )
-            words = f"{counted(len(written), 'span')} cut out into {plan.folder}."
-            same = sum(one.state != "empty" for one in plan.cuts) - len(written)
+            words = f"{counted(len(written), 'span')} cut out into {folder}."
+            same = sum(one.state != "empty" for one in cuts) - len(written)
             words += f" {same} stayed as they were." if same else ""
-            return words + without_frame(plan.cuts)
+            return words + without_frame(cuts)
 
-        self._runner.submit(cut, _title(len(plan.cuts)))
-
-    def give_up(self) -> None:
-        """Stop; complete folders stay, and the next export continues from there."""
-        self._runner.cancel()
-        self._plan = None
-
-    def _receive(self, result: _Plan | str) -> None:
-        if isinstance(result, str):
-            self.noted.emit(result)
-            return
-        self._plan = result
-        others = [cut.path.name for cut in result.cuts if cut.state == "other"]
-        if others:
-            self.asked.emit(len(others), others[0])
-        else:
-            self.go_on(replace_others=False)
-
-
-def _title(count: int) -> str:
-    return f"Cutting out {counted(count, 'span')}"
+        self._runner.submit(cut, f"Cutting out {counted(len(cuts), 'span')}")
 
 
 def ask_for_cut_outs(shell: Shell, labels: LabelsModel, model: CutOutModel) -> None:
@@ -311,25 +286,23 @@ def ask_for_cut_outs(shell: Shell, labels: LabelsModel, model: CutOutModel) -> N
         return
     spans, parts = dialog.spans, dialog.parts
     if folder := ask_folder(shell.dialog_parent, "Folder for the cut-outs"):
-        model.start(spans, parts, folder)
+        replaces = partial(_ask_about_others, shell.dialog_parent)
+        shell.attempt(lambda: model.start(spans, parts, folder, replaces))
 
 
-def ask_about_others(parent: QWidget, model: CutOutModel, count: int, example: str) -> None:
-    """Ask what to do with folders that hold something else."""
+def _ask_about_others(parent: QWidget, others: Sequence[str]) -> bool | None:
+    """Whether folders that hold something else are replaced; None where the user cancels."""
     box = QMessageBox(parent)
     box.setWindowTitle("Replace cut-outs?")
-    folders = counted(count, "folder")
-    box.setText(f"{folders} of the same name hold something else, such as {example}.")
+    folders = counted(len(others), "folder")
+    box.setText(f"{folders} of the same name hold something else, such as {others[0]}.")
     replace = box.addButton("Replace", QMessageBox.ButtonRole.DestructiveRole)
     keep = box.addButton("Keep them", QMessageBox.ButtonRole.AcceptRole)
     box.addButton(QMessageBox.StandardButton.Cancel)
     box.setDefaultButton(keep)
     box.exec()
-    if box.clickedButton() in (replace, keep):
-        model.go_on(replace_others=box.clickedButton() is replace)
-    else:
-        model.give_up()
     box.deleteLater()
+    return {replace: True, keep: False}.get(box.clickedButton())
 
 
 def _groups(labels: Labels, selected: Sequence[Span]) -> list[SpanGroup]:

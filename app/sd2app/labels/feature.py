@@ -14,7 +14,7 @@ from sd2app.labels.actions import LabelActions, LabelTracks, editing, offer_trac
 from sd2app.labels.autosave import LabelAutosave
 from sd2app.labels.dragging import LabelDragging, SpanDragger
 from sd2app.labels.edits import LabelEdits, LabelMarking
-from sd2app.labels.exports import CutOutModel, ask_about_others, ask_for_cut_outs, export_labels
+from sd2app.labels.exports import CutOutModel, ask_for_cut_outs, export_labels
 from sd2app.labels.import_dialog import import_labels, is_label_file
 from sd2app.labels.loop import SpanLoop
 from sd2app.labels.model import LabelsModel
@@ -57,9 +57,6 @@ class LabelsFeature(Feature):
         self.loop = SpanLoop(labels, session.playback, session.parent)
         self.over_maps, self.over_all = map_overlay(labels), strip_overlay(labels)
         self.cut_out = CutOutModel(session, synthesis, session.parent)
-        self.cut_out.asked.connect(
-            lambda *others: ask_about_others(shell.dialog_parent, self.cut_out, *others)
-        )
         self.edits.done_at.connect(session.span.reveal_any)
         self.edits.failed.connect(shell.warn)
         self.edits.restoring.connect(session.edits.restore)

@@ -1,4 +1,4 @@
-"""Import of labels: a file is read in the background, shown, and taken as the user chooses."""
+"""Import of labels: a file is read, shown, and taken as the user chooses."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from typing import Any
 from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QLabel, QWidget
 
-from sd2app.background.latest import Emit, LatestRunner
 from sd2app.feature import Shell
 from sd2app.labels.edits import LabelEdits
 from sd2app.manual.help import with_help
@@ -18,9 +17,11 @@ from sd2app.session.content import UNTITLED
 from sd2app.widgets.dialogs import Dialog, accepted, accepting, ask_file
 from sd2app.widgets.inputs import Choice, NumberBox
 from sd2app.widgets.layouts import column_of, form_of
-from sd2app.widgets.panel import FactRows, copy_button, rule, say, sentence, title
+from sd2app.widgets.panel import FactRows, copy_button, rule, sentence, show_words, title
 from sd2app.widgets.text import counted, quoted
 from sd2core.cli.labels import Convert
+from sd2core.cli.running import explanation
+from sd2core.errors import Sd2Error
 from sd2core.io.imu_columns import holds_inertial_signals
 from sd2core.labels.formats import (
     FORMATS,
@@ -115,14 +116,11 @@ class LabelImportDialog(Dialog):
         super().__init__("Import labels", parent)
         self._recording = recording
         self._path, self._labels, self._timebase = path, labels, timebase
-        self.reading: LabelReading | None = None  # what the file has; None while reading
+        self.reading: LabelReading | None = None  # what the file has; None: it cannot be read
         self.incoming: Incoming | None = None  # the same, fitted to the recording
         self.problem = ""  # why the file cannot be read
         self.observations: tuple[str, ...] = ()  # to choose from, where there are several videos
         self._observed: str | None = None
-        self._runner = LatestRunner("labels", self, self._receive, self._refuse)
-        self.finished.connect(lambda _: self._runner.close())
-        self._runner.partial.connect(self._learn)
         self._format = Choice(
             "The program that the file is of",
             self,
@@ -136,7 +134,7 @@ class LabelImportDialog(Dialog):
         self._observation.currentTextChanged.connect(self._observe)
         self._observation_name = QLabel("Observation", self)
         self._facts = FactRows(_MAX_FACTS, at_the_edge=False, parent=self)
-        self._message, self._consequence = sentence(""), sentence("")
+        self._message, self._consequence = sentence("", "warning"), sentence("")
         self._way = Choice("What becomes of the labels that are there", self, _WAYS)
         self._way.show_value("add" if labels.spans else "replace")
         self._way.currentIndexChanged.connect(self._refresh)
@@ -225,35 +223,21 @@ class LabelImportDialog(Dialog):
             self._read()
 
     def _read(self) -> None:
-        self.incoming, self.problem = None, ""
+        self.reading, self.incoming, self.problem = None, None, ""
         path, name, base = self._path, self._format.currentData(), self._timebase
-        observation, mark_s = self._observed, self._mark.value() or None
-
-        def read(emit: Emit) -> tuple[LabelReading, Incoming]:
-            emit(names := observations(path, name))
-            chosen = observation or next(iter(names), None)
-            reading = read_label_file(path, base, name, observation=chosen, mark_s=mark_s)
-            return reading, Incoming.of(reading.labels, base)
-
-        self._runner.submit(read)
-        self._refresh()
-
-    def _learn(self, names: tuple[str, ...]) -> None:
-        self.observations = names if len(names) > 1 else ()
-        self._observed = self._observed or next(iter(self.observations), None)
-
-    def _receive(self, result: tuple[LabelReading, Incoming]) -> None:
-        self.reading, self.incoming = result
-        self._refresh()
-
-    def _refuse(self, error: Exception) -> None:
-        self.problem = str(error)
+        try:
+            names = observations(path, name)
+            self.observations = names if len(names) > 1 else ()
+            self._observed = self._observed or next(iter(self.observations), None)
+            chosen, mark_s = self._observed or next(iter(names), None), self._mark.value() or None
+            self.reading = read_label_file(path, base, name, observation=chosen, mark_s=mark_s)
+            self.incoming = Incoming.of(self.reading.labels, base)
+        except (Sd2Error, OSError) as error:
+            self.problem = str(explanation(error))
         self._refresh()
 
     def _refresh(self) -> None:
-        message = self.problem or ("" if self.incoming is not None else "Reading…")
-        say(self._message, message, "warning" if self.problem else "muted")
-        self._message.setVisible(bool(message))
+        show_words(self._message, self.problem)
         self._facts.show_facts(self.facts())
         for widget in (self._observation_name, self._observation):
             widget.setVisible(bool(self.observations))

@@ -147,7 +147,7 @@ class ExportButtons(QDialogButtonBox):
         self._export.clicked.connect(ask)
         self.rejected.connect(dialog.reject)
 
-    def show_state(self, *, possible: bool, exporting: bool) -> None:
+    def show_state(self, *, possible: bool, exporting: bool = False) -> None:
         """Follow the state: something can be exported, or is being written."""
         self._export.setEnabled(possible and not exporting)
         self._export.setText("Exporting…" if exporting else "Export…")

@@ -27,18 +27,12 @@ def of(*spans: tuple[float, float, str]) -> Labels:
 
 @pytest.fixture
 def importing(qtbot):
-    models = []
-
     def read(path: Path, here: Labels = HERE) -> LabelImportDialog:
         model = LabelImportDialog(path, here, FRAMES)
         qtbot.addWidget(model)
-        models.append(model)
-        qtbot.waitUntil(lambda: bool(model.incoming or model.problem), timeout=10_000)
         return model
 
-    yield read
-    for model in models:
-        model.reject()
+    return read
 
 
 def test_the_preview_says_what_becomes_of_everything(importing, tmp_path) -> None:
@@ -82,7 +76,7 @@ def test_a_file_without_spans_is_shown_as_that(importing, tmp_path) -> None:
     assert dict(model.facts()) == {"Spans": "none", "Tracks": "1: Gestures", "Labels": "none"}
 
 
-def test_of_several_videos_in_a_file_one_is_chosen(importing, tmp_path, qtbot) -> None:
+def test_of_several_videos_in_a_file_one_is_chosen(importing, tmp_path) -> None:
     path = tmp_path / "project.boris"
     write_labels(path, of((1.0, 2.0, "wave")), FRAMES)
     project = json.loads(path.read_text("utf-8"))
@@ -96,7 +90,6 @@ def test_of_several_videos_in_a_file_one_is_chosen(importing, tmp_path, qtbot) -
     assert model.observations == (name, "later")
     assert model.incoming.labels.spans[0].start_s == 1.0
     named(model, "Which of the videos", Choice).setCurrentText("later")
-    qtbot.waitUntil(lambda: model.incoming is not None, timeout=10_000)
     assert model.incoming.labels.spans[0].start_s == 2.0
 
 
@@ -108,18 +101,14 @@ def test_what_is_a_label_file() -> None:
 def test_an_export_says_its_losses_before_and_after(qtbot, tmp_path) -> None:
     model = LabelExportDialog(HERE, FRAMES, Recording(Path("walk.sd2")), "mine")
     qtbot.addWidget(model)
-    qtbot.waitUntil(lambda: model.losses is not None, timeout=10_000)
     assert model.losses == ()
     model.findChild(Choice).setCurrentText("Audacity")
-    qtbot.waitUntil(lambda: model.losses is not None, timeout=10_000)
     assert "notes" in {loss.what for loss in model.losses}
     assert model.line == "sd2 labels convert walk.sd2 --out mine.txt --to audacity"
     model.export(tmp_path / "no such folder" / "mine.txt")
-    qtbot.waitUntil(lambda: bool(model.problem), timeout=10_000)
-    assert not model.exporting
+    assert "No such file" in model.problem
     with qtbot.waitSignal(model.written, timeout=10_000) as said:
         model.export(tmp_path / "mine")
-        assert not model.problem
     (text,), path = said.args, tmp_path / "mine.txt"
     assert text.startswith(f"Wrote {path} with ")
     assert "keeps no notes: 1 note left out" in text
@@ -131,7 +120,7 @@ def test_an_export_says_its_losses_before_and_after(qtbot, tmp_path) -> None:
 
 
 def test_what_of_the_file_was_not_read_is_listed_and_marks_get_a_length(
-    importing, qtbot, tmp_path
+    importing, tmp_path
 ) -> None:
     path = tmp_path / "ben.csv"
     path.write_text("label,start,end\nwave,1,2\nwave,n/a,3\ntap,5,5\n")
@@ -139,5 +128,4 @@ def test_what_of_the_file_was_not_read_is_listed_and_marks_get_a_length(
     assert "1 left out (line 3: start_s is 'n/a')" in dict(model.facts())["Of the file"]
     assert model.incoming.labels.spans[-1].duration_s == pytest.approx(0.1)
     named(model, "Length of marks without a duration", NumberBox).setValue(0.5)
-    qtbot.waitUntil(lambda: model.incoming is not None, timeout=10_000)
     assert model.incoming.labels.spans[-1].duration_s == pytest.approx(0.5)

@@ -130,7 +130,7 @@ def test_a_command_cannot_choose_single_spans(window, qtbot) -> None:
 
 def test_cancelled_it_leaves_whole_folders_only(window, qtbot, cuts) -> None:
     c = models_of(window)
-    c.cut_out.start(c.labels.labels.spans, ("video", "mesh", "maps"), cuts)
+    c.cut_out.start(c.labels.labels.spans, ("video", "mesh", "maps"), cuts, lambda _: False)
     (job,) = c.jobs.jobs
     assert job.title == "Cutting out 2 spans"
     c.jobs.cancel(job)
