@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -161,25 +161,22 @@ class ClassifyModel(ReportingModel, SpanFinder):
         """True once every frame of the map is classified."""
         return self.track.complete
 
-    def look(self, threshold: float) -> Callable[[], SearchResult]:
-        """Make the search, to be run in the background."""
+    def look(self, threshold: float) -> SearchResult:
+        """Search."""
         source, card = self.source, self.track.card
         assert source is not None
         assert source.map is not None
         assert card is not None
-        doppler, shares = source.map, self.track.shares.copy()
-        timebase = doppler.timebase.shifted(source.offset_s)
-        options = PredictedSpans(min_confidence=threshold / 100.0 or None)
-        names = {name: self.label_of(name) for name in card.classes}
-
-        def look() -> SearchResult:
-            spans = predicted_spans(
-                shares, timebase, card.classes, options, present=doppler.present
-            )
-            named = tuple(replace(span, label=names[span.label]) for span in spans)
-            return SearchResult(named, "" if named else "Nothing: no gesture is that sure")
-
-        return look
+        doppler = source.map
+        spans = predicted_spans(
+            self.track.shares,
+            doppler.timebase.shifted(source.offset_s),
+            card.classes,
+            PredictedSpans(min_confidence=threshold / 100.0 or None),
+            present=doppler.present,
+        )
+        named = tuple(replace(span, label=self.label_of(span.label)) for span in spans)
+        return SearchResult(named, "" if named else "Nothing: no gesture is that sure")
 
     def words(self, recording: Path, threshold: float) -> list[str]:
         """Words of ``sd2 classify apply``."""

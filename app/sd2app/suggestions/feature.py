@@ -130,7 +130,6 @@ class SuggestionsFeature(Feature):
         finders = (MotionFinder(searched), *others)
         self.model = SuggestionsModel(edits, finders, session.parent)
         self.changing = self.model.changed, *(track.came_or_went for track in searched)
-        self.closing = (self.model,)
 
     def actions(self) -> Sequence[Action]:
         """Find, accept, reject."""

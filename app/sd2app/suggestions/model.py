@@ -1,20 +1,20 @@
-"""Suggested spans: who finds them, found in the background, then decided one by one."""
+"""Suggested spans: who finds them, found, then decided one by one."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from PySide6.QtCore import QObject, SignalInstance
+from PySide6.QtCore import QObject, Signal, SignalInstance
 
-from sd2app.background.latest import LatestRunner, ProblemModel
 from sd2app.labels.edits import LabelEdits
 from sd2app.session.content import folder_for_command
 from sd2app.session.maps import MapModel
 from sd2app.widgets.text import counted, quoted
 from sd2core.cli.labels.suggest import Suggest
+from sd2core.errors import Sd2Error
 from sd2core.labels.field_edits import offer, pending, reject, take
 from sd2core.labels.spans import Labels, Span
 from sd2core.labels.suggest import LABEL, motion_energy_db, suggest_spans
@@ -73,8 +73,8 @@ class SpanFinder:
     def wake(self) -> None:
         """Begin to get ready; a map is made anyway."""
 
-    def look(self, threshold: float) -> Callable[[], SearchResult]:
-        """Make the search, to be run in the background."""
+    def look(self, threshold: float) -> SearchResult:
+        """Search; Sd2Error where the map is damaged."""
         raise NotImplementedError
 
     def words(self, recording: Path, threshold: float) -> list[str]:
@@ -105,22 +105,19 @@ class MotionFinder(SpanFinder):
         """True if the map is complete."""
         return self.source is not None and self.source.covered is None
 
-    def look(self, threshold: float) -> Callable[[], SearchResult]:
-        """Make the search, to be run in the background."""
+    def look(self, threshold: float) -> SearchResult:
+        """Search; Sd2Error where the map is damaged."""
         source = self.source
         assert source is not None
         assert source.map is not None
         doppler = source.map.shifted(source.offset_s)
-        options = SuggestOptions(**_levels(threshold))
-
-        def look() -> SearchResult:
-            spans = suggest_spans(doppler, options)
-            loudest_db = float(np.nanmax(motion_energy_db(doppler), initial=0.0))
-            if loudest_db < threshold:
-                return SearchResult(spans, f"Nothing: the loudest frame has {loudest_db:.1f} dB")
+        if spans := suggest_spans(doppler, SuggestOptions(**_levels(threshold))):
             return SearchResult(spans)
-
-        return look
+        loudest_db = float(np.nanmax(motion_energy_db(doppler), initial=0.0))
+        short = loudest_db >= threshold
+        return SearchResult(
+            (), "" if short else f"Nothing: the loudest frame has {loudest_db:.1f} dB"
+        )
 
     def words(self, recording: Path, threshold: float) -> list[str]:
         """Words of ``sd2 labels suggest``."""
@@ -135,7 +132,7 @@ def _levels(threshold_db: float) -> dict[str, Any]:
     return {"high_db": threshold_db, "low_db": low_db}
 
 
-class SuggestionsModel(ProblemModel):
+class SuggestionsModel(QObject):
     """Suggested spans to be accepted or rejected; the spans themselves are among the labels.
 
     Another threshold takes the place of the step before as long as nothing else was done, so
@@ -143,21 +140,22 @@ class SuggestionsModel(ProblemModel):
     recording is open. The first of ``finders`` is the default.
     """
 
+    changed = Signal()
+
     def __init__(self, edits: LabelEdits, finders: Sequence[SpanFinder], parent: QObject) -> None:
         super().__init__(parent)
         self.finders, self.finder = tuple(finders), finders[0]
         self.active = False  # while the bar of suggestions is shown
+        self.waiting = False  # for the map to be complete, and classified where that is searched
+        self.problem = ""  # why the search failed; empty where it did not
         self.pending: tuple[Span, ...] = ()  # neither accepted nor rejected
         self._edits, self._labels, self._playback = edits, edits.labels, edits.playback
         self._stack = edits.undo_stack
-        self._wanted = False
         self._thresholds = {finder.title: finder.threshold.usual for finder in finders}
         self._if_none = ""
         self._why_not = ""  # of the finder, when it was last looked at
         self._declined: tuple[Span, ...] = ()
         self._made: tuple[Labels, int] | None = None
-        self._runner = LatestRunner("suggest", self, self._receive, self._refuse)
-        self._runner.idle_changed.connect(lambda _: self.changed.emit())
         self._labels.changed.connect(self._follow)
         self._labels.selection_changed.connect(self.changed)
         for finder in finders:
@@ -165,11 +163,6 @@ class SuggestionsModel(ProblemModel):
                 signal.connect(self._begin_if_complete)
 
     # --- what is there --------------------------------------------------------------------
-
-    @property
-    def busy(self) -> bool:
-        """True during a search, or while its map is being computed."""
-        return self._runner.busy or self._wanted
 
     @property
     def threshold(self) -> float:
@@ -194,12 +187,10 @@ class SuggestionsModel(ProblemModel):
         if why_not or source is None:
             # Those of a file can be decided on before their map is there.
             return to_decide if self.pending and not self.problem else why_not
-        if self._wanted:
+        if self.waiting:
             title = source.title.lower()
             waits = source.covered is not None
             return f"Waiting for the map: {title}" if waits else f"Classifying the map: {title}"
-        if self._runner.busy:
-            return "Looking…"
         if self.pending:
             return to_decide
         return self._if_none or "No suggestions left to decide on"
@@ -228,9 +219,8 @@ class SuggestionsModel(ProblemModel):
             self._look()
 
     def stop(self) -> None:
-        """Stop the search and hide the bar; suggestions that are there stay."""
-        self._runner.cancel()
-        self.active = self._wanted = False
+        """Wait for no map any more, and hide the bar; suggestions that are there stay."""
+        self.active = self.waiting = False
         self.changed.emit()
 
     def set_threshold(self, threshold: float) -> None:
@@ -251,8 +241,7 @@ class SuggestionsModel(ProblemModel):
         self._made, self._if_none, self.problem = None, "", ""
         for finder in self.finders:
             finder.set_source(None)
-        self._runner.cancel()
-        self._wanted, self.active = False, bool(self.pending)
+        self.waiting, self.active = False, bool(self.pending)
         self.changed.emit()
 
     # --- deciding -------------------------------------------------------------------------
@@ -309,26 +298,27 @@ class SuggestionsModel(ProblemModel):
 
     def _look(self) -> None:
         self.problem = self._if_none = ""
-        if not self.active or self.finder.why_not:
-            self._runner.cancel()
-            self._wanted = False
-            self.changed.emit()
-            return
-        self.finder.wake()
-        self._wanted = not self.finder.ready
-        if not self._wanted:
-            look = self.finder.look(self.threshold)
-            self._runner.submit(lambda emit: look())
+        self.waiting = False
+        if self.active and not self.finder.why_not:
+            self.finder.wake()
+            self.waiting = not self.finder.ready
+            if not self.waiting:
+                self._search()
         self.changed.emit()
 
     def _begin_if_complete(self) -> None:
         before, self._why_not = self._why_not, self.finder.why_not
-        if self._wanted:
+        if self.waiting:
             self._look()
         elif self.active and self._why_not != before:
             self.changed.emit()
 
-    def _receive(self, result: SearchResult) -> None:
+    def _search(self) -> None:
+        try:
+            result = self.finder.look(self.threshold)
+        except Sd2Error as error:
+            self.problem = str(error)
+            return
         self._if_none = result.if_none
         labels, step = self._made or (None, 0)
         if labels is self._labels.labels and step == self._stack.index():
@@ -342,7 +332,6 @@ class SuggestionsModel(ProblemModel):
         after = self._labels.labels
         self._made = (after, self._stack.index()) if after is not before else None
         self._go_on(self._playback.time_s)
-        self.changed.emit()
 
     def _follow(self) -> None:
         now = pending(self._labels.labels)

@@ -49,7 +49,7 @@ class KnownSpans:
             Span(2, "Suggestions", 8.0, 9.0, "up-to-down", confidence=0.6, origin="suggestion"),
         )
         named = tuple(span for span in spans if span.confidence >= threshold / 100)
-        return lambda: SearchResult(named, "" if named else "Nothing that sure")
+        return SearchResult(named, "" if named else "Nothing that sure")
 
 
 @pytest.fixture
@@ -64,13 +64,11 @@ def set_up(qtbot):
 
     def look(threshold_db: float | None = None) -> None:
         model.start() if threshold_db is None else model.set_threshold(threshold_db)
-        qtbot.waitUntil(lambda: not model.busy, timeout=10_000)
 
-    yield SimpleNamespace(
+    return SimpleNamespace(
         model=model, labels=labels, playback=playback, real=real, edits=edits,
         stack=edits.undo_stack, look=look,
     )  # fmt: skip
-    model.close()
 
 
 def starts(spans) -> list[int]:
@@ -162,15 +160,14 @@ def test_all_at_once(set_up) -> None:
     assert set_up.model.text == "No suggestions left to decide on"
 
 
-def test_a_map_that_is_being_computed_is_waited_for(set_up, qtbot) -> None:
+def test_a_map_that_is_being_computed_is_waited_for(set_up) -> None:
     model, real = set_up.model, set_up.real
     whole = real.map
     real.set_map(whole, np.arange(600) < 300)
     model.start()
-    assert model.busy
+    assert model.waiting
     assert model.text == "Waiting for the map: real"
     real.set_map(whole)
-    qtbot.waitUntil(lambda: not model.busy, timeout=10_000)
     assert len(model.pending) == 3
 
 
@@ -219,11 +216,10 @@ def test_suggestions_of_a_file_are_to_be_decided_on_without_looking(set_up) -> N
     assert (taken.origin, taken.label) == ("person", "background")
 
 
-def test_what_says_which_gesture_it_is_keeps_that_and_how_sure_it_is(set_up, qtbot) -> None:
+def test_what_says_which_gesture_it_is_keeps_that_and_how_sure_it_is(set_up) -> None:
     model, labels = set_up.model, set_up.labels
     labels.set_label("down-to-up")
     model.start(model.finders[1])
-    qtbot.waitUntil(lambda: not model.busy, timeout=10_000)
     assert [(span.label, span.confidence) for span in model.pending] == [
         ("horizontal", 0.9),
         ("up-to-down", 0.6),
@@ -241,20 +237,17 @@ def test_what_says_which_gesture_it_is_keeps_that_and_how_sure_it_is(set_up, qtb
     assert [span.label for span in model.pending] == ["up-to-down"]
 
 
-def test_each_way_of_finding_has_its_own_threshold(set_up, qtbot) -> None:
+def test_each_way_of_finding_has_its_own_threshold(set_up) -> None:
     model = set_up.model
     set_up.look()
     assert model.accepted_as == labels_in_use(set_up)
     model.set_finder(model.finders[1])
-    qtbot.waitUntil(lambda: not model.busy, timeout=10_000)
     assert starts(model.pending) == [5, 8]
     model.set_threshold(95.0)
-    qtbot.waitUntil(lambda: not model.busy, timeout=10_000)
     assert not model.pending
     assert model.text == "Nothing that sure"
     model.set_finder(model.finders[0])
     assert model.threshold == 7.0
-    qtbot.waitUntil(lambda: not model.busy, timeout=10_000)
     assert starts(model.pending) == [5, 10, 15]
     # Trying ways is one step, as trying thresholds is.
     assert set_up.stack.index() == 1

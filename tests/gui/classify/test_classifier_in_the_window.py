@@ -64,7 +64,7 @@ def labels(window):
 
 def found(window, qtbot):
     key(window, "G", SHIFT)
-    qtbot.waitUntil(lambda: not models_of(window).suggestions.busy, timeout=10_000)
+    qtbot.waitUntil(lambda: not models_of(window).suggestions.waiting, timeout=10_000)
 
 
 def press(view, text, qtbot):
@@ -238,7 +238,7 @@ def test_how_sure_it_must_be_is_typed(classified, qtbot):
     limit = round(100 * sure[0]) + 1
     qtbot.keyClicks(box, str(limit))
     qtbot.keyClick(box, Qt.Key.Key_Return)
-    qtbot.waitUntil(lambda: not c.suggestions.busy, timeout=10_000)
+    qtbot.waitUntil(lambda: not c.suggestions.waiting, timeout=10_000)
     assert c.suggestions.threshold == limit
     assert len(c.suggestions.pending) < many
 

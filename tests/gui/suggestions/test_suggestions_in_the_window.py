@@ -51,7 +51,8 @@ def key(window, qtbot, name: str, modifier=NONE) -> None:
 
 def asked(window, qtbot) -> None:
     key(window, qtbot, "F")
-    qtbot.waitUntil(lambda: not models_of(window).suggestions.busy, timeout=10_000)
+    qtbot.waitUntil(lambda: not models_of(window).suggestions.waiting, timeout=10_000)
+    qtbot.waitUntil(window.action("accept_suggestion").isEnabled)
 
 
 def decided(window) -> list[tuple[str, str]]:
