@@ -80,6 +80,7 @@ class SpanTable(CellTable):
         self._model, self._edits, self._session, self._shell = model, edits, session, shell
         self._labels, self._playback = edits.labels, session.playback
         self._mirroring = False
+        self._row = -1  # that was current last
         self.setModel(model)
         self.setItemDelegate(SpanCells(model, edits.labels, self))
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
@@ -160,7 +161,7 @@ class SpanTable(CellTable):
     def selectionChanged(self, selected: QItemSelection, deselected: QItemSelection) -> None:
         """Select the chosen rows' spans in the whole window."""
         super().selectionChanged(selected, deselected)
-        if not (self._mirroring or self._model.following):
+        if not self._mirroring:
             # By ranges: rows one by one are asked for every cell, which takes seconds.
             spans = self._model.rows
             ranges = cast(Iterable[QItemSelectionRange], self.selectionModel().selection())
@@ -171,7 +172,8 @@ class SpanTable(CellTable):
     def currentChanged(self, current: QModelIndex, previous: QModelIndex) -> None:
         """Go to the span of the current cell."""
         super().currentChanged(current, previous)
-        if not (self._mirroring or self._model.following):
+        self._row = current.row()
+        if not self._mirroring:
             self._go(current)
 
     def _go(self, index: QModelIndex) -> None:
@@ -192,7 +194,7 @@ class SpanTable(CellTable):
 
     def mirror(self) -> None:
         """Select the rows of the spans selected elsewhere."""
-        if not self.isVisible() or self._model.following:
+        if not self.isVisible():
             return
         rows = sorted(
             row for one in self._labels.selected if (row := self._model.row_of(one.id)) is not None
@@ -213,6 +215,10 @@ class SpanTable(CellTable):
                 current = self._model.index(rows[0], column)
                 self.selectionModel().setCurrentIndex(current, flags.NoUpdate)
                 self.scrollTo(current)
+            elif not self.currentIndex().isValid() and self._row >= 0:  # its span is gone
+                row = min(self._row, self._model.rowCount() - 1)
+                current = self._model.index(row, 0)
+                self.selectionModel().setCurrentIndex(current, flags.NoUpdate)
         finally:
             self._mirroring = False
 

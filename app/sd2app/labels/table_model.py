@@ -6,15 +6,14 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QModelIndex, QObject, Qt, Signal
 from PySide6.QtGui import QIcon
 
 from sd2app.labels.edits import LabelEdits
 from sd2app.widgets.icons import swatch_icon
-from sd2app.widgets.record_table import NO_PARENT, Heading, Index, RecordTableModel
+from sd2app.widgets.record_table import Heading, Index, RecordTableModel
 from sd2app.widgets.text import counted
 from sd2core.errors import Sd2Error
-from sd2core.labels.comparison import same_ends
 from sd2core.labels.edits import Change, Side
 from sd2core.labels.field_edits import SpanField, change_spans
 from sd2core.labels.spans import Span
@@ -184,7 +183,7 @@ class SpanFilter:
 
 
 class SpanTableModel(RecordTableModel[Span]):
-    """A row per span. Rows are moved rather than rebuilt, so that a view keeps its current span."""
+    """A row per span."""
 
     noted = Signal(str)  # a typed time could not be reached
 
@@ -194,10 +193,9 @@ class SpanTableModel(RecordTableModel[Span]):
         ]
         super().__init__(headings, parent)
         self._labels, self._playback, self._edits = edits.labels, edits.playback, edits
-        self._row_of: dict[int, int] | None = None
+        self._row_of: dict[int, int] = {}
         self._filter = SpanFilter()
         self._by, self._falling = COLUMNS[0], False
-        self.following = False  # rows change because the labels have, not by the user's choice
         self._labels.changed.connect(self._follow)
 
     # --- what is shown --------------------------------------------------------------------
@@ -215,8 +213,6 @@ class SpanTableModel(RecordTableModel[Span]):
 
     def row_of(self, span_id: int) -> int | None:
         """Return the row of a span, or None."""
-        if self._row_of is None:
-            self._row_of = {span.id: row for row, span in enumerate(self.rows)}
         return self._row_of.get(span_id)
 
     def choices(self, listed: str) -> list[str]:
@@ -254,55 +250,20 @@ class SpanTableModel(RecordTableModel[Span]):
         rows = self._filter.keeps(self._labels.labels.spans)
         if self._by.id != "start" or self._falling:
             rows.sort(key=self._by.order, reverse=self._falling)
-        self.following = True
-        try:
-            self._show(rows)
-        finally:
-            self.following = False
+        self._show(rows)
 
     def _show(self, rows: list[Span]) -> None:
-        by_id = {span.id: span for span in rows}
-        self._replace([by_id.get(span.id, span) for span in self.rows])
-        before = self.rows
-        head, tail = same_ends(rows, before)
-        if len(rows) == len(before) and all(span.id in by_id for span in before):
-            if head < len(rows):
-                self._reorder(rows)
-            return
-        if (stop := len(before) - tail) > head:
-            self.beginRemoveRows(NO_PARENT, head, stop - 1)
-            self._assign([*before[:head], *before[stop:]])
-            self.endRemoveRows()
-        if (stop := len(rows) - tail) > head:
-            self.beginInsertRows(NO_PARENT, head, stop - 1)
-            self._assign(rows)
-            self.endInsertRows()
-
-    def _reorder(self, rows: list[Span]) -> None:
+        """Show spans; what points at one of them goes along."""
         self.layoutAboutToBeChanged.emit()
         held = self.persistentIndexList()
         ids = [self.rows[index.row()].id for index in held]
-        self._assign(rows)
+        self.rows, self._row_of = rows, {span.id: row for row, span in enumerate(rows)}
         moved = [
-            self.index(self.row_of(one) or 0, index.column())
+            QModelIndex() if (row := self.row_of(one)) is None else self.index(row, index.column())
             for one, index in zip(ids, held, strict=True)
         ]
         self.changePersistentIndexList(held, moved)
         self.layoutChanged.emit()
-
-    def _replace(self, rows: list[Span]) -> None:
-        """Other spans in the same rows: report the rows that look different."""
-        changed = [row for row, span in enumerate(rows) if span is not self.rows[row]]
-        self._assign(rows)
-        if not changed:
-            # Perhaps the colours of the label set, which are in the cells too.
-            changed = [0, len(rows) - 1]
-        if rows:
-            last = self.index(changed[-1], len(COLUMNS) - 1)
-            self.dataChanged.emit(self.index(changed[0], 0), last)
-
-    def _assign(self, rows: Sequence[Span]) -> None:
-        self.rows, self._row_of = rows, None
 
     # --- cells ----------------------------------------------------------------------------
 

@@ -107,6 +107,7 @@ def test_one_selection_in_table_and_timeline(labelled) -> None:
     assert rows == [1]
     assert table(labelled).currentIndex().row() == 1
     press(labelled, "Delete")
+    assert table(labelled).currentIndex().row() == 0, "the next one, or the last"
     assert spans(labelled) == [THERE]
     assert c.document.undo_stack.undoText() == "Delete span"
 
