@@ -302,7 +302,8 @@ def _ask_about_others(parent: QWidget, others: Sequence[str]) -> bool | None:
     box.setDefaultButton(keep)
     box.exec()
     box.deleteLater()
-    return {replace: True, keep: False}.get(box.clickedButton())
+    clicked = box.clickedButton()
+    return clicked is replace if clicked in (replace, keep) else None
 
 
 def _groups(labels: Labels, selected: Sequence[Span]) -> list[SpanGroup]:

@@ -80,21 +80,13 @@ class MapModel(QObject):
         self.growing = False  # frames are being added at its end
         self.awaited = False  # is going to be made: its place is kept while it is not there
         self.status = ""  # quality of the map in a few words, e.g. "exact"
-        self._gaps: tuple[tuple[int, int], ...] = ()
-        self._strongest: float | None = None
-        self._added: tuple[DopplerMap, NDArray[np.float32]] | None = None  # parts of which map
 
     @property
     def values(self) -> NDArray[np.float32]:
         """Values on screen, (bins, frames): the map's, or of some parts of the body or people."""
         assert self.map is not None
-        split = self.split
-        if not split:
-            return self.map.values
-        if self._added is None or self._added[0] is not self.map:
-            values = [*split.values()]
-            self._added = self.map, values[0] if len(values) == 1 else np.sum(values, axis=0)
-        return self._added[1]
+        split = [*self.split.values()]
+        return np.sum(split, axis=0) if split else self.map.values
 
     @property
     def split(self) -> dict[str, NDArray[np.float32]]:
@@ -115,7 +107,8 @@ class MapModel(QObject):
     @property
     def gaps_s(self) -> tuple[tuple[float, float], ...]:
         """Stretches without a person, half-open on the recording's clock."""
-        return self._seconds(self._gaps)
+        present = None if self.map is None else self.map.present
+        return () if present is None else self._seconds(runs(~present))
 
     @property
     def covered_s(self) -> tuple[tuple[float, float], ...]:
@@ -134,9 +127,8 @@ class MapModel(QObject):
     @property
     def strongest_db(self) -> float:
         """Level of the strongest bin of the map, minus infinity for an empty one."""
-        if self._strongest is None:
-            self._strongest = float(self.values.max()) if self.map is not None else 0.0
-        return float(self.levels_db(np.array(self._strongest, np.float32)))
+        empty = self.map is None
+        return -np.inf if empty else self.levels_db(self.values.max(keepdims=True)).item()
 
     def set_map(
         self,
@@ -151,9 +143,6 @@ class MapModel(QObject):
         self.covered = covered
         self.key = key
         self.uncertainty = None
-        present = None if doppler_map is None else doppler_map.present
-        self._gaps = () if present is None else runs(~present)
-        self._strongest = None
         self.changed.emit()
         if came_or_went:
             self.came_or_went.emit()
@@ -178,7 +167,6 @@ class MapModel(QObject):
         """Show some parts of the body alone, or (none) all of it."""
         if parts != self.parts:
             self.parts = parts
-            self._strongest = self._added = None
             self.changed.emit()
 
     def set_offset(self, offset_s: float) -> None:
