@@ -123,7 +123,7 @@ def feature_of(name: str) -> str:
 @pytest.fixture(scope="module")
 def views(files: Mapping[str, Path]) -> set[str]:
     """Modules of the window that make widgets."""
-    widgets = ("PySide6.QtWidgets", "pyvista", "vtkmodules")
+    widgets = ("PySide6.QtWidgets", "vtkmodules")
     return {
         name
         for name, file in files.items()

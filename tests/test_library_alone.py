@@ -26,12 +26,11 @@ from tests.environments import (
     site_packages,
 )
 
-WINDOW = {"PySide6-Essentials", "pyvista", "pyvistaqt", "vtk"}
+WINDOW = {"PySide6-Essentials", "vtk"}
 LEARNING = {"torch"}
 ABSENT = (
     "PySide6",
     "anny",
-    "pyvista",
     "shiboken6",
     "torch",
     "vtk",

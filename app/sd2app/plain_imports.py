@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import builtins
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from types import ModuleType
-
-_kept: list[Callable[..., ModuleType]] = []
-"""PySide's ``import``, once it was replaced."""
 
 
 @contextmanager
@@ -20,21 +16,6 @@ def plain_imports() -> Iterator[None]:
     tenth of the start.
     """
     plain = builtins.__import__
-    try:
-        yield
-    finally:
-        _kept.append(builtins.__import__)
-        builtins.__import__ = plain
-
-
-@contextmanager
-def imports_of_qt() -> Iterator[None]:
-    """Import as PySide does: Python's own ``from PySide6.QtCore import *`` finds next to nothing.
-
-    PySide makes its classes when they are first asked for, by name or by its own ``import *``.
-    """
-    plain = builtins.__import__
-    builtins.__import__ = _kept[0] if _kept else plain
     try:
         yield
     finally:

@@ -5,10 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
-import pytest
-
 PLAIN = """
-from sd2app.plain_imports import imports_of_qt, plain_imports
+from sd2app.plain_imports import plain_imports
 import builtins
 own = builtins.__import__
 with plain_imports():
@@ -17,8 +15,5 @@ assert builtins.__import__ is own
 """
 
 
-@pytest.mark.parametrize("module", ["PySide6.QtCore", "qtpy.QtCore"])
-def test_all_of_qts_names_are_there_for_who_takes_them_at_once(module: str) -> None:
-    star = f"with imports_of_qt():\n    from {module} import *\nassert QEventLoop and QObject\n"
-    after = "assert builtins.__import__ is own\n"
-    subprocess.run([sys.executable, "-c", PLAIN + star + after], check=True)
+def test_qt_leaves_pythons_own_import_in_place() -> None:
+    subprocess.run([sys.executable, "-c", PLAIN], check=True)

@@ -1,14 +1,10 @@
-"""Draws off-screen and paints the picture: for software OpenGL and for tests.
-
-Plain VTK, because importing pyvista's plotter costs a second (matplotlib).
-"""
+"""Draws off-screen, by GPU or software, and paints the picture."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
 
 import numpy as np
 import vtkmodules.vtkRenderingOpenGL2 as opengl
@@ -20,11 +16,20 @@ from vtkmodules.vtkCommonCore import vtkLogger, vtkObject, vtkUnsignedCharArray
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
 
 from sd2app.background.latest import delayed
-from sd2app.scene.backend import GL_BROKEN, GL_MISSING, NoOpenGL, Prepare, missing_library
 
+GL_BROKEN = (
+    "The 3D view needs OpenGL, and no OpenGL driver answers on this machine. "
+    "On Debian or Ubuntu: sudo apt-get install libgl1-mesa-dri libegl-mesa0. Then start again."
+)
 _IDLE_MS = 160
 _SUPERSAMPLING = 2
 _MAX_PIXELS = 4_000_000
+Prepare = Callable[[tuple[float, float], float], None]
+"""Called right before a rendering with the widget's size and the pixel scale."""
+
+
+class NoOpenGL(RuntimeError):
+    """OpenGL does not work here; the message is for the user."""
 
 
 class ImageBackend(QWidget):
@@ -38,9 +43,6 @@ class ImageBackend(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         # Before the widget: one that was made half must not remain in its parent.
-        library = missing_library("image")
-        if library is not None:
-            raise NoOpenGL(GL_MISSING.format(library=library))
         window = _off_screen_window()
         super().__init__(parent)
         self._window: vtkRenderWindow | None = window
@@ -56,11 +58,6 @@ class ImageBackend(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-
-    @property
-    def widget(self) -> QWidget:
-        """The widget itself."""
-        return self
 
     def start(self, prepare: Prepare) -> None:
         """Draw from now on."""
@@ -135,25 +132,13 @@ def _off_screen_window() -> vtkRenderWindow:
     """Make a window that needs no screen; NoOpenGL where no driver would draw in it."""
     uses_egl = sys.platform.startswith("linux") and hasattr(opengl, "vtkEGLRenderWindow")
     # Left to itself VTK tries the X server first and complains when there is none.
-    kind = opengl.vtkEGLRenderWindow if uses_egl else vtkRenderWindow
-    with _quiet_vtk():
-        if not _answers(kind):
-            raise NoOpenGL(GL_BROKEN)
-        return _small(kind)
-
-
-def _small(kind: type[vtkRenderWindow]) -> vtkRenderWindow:
-    window = kind()
+    window = opengl.vtkEGLRenderWindow() if uses_egl else vtkRenderWindow()
     window.SetOffScreenRendering(True)
     window.SetMultiSamples(0)
-    window.SetSize(64, 48)
+    with _quiet_vtk():
+        if not window.SupportsOpenGL():
+            raise NoOpenGL(GL_BROKEN)
     return window
-
-
-@cache
-def _answers(kind: type[vtkRenderWindow]) -> bool:
-    """True if OpenGL works; asked once, because each answer costs a render window."""
-    return bool(_small(kind).SupportsOpenGL())
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, get_args
 
@@ -12,11 +12,11 @@ from PySide6.QtCore import QEvent, QObject, QPointF, QSize, Qt
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QMouseEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import QMenu, QWidget
 
-from sd2app.scene.backend import NoOpenGL, chosen_backend
 from sd2app.scene.camera import Preset
 from sd2app.scene.colours import SceneColours
 from sd2app.scene.inertial import LIMB_HINT, PLACING_HINT, InertialHand, LimbHand
 from sd2app.scene.navigation import Navigator
+from sd2app.scene.offscreen_backend import ImageBackend, NoOpenGL
 from sd2app.scene.overlay import Overlay
 from sd2app.scene.scene import Scene
 from sd2app.session.maps import part_words
@@ -30,14 +30,10 @@ if TYPE_CHECKING:
     from sd2app.imu.model import ImuModel
     from sd2app.maps.limbs import LimbsModel
     from sd2app.maps.model import SynthesisModel
-    from sd2app.scene.offscreen_backend import ImageBackend
-    from sd2app.scene.opengl_backend import InteractorBackend
     from sd2app.sensor.placements import PlacementsModel
     from sd2app.session.session import Session
     from sd2core.mesh.sequence import MeshSequence
     from sd2core.mesh.things import Surroundings
-
-    Backend = InteractorBackend | ImageBackend
 
 _MOUSE = (
     QEvent.Type.MouseMove,
@@ -70,12 +66,12 @@ class SceneView(QWidget):
         super().__init__()
         self._session, self._synthesis, self._placements = session, synthesis, placements
         self._inertial = inertial
-        self._backend: Backend | None = None
+        self._backend: ImageBackend | None = None
         self.menu_parts: Sequence[MenuPart] = ()
         self.setMinimumSize(200, 150)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         try:
-            self._backend = make_backend(self)
+            self._backend = ImageBackend(self)
         except NoOpenGL as problem:
             self._explain(str(problem))
             return
@@ -91,7 +87,7 @@ class SceneView(QWidget):
         self._dragged = False
         self._around: Surroundings | None = None
         self._others: tuple[MeshSequence, ...] = ()
-        self._backend.widget.installEventFilter(self)
+        self._backend.installEventFilter(self)
         self._followed = (
             (session.display.theme_changed, self._follow_theme),
             (session.display.mesh_changed, self._follow_colour),
@@ -138,7 +134,7 @@ class SceneView(QWidget):
         if backend is not None:
             for signal, slot in self._followed:
                 signal.disconnect(slot)
-            backend.widget.removeEventFilter(self)
+            backend.removeEventFilter(self)
             backend.shut_down()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -158,10 +154,6 @@ class SceneView(QWidget):
             self.navigator.leave()
             self.overlay.show_reading((0.0, 0.0), "")
             self.overlay.hint = PLACING_HINT if self.inertial_hand.placing else ""
-        elif kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
-            # QtInteractor would take them; they belong to the window.
-            event.ignore()
-            return True
         else:
             if kind == QEvent.Type.Hide:
                 self.navigator.let_go()
@@ -392,32 +384,14 @@ class SceneView(QWidget):
             shape = Qt.CursorShape.CrossCursor
         else:
             shape = Qt.CursorShape.ArrowCursor
-        if self._backend.widget.cursor().shape() != shape:
-            self._backend.widget.setCursor(shape)
+        if self._backend.cursor().shape() != shape:
+            self._backend.setCursor(shape)
 
     def _explain(self, problem: str) -> None:
         label = sentence(problem)
         label.setParent(self)
         label.setAlignment(Qt.AlignmentFlag.AlignCenter)
         label.setMargin(24)
-
-
-def make_backend(parent: QWidget) -> Backend:
-    """Make the backend that suits the machine, off-screen when the other one fails.
-
-    Raises NoOpenGL, with a message for the user, if neither works.
-    """
-    try:
-        if chosen_backend() == "gl":
-            with suppress(NoOpenGL, ImportError):
-                from sd2app.scene.opengl_backend import InteractorBackend
-
-                return InteractorBackend(parent)
-        from sd2app.scene.offscreen_backend import ImageBackend
-
-        return ImageBackend(parent)
-    except ImportError as error:
-        raise NoOpenGL(f"The 3D view cannot be loaded: {error}.") from error
 
 
 def _place(event: QMouseEvent | QWheelEvent) -> tuple[float, float]:

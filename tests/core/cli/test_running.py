@@ -227,7 +227,7 @@ HEAVY = (
     "torch",
     "anny",
 )
-WINDOW = ("PySide6", "shiboken6", "vtk", "vtkmodules", "pyvista", "pyvistaqt", "pyqtgraph")
+WINDOW = ("PySide6", "shiboken6", "vtk", "vtkmodules", "pyqtgraph")
 
 
 @pytest.mark.parametrize(

@@ -19,14 +19,13 @@ SIZE = (600, 450)
 
 
 @pytest.fixture
-def make_stage(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], Stage]]:
-    """Build a stage with one of the two backends."""
+def make_stage(qtbot: Any) -> Iterator[Callable[[], Stage]]:
+    """Build a stage."""
     made: list[Stage] = []
 
-    def make(backend: str) -> Stage:
+    def make() -> Stage:
         from sd2app.scene.view import SceneView
 
-        monkeypatch.setenv("SD2_SCENE", backend)
         document, synthesis, placements = Document(), Synthesis(), Placements()
         playback, sensor, display = PlaybackModel(), SensorModel(), DisplayModel()
         inertial, placing, limbs = Inertial(), Mode(document), Limbs()
@@ -55,9 +54,9 @@ def make_stage(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable
 
 
 @pytest.fixture
-def stage(make_stage: Callable[[str], Stage]) -> Stage:
-    """A stage that draws off-screen, with two plates seen from the camera."""
-    made = make_stage("image")
+def stage(make_stage: Callable[[], Stage]) -> Stage:
+    """A stage with two plates seen from the camera."""
+    made = make_stage()
     made.open(two_plates())
     made.view.set_view("camera")
     made.view.grab()

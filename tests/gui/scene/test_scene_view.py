@@ -1,4 +1,4 @@
-"""The 3D view with the off-screen backend: colours, gestures, models."""
+"""The 3D view: colours, gestures, models."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel, QMenu
 from scene_stage import LEFT, RIGHT, Stage, two_plates
 
-from sd2app.scene import backend as choose
 from sd2app.scene import offscreen_backend as image_backend
 from sd2app.scene.colours import SceneColours
 from sd2app.scene.navigation import Target
@@ -380,14 +379,6 @@ def test_a_mesh_that_cannot_be_read_any_more_is_said(stage: Stage) -> None:
     assert "taken away" in stage.view.overlay.message
 
 
-def test_when_the_window_cannot_be_drawn_into_the_picture_is_painted(
-    make_stage: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(choose, "_has_no_window", lambda: False)
-    monkeypatch.setitem(sys.modules, "pyvistaqt", None)
-    assert isinstance(make_stage("gl").view._backend, image_backend.ImageBackend)
-
-
 def test_an_unknown_view_is_an_error(stage: Stage) -> None:
     with pytest.raises(ValueError, match="behind"):
         stage.view.set_view("behind")
@@ -396,15 +387,14 @@ def test_an_unknown_view_is_an_error(stage: Stage) -> None:
 # Without OpenGL, and the end
 
 
-@pytest.mark.parametrize("cause", ["library", "driver"])
 def test_without_opengl_the_view_says_what_to_install(
-    make_stage: Any, monkeypatch: pytest.MonkeyPatch, cause: str
+    make_stage: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if cause == "library":
-        monkeypatch.setattr(image_backend, "missing_library", lambda _: "libEGL.so.1")
-    else:
-        monkeypatch.setattr(image_backend, "_answers", lambda _: False)
-    made = make_stage("image")
+    def refuse() -> None:
+        raise image_backend.NoOpenGL(image_backend.GL_BROKEN)
+
+    monkeypatch.setattr(image_backend, "_off_screen_window", refuse)
+    made = make_stage()
     assert made.view._backend is None
     text = made.view.findChild(QLabel).text()
     assert "OpenGL" in text
@@ -453,8 +443,7 @@ def test_a_view_that_nobody_closed_does_not_crash_at_exit() -> None:
 
 _WITHOUT_DRIVER = """
 from PySide6.QtWidgets import QMenu, QApplication
-from sd2app.scene.backend import NoOpenGL
-from sd2app.scene.offscreen_backend import ImageBackend
+from sd2app.scene.offscreen_backend import ImageBackend, NoOpenGL
 application = QApplication([])
 try:
     ImageBackend()
@@ -478,55 +467,19 @@ def test_a_machine_without_a_driver_gets_a_sentence_and_no_crash(tmp_path: Path)
         },
     )
     assert run.returncode == 0, run.stderr
-    assert run.stdout.strip() == choose.GL_BROKEN
+    assert run.stdout.strip() == image_backend.GL_BROKEN
     assert run.stderr == ""
 
 
-def test_importing_the_view_loads_neither_pyvista_nor_matplotlib() -> None:
+def test_importing_the_view_loads_no_matplotlib() -> None:
     code = (
-        "import sys; import sd2app.scene.view, sd2app.scene.offscreen_backend;"
-        "print([m for m in ('pyvista', 'pyvistaqt', 'matplotlib', 'scipy') if m in sys.modules])"
+        "import sys; import sd2app.scene.view;"
+        "print([m for m in ('matplotlib', 'scipy') if m in sys.modules])"
     )
     run = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True
     )
     assert run.stdout.strip() == "[]"
-
-
-# Which backend
-
-
-def test_the_wish_decides_unless_there_is_no_window(
-    qapp: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(choose, "_has_no_window", lambda: False)
-    for wish in ("gl", "image"):
-        monkeypatch.setenv("SD2_SCENE", wish)
-        assert choose.chosen_backend() == wish
-    monkeypatch.setattr(choose, "_has_no_window", lambda: True)
-    monkeypatch.setenv("SD2_SCENE", "gl")
-    assert choose.chosen_backend() == "image"
-
-
-@pytest.mark.parametrize(
-    ("gpu", "renderer", "expected"),
-    [
-        (False, "NVIDIA H200", "image"),
-        (True, "llvmpipe (LLVM 15.0.6, 256 bits)", "image"),
-        (True, None, "image"),
-        (True, "NVIDIA GeForce RTX 4060/PCIe/SSE2", "gl"),
-        (True, "Mesa Intel(R) UHD Graphics 620 (KBL GT2)", "gl"),
-        (True, "GDI Generic", "image"),
-    ],
-)
-def test_a_gpu_that_draws_gets_the_window(
-    monkeypatch: pytest.MonkeyPatch, gpu: bool, renderer: str | None, expected: str
-) -> None:
-    monkeypatch.delenv("SD2_SCENE", raising=False)
-    monkeypatch.setattr(choose, "_has_no_window", lambda: False)
-    monkeypatch.setattr(choose, "_has_gpu_device", lambda: gpu)
-    monkeypatch.setattr(choose, "opengl_renderer", lambda: renderer)
-    assert choose.chosen_backend() == expected
 
 
 # Planned places
