@@ -16,14 +16,12 @@ from pathlib import Path
 
 from labelled import even, imported, random_edit
 
-from sd2core.labels import journal
 from sd2core.labels.recovery import Recoverable, RecoveryPlace, offers_in
 from sd2core.labels.spans import Labels
 
 FRAMES = even()
 START = imported(FRAMES, 7)
 LONGEST_S = 0.03
-journal.SHORTEST_BYTES = 4000
 
 
 def after(labels: Labels, number: int) -> Labels:

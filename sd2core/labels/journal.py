@@ -1,23 +1,19 @@
 """Journal of label edits: each edit is on disk when it is made, apart from the user's file.
 
-A session of editing writes parts. A part begins with all labels, and every edit adds a record
-of what it changed. When the edits of a part have grown longer than its labels, the next part
-begins and the one before the last is deleted: the labels are read back from the newest part, and
-from the one before it should the newest be damaged.
+A session of editing has a file, which every edit replaces by one with all labels: a record in one
+line, of eight hexadecimal digits of length in bytes, a space, eight of the CRC-32, a space, JSON in
+UTF-8, and a newline. Earlier versions began with such a record, too, and added one of what it
+changed for every edit, in parts of which the last two are there; those are read as far as their
+records are whole.
 
-A record is one line: eight hexadecimal digits of length in bytes, a space, eight of the CRC-32,
-a space, JSON in UTF-8, and a newline. A file that ends in the middle of a record, or goes on
-with something else, is read up to the last whole record.
-
-A record is written in one go and flushed to the disk (``fsync``) before :meth:`Journal.write`
-returns, so neither the end of the process nor of the power loses an edit that has returned, as
-far as the disk keeps what it says it has (on macOS, ``fsync`` does not empty the drive's own
-cache). Decision 43 compares this with SQLite.
+The file is flushed to the disk (``fsync``) before it replaces the one before and
+:meth:`Journal.write` returns, so neither the end of the process nor of the power loses an edit that
+has returned, as far as the disk keeps what it says it has (on macOS, ``fsync`` does not empty the
+drive's own cache). Decision 30 compares this with SQLite, and with records of changes.
 """
 
 from __future__ import annotations
 
-import os
 import time
 import zlib
 from dataclasses import dataclass, replace
@@ -27,16 +23,7 @@ from typing import Any, Literal
 from pydantic import FiniteFloat, NonNegativeInt
 
 from sd2core.files.atomic import atomic_write, to_json
-from sd2core.labels.comparison import same_ends
-from sd2core.labels.entries import (
-    Entry,
-    LabelsEntry,
-    SpanEntry,
-    label_set_entry,
-    labels_entry,
-    span_entry,
-    track_entries,
-)
+from sd2core.labels.entries import Entry, LabelsEntry, SpanEntry, labels_entry
 from sd2core.labels.label_set import LabelSet
 from sd2core.labels.spans import Labels, LabelTrack
 
@@ -47,7 +34,7 @@ _PREFIX_BYTES = 18
 
 
 class Head(Entry):
-    """First record of a part: the recording, and all its labels at that point.
+    """Record of a part: the recording, and all its labels at that point.
 
     ``unsaved`` counts the edits up to here that the user's file does not hold; ``time_unix_s`` is
     when the last of them was made. ``others`` are other fields of the recording, where they were
@@ -65,8 +52,9 @@ class Head(Entry):
 
 
 class Change(Entry):
-    """Record of one edit: spans deleted (``gone``), new or changed (``put``), tracks, label set.
+    """Record of an edit, by an earlier version.
 
+    Spans deleted (``gone``), new or changed (``put``), tracks, label set.
     ``others`` are other fields of the recording, all of them where one was edited.
     A record without any of them says that the user's file was written (``saved``).
     """
@@ -93,8 +81,18 @@ class Kept:
     others: dict[str, Any] | None = None  # Other fields of the recording, where they were edited.
 
 
-def packed(content: dict[str, Any]) -> bytes:
-    """Encode one record."""
+def packed(kept: Kept) -> bytes:
+    """Encode the record of what a journal keeps."""
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "recording": str(kept.recording),
+        "unsaved": kept.edits,
+        "last": kept.last,
+        "time_unix_s": kept.time_unix_s,
+        "labels": labels_entry(kept.labels),
+        "others": kept.others,
+    }
     payload = to_json(content, separators=(",", ":")).encode()
     return b"%08x %08x %b\n" % (len(payload), zlib.crc32(payload), payload)
 
@@ -121,42 +119,8 @@ def unpacked(content: bytes) -> tuple[list[bytes], int]:
         at = end + 1
 
 
-def head(kept: Kept) -> dict[str, Any]:
-    """Return the content of the first record."""
-    return {
-        "format": FORMAT,
-        "version": VERSION,
-        "recording": str(kept.recording),
-        "unsaved": kept.edits,
-        "last": kept.last,
-        "time_unix_s": kept.time_unix_s,
-        "labels": labels_entry(kept.labels),
-        "others": kept.others,
-    }
-
-
-def change(before: Labels, after: Labels) -> dict[str, Any]:
-    """Return what of the labels an edit has changed, for its record."""
-    content: dict[str, Any] = {}
-    if before.spans is not after.spans:
-        # Spans that an edit did not touch are the very same; those that equal others do no harm.
-        first, stop = same_ends(before.spans, after.spans)
-        old = {span.id: span for span in before.spans[first : len(before.spans) - stop]}
-        new = after.spans[first : len(after.spans) - stop]
-        put = [span_entry(span) for span in new if old.pop(span.id, None) is not span]
-        if old:
-            content["gone"] = list(old)
-        if put:
-            content["put"] = put
-    if before.tracks != after.tracks:
-        content["tracks"] = track_entries(after.tracks)
-    if before.label_set != after.label_set:
-        content["label_set"] = label_set_entry(after.label_set)
-    return content
-
-
 def replay(records: list[bytes]) -> Kept:
-    """Replay the edits of a part.
+    """Return what the records of a file keep, with the edits of earlier versions done again.
 
     Raises ValueError (pydantic's) when a record holds something else than this version writes;
     Sd2Error when the resulting labels are not valid.
@@ -182,89 +146,40 @@ def replay(records: list[bytes]) -> Kept:
 
 
 SUFFIX = ".journal"
-KEPT_PARTS = 2
-SHORTEST_BYTES = 1 << 18
-"""Edits of a part may be as long as this, or as its labels, before the next part begins."""
 
 
 class Journal:
     """Journal of one editing session; made by :meth:`.recovery.RecoveryPlace.begin`.
 
-    ``folder`` holds the parts, ``SESSION-PART.journal``; ``kept`` is what there is at the beginning
-    of the session, and from then on. Raises OSError when the first part cannot be written: editing
-    may go on without a journal, but tell the user.
+    ``folder`` holds its file; ``kept`` is what there is at the beginning of the session, and from
+    then on. Raises OSError when the file cannot be written: editing may go on without a journal,
+    but tell the user.
     """
 
     def __init__(self, folder: Path, session: int, kept: Kept) -> None:
-        self._folder, self._session = folder, session
-        self.kept = replace(kept, time_unix_s=time.time())
-        self._parts: list[Path] = []
-        self._part = 0
-        self._stream: int | None = None
-        self._left_bytes = 0
-        self._begin_part()
+        self._path = folder / f"{session:06d}-000001{SUFFIX}"
+        self._keep(replace(kept, time_unix_s=time.time()))
 
     def write(self, name: str, labels: Labels, others: dict[str, Any] | None = None) -> None:
         """Record an edit, an undo or a redo; on disk on return.
 
         ``others`` are other fields of the recording, as JSON holds them, where they were edited.
-        Raises OSError when it cannot be written. The next one is tried in a new part, with all
-        labels.
+        Raises OSError when it cannot be written; with the next one all labels are.
         """
-        before, now_s = self.kept, time.time()
-        content = {"name": name, "time_unix_s": now_s} | change(before.labels, labels)
-        if others is not None:
-            content["others"] = others
-        self.kept = Kept(
-            before.recording, labels, before.edits + 1, name, now_s, others or before.others
-        )
-        self._append(packed(content))
+        before = self.kept
+        others = others or before.others
+        edits = before.edits + 1
+        self._keep(Kept(before.recording, labels, edits, name, time.time(), others))
 
     def saved(self) -> None:
         """Record that the user's file holds the current labels."""
-        now_s = time.time()
-        self.kept = replace(self.kept, edits=0, time_unix_s=now_s, others=None)
-        self._append(packed({"name": self.kept.last, "time_unix_s": now_s, "saved": True}))
+        self._keep(replace(self.kept, edits=0, time_unix_s=time.time(), others=None))
 
     def close(self) -> None:
-        """End the session and delete its parts: all is saved, or the user discards it."""
-        self._close_stream()
-        for path in self._parts:
-            path.unlink(missing_ok=True)
-        self._parts = []
+        """End the session and delete its file: all is saved, or the user discards it."""
+        self._path.unlink(missing_ok=True)
 
-    def _append(self, record: bytes) -> None:
-        stream = self._stream
-        # Appending to a deleted file would keep nothing.
-        if stream is None or self._left_bytes < len(record) or os.fstat(stream).st_nlink == 0:
-            self._begin_part()
-            return
-        try:
-            rest = memoryview(record)
-            while rest:
-                rest = rest[os.write(stream, rest) :]
-            os.fsync(stream)
-        except OSError:
-            # Half a record may be there: nothing after it would be read.
-            self._close_stream()
-            raise
-        self._left_bytes -= len(record)
-
-    def _begin_part(self) -> None:
-        self._close_stream()
-        self._part += 1
-        path = self._folder / f"{self._session:06d}-{self._part:06d}{SUFFIX}"
-        record = packed(head(self.kept))
-        with atomic_write(path, mode=0o600) as stream:
-            stream.write(record)
-        self._parts.append(path)
-        self._stream = os.open(path, os.O_WRONLY | os.O_APPEND | getattr(os, "O_BINARY", 0))
-        self._left_bytes = max(SHORTEST_BYTES, len(record))
-        for old in self._parts[:-KEPT_PARTS]:
-            old.unlink(missing_ok=True)
-        self._parts = self._parts[-KEPT_PARTS:]
-
-    def _close_stream(self) -> None:
-        if self._stream is not None:
-            os.close(self._stream)
-            self._stream = None
+    def _keep(self, kept: Kept) -> None:
+        self.kept = kept
+        with atomic_write(self._path, mode=0o600) as stream:
+            stream.write(packed(kept))

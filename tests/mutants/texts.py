@@ -20,7 +20,7 @@ from sd2core.io.radar.mars import mars_parts, read_mars
 from sd2core.io.video import open_video
 from sd2core.labels import files
 from sd2core.labels.formats import read_labels, write_labels
-from sd2core.labels.journal import Kept, change, head, packed
+from sd2core.labels.journal import Kept, packed
 from sd2core.labels.label_set import GESTURES
 from sd2core.labels.recovery import search
 from sd2core.labels.spans import Labels
@@ -35,6 +35,7 @@ from sd2core.train.config import read_config
 from sd2core.train.folder import TrainingFolder
 from tests.core.io.radar.point_files import walk, write_csv
 from tests.core.mocap.mars_files import approaching, write_part
+from tests.earlier_journals import change, record
 from tests.labelled import imported
 from tests.mutants.target import Target
 from tests.mutants.telling import sd2, tell
@@ -132,8 +133,7 @@ def _write_recording(path: Path) -> None:
 
 def _journal() -> bytes:
     before, after = Labels(), replace(_LABELS, label_set=GESTURES)
-    first = head(Kept(Path("/walk.sd2"), before, time_unix_s=1.0))
-    return packed(first) + packed(
+    return packed(Kept(Path("/walk.sd2"), before, time_unix_s=1.0)) + record(
         {"name": "Add", "time_unix_s": 2.0, **change(before, after), "others": {"title": "x"}}
     )
 

@@ -8,15 +8,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from earlier_journals import part
 from labelled import even, imported
 from lock_holders import held
 
 from sd2core.errors import Sd2Error
 from sd2core.files.edit_lock import Holder
-from sd2core.labels import journal as journal_module
-from sd2core.labels.journal import Journal
 from sd2core.labels.recovery import Recoveries, RecoveryPlace, offers_in
-from sd2core.labels.spans import Labels, Span
+from sd2core.labels.spans import Labels
 
 START = imported(even(), 7)
 
@@ -35,13 +34,16 @@ def crashed(root: Path, recording: Path, edits: int, *, saved_after: int = 0) ->
         journal.write(f"Edit {count}", edited(count))
         if count == saved_after:
             journal.saved()
-    abandon(place, journal)
-
-
-def abandon(place: RecoveryPlace, journal: Journal) -> None:
-    """What the end of a process does."""
-    journal._close_stream()
     place.release()
+
+
+def crashed_earlier(root: Path, recording: Path, edits: int, saved_after: int = 0) -> Path:
+    """Part of a session of an earlier version that ended without a close."""
+    crashed(root, recording, 0)
+    (path,) = root.rglob("*.journal")
+    states = [edited(count) for count in range(edits + 1)]
+    path.write_bytes(b"".join(part(recording, states, saved_after)))
+    return path
 
 
 Take = Callable[[Path, Path], RecoveryPlace]
@@ -126,7 +128,7 @@ class TestOffers:
         assert not any(path.exists() for path in offer.files)
         assert journal.kept.edits == 3
         journal.write("Edit 4", edited(4))
-        abandon(place, journal)
+        place.release()
         (again,) = taken(root, recording).offers().offers
         assert (again.edits, again.last, again.labels) == (4, "Edit 4", edited(4))
 
@@ -136,7 +138,8 @@ class TestOffers:
         crashed(root, recording, 3)
         place = taken(root, recording)
         (offer,) = place.offers().offers
-        abandon(place, place.begin(offer.labels, offer))
+        place.begin(offer.labels, offer)
+        place.release()
         (again,) = taken(root, recording).offers().offers
         assert (again.edits, again.last, again.labels) == (3, "Edit 3", edited(3))
 
@@ -157,7 +160,7 @@ class TestOffers:
         assert declined.labels == edited(3)
         journal = place.begin(START)
         journal.write("Edit", edited(1))
-        abandon(place, journal)
+        place.release()
         place = taken(root, recording)
         assert [one.edits for one in place.offers(declined=True).offers] == [1, 3]
         place.delete(declined)
@@ -235,28 +238,19 @@ class TestDamage:
         assert newest.with_suffix(".damaged").read_bytes() == content
 
     def test_of_the_newest_part_costs_that_part(
-        self, taken: Take, root: Path, recording: Path, monkeypatch: pytest.MonkeyPatch
+        self, taken: Take, root: Path, recording: Path
     ) -> None:
-        monkeypatch.setattr(journal_module, "SHORTEST_BYTES", 1)
-        place = taken(root, recording)
-        journal = place.begin(Labels())
-        made = Labels()
-        for count in range(60):
-            made = made.with_spans([Span(count + 1, "Gestures", count, count + 0.5, "wave")])
-            journal.write("Edit", made)
-        abandon(place, journal)
-        older, newest = sorted(root.rglob("*.journal"))
-        damaged = newest.read_bytes()[:-1][1:]
-        newest.write_bytes(damaged)
+        older = crashed_earlier(root, recording, 40)
+        newest = older.with_name("000001-000002.journal")
+        newest.write_bytes(older.read_bytes()[1:])
         found = taken(root, recording).offers()
         assert found.offers[0].files == (older,)
-        assert 30 < found.offers[0].edits < 60
-        assert found.offers[0].labels.spans == made.spans[: found.offers[0].edits]
+        assert found.offers[0].edits == 40
+        assert found.offers[0].labels == edited(40)
         assert "is kept" in found.notes[0]
 
     def test_a_torn_end_is_noted(self, taken: Take, root: Path, recording: Path) -> None:
-        crashed(root, recording, 3)
-        (path,) = root.rglob("*.journal")
+        path = crashed_earlier(root, recording, 3)
         path.write_bytes(path.read_bytes()[:-7])
         found = taken(root, recording).offers()
         assert found.offers[0].labels == edited(2)
@@ -265,8 +259,7 @@ class TestDamage:
     def test_half_an_edit_and_nothing_else_is_noted_once(
         self, taken: Take, root: Path, recording: Path
     ) -> None:
-        crashed(root, recording, 3, saved_after=2)
-        (path,) = root.rglob("*.journal")
+        path = crashed_earlier(root, recording, 3, saved_after=2)
         path.write_bytes(path.read_bytes()[:-7])
         place = taken(root, recording)
         found = place.offers()

@@ -149,7 +149,7 @@ class TestAfterACrash:
         (path,) = recovery_folder().rglob("*.journal")
         path.write_bytes(path.read_bytes()[:-9])
         window = on(crashed)
-        assert "ends within an edit" in bar(window).text
+        assert "cannot be read and is kept" in bar(window).text
         press(window, qtbot, "✕")
         assert bar(window).text == ""
 
