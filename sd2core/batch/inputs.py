@@ -16,7 +16,7 @@ from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan import Recordings
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
-from sd2core.files.digests import Digests, signature
+from sd2core.files.digests import Signature, cached_digest, deep_signature, signature
 from sd2core.files.keys import code_digest, key_of
 from sd2core.files.paths import files_at, is_there
 from sd2core.files.texts import read_json
@@ -155,17 +155,12 @@ def known_inspection(folder: BatchFolder, origin: Origin) -> Inspection | None:
 
 
 def inspect(folder: BatchFolder, origin: Origin) -> Inspection:
-    """Inspect a recording and keep the result.
-
-    Contents are hashed where size, time of change or inode are not those from before.
-    """
-    before = _record(folder, origin) or {"files": [], "digests": {}}
-    digests = Digests(before["files"], before["digests"])
-    inspection = _Look(folder, digests).at(Path(origin.path))
+    """Inspect a recording and keep the result."""
+    look = _Look(folder)
+    inspection = look.at(Path(origin.path))
     content = {
         "code": code_digest("inspect"),
-        "files": digests.files,
-        "digests": digests.digests,
+        "files": look.files,
         "inspection": asdict(inspection),
     }
     path = _record_path(folder, origin)
@@ -176,14 +171,15 @@ def inspect(folder: BatchFolder, origin: Origin) -> Inspection:
 
 def glance(origin: Origin) -> Inspection:
     """Inspect a recording without hashing it: its identities are empty."""
-    return _Look(None, Digests([], {})).at(Path(origin.path))
+    return _Look(None).at(Path(origin.path))
 
 
 class _Look:
     """Inspection that notes the files it depends on; without a folder nothing is hashed."""
 
-    def __init__(self, folder: BatchFolder | None, digests: Digests) -> None:
-        self._folder, self._digests = folder, digests
+    def __init__(self, folder: BatchFolder | None) -> None:
+        self._folder = folder
+        self.files: Signature = []
 
     def at(self, path: Path) -> Inspection:
         from sd2core.datasets.people import People
@@ -197,7 +193,7 @@ class _Look:
         if kind == "recording":
             recording = open_recording(path)
             for name in (FILE_NAME, LABELS_NAME):
-                self._digests.look_at(recording.folder / name)
+                self.files += deep_signature([recording.folder / name])
         elif kind == "mesh":
             recording = Recording(path.parent, mesh=path)
         elif kind == "video":
@@ -239,7 +235,7 @@ class _Look:
         from sd2core.io.unpacking import unpack_npz
 
         assert self._folder is not None
-        out = self._folder.result("meshes", self._digests.digests[str(path)][:32], ".zarr")
+        out = self._folder.result("meshes", cached_digest(path)[:32], ".zarr")
         if not out.exists():
             out.parent.mkdir(parents=True, exist_ok=True)
             unpack_npz(path, out)
@@ -279,7 +275,10 @@ class _Look:
         return " ".join(map(self._digest, [radar, *companions(radar)]))
 
     def _digest(self, path: Path) -> str:
-        return "" if self._folder is None else self._digests.of(path)
+        if self._folder is None:
+            return ""
+        self.files += deep_signature([path])
+        return cached_digest(path)
 
 
 def open_mesh(path: Path, faces: str | None, reading: Mapping[str, Any]) -> MeshSequence:

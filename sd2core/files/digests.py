@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -50,35 +51,6 @@ def deep_signature(paths: Iterable[Path]) -> Signature:
     return signature(file for path in paths for file in _tree(path))
 
 
-class Digests:
-    """Hashes of some files; those that have not changed are not read again.
-
-    ``before`` is the signature of the last time, ``known`` the hashes of then, by path. ``files``
-    and ``digests`` are those of all that was asked for.
-    """
-
-    def __init__(self, before: Signature, known: Mapping[str, str]) -> None:
-        self._before = {str(entry[0]): entry for entry in before}
-        self._known = known
-        self.files: Signature = []
-        self.digests: dict[str, str] = {}
-
-    def of(self, path: Path) -> str:
-        """Hash of a file, or of a folder with all files in it."""
-        entries = self.look_at(path)
-        known = self._known.get(str(path))
-        if known is None or any(self._before.get(entry[0]) != entry for entry in entries):
-            known = file_digest(path)
-        self.digests[str(path)] = known
-        return known
-
-    def look_at(self, path: Path) -> Signature:
-        """Note the signature of a file or folder without hashing it."""
-        entries = deep_signature([path])
-        self.files += entries
-        return entries
-
-
 def cached_digest(path: Path) -> str:
     """Hash of a file or folder, kept in the user's cache folder until it changes.
 
@@ -87,14 +59,17 @@ def cached_digest(path: Path) -> str:
     if not path.exists():
         return ""
     path = path.absolute()
-    if sum(entry[1] for entry in deep_signature([path])) < _WORTH_KEEPING_BYTES:
+    files = deep_signature([path])
+    if sum(entry[1] for entry in files) < _WORTH_KEEPING_BYTES:
         return file_digest(path)
     name = hashlib.sha256(str(path).encode()).hexdigest()[:32]
     place = user_cache("contents") / f"{name}.json"
-    digests = Digests(*_kept(place))
-    digest = digests.of(path)
-    content = {"files": digests.files, "digests": digests.digests}
-    keep_text(place, json.dumps(content) + "\n")
+    with suppress(Sd2Error, KeyError, TypeError):
+        kept = read_json(place)
+        if kept["files"] == files:
+            return str(kept["digests"][str(path)])
+    digest = file_digest(path)
+    keep_text(place, json.dumps({"files": files, "digests": {str(path): digest}}) + "\n")
     return digest
 
 
@@ -103,11 +78,3 @@ def _tree(path: Path) -> Iterable[Path]:
     yield path
     if path.is_dir():
         yield from sorted(path.rglob("*"))
-
-
-def _kept(place: Path) -> tuple[Signature, dict[str, str]]:
-    try:
-        content = read_json(place)
-        return list(content["files"]), dict(content["digests"])
-    except (Sd2Error, ValueError, KeyError, TypeError):
-        return [], {}
