@@ -1,9 +1,9 @@
-"""Use of a trained denoiser: on whole maps, live on single frames, on maps larger than memory."""
+"""Use of a trained denoiser: on whole maps, and live on single frames."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sized
+from collections.abc import Iterable, Sized
 from dataclasses import replace
 from typing import Any
 
@@ -40,13 +40,6 @@ sample farther away, bundled models keep half of their usual share at 0.15, a tw
 
 _ROUND = 64
 _BATCH = 16
-_BLOCK = 16 * CHUNK
-
-Read = Callable[[int, int], NDArray[np.float32]]
-"""Returns the energies of frames from one to another (exclusive), (n, features)."""
-
-Write = Callable[[int, NDArray[np.float32]], None]
-"""Takes the first frame, and its denoised energies and those of the next ones, (n, bins)."""
 
 
 class TrainedDenoiser:
@@ -97,48 +90,14 @@ class TrainedDenoiser:
         resampled = matching.apply_to_stretches(
             self.denoise_values, doppler, energies, self.card.frame_rate_hz, denoised, progress
         )
-        return self.as_denoised(doppler, denoised, resampled, self.note([doppler]))
-
-    def note(self, parts: Iterable[DopplerMap]) -> str | None:
-        """Sentences on what of a map, given in parts, the model has learnt nothing of."""
-        peak, strange, known = 0.0, [], self.card.known
-        for one in parts:
-            peak = max(peak, float(one.values.max(initial=0.0)))
-            if known is not None:
-                strange.append(known.strange(one.values.T, self.card.axis))
-        notes = [] if known is None else [known.note(np.concatenate(strange))]
-        share = peak / self.card.scaling.input.reference
-        if 0.0 < share < _FAINT:
-            notes.append(
-                f"its strongest cell has {share:.2g} times the mean energy that the model learnt"
-                " from: little or nothing of echoes so faint stands out of a radar's noise"
-            )
-        return "; ".join(filter(None, notes)) or None
-
-    def as_denoised(
-        self, doppler: DopplerMap, energies: NDArray[np.float32], resampled: bool, note: str | None
-    ) -> DopplerMap:
-        """Denoised map from a synthetic one, or a part of one.
-
-        Parameters
-        ----------
-        doppler : DopplerMap
-            The synthetic one.
-        energies : float32 ndarray, (frames, bins)
-            Its denoised energies; bins that the radar does not see are emptied in them.
-        resampled : bool
-            True if frames were interpolated to the model's rate and back.
-        note : str, optional
-            What :meth:`note` says of the whole map.
-        """
-        energies[:, list(doppler.unseen_bins)] = 0.0
+        denoised[:, list(doppler.unseen_bins)] = 0.0
         return replace(
             doppler,
-            values=energies.T,
+            values=denoised.T,
             kind="denoised",
             unit=self.card.unit,
             null_bins=self.card.null_bins,
-            meta=self._provenance(doppler, resampled, note),
+            meta=self._provenance(doppler, resampled),
             uncertainty=None,
             limbs=None,
         )
@@ -230,16 +189,13 @@ class TrainedDenoiser:
                 done[start : start + CHUNK] = answer[0].cpu().numpy()
         return done[:frames]
 
-    def windows_in(self, frames: int) -> tuple[int, int]:
-        """Length and overlap of the windows of a clip, for a model that looks at later frames."""
-        if (window := self.network.window) is not None:
-            return window, OVERLAP if window > OVERLAP else window // 2
-        return (frames, 0) if frames <= PIECE else (PIECE, LENGTH)
-
     def _in_windows(self, values: NDArray[np.float32], progress: Progress) -> NDArray[np.float32]:
         """Apply a model to windows, which overlap and are blended."""
         frames = len(values)
-        window, overlap = self.windows_in(frames)
+        if (window := self.network.window) is not None:
+            overlap = OVERLAP if window > OVERLAP else window // 2
+        else:
+            window, overlap = (frames, 0) if frames <= PIECE else (PIECE, LENGTH)
         known = np.pad(values, ((0, max(0, window - frames)), (0, 0)), "symmetric")
         starts = segment_starts(len(known), window, overlap)
         windows = cut(known, starts, window)
@@ -251,7 +207,7 @@ class TrainedDenoiser:
                 done[first : first + _BATCH] = self.network(batch).cpu().numpy()
         return join(done, starts, len(known))[:frames]
 
-    def _provenance(self, doppler: DopplerMap, resampled: bool, note: str | None) -> dict[str, Any]:
+    def _provenance(self, doppler: DopplerMap, resampled: bool) -> dict[str, Any]:
         card, notes = self.card, []
         emptied = sorted(set(card.null_bins) - set(doppler.null_bins))
         if emptied:
@@ -269,8 +225,15 @@ class TrainedDenoiser:
                 f"frames at {doppler.timebase.frames_per_s:.4g}/s were interpolated to the model's"
                 f" {card.frame_rate_hz:g}/s and back"
             )
-        if note:
-            notes.append(note)
+        if card.known is not None:
+            strange = card.known.strange(doppler.values.T, card.axis)
+            notes += filter(None, [card.known.note(strange)])
+        share = float(doppler.values.max(initial=0.0)) / card.scaling.input.reference
+        if 0.0 < share < _FAINT:
+            notes.append(
+                f"its strongest cell has {share:.2g} times the mean energy that the model learnt"
+                " from: little or nothing of echoes so faint stands out of a radar's noise"
+            )
         about = {
             "model": card.model,
             "name": card.name,
@@ -404,89 +367,3 @@ class LiveDenoiser:
 
 def _summed(answers: Iterable[NDArray[np.float32]]) -> NDArray[np.float32]:
     return np.asarray(sum(answers), np.float32)
-
-
-def denoise_long(
-    trained: TrainedDenoiser,
-    runs: list[tuple[int, int]],
-    times_s: NDArray[np.float64],
-    read: Read,
-    write: Write,
-) -> None:
-    """Denoise a long map block by block, with the result of :meth:`TrainedDenoiser.denoise`.
-
-    A causal model continues from its last state; another one gets the windows that it would get
-    in the whole map. So results are equal to the rounding of single precision.
-
-    Parameters
-    ----------
-    trained : TrainedDenoiser
-        Its device does the work.
-    runs : list of tuple of 2 int
-        Half-open ranges of frames that are clips of their own, from
-        :func:`~sd2core.denoise.resample_to_model.clips`.
-    times_s : float64 ndarray, (T,)
-        Times of all frames.
-    read : callable
-        ``read(start, stop)`` returns the energies of frames, (n, features).
-    write : callable
-        ``write(first, energies)`` takes denoised ones, (n, bins), of all runs in their order.
-    """
-    rate_hz = trained.card.frame_rate_hz
-    for start, stop in runs:
-        own_s = times_s[start:stop]
-        if matching.is_regular(own_s, rate_hz):
-            for first, answers in _blocks(trained, stop - start, _from(start, read)):
-                write(start + first, answers)
-        else:
-            _at_rate(trained, start, own_s, read, write)
-
-
-def _from(start: int, read: Read) -> Read:
-    """Reader with frames counted from ``start``."""
-    return lambda low, high: read(start + low, start + high)
-
-
-def _at_rate(
-    trained: TrainedDenoiser, start: int, times_s: NDArray[np.float64], read: Read, write: Write
-) -> None:
-    """Denoise one run of another or uneven frame rate, interpolated there and back."""
-    even_s = matching.even_times(times_s, trained.card.frame_rate_hz)
-
-    def between(low: int, high: int) -> NDArray[np.float32]:
-        first = max(int(np.searchsorted(times_s, even_s[low])) - 1, 0)
-        last = min(int(np.searchsorted(times_s, even_s[high - 1])) + 1, len(times_s))
-        values = read(start + first, start + last)
-        return matching.interpolated(values, times_s[first:last], even_s[low:high])
-
-    written = 0
-    before = np.zeros((0, trained.card.axis.bins), np.float32)
-    for low, answers in _blocks(trained, len(even_s), between):
-        high = low + len(answers)
-        known_s = even_s[low - len(before) : high]
-        known = np.concatenate([before, answers])
-        # A frame lies between two even times; the last one of a block has its second later.
-        ready = len(times_s) if high == len(even_s) else int(np.searchsorted(times_s, known_s[-1]))
-        if ready > written:
-            write(start + written, matching.interpolated(known, known_s, times_s[written:ready]))
-            written = ready
-        before = answers[-1:]
-
-
-def _blocks(
-    trained: TrainedDenoiser, count: int, read: Read
-) -> Iterator[tuple[int, NDArray[np.float32]]]:
-    """Denoise frames at the model's rate block by block; yields first frames and results."""
-    if trained.network.causal:
-        live = trained.live()
-        for low in range(0, count, _BLOCK):
-            yield low, live.advance(read(low, min(low + _BLOCK, count)))
-        return
-    # Windows begin every so many frames from the start of the run.
-    window, overlap = trained.windows_in(count)
-    step = window - overlap
-    for low in range(0, count, _BLOCK):
-        high = min(low + _BLOCK, count)
-        first = max((low - window) // step * step, 0)
-        last = min(high + window, count)
-        yield low, trained.denoise_values(read(first, last))[low - first : high - first]

@@ -93,39 +93,22 @@ class Texture:
         power = (self.floor + self.gain * mean) * gammaincinv(self.looks, above) / self.looks
         return np.where(rank > 1.0 - shown, power, 0.0).astype(np.float32)
 
-    def on(
-        self, doppler: DopplerMap, seed: int, first: int = 0, content: int | None = None
-    ) -> DopplerMap:
+    def on(self, doppler: DopplerMap, seed: int) -> DopplerMap:
         """A denoised map as the radar would show it; other maps get other fluctuations.
 
-        Parameters
-        ----------
-        doppler : DopplerMap
-            The map, or a stretch of it.
-        seed : int
-            The same one draws the same map again.
-        first : int
-            Number of the stretch's first frame in the map.
-        content : int, optional
-            :func:`content_of` the map that a stretch is of, so that it gets its fluctuations; by
-            default that of ``doppler``.
+        The same ``seed`` draws the same map again.
         """
-        content = content_of(doppler) if content is None else content
         note = f"drawn as the radar would show it (seed {seed}): it scatters about the mean"
         notes = [*doppler.meta.get("notes", []), note]
         meta = {**doppler.meta, "texture": {"seed": seed}, "notes": notes}
-        drawn = self.drawn(np.ascontiguousarray(doppler.values.T), (seed, content), first)
+        content = zlib.crc32(doppler.values.tobytes())
+        drawn = self.drawn(np.ascontiguousarray(doppler.values.T), (seed, content))
         return replace(doppler, values=drawn.T, meta=meta)
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any] | None) -> Texture | None:
         """Read from a model file; models of before there were textures have none."""
         return None if content is None else cls(**{name: float(content[name]) for name in content})
-
-
-def content_of(doppler: DopplerMap) -> int:
-    """Number that a map's fluctuations depend on."""
-    return zlib.crc32(doppler.values.tobytes())
 
 
 def _change(radar: Energies, apart: int) -> float:
