@@ -128,7 +128,7 @@ class FrameCounts:
                 if scatterers.mask is not None:
                     marked_counts_kernel(scatterers.mask, prepared.stands_for, into.visible)
                 elif scatterers.normals is not None:
-                    prepared.add_still(block, rows, moving, ends[0], into.visible)
+                    prepared.count_facing(block, rows, ends[0], into.visible)
                 else:
                     into.visible[:] = self.mesh.represented_count
         if self.options.range_law == "frame":

@@ -6,17 +6,11 @@ import numpy as np
 
 from sd2core.doppler.kernels import multiplicity_seen
 from sd2core.numerics.compiled import compiled
-from sd2core.scattering.visibility import add_cross_product, set_normal
+from sd2core.scattering.visibility import add_cross_product, facing_kernel, set_normal
 
 GROUP = 4
 """Frames whose moving vertices are kept together. With more, knots are shared by more frames, but
 more vertices are kept that do not move in all of them."""
-
-STEADY = 8
-"""Frames for which it is decided together which vertices face a sensor."""
-
-_SLACK = 2e-3
-"""Roundings of a cosine with a normal 127 long, in units of the distance: ten times as many."""
 
 
 @compiled
@@ -117,75 +111,15 @@ def moving_normals_kernel(points, faces, vertex, first, normals):  # type: ignor
 
 
 @compiled
-def steadiness_kernel(points, normals, turn, shift):  # type: ignore[no-untyped-def]
-    """Bound how much the cosines of a facing test differ between the frames of a group.
-
-    n·(s − p), with normal n, place p and sensor s, differs from that in the middle of the group,
-    n₀·(s − p₀), by (n − n₀)·(s − p₀) − n·(p − p₀): by no more than ``turn`` |s − p₀| + ``shift``.
-
-    Parameters
-    ----------
-    points, normals : (n, 3, V) and int8 (n, 3, V)
-        All vertices.
-    turn, shift : float32 (groups, V)
-        Written; roundings are in them.
-    """
-    slack = np.float32(_SLACK)
-    for group in range(turn.shape[0]):
-        first, last = group * STEADY, min((group + 1) * STEADY, points.shape[0])
-        middle = (first + last) // 2
-        here, normal = points[middle], normals[middle]
-        turned, shifted = turn[group], shift[group]
-        turned[:] = 0
-        shifted[:] = 0
-        for t in range(first, last):
-            there, other = points[t], normals[t]
-            for v in range(turn.shape[1]):
-                x, y, z = np.float32(other[0, v]), np.float32(other[1, v]), np.float32(other[2, v])
-                a, b, c = x - normal[0, v], y - normal[1, v], z - normal[2, v]
-                dx = np.float32(there[0, v] - here[0, v])
-                dy = np.float32(there[1, v] - here[1, v])
-                dz = np.float32(there[2, v] - here[2, v])
-                away = abs(x * dx + y * dy + z * dz) + slack * (abs(dx) + abs(dy) + abs(dz))
-                turned[v] = max(turned[v], np.float32(a * a + b * b + c * c))
-                shifted[v] = max(shifted[v], away)
-        for v in range(turn.shape[1]):
-            turned[v] = np.sqrt(turned[v]) + slack
-
-
-@compiled
-def _decide(here, normal, turned, shifted, sensor, seen):  # type: ignore[no-untyped-def]
-    """Set what is seen of a group's vertices: 1 in all its frames, 0 in none, 2 in some, maybe."""
-    sx, sy, sz = sensor[0], sensor[1], sensor[2]
-    for v in range(seen.shape[0]):
-        x, y, z = sx - here[0, v], sy - here[1, v], sz - here[2, v]
-        cosine = (
-            x * np.float32(normal[0, v])
-            + y * np.float32(normal[1, v])
-            + z * np.float32(normal[2, v])
-        )
-        room = turned[v] * np.sqrt(x * x + y * y + z * z) + shifted[v]
-        # Where a number is none or infinite nothing is decided.
-        surely = np.uint8(1) if cosine > room else np.uint8(2)
-        seen[v] = np.uint8(0) if cosine < -room else surely
-
-
-@compiled
-def add_still_kernel(  # type: ignore[no-untyped-def]
-    points, normals, turn, shift, vertex, first, multiplicity, start, sensor, visible
+def facing_counts_kernel(  # type: ignore[no-untyped-def]
+    points, normals, multiplicity, start, sensor, visible
 ):
-    """Add the vertices that do not move and face the sensor, or those that they stand for.
-
-    Most are looked at once for a group of frames.
+    """Number of vertices that face the sensor in each frame, or that they stand for.
 
     Parameters
     ----------
     points, normals : (N, 3, V) and int8 (N, 3, V)
         All vertices.
-    turn, shift : float32 (groups, V)
-        Those of :func:`steadiness_kernel`.
-    vertex, first
-        What moves: those of :class:`~sd2core.doppler.histogram.Paths`.
     multiplicity : float32 (V,)
         Number of vertices that each stands for.
     start : int
@@ -193,47 +127,16 @@ def add_still_kernel(  # type: ignore[no-untyped-def]
     sensor : (3,)
         In the frame and the precision of the points.
     visible : float64 (n,)
-        Those that move; the others are added.
+        Written.
     """
-    vertices = points.shape[2]
-    words = np.zeros(-(-vertices // 8), np.uint64)  # eight vertices each, to skip those decided
-    seen, unsure = words.view(np.uint8)[:vertices], np.empty(vertices, np.int32)
-    moves = np.full(vertices, np.int64(-1))  # group in which a vertex was found to move
-    sx, sy, sz = sensor[0], sensor[1], sensor[2]
-    known, group, doubtful, facing, sure = -1, -1, 0, 0.0, 0.0
+    seen = np.empty(points.shape[2], np.uint8)
     for i in range(visible.shape[0]):
-        t = start + i
-        if t // STEADY != known:
-            known = t // STEADY
-            middle = (known * STEADY + min((known + 1) * STEADY, points.shape[0])) // 2
-            _decide(points[middle], normals[middle], turn[known], shift[known], sensor, seen)
-            doubtful = 0
-            for word in range(words.shape[0]):
-                if words[word] & np.uint64(0x0202020202020202):
-                    for v in range(8 * word, min(8 * word + 8, vertices)):
-                        unsure[doubtful] = v
-                        doubtful += seen[v] == 2
-                        seen[v] &= 1
-            facing = float(multiplicity_seen(seen, multiplicity))
-        if t // GROUP != group:
-            group = t // GROUP
-            sure = facing
-            for v in vertex[first[group] : first[group + 1]]:
-                moves[v] = group
-                sure -= multiplicity[v] if seen[v] != 0 else 0.0
-        x, y, z = points[t, 0], points[t, 1], points[t, 2]
-        nx, ny, nz = normals[t, 0], normals[t, 1], normals[t, 2]
-        visible[i] += sure
-        for v in unsure[:doubtful]:
-            if moves[v] == group:
-                continue
-            cosine = (
-                (sx - x[v]) * np.float32(nx[v])
-                + (sy - y[v]) * np.float32(ny[v])
-                + (sz - z[v]) * np.float32(nz[v])
-            )
-            if cosine >= np.float32(0):
-                visible[i] += multiplicity[v]
+        here, normal = points[start + i], normals[start + i]
+        facing_kernel(
+            here[0], here[1], here[2], normal[0], normal[1], normal[2],
+            sensor[0], sensor[1], sensor[2], seen,
+        )  # fmt: skip
+        visible[i] = multiplicity_seen(seen, multiplicity)
 
 
 @compiled
@@ -253,9 +156,5 @@ def compile_kernels() -> None:
     for positions in (points, points.astype(np.float64)):
         sensor = np.zeros(3, positions.dtype)
         moving_kernel(positions, knots, knots, np.ones((1, 1)), np.zeros((1, 4), np.bool_))
-        steadiness_kernel(positions, normals, points[0, :1], points[0, 1:2])
-        bounds = points[0, :1], points[0, 1:2]
-        add_still_kernel(
-            positions, normals, *bounds, vertex, first, points[0, 2], 0, sensor, np.zeros(1)
-        )
+        facing_counts_kernel(positions, normals, points[0, 2], 0, sensor, np.zeros(1))
     marked_counts_kernel(normals[0].view(np.uint8), points[0, 0], np.zeros(3))

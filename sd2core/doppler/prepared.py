@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from sd2core.doppler import vid2doppler
 from sd2core.doppler.histogram import Counting, Frames
 from sd2core.doppler.moving import MovingVertices, find_moving, still_bins
-from sd2core.doppler.moving_kernels import STEADY, add_still_kernel, steadiness_kernel
+from sd2core.doppler.moving_kernels import facing_counts_kernel
 from sd2core.doppler.options import SynthesisOptions
 from sd2core.mesh.made_vertices import unshifted
 from sd2core.mesh.sequence import MeshSequence, refuse_missing
@@ -259,32 +259,23 @@ class PreparedMesh:
 
         return self._kept("normals", block, self._normals, moving, few)
 
-    def add_still(
-        self,
-        block: Block,
-        rows: slice,
-        moving: MovingVertices,
-        place_m: NDArray[np.float64],
-        visible: NDArray[np.float64],
+    def count_facing(
+        self, block: Block, rows: slice, place_m: NDArray[np.float64], visible: NDArray[np.float64]
     ) -> None:
-        """Add to the visible vertices that move those of the others that face the sensor.
+        """Set the number of vertices that face the sensor.
 
         Parameters
         ----------
-        block, rows, moving
-            The n frames, and what moves in the block.
+        block, rows
+            The n frames.
         place_m : float64 ndarray, (3,)
             Of the sensor, in the frame of the prepared positions.
         visible : float64 ndarray, (n,)
             Written.
         """
         points, normals = self.points(block), self.normals(block)
-        turn, shift = self._kept("steadiness", block, self._steadiness)
-        place, stands_for = place_m.astype(points.dtype), self.stands_for
-        paths = moving.vertex, moving.first
-        add_still_kernel(
-            points, normals, turn, shift, *paths, stands_for, rows.start, place, visible
-        )
+        place = place_m.astype(points.dtype)
+        facing_counts_kernel(points, normals, self.stands_for, rows.start, place, visible)
 
     def areas(self, block: Block, moving: MovingVertices | None = None) -> NDArray[np.float32]:
         """Vertex areas of a block's frames in m², float32 (n, V), or of what moves."""
@@ -394,13 +385,6 @@ class PreparedMesh:
 
     def _normals(self, block: Block) -> NDArray[np.int8]:
         return self._by(visibility.vertex_normals_kernel, block, np.int8, 3)
-
-    def _steadiness(self, block: Block) -> NDArray[np.float32]:
-        """How little facing tests change within groups of frames, (2, groups, V)."""
-        points = self.points(block)
-        steady = np.empty((2, -(-len(points) // STEADY), points.shape[2]), np.float32)
-        steadiness_kernel(points, self.normals(block), *steady)
-        return steady
 
     def _area_vectors(self, block: Block) -> NDArray[np.float32]:
         return self._by(amplitude.vertex_area_vectors_kernel, block, np.float32, 3)
