@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,20 +15,6 @@ from sd2core.labels.label_set import UNKNOWN
 from sd2core.labels.spans import Labels, LabelTrack, Span
 from sd2core.labels.suggest import LABEL as UNNAMED
 from sd2core.labels.suggest import TRACK as SUGGESTIONS
-
-WIDE_PX = 4.0
-"""Smallest width of a span with a box of its own."""
-_SEEN = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class SpanColumns:
-    """Spans in view at some scale."""
-
-    wide: NDArray[np.int64]  # rows of SpanArrays wide enough for a box of their own, in order
-    share: NDArray[np.float32]  # (lanes, columns): part of a column covered by narrow spans
-    tone: NDArray[np.int64]  # (lanes, columns): colour of those that cover most of it
-    selected: NDArray[np.bool_]  # (lanes, columns): True where one of them is selected
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,63 +75,6 @@ class SpanArrays:
     def within(self, start_s: float, end_s: float) -> NDArray[np.int64]:
         """Return the rows of spans that overlap an interval."""
         return np.flatnonzero((self.starts_s < end_s) & (self.ends_s > start_s))
-
-
-@lru_cache(maxsize=8)  # maps, timelines and overview use few scales, at every frame
-def span_columns(
-    arrays: SpanArrays,
-    selected: frozenset[int],
-    stretch_s: tuple[float, float],
-    columns: int,
-    wide_columns: float,
-    together: bool = False,
-) -> SpanColumns:
-    """Compute the content of a time window in a number of columns.
-
-    Spans at least ``wide_columns`` wide get a box; narrower ones share columns. ``selected`` are
-    the ids of the selected spans. ``together`` puts all tracks in one lane.
-    """
-    start_s, end_s = stretch_s
-    view = arrays.within(start_s, end_s)
-    per_s = columns / (end_s - start_s)
-    lefts = (arrays.starts_s[view] - start_s) * per_s
-    rights = (arrays.ends_s[view] - start_s) * per_s
-    wide = rights - lefts >= wide_columns
-    narrow, lefts, rights = view[~wide], lefts[~wide], rights[~wide]
-    lanes = 1 if together else sum(arrays.lanes_of_track)
-    rows = np.zeros(len(narrow), np.int64) if together else arrays.rows[narrow]
-    shape = lanes, len(arrays.colours), columns
-    by_tone = _held(rows * len(arrays.colours) + arrays.tones[narrow], lefts, rights, shape)
-    is_chosen = np.isin(narrow, arrays.rows_of(selected))
-    marked = _held(rows[is_chosen], lefts[is_chosen], rights[is_chosen], (lanes, 1, columns))
-    share = np.minimum(by_tone.sum(axis=1), 1.0).astype(np.float32)
-    return SpanColumns(view[wide], share, by_tone.argmax(axis=1), marked[:, 0] > 0)
-
-
-def _held(
-    rows: NDArray[np.int64],
-    lefts: NDArray[np.float64],
-    rights: NDArray[np.float64],
-    shape: tuple[int, int, int],
-) -> NDArray[np.float64]:
-    """Share of every column that spans cover from left to right, summed in each row."""
-    columns = shape[-1]
-    lefts, rights = np.clip(lefts, 0.0, columns), np.clip(rights, 0.0, columns)
-    first = np.minimum(lefts.astype(np.int64), columns - 1)
-    last = np.clip(np.ceil(rights).astype(np.int64) - 1, first, columns - 1)
-    # One column more, where what goes on until the last one ends.
-    line = rows * (columns + 1)
-    size = shape[0] * shape[1] * (columns + 1)
-    # What is too short to hold anything of its column is still seen.
-    at_first = np.maximum(np.minimum(rights, first + 1) - lefts, _SEEN)
-    at_last = np.where(last > first, rights - last, 0.0)
-    held = np.bincount(line + first, at_first, size) + np.bincount(line + last, at_last, size)
-    more = last > first + 1
-    begun = np.bincount((line + first + 1)[more], minlength=size)
-    ended = np.bincount((line + last)[more], minlength=size)
-    parted = *shape[:2], columns + 1
-    between = np.cumsum((begun - ended).reshape(parted), axis=-1)
-    return np.asarray(held.reshape(parted) + between, np.float64)[..., :-1]
 
 
 def _lanes(spans: list[Span]) -> tuple[list[int], int]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QAction, QBrush, QColor, QImage, QKeySequence, QPainter, QPen
 
-from sd2app.labels.model import WIDE_PX, LabelsModel, Mark, SpanArrays, SpanColumns, span_columns
+from sd2app.labels.model import LabelsModel, Mark, SpanArrays
 from sd2app.maps.arrangement import BELOW_PX
 from sd2app.palette import Palette
 from sd2app.widgets.canvas import AT_RIGHT, Overlay, clipped, faint, image_of
@@ -23,12 +22,12 @@ ROW_PX = 24.0
 _LANE_PX, _HIGHEST_PX = 17.0, 72.0
 _GAP_PX = 1.0
 _TINT, _SELECTED_TINT = 64, 96
-_NARROW_TINTS = 90, 255
-"""Opacities of columns that narrow spans cover hardly and wholly."""
-_REGION_TINT, _SELECTED_REGION_TINT = 140, 255
+_OPAQUE = 255
+_REGION_TINT = 140
+_WIDE_PX = 4.0
+"""Smallest width of a span with a box of its own."""
 _EDGES_FROM_PX = 12.0
 """On a map, which lines closer than that would hide."""
-_OVERVIEW_TINTS = 130, 255
 _TEXT_FROM_PX = 26.0
 _INSET_PX = 1.0
 _CHOSEN_PX = 3.0
@@ -208,23 +207,26 @@ def _paint_spans(
     rows: Sequence[TrackRow],
     palette: Palette,
 ) -> None:
-    columns = _columns_in(painter, plot, scale, model)
     arrays = model.arrays
-    image = _tinted(columns, arrays.colours, _NARROW_TINTS)
+    numbers, lefts, rights = _in_view(scale, arrays)
+    wide = rights - lefts >= _WIDE_PX
+    narrow, lines = numbers[~wide], arrays.rows[numbers[~wide]]
+    chosen = _selected(model, narrow)
+    image = _lines(painter, plot, scale, arrays, narrow, _colours(arrays, narrow, _OPAQUE), lines)
     # A line per lane that marks selected spans.
-    lines = np.where(columns.selected, QColor(palette.text).rgb(), 0)
-    marked = image_of(lines.astype(np.uint32))
+    text = np.full(int(chosen.sum()), QColor(palette.text).rgb(), np.uint32)
+    marked = _lines(painter, plot, scale, arrays, narrow[chosen], text, lines[chosen])
     line = 0
     for row, lanes in zip(rows, arrays.lanes_of_track, strict=True):
         for lane in range(lanes):
-            if columns.share[line].any():
-                box = lane_box(row, lane, plot.left(), plot.right())
-                painter.drawImage(box, image, QRectF(0, line, image.width(), 1))
-                for edge in (box.top(), box.bottom() - 1.5):
-                    target = QRectF(box.left(), edge, box.width(), 1.5)
-                    painter.drawImage(target, marked, QRectF(0, line, marked.width(), 1))
+            box = lane_box(row, lane, plot.left(), plot.right())
+            part = QRectF(0, line, image.width(), 1)
+            painter.drawImage(box, image, part)
+            for edge in (box.top(), box.bottom() - 1.5):
+                painter.drawImage(QRectF(box.left(), edge, box.width(), 1.5), marked, part)
             line += 1
-    for number, left, right in _ends_px(columns, scale, arrays):
+    ends_px = zip(numbers[wide].tolist(), lefts[wide].tolist(), rights[wide].tolist(), strict=True)
+    for number, left, right in ends_px:
         span = arrays.spans[number]
         row = rows[arrays.tracks[number]]
         paint_span(
@@ -238,13 +240,45 @@ def _paint_spans(
         )
 
 
-def _ends_px(
-    columns: SpanColumns, scale: TimeScale, arrays: SpanArrays
-) -> Iterator[tuple[int, float, float]]:
-    """Number, left and right of every wide span in view."""
-    wide = columns.wide
-    lefts, rights = scale.xs_of(arrays.starts_s[wide]), scale.xs_of(arrays.ends_s[wide])
-    return zip(wide.tolist(), lefts.tolist(), rights.tolist(), strict=True)
+def _in_view(
+    scale: TimeScale, arrays: SpanArrays
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Numbers, lefts and rights of the spans in view."""
+    numbers = arrays.within(scale.start_s, scale.end_s)
+    return numbers, scale.xs_of(arrays.starts_s[numbers]), scale.xs_of(arrays.ends_s[numbers])
+
+
+def _selected(model: LabelsModel, numbers: NDArray[np.int64]) -> NDArray[np.bool_]:
+    return np.isin(model.arrays.ids[numbers], list(model.selected_ids))
+
+
+def _colours(
+    arrays: SpanArrays, numbers: NDArray[np.int64], alphas: int | NDArray[np.int64]
+) -> NDArray[np.uint32]:
+    table = np.array([QColor(colour).rgb() & 0xFFFFFF for colour in arrays.colours], np.uint32)
+    return table[arrays.tones[numbers]] | (np.uint32(alphas) << np.uint32(24))
+
+
+def _lines(
+    painter: QPainter,
+    plot: QRectF,
+    scale: TimeScale,
+    arrays: SpanArrays,
+    numbers: NDArray[np.int64],
+    colours: NDArray[np.uint32],
+    lines: NDArray[np.int64] | None = None,
+) -> QImage:
+    """Line of device pixels, or one per lane; each span has one of its colour at least."""
+    columns = max(round(plot.width() * painter.device().devicePixelRatioF()), 1)
+    per_s = columns / (scale.end_s - scale.start_s)
+    starts, ends = (one[numbers] - scale.start_s for one in (arrays.starts_s, arrays.ends_s))
+    firsts = np.clip(np.floor(per_s * starts), 0, columns - 1).astype(np.int64)
+    counts = np.maximum(np.clip(np.ceil(per_s * ends), 0, columns).astype(np.int64) - firsts, 1)
+    # Of each span one pixel after the other.
+    offsets = firsts - (np.cumsum(counts) - counts) + (0 if lines is None else columns * lines)
+    image = np.zeros((1 if lines is None else sum(arrays.lanes_of_track), columns), np.uint32)
+    image.ravel()[np.repeat(offsets, counts) + np.arange(counts.sum())] = np.repeat(colours, counts)
+    return image_of(image)
 
 
 def text_on(span: Span, arrays: SpanArrays) -> str:
@@ -263,20 +297,20 @@ def map_overlay(model: LabelsModel) -> Overlay:
     """
 
     def paint(painter: QPainter, plot: QRectF, scale: TimeScale) -> None:
-        columns = _columns_in(painter, plot, scale, model, together=True, wide_px=math.inf)
         arrays = model.arrays
-        tints = np.where(columns.selected, _SELECTED_REGION_TINT, _REGION_TINT) * columns.share
+        numbers, lefts, rights = _in_view(scale, arrays)
+        tints = np.where(_selected(model, numbers), _OPAQUE, _REGION_TINT)
         below = QRectF(plot.left(), plot.bottom() + 1.0, plot.width(), BELOW_PX - 1.0)
-        painter.drawImage(below, _coloured(columns, arrays.colours, tints))
+        colours = _colours(arrays, numbers, tints)
+        painter.drawImage(below, _lines(painter, plot, scale, arrays, numbers, colours))
         with clipped(painter, plot):
             edges: dict[tuple[int, bool], list[QLineF]] = {}
-            wide = _columns_in(painter, plot, scale, model)
-            for number, left, right in _ends_px(wide, scale, arrays):
+            wide = rights - lefts >= _EDGES_FROM_PX
+            for number, left, right in zip(numbers[wide], lefts[wide], rights[wide], strict=True):
                 span, tone = arrays.spans[number], int(arrays.tones[number])
-                if right - left >= _EDGES_FROM_PX:
-                    lines = edges.setdefault((tone, span.origin == "suggestion"), [])
-                    lines.append(QLineF(left, plot.top(), left, plot.bottom()))
-                    lines.append(QLineF(right, plot.top(), right, plot.bottom()))
+                lines = edges.setdefault((tone, span.origin == "suggestion"), [])
+                lines.append(QLineF(left, plot.top(), left, plot.bottom()))
+                lines.append(QLineF(right, plot.top(), right, plot.bottom()))
             for (tone, suggested), lines in edges.items():
                 style = Qt.PenStyle.DashLine if suggested else Qt.PenStyle.SolidLine
                 painter.setPen(QPen(QColor(arrays.colours[tone]), 1.0, style))
@@ -293,41 +327,11 @@ def strip_overlay(model: LabelsModel) -> Overlay:
     """Make the overlay of the spans of all tracks as one line."""
 
     def paint(painter: QPainter, strip: QRectF, scale: TimeScale) -> None:
-        columns = _columns_in(painter, strip, scale, model, together=True, wide_px=math.inf)
-        painter.drawImage(strip, _tinted(columns, model.arrays.colours, _OVERVIEW_TINTS))
+        arrays, numbers = model.arrays, model.arrays.within(scale.start_s, scale.end_s)
+        colours = _colours(arrays, numbers, _OPAQUE)
+        painter.drawImage(strip, _lines(painter, strip, scale, arrays, numbers, colours))
 
     return Overlay(paint, (model.changed,))
-
-
-def _columns_in(
-    painter: QPainter,
-    plot: QRectF,
-    scale: TimeScale,
-    model: LabelsModel,
-    *,
-    together: bool = False,
-    wide_px: float = WIDE_PX,
-) -> SpanColumns:
-    """Spans in view, one column per device pixel."""
-    ratio = painter.device().devicePixelRatioF()
-    count = max(round(plot.width() * ratio), 1)
-    stretch_s = scale.start_s, scale.end_s
-    arrays, selected = model.arrays, model.selected_ids
-    return span_columns(arrays, selected, stretch_s, count, wide_px * ratio, together)
-
-
-def _tinted(columns: SpanColumns, colours: tuple[str, ...], tints: tuple[int, int]) -> QImage:
-    """A line per lane in the colour that covers most, more opaque the more is covered."""
-    low, high = tints
-    alphas = np.where(columns.share > 0, low + (high - low) * columns.share, 0)
-    return _coloured(columns, colours, alphas)
-
-
-def _coloured(
-    columns: SpanColumns, colours: tuple[str, ...], alphas: NDArray[np.floating]
-) -> QImage:
-    table = np.array([QColor(colour).rgb() & 0xFFFFFF for colour in colours], np.uint32)
-    return image_of(table[columns.tone] | (alphas.astype(np.uint32) << np.uint32(24)))
 
 
 _WIDTHS_PX, _HEIGHT_PX, _BETWEEN_PX = (30.0, 17.0), 17.0, 2.0

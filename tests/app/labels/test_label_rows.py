@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-from sd2app.labels.model import Mark, SpanArrays
-from sd2app.labels.painting import ROW_PX, LabelRows
+from PySide6.QtCore import QRectF
+from PySide6.QtGui import QColor, QImage, QPainter
+
+from sd2app.labels.model import LabelsModel, Mark, SpanArrays
+from sd2app.labels.painting import ROW_PX, LabelRows, paint_tracks, strip_overlay
+from sd2app.palette import palette_for
+from sd2app.widgets.time_axis import GUTTER_PX, MARGIN_PX, TimeScale
 from sd2core.labels.spans import Labels, LabelTrack, Span
 
 TRACKS = (LabelTrack("One"), LabelTrack("Many", "free"), LabelTrack("Last"))
@@ -42,3 +47,31 @@ def test_a_mark_takes_a_lane_that_is_free_from_its_start_on() -> None:
 def test_without_tracks_there_is_room_for_one() -> None:
     rows = rows_of(Labels(()))
     assert (rows.tracks, rows.height_px) == ((), ROW_PX)
+
+
+def test_a_span_too_narrow_for_a_box_is_a_line_in_its_colour(qapp) -> None:
+    spans = (
+        Span(1, "One", 2.0, 2.001, "left-to-right"),
+        Span(2, "One", 5.0, 5.02, "up-to-down"),
+        Span(3, "Many", 5.0, 5.01, "x"),
+    )
+    model, scale = LabelsModel(), TimeScale(0.0, 10.0, GUTTER_PX + 500 + MARGIN_PX)
+    model.open(Labels(TRACKS, spans))
+    model.select([2])
+    rows = LabelRows.of(TRACKS, model.arrays, ())
+    seen, palette = QImage(620, 80, QImage.Format.Format_ARGB32), palette_for(False)
+    with QPainter(seen) as painter:
+        plot = QRectF(GUTTER_PX, 0, 500, 76)
+        paint_tracks(painter, plot, scale, model, rows.tracks, palette)
+        strip_overlay(model).paint(painter, QRectF(GUTTER_PX, 77, 500, 3), scale)
+    colour_of, middle = model.labels.label_set.colour_of, int(ROW_PX / 2)
+    tops = {one.name: int(one.top_px) for one in rows.tracks}
+    for span in spans:
+        x = GUTTER_PX + round(50 * span.start_s)
+        assert seen.pixelColor(x, tops[span.track] + middle) == QColor(colour_of(span.label))
+        assert seen.pixelColor(x - 2, tops[span.track] + middle) == QColor(palette.well)
+    # What is selected is marked at both ends of its height.
+    x = GUTTER_PX + 250
+    assert seen.pixelColor(x, 2) == seen.pixelColor(x, int(ROW_PX) - 3) == QColor(palette.text)
+    assert seen.pixelColor(GUTTER_PX + 100, 2) != QColor(palette.text)
+    assert seen.pixelColor(GUTTER_PX + 100, 78) == QColor(colour_of("left-to-right"))
