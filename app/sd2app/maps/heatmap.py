@@ -110,7 +110,7 @@ class HeatmapView(TrackMouse, MapWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self._room_px = 0
-        self._span.changed.connect(self.invalidate)
+        self._span.changed.connect(self.redraw)
         track.status_changed.connect(self.redraw)
         self.follow(self._pointer.changed)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QBrush, QColor, QImage, QMouseEvent, QPainter, QPen, QResizeEvent
+from PySide6.QtGui import QBrush, QColor, QImage, QMouseEvent, QPainter, QPen
 
 from sd2app.maps.difference import DifferenceModel
 from sd2app.maps.track_mouse import TimePlot
@@ -168,40 +168,26 @@ def difference_image(
 
 
 class MapWidget(TimePlot):
-    """Keeps the picture of a map until map, stretch, levels, theme or size change."""
+    """Shows a map, whose picture is kept until map, stretch, levels, theme or size change."""
 
     BOTTOM_PX = 4
 
     def __init__(self, track: MapModel, session: Session, overlays: Sequence[Overlay] = ()) -> None:
         super().__init__(session, overlays)
         self.track = track  # the map that is shown
-        self._image: QImage | None = None
         self.setMouseTracking(True)
         track.changed.connect(self._redraw_map)
-        for signal in (self._display.levels_changed, self._display.theme_changed):
-            signal.connect(self.invalidate)
+        self._display.levels_changed.connect(self.redraw)
 
     def _redraw_map(self) -> None:
-        self._image = None
         for draw in [draw for draw in self._kept if draw != self._paint_overlays]:
             del self._kept[draw]  # labels over the map stay
         self.update()
 
-    def invalidate(self) -> None:
-        """Draw the map again, and all that is around it."""
-        self._image = None
-        self.redraw()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Draw the map again for the new number of columns."""
-        self.invalidate()
-
     def paint_map(self, painter: QPainter, plot: QRectF, start_s: float, end_s: float) -> None:
         """The map from ``start_s`` to ``end_s``, one column per device pixel."""
-        if self._image is None:
-            columns = max(round(plot.width() * self.devicePixelRatioF()), 1)
-            self._image = self.make_image(start_s, end_s, columns)
-        painter.drawImage(plot, self._image)
+        columns = max(round(plot.width() * self.devicePixelRatioF()), 1)
+        painter.drawImage(plot, self.make_image(start_s, end_s, columns))
 
     def make_image(self, start_s: float, end_s: float, columns: int) -> QImage:
         """Image of the time window, one pixel per column and bin."""
@@ -245,14 +231,14 @@ class Overview(MapWidget):
     def __init__(self, session: Session, overlays: Sequence[Overlay] = ()) -> None:
         super().__init__(session.maps.synthetic, session, overlays)
         self.setFixedHeight(20)
-        self.follow(self._span.changed)
+        self._span.changed.connect(self.redraw)
 
     def set_track(self, track: MapModel) -> None:
         """Show another track."""
         self.track.changed.disconnect(self._redraw_map)
         self.track = track
         track.changed.connect(self._redraw_map)
-        self.invalidate()
+        self.redraw()
 
     @property
     def scale(self) -> TimeScale:
@@ -262,12 +248,7 @@ class Overview(MapWidget):
     def paint(self, painter: QPainter) -> None:
         """Small map, spans, frame around the time window, cursor."""
         colours, scale, plot = self._display.palette, self.scale, self.plot_rect()
-        painter.fillRect(self.rect(), QColor(colours.panel))
-        painter.setPen(QColor(colours.muted))
-        painter.drawText(QRectF(0, plot.top(), GUTTER_PX - 8, plot.height()), AT_RIGHT, "All")
-        if self.track.map is not None:
-            self.paint_map(painter, plot, *self._span.extent_s)
-            self.paint_gaps(painter, plot, scale)
+        self.paint_kept(painter, self._paint_all)
         strip = QRectF(plot.left(), plot.top(), plot.width(), _LABELS_PX)
         for overlay in self._overlays:
             overlay.paint(painter, strip, scale)
@@ -280,6 +261,16 @@ class Overview(MapWidget):
             QRectF(left, plot.top(), right - left, plot.height()).adjusted(0, 1, 0, -1), 2, 2
         )
         paint_cursor(painter, plot, scale.x_of(self._playback.time_s))
+
+    def _paint_all(self, painter: QPainter) -> None:
+        """Paint the parts that do not move."""
+        colours, plot = self._display.palette, self.plot_rect()
+        painter.fillRect(self.rect(), QColor(colours.panel))
+        painter.setPen(QColor(colours.muted))
+        painter.drawText(QRectF(0, plot.top(), GUTTER_PX - 8, plot.height()), AT_RIGHT, "All")
+        if self.track.map is not None:
+            self.paint_map(painter, plot, *self._span.extent_s)
+            self.paint_gaps(painter, plot, self.scale)
 
     def _handle_at(self, x: float) -> str:
         scale = self.scale

@@ -42,7 +42,7 @@ class DifferenceView(HeatmapView):
     ) -> None:
         super().__init__(difference.denoised, session, overlays)
         self._difference = difference
-        difference.changed.connect(self.invalidate)
+        difference.changed.connect(self.redraw)
 
     def title(self) -> str:
         """Title: the two maps that are compared."""
