@@ -174,11 +174,11 @@ class InertialTrack(TrackMouse):
     # --- painting -------------------------------------------------------------------------
 
     def paint(self, painter: QPainter) -> None:
-        """Header and lanes, then labels, both kept, and the cursors over them."""
+        """Header and lanes, which are kept, then labels and the cursors over them."""
         self.paint_kept(painter, self._paint_track)
         if self._model.folded:
             return
-        self.paint_kept(painter, self._paint_overlays)
+        self._paint_overlays(painter)
         plot, scale = self.plot_rect(), self.scale
         with clipped(painter, plot):
             self.paint_cursors(painter, plot, QColor(self._display.palette.muted))

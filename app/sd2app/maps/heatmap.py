@@ -165,12 +165,12 @@ class HeatmapView(TrackMouse, MapWidget):
     # --- painting -------------------------------------------------------------------------
 
     def paint(self, painter: QPainter) -> None:
-        """Header, map, marked bins, axis, then labels, both kept, and the cursors over them."""
+        """Header, map, marked bins and axis, all kept, then labels and the cursors over them."""
         if self._button_px != self._room_px:
             self._kept.clear()
         self.paint_kept(painter, self._paint_map)
         if self.track.map is not None and not self.folded:
-            self.paint_kept(painter, self._paint_overlays)
+            self._paint_overlays(painter)
             self._paint_cursors(painter, self.plot_rect())
             self.paint_grip(painter)
 

@@ -176,13 +176,8 @@ class MapWidget(TimePlot):
         super().__init__(session, overlays)
         self.track = track  # the map that is shown
         self.setMouseTracking(True)
-        track.changed.connect(self._redraw_map)
-        self._display.levels_changed.connect(self.redraw)
-
-    def _redraw_map(self) -> None:
-        for draw in [draw for draw in self._kept if draw != self._paint_overlays]:
-            del self._kept[draw]  # labels over the map stay
-        self.update()
+        for signal in (track.changed, self._display.levels_changed):
+            signal.connect(self.redraw)
 
     def paint_map(self, painter: QPainter, plot: QRectF, start_s: float, end_s: float) -> None:
         """The map from ``start_s`` to ``end_s``, one column per device pixel."""
@@ -235,9 +230,9 @@ class Overview(MapWidget):
 
     def set_track(self, track: MapModel) -> None:
         """Show another track."""
-        self.track.changed.disconnect(self._redraw_map)
+        self.track.changed.disconnect(self.redraw)
         self.track = track
-        track.changed.connect(self._redraw_map)
+        track.changed.connect(self.redraw)
         self.redraw()
 
     @property

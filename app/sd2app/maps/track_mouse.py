@@ -47,12 +47,7 @@ class TimePlot(Canvas):
         self.follow(self._playback.frame_changed, session.aligning.changed)
         self._display.theme_changed.connect(self.redraw)
         for overlay in self._overlays:
-            for signal in overlay.changed:
-                signal.connect(self._redraw_overlays)
-
-    def _redraw_overlays(self) -> None:
-        self._kept.pop(self._paint_overlays, None)
-        self.update()
+            self.follow(*overlay.changed)
 
     def _paint_overlays(self, painter: QPainter) -> None:
         for overlay in self._overlays:
