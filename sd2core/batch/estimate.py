@@ -115,7 +115,7 @@ def estimate(plan: BatchPlan, workers: int, progress: Progress = silent) -> Batc
         if (
             any(one.to_do for one in steps.values())
             or not is_exported(folder, plan.export)
-            or any(rows[0]["source"] not in here for rows in rows_of(folder))
+            or any(row["source"] not in here for row in rows_of(folder))
         ):
             export.to_do, export.work = 1, maps.there + maps.to_do
         else:

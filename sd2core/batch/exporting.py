@@ -7,13 +7,11 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 from functools import cache, cached_property, lru_cache, partial
-from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.inputs import open_mesh
-from sd2core.batch.synthesis import LONGEST_FRAMES
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
 from sd2core.files.digests import file_digest
@@ -21,7 +19,7 @@ from sd2core.files.keys import key_of
 from sd2core.files.limits import open_regular
 from sd2core.files.paths import remove
 from sd2core.files.texts import parse_json, read_json, whole_lines
-from sd2core.maps import DopplerMap, MapKind, joined, without_shares
+from sd2core.maps import DopplerMap, MapKind, without_shares
 from sd2core.options.exporting import Exporting
 from sd2core.options.records import changed
 from sd2core.progress import Progress
@@ -33,9 +31,8 @@ if TYPE_CHECKING:
     from sd2core.mesh.sequence import MeshSequence
 
 Row = dict[str, Any]
-"""A line of ``results.jsonl``: one stretch of one map."""
+"""A line of ``results.jsonl``: the map of one person, or everybody's."""
 
-_OF_ONE_MAP = "recording", "placement", "person"
 _NOTE = "dataset.json"
 
 _NEW = ("imu", "label_rule", "min_share", "null_bins")
@@ -119,45 +116,29 @@ def _is_stale(out: Path, folder: BatchFolder, export: Exporting) -> bool:
         return False
 
 
-def rows_of(folder: BatchFolder) -> Iterator[list[Row]]:
-    """Yield the rows of one person's map, or everybody's, after the other."""
+def rows_of(folder: BatchFolder) -> Iterator[Row]:
+    """Yield the rows of the results."""
     with open_regular(folder.results) as stream:
-        place, expected = folder.results, "lines that `sd2 batch` wrote"
-        rows = (parse_json(line.decode(), place, expected) for line in whole_lines(stream))
-        for _, group in groupby(rows, lambda row: [row.get(name) for name in _OF_ONE_MAP]):
-            yield list(group)
+        for line in whole_lines(stream):
+            yield parse_json(line.decode(), folder.results, "lines that `sd2 batch` wrote")
 
 
 def _sources(folder: BatchFolder, export: Exporting) -> Iterator[LazySource]:
     from sd2core.datasets.source import LazySource, SourceKey
 
     opened = lru_cache(maxsize=1)(_Opened)
-    for rows in rows_of(folder):
-        parts = parts_of(rows[-1]["stop"], export)
-        for number, (start, stop) in enumerate(parts):
-            name = Path(rows[0]["recording"]).with_suffix("").as_posix()
-            if len(parts) > 1:
-                name = f"{name} part {number + 1} of {len(parts)}"
-            key = SourceKey(rows[0]["subject"], name, rows[0]["placement"])
-            load = partial(_source, folder, rows, key, (start, stop), opened, export.imu)
-            content = json.dumps([rows, start, stop], sort_keys=True)
-            fingerprint = hashlib.sha256(content.encode()).hexdigest()[:32]
-            yield LazySource(key, load, partial(str, fingerprint))
-
-
-def parts_of(frames: int, export: Exporting) -> list[tuple[int, int]]:
-    """Ranges of frames to cut, which give the segments that the recording gives as a whole."""
-    step = export.segment_frames - export.overlap_frames
-    length = max(LONGEST_FRAMES // step, 1) * step
-    starts = range(0, max(frames - export.overlap_frames, 1), length)
-    return [(start, min(start + length + export.overlap_frames, frames)) for start in starts]
+    for row in rows_of(folder):
+        name = Path(row["recording"]).with_suffix("").as_posix()
+        key = SourceKey(row["subject"], name, row["placement"])
+        load = partial(_source, folder, row, key, opened, export.imu)
+        fingerprint = hashlib.sha256(json.dumps(row, sort_keys=True).encode()).hexdigest()[:32]
+        yield LazySource(key, load, partial(str, fingerprint))
 
 
 def _source(
     folder: BatchFolder,
-    rows: Sequence[Row],
+    row: Row,
     key: SourceKey,
-    part: tuple[int, int],
     opened: Callable[[str, str], _Opened],
     imu: Sequence[str],
     _: Progress,
@@ -170,11 +151,11 @@ def _source(
     maps: dict[MapKind, DopplerMap] = {}
     kinds: tuple[MapKind, ...] = ("synthetic", "denoised", "simulated")
     for kind in kinds:
-        if all(row[kind] is not None for row in rows):
-            maps[kind] = _stretch_of(folder, rows, kind, part)
-    scene, person = opened(rows[0]["source"], rows[0]["mesh"]), rows[0].get("person", "")
+        if row[kind] is not None:
+            maps[kind] = _map_at(folder.path / row[kind])
+    scene, person = opened(row["source"], row["mesh"]), row.get("person", "")
     recording, people = scene.recording, scene.people
-    first = _stretch_of(folder, rows, "clock" if "clock" in rows[0] else "synthetic", part)
+    first = maps["synthetic"] if "clock" not in row else _map_at(folder.path / row["clock"])
     if recording.radar is not None and key.placement == 0:
         radar = on_clock(scene.radar_of(first.axis), first.timebase)
         maps.setdefault(radar.kind, radar)
@@ -182,38 +163,26 @@ def _source(
     maps, own = people.known(person, names, maps), people.labels_of(person)
     return Source(
         *key,
-        VirtualSensor.from_dict(rows[0]["sensor"]),
+        VirtualSensor.from_dict(row["sensor"]),
         maps,
         label_per_frame(own, names, first.times_s),
         names,
         classes,
-        tuple(rows[0]["target_m"]),
+        tuple(row["target_m"]),
         {
             "recording": recording.title or key.recording,
             "simulated": recording.simulated,
             **people.shown(person, maps),
         },
-        {place: scene.imu_of(place, person).between(*part) for place in imu},
+        {place: scene.imu_of(place, person) for place in imu},
         labelled_spans(own, names),
     )
 
 
-def _stretch_of(
-    folder: BatchFolder, rows: Sequence[Row], kind: str, part: tuple[int, int]
-) -> DopplerMap:
-    """Join frames of a map from the files of its stretches."""
-    start, stop = part
-    maps = []
-    for row in rows:
-        low, high = max(start, row["start"]), min(stop, row["stop"])
-        if low < high:
-            stretch = DopplerMap.load(folder.path / row[kind])
-            maps.append(stretch.between(low - row["start"], high - row["start"]))
-    whole = joined(maps)
-    kept = without_shares(whole.meta)  # of the first stretch only, and of no use to who learns
-    if len(maps) > 1:
-        kept.pop("body_error_l1", None)
-    return replace(whole, meta=kept)
+def _map_at(file: Path) -> DopplerMap:
+    """Map of a file, without numbers per frame that are of no use to who learns."""
+    doppler = DopplerMap.load(file)
+    return replace(doppler, meta=without_shares(doppler.meta))
 
 
 class _Opened:

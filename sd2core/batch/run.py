@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 import shutil
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack, suppress
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
@@ -238,10 +237,9 @@ class _Run:
                 if number % 256 == 0:
                     self._tick()
                 damaged[origin.name] = mesh.damaged
-                for share, index in product(planned.shares, range(len(planned.stretches))):
-                    who, (start, stop) = share.who, planned.stretches[index]
-                    of_all = planned.synthesis[index].out
-                    simulated = [task.out for task in planned.simulation]
+                of_all, simulation = planned.synthesis.out, planned.simulation
+                for share in planned.shares:
+                    who, denoising = share.who, share.denoising
                     row = {
                         "source": origin.path,
                         "mesh": mesh.path,
@@ -252,13 +250,13 @@ class _Run:
                         "sensor": planned.sensor.as_dict(),
                         "target_m": (mesh.target_m, *mesh.others_m)[who.body or 0],
                         "about": about,
-                        "start": start,
-                        "stop": stop,
-                        "synthetic": _if_there(share.synthetic[index : index + 1], root),
-                        "denoised": _if_there(share.denoised[index : index + 1], root),
-                        "simulated": _if_there(simulated[index : index + 1], root),
+                        "start": 0,
+                        "stop": mesh.frames,
+                        "synthetic": _if_there(share.synthetic, root),
+                        "denoised": _if_there(denoising.out if denoising else None, root),
+                        "simulated": _if_there(simulation.out if simulation else None, root),
                         # Of somebody who is not in the scene: a map with the axis and the times.
-                        **({} if share.synthetic else {"clock": _if_there([of_all], root)}),
+                        **({} if share.synthetic else {"clock": _if_there(of_all, root)}),
                     }
                     if Path(of_all).exists():
                         stream.write((json.dumps(row, ensure_ascii=False) + "\n").encode())
@@ -306,10 +304,10 @@ class _Run:
             stream.write(b"\n  ]\n}\n")
 
 
-def _if_there(out: Sequence[str | Path], root: Path) -> str | None:
+def _if_there(out: str | Path | None, root: Path) -> str | None:
     """Path of a file below the root; None where none is made, or it is missing."""
-    existing = (path.relative_to(root).as_posix() for path in map(Path, out) if path.exists())
-    return next(existing, None)
+    path = None if out is None else Path(out)
+    return path.relative_to(root).as_posix() if path is not None and path.exists() else None
 
 
 def remove_old_leftovers(folder: Path) -> None:

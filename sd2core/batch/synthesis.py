@@ -1,4 +1,4 @@
-"""Tasks that make synthetic and simulated Doppler maps of a mesh, in stretches of frames."""
+"""Tasks that make synthetic and simulated Doppler maps of a mesh."""
 
 from __future__ import annotations
 
@@ -25,20 +25,6 @@ if TYPE_CHECKING:
 
 PREPARED_BYTES = 128 << 20
 """Memory for the prepared part of a mesh; with less a block would be prepared twice."""
-
-LONGEST_FRAMES = 18_000
-"""Longest stretch: ten minutes at 30 frames/s, whose maps are a few MB, so that memory does not
-grow with the length of a clip."""
-
-FrameRange = tuple[int, int]
-"""Half-open range of frames of a clip."""
-
-
-def stretches_of(frames: int, longest: int = LONGEST_FRAMES) -> list[FrameRange]:
-    """Cut a clip into as few stretches as possible, of nearly equal lengths."""
-    count = max(1, -(-frames // longest))
-    edges = [frames * number // count for number in range(count + 1)]
-    return [(edges[number], edges[number + 1]) for number in range(count)]
 
 
 @dataclass(frozen=True)
@@ -68,14 +54,10 @@ def synthesise(
     mesh: MeshInput,
     sensor: VirtualSensor,
     section: Synthesis,
-    stretch: FrameRange,
     choosing: Choosing | None,
     outs: Sequence[Path],
 ) -> None:
-    """Make the map of some frames and write it.
-
-    It equals these columns of the map of the whole clip: smoothing and the reuse of masks
-    look beyond the stretch.
+    """Make a map and write it.
 
     Parameters
     ----------
@@ -85,8 +67,6 @@ def synthesise(
         Sd2Error if it stands in the body.
     section : Synthesis
         Section ``[synthesise]`` of the plan.
-    stretch : tuple of 2 int
-        Half-open range of frames.
     choosing : Choosing or None
         For a section with a tolerance: maps that share an accuracy plan.
     outs : sequence of Path
@@ -100,8 +80,8 @@ def synthesise(
     plan = None if choosing is None else chosen_plan(mesh, section, choosing)
     maker, limbs = _synthesizer(mesh, section, plan), section.limbs or len(outs) > 1
     # Looked for only: the batch's own folder keeps what it makes.
-    key = synthetic_key(mesh.identity, maker, sensor, limbs=limbs, frames=stretch)
-    doppler = found_map(key) or synthetic_map(maker, sensor, limbs=limbs, frames=stretch)
+    key = synthetic_key(mesh.identity, maker, sensor, limbs=limbs)
+    doppler = found_map(key) or synthetic_map(maker, sensor, limbs=limbs)
     if plan is not None:
         doppler = replace(doppler, meta=doppler.meta | plan["provenance"])
     outs[0].parent.mkdir(parents=True, exist_ok=True)
@@ -110,7 +90,7 @@ def synthesise(
         return
     scene = kept_mesh(mesh)
     for person, body, out in zip(scene.persons, scene.bodies, outs, strict=True):
-        one = map_of(person, body, doppler, stretch[0])
+        one = map_of(person, body, doppler)
         (one if section.limbs else replace(one, limbs=None)).save(out)
 
 
@@ -119,12 +99,9 @@ def simulate(
     sensor: VirtualSensor,
     simulation: Simulation,
     axis: VelocityAxis,
-    stretch: FrameRange,
     outs: Sequence[Path],
 ) -> None:
-    """Make the map that a radar would show of some frames and write it.
-
-    It equals these columns of the map of the whole clip.
+    """Make the map that a radar would show and write it.
 
     Parameters
     ----------
@@ -136,15 +113,13 @@ def simulate(
         Radar and seed.
     axis : VelocityAxis
         Of the map.
-    stretch : tuple of 2 int
-        Half-open range of frames.
     outs : sequence of Path
         Map to write (.npz), one.
     """
     from sd2core.datasets.simulating import simulated_map
 
     refuse_inside(mesh, sensor)
-    doppler = simulated_map(kept_mesh(mesh), sensor, simulation, axis, stretch)
+    doppler = simulated_map(kept_mesh(mesh), sensor, simulation, axis)
     outs[0].parent.mkdir(parents=True, exist_ok=True)
     doppler.save(outs[0])
 

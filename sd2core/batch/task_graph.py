@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,7 @@ from sd2core.batch.inputs import (
     known_inspection,
 )
 from sd2core.batch.plan import STEPS, BatchPlan, Step
-from sd2core.batch.synthesis import Choosing, FrameRange, stretches_of
+from sd2core.batch.synthesis import Choosing
 from sd2core.batch.tasks import Task
 from sd2core.doppler.options import chosen_options
 from sd2core.errors import Sd2Error
@@ -41,16 +41,11 @@ _MAPS: tuple[Step, ...] = ("synthesise", "denoise", "simulate")
 
 @dataclass(frozen=True)
 class PlannedShare:
-    """Share of a person in the maps from one place, or everybody's: one file per stretch."""
+    """Share of a person in the map from one place, or everybody's."""
 
     who: Somebody
-    synthetic: tuple[Path, ...]  # none of somebody who is not in the scene
-    denoising: Task | None = None  # covers all stretches, because a model carries its state on
-
-    @property
-    def denoised(self) -> tuple[Path, ...]:
-        """Files of the denoised stretches, or none."""
-        return () if self.denoising is None else tuple(self.denoising.arguments["outs"])
+    synthetic: Path | None  # none of somebody who is not in the scene
+    denoising: Task | None = None
 
 
 @dataclass(frozen=True)
@@ -59,10 +54,9 @@ class PlannedMap:
 
     placement: int  # 0 is the recording's own sensor; 1 and up are the places of the plan
     sensor: VirtualSensor
-    stretches: tuple[FrameRange, ...]
-    synthesis: tuple[Task, ...]  # one per stretch
+    synthesis: Task
     shares: tuple[PlannedShare, ...]
-    simulation: tuple[Task, ...] = ()  # one per stretch, or none; of everybody
+    simulation: Task | None = None  # of everybody
 
     @property
     def denoising(self) -> tuple[Task, ...]:
@@ -72,14 +66,15 @@ class PlannedMap:
     @property
     def tasks(self) -> tuple[Task, ...]:
         """All tasks of this map."""
-        return (*self.synthesis, *self.denoising, *self.simulation)
+        simulation = () if self.simulation is None else (self.simulation,)
+        return (self.synthesis, *self.denoising, *simulation)
 
 
 class TaskGraph:
     """Tasks of a batch, each known as soon as the tasks before it are done.
 
     The paths of the plan are absolute. ``total`` counts the tasks per step that are known
-    of so far; a map counts once until it is known into how many stretches it is cut.
+    of so far; a map counts once until it is known how many persons it is of.
     """
 
     def __init__(self, plan: BatchPlan, folder: BatchFolder, origins: Sequence[Origin]) -> None:
@@ -93,8 +88,7 @@ class TaskGraph:
         # File of the denoiser and the hash of its content.
         self.model = None if plan.denoise is None else _model_of(plan)
         self._simulation = None if plan.simulate is None else simulation_of(plan.simulate)
-        # Of a map whose stretches are not all there yet: how many are missing.
-        self._missing: dict[tuple[str, int], int] = {}
+        # Of a map that is not there yet.
         self._denoising: dict[tuple[str, int], tuple[Task, ...]] = {}
         self.total: Counter[str] = Counter()
         self.total["inspect"] = len(origins)
@@ -147,7 +141,7 @@ class TaskGraph:
                 raise _changing(task.origin)
             return self._synthesis(task.origin, inspection, mesh)
         if task.step == "synthesise":
-            return self._after_map(task)
+            return iter(self._denoising.pop((task.origin.name, task.placement or 0), ()))
         return iter(())
 
     def lost_with(self, task: Task) -> dict[str, int]:
@@ -155,8 +149,7 @@ class TaskGraph:
         if task.step in ("inspect", "fit"):
             return self._maps_of_one(1)
         where = (task.origin.name, task.placement or 0)
-        if task.step == "synthesise" and where in self._missing:
-            del self._missing[where]
+        if task.step == "synthesise" and where in self._denoising:
             return {"denoise": len(self._denoising.pop(where))}
         return {}
 
@@ -194,29 +187,16 @@ class TaskGraph:
         if self.plan.synthesise is None:
             return
         for planned in self.maps_of(origin, inspection, mesh):
-            self.total["synthesise"] += len(planned.stretches) - 1
             if self.model is not None:
                 self.total["denoise"] += len(planned.denoising) - 1
             if planned.denoising:
-                where = (origin.name, planned.placement)
-                self._missing[where] = len(planned.stretches)
-                self._denoising[where] = planned.denoising
-            yield from planned.synthesis
+                self._denoising[origin.name, planned.placement] = planned.denoising
+            yield planned.synthesis
         if self._simulation is not None:
             # After all that is quick, so that this can be given out together.
             for planned in self.maps_of(origin, inspection, mesh):
-                self.total["simulate"] += len(planned.stretches) - 1
-                yield from planned.simulation
-
-    def _after_map(self, task: Task) -> Iterator[Task]:
-        where = (task.origin.name, task.placement or 0)
-        if where not in self._missing:
-            return iter(())
-        self._missing[where] -= 1
-        if self._missing[where]:
-            return iter(())
-        del self._missing[where]
-        return iter(self._denoising.pop(where))
+                assert planned.simulation is not None
+                yield planned.simulation
 
     def maps_of(
         self, origin: Origin, inspection: Inspection, mesh: MeshInput
@@ -224,25 +204,21 @@ class TaskGraph:
         """Yield all maps of one recording, for a data set those of whom its labels name."""
         people = () if self.plan.export is None else inspection.people
         bodies = 1 + len(mesh.others_m) if people else 1
-        stretches = tuple(stretches_of(mesh.frames))
         sensors = self.plan.sensors(inspection.sensor, mesh.target_m)
         choosing = self._choosing(mesh, list(sensors.values()))
         for placement, sensor in sensors.items():
             where = (origin, mesh, placement, sensor)
-            synthesis = tuple(
-                self._synthesis_task(where, one, choosing, bodies) for one in stretches
-            )
+            synthesis = self._synthesis_task(where, choosing, bodies)
             shares = tuple(self._share(synthesis, one) for one in people or (Somebody(),))
-            simulated = () if self._simulation is None else stretches
-            simulation = tuple(self._simulation_task(where, one) for one in simulated)
-            yield PlannedMap(placement, sensor, stretches, synthesis, shares, simulation)
+            simulation = None if self._simulation is None else self._simulation_task(where)
+            yield PlannedMap(placement, sensor, synthesis, shares, simulation)
 
-    def _share(self, synthesis: Sequence[Task], who: Somebody) -> PlannedShare:
+    def _share(self, synthesis: Task, who: Somebody) -> PlannedShare:
         if who.body is None:
-            return PlannedShare(who, ())
-        maps = tuple(one.arguments["outs"][who.body] for one in synthesis)
-        denoising = None if self.model is None else self._denoising_task(synthesis, maps)
-        return PlannedShare(who, maps, denoising)
+            return PlannedShare(who, None)
+        synthetic = synthesis.arguments["outs"][who.body]
+        denoising = None if self.model is None else self._denoising_task(synthesis, synthetic)
+        return PlannedShare(who, synthetic, denoising)
 
     def _choosing(self, mesh: MeshInput, sensors: Sequence[VirtualSensor]) -> Choosing | None:
         """Describe the choice of an accuracy plan for a mesh; None without a tolerance."""
@@ -255,55 +231,50 @@ class TaskGraph:
         key = key_of("synthesise", {"mesh": mesh.identity, **self._scene, **about})
         return Choosing(self.folder.result("plans", key, ".json"), places, frames)
 
-    def _synthesis_task(
-        self, where: _View, stretch: FrameRange, choosing: Choosing | None, bodies: int
-    ) -> Task:
+    def _synthesis_task(self, where: _View, choosing: Choosing | None, bodies: int) -> Task:
         arguments = {"section": self.plan.synthesise, "choosing": choosing}
         content = self._scene | ({"bodies": bodies} if bodies > 1 else {})
-        return self._map_task("synthesise", where, stretch, content, arguments, bodies)
+        return self._map_task("synthesise", where, content, arguments, bodies)
 
-    def _simulation_task(self, where: _View, stretch: FrameRange) -> Task:
+    def _simulation_task(self, where: _View) -> Task:
         assert self._simulation is not None
         assert self.plan.synthesise is not None
         axis = chosen_options(self.plan.synthesise).axis
         content = {"axis": asdict(axis), "simulation": self._simulation.as_json()}
         arguments = {"axis": axis, "simulation": self._simulation}
-        return self._map_task("simulate", where, stretch, content, arguments)
+        return self._map_task("simulate", where, content, arguments)
 
     def _map_task(
         self,
         step: Step,
         where: _View,
-        stretch: FrameRange,
         content: dict[str, Any],
         arguments: dict[str, Any],
         maps: int = 1,
     ) -> Task:
-        """Return the task for a stretch of maps; its key hashes ``content``, mesh and sensor."""
+        """Return the task for maps; its key hashes ``content``, mesh and sensor."""
         origin, mesh, placement, sensor = where
-        view = {"sensor": sensor.as_dict(), "stretch": list(stretch)}
-        key = key_of(step, {"mesh": mesh.identity, **view, **content})
+        key = key_of(step, {"mesh": mesh.identity, "sensor": sensor.as_dict(), **content})
         outs = self._files("synthetic" if step == "synthesise" else "simulated", key, maps)
-        arguments |= {"mesh": mesh, "sensor": sensor, "stretch": stretch, "outs": outs}
-        frames = (stretch[1] - stretch[0]) * maps
+        arguments |= {"mesh": mesh, "sensor": sensor, "outs": outs}
+        frames = mesh.frames * maps
         return Task(step, key, origin, arguments, placement, frames, origin.name, str(outs[-1]))
 
     def _files(self, kind: str, key: str, count: int) -> list[Path]:
         ends = [".npz"] if count == 1 else [f"-{number}.npz" for number in range(count)]
         return [self.folder.result(kind, key, end) for end in ends]
 
-    def _denoising_task(self, synthesis: Sequence[Task], maps: Sequence[Path]) -> Task:
+    def _denoising_task(self, synthesis: Task, synthetic: Path) -> Task:
         assert self.plan.denoise is not None
         assert self.model is not None
         (model, digest), texture = self.model, self.plan.denoise.texture
         drawn = {} if texture is None else {"texture": texture}
-        key = key_of("denoise", {"model": digest, "maps": [one.stem for one in maps], **drawn})
-        outs = self._files("denoised", key, len(maps))
-        arguments = {"maps": maps, "model": model, "digest": digest, "outs": outs, **drawn}
-        one = synthesis[0]
-        frames = sum(each.frames // len(each.arguments["outs"]) for each in synthesis)
-        return Task(
-            "denoise", key, one.origin, arguments, one.placement, frames, one.group, str(outs[-1])
+        key = key_of("denoise", {"model": digest, "map": synthetic.stem, **drawn})
+        out = self.folder.result("denoised", key, ".npz")
+        arguments = {"synthetic": synthetic, "model": model, "out": out, **drawn}
+        frames = synthesis.frames // len(synthesis.arguments["outs"])
+        return replace(
+            synthesis, step="denoise", key=key, arguments=arguments, frames=frames, out=str(out)
         )
 
     def all_maps(self) -> Iterator[tuple[Origin, str, MeshInput, PlannedMap]]:

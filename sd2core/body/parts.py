@@ -122,7 +122,6 @@ def synthetic_map(
     sensor: VirtualSensor,
     *,
     limbs: bool,
-    frames: tuple[int, int] | None = None,
     progress: Progress = silent,
 ) -> DopplerMap:
     """Doppler map of a mesh that states its accuracy, as far as the mesh says that of the body.
@@ -135,8 +134,6 @@ def synthetic_map(
         Where it stands and looks.
     limbs : bool
         True for its split as well, by the parts that :func:`known_parts` finds (or refuses).
-    frames : tuple of 2 int, optional
-        Half-open range; all frames by default.
     progress : Progress
         Counts frames; may raise Cancelled.
     """
@@ -144,10 +141,10 @@ def synthetic_map(
 
     if limbs:
         parts = known_parts(maker.mesh)
-        made = maker.limb_maps(sensor, parts, frames=frames, progress=progress)
+        made = maker.limb_maps(sensor, parts, progress=progress)
     else:
-        made = maker.map(sensor, frames=frames, progress=progress)
-    error = body_error(maker, sensor, frames=frames)
+        made = maker.map(sensor, progress=progress)
+    error = body_error(maker, sensor)
     return made if error is None else replace(made, meta=made.meta | {"body_error_l1": error})
 
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sd2core.body.parts import synthetic_map
 from sd2core.denoise.files import describe_model
@@ -57,8 +57,8 @@ def mesh_identity(recording: Recording, digest: Callable[[Path], str] = cached_d
     return key_of("inspect", {"mesh": [[*map(digest, recording.scene_files)], reading]})
 
 
-def synthetic_key(mesh: str, maker: Synthesizer, sensor: VirtualSensor, **asked: Any) -> str:
-    """Key of the map that is ``asked`` of a maker, whose mesh was one of this identity."""
+def synthetic_key(mesh: str, maker: Synthesizer, sensor: VirtualSensor, *, limbs: bool) -> str:
+    """Key of a map, split by ``limbs`` or not, of a maker whose mesh was one of this identity."""
     content = {
         "mesh": mesh,
         "sources": [body.source for body in maker.mesh.bodies],  # which the map names
@@ -66,8 +66,9 @@ def synthetic_key(mesh: str, maker: Synthesizer, sensor: VirtualSensor, **asked:
         "options": asdict(maker.options),
         "left_out": sorted(maker.left_out),
         "sensor": sensor.as_dict(),
+        "limbs": limbs,
     }
-    return key_of("synthesise", content | asked)
+    return key_of("synthesise", content)
 
 
 def computed_maps(
@@ -93,8 +94,7 @@ def computed_maps(
         as for :func:`denoised`.
     """
     limbs = limbs or (model is not None and bool(describe_model(model).parts))
-    frames = 0, maker.mesh.frame_count
-    key = synthetic_key(mesh_identity(recording), maker, sensor, limbs=limbs, frames=frames)
+    key = synthetic_key(mesh_identity(recording), maker, sensor, limbs=limbs)
     share = part_of(progress, 0.0, 1.0 if model is None else 0.5)
     counted = kept_map(key, lambda: synthetic_map(maker, sensor, limbs=limbs, progress=share))
     if model is None:

@@ -150,10 +150,9 @@ class People:
         return {"scene": scene, "person": person, "everybody": everybody}
 
 
-def map_of(person: str, body: MeshSequence, everybody: DopplerMap, start: int = 0) -> DopplerMap:
-    """Map of a person of a scene alone, from the split map of all from a frame of the body on."""
-    present = present_frames([body])[start : start + len(everybody.timebase)]
-    return replace(everybody.of_person(person), present=present)
+def map_of(person: str, body: MeshSequence, everybody: DopplerMap) -> DopplerMap:
+    """Map of a person of a scene alone, from the split map of all."""
+    return replace(everybody.of_person(person), present=present_frames([body]))
 
 
 def present_frames(bodies: Iterable[MeshSequence]) -> NDArray[np.bool_]:

@@ -61,7 +61,6 @@ def simulated_map(
     sensor: VirtualSensor,
     simulation: Simulation,
     axis: VelocityAxis,
-    frames: tuple[int, int] | None = None,
     progress: Progress = silent,
 ) -> DopplerMap:
     """Simulate the map that a radar shows of a mesh, at the times of the mesh's frames.
@@ -80,22 +79,18 @@ def simulated_map(
         Radar, and the seed of phases and noise, see :func:`seed_of`.
     axis : VelocityAxis
         Of the map.
-    frames : tuple of 2 int, optional
-        Half-open range that limits the result to columns of the whole map.
     progress : Progress
         May raise Cancelled.
     """
-    start_s = mesh.timebase.start_s
+    clock = mesh.timebase
     # As a capture says it, whose clock begins with its first frame.
-    times_s = radar_times_s(mesh.timebase, simulation.radar)
-    mesh_s = (times_s - times_s[0]) + start_s
-    clock = mesh.timebase if frames is None else Timebase(mesh.times_s[slice(*frames)])
-    # With a neighbour on each side, so that the nearest is among them.
-    first = max(int(np.searchsorted(mesh_s, clock.start_s)) - 1, 0)
+    times_s = radar_times_s(clock, simulation.radar)
+    mesh_s = (times_s - times_s[0]) + clock.start_s
+    # With a neighbour after the last, so that the nearest is among them.
     stop = min(int(np.searchsorted(mesh_s, clock.times_s[-1])) + 1, len(mesh_s))
     options = SignalOptions(seed=seed_of(mesh, sensor, simulation), link=LinkBudget())
     maps = []
-    for low in range(first, stop, _BLOCK_FRAMES):
+    for low in range(0, stop, _BLOCK_FRAMES):
         high = min(low + _BLOCK_FRAMES, stop)
         capture = simulate_radar(
             mesh,
@@ -106,7 +101,7 @@ def simulated_map(
             wave=WaveOptions(coherent=False),
             options=options,
             memory_bytes=_BLOCK_BYTES,
-            progress=part_of(progress, low - first, high - first, stop - first),
+            progress=part_of(progress, low, high, stop),
         )
         block = doppler_map(capture, axis=axis, clutter=CLUTTER)
         meta = _of_all_frames(block.meta, capture.meta["simulation"])

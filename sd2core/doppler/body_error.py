@@ -19,11 +19,7 @@ _STRETCHES, _FRAMES = 8, 8
 
 
 def body_error(
-    maker: Synthesizer,
-    sensor: VirtualSensor,
-    *,
-    frames: tuple[int, int] | None = None,
-    progress: Progress = silent,
+    maker: Synthesizer, sensor: VirtualSensor, *, progress: Progress = silent
 ) -> float | None:
     """Expected relative L1 between a synthesizer's map and the true body's, after smoothing.
 
@@ -38,8 +34,6 @@ def body_error(
         Of the mesh and the options that the map is made with.
     sensor : VirtualSensor
         Of the map.
-    frames : tuple of 2 int, optional
-        Half-open range; all frames by default.
     progress : Progress
         Counts the stretches; may raise Cancelled.
     """
@@ -47,10 +41,10 @@ def body_error(
 
     if all(body.uncertainty is None for body in maker.mesh.bodies):
         return None
-    start, stop = frames or (0, maker.mesh.frame_count)
-    spans = [(start, stop)]
-    if stop - start > _STRETCHES * _FRAMES:
-        firsts = np.linspace(start, stop - _FRAMES, _STRETCHES).astype(int).tolist()
+    count = maker.mesh.frame_count
+    spans = [(0, count)]
+    if count > _STRETCHES * _FRAMES:
+        firsts = np.linspace(0, count - _FRAMES, _STRETCHES).astype(int).tolist()
         spans = [(first, first + _FRAMES) for first in firsts]
     off = expected = doubt = 0.0
     for number, span in enumerate(spans):

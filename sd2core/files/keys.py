@@ -29,6 +29,7 @@ _CODE: dict[str, tuple[str, ...]] = {
     "synthesise": (*_MAP, "body/limbs.py", "body/parts.py", "doppler", "accuracy", "numerics"),
     "denoise": (
         "batch/denoising.py",
+        "datasets/kept_maps.py",
         "denoise",
         "mesh/presence.py",
         "pairs/segments.py",

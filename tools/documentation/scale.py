@@ -17,13 +17,14 @@ from pathlib import Path
 
 from sd2core.batch.denoising import denoise
 from sd2core.batch.folder import BatchFolder
-from sd2core.batch.inputs import find_origins, glance
+from sd2core.batch.inputs import find_origins, glance, mesh_input_of
 from sd2core.batch.plan import BatchPlan
 from sd2core.batch.plan_file import plan_from_text
 from sd2core.batch.synthesis import Choosing, synthesise
 from sd2core.batch.task_graph import TaskGraph
 from sd2core.cli.batch import bytes_words
 from sd2core.files.limits import size_bytes
+from sd2core.io.mesh import load_mesh, save_mesh
 from sd2core.numerics.compiled import warm_up
 from sd2core.recording.recording import open_recording
 from sd2core.sensor import VirtualSensor
@@ -216,7 +217,7 @@ def _costs_of_maps(plan: BatchPlan, folder: Path, title: str) -> tuple[Cost, Cos
     origins = find_origins(plan.recordings, Path(plan.out))
     denoiser = TaskGraph(plan, BatchFolder(Path(plan.out)), origins).model
     assert denoiser is not None
-    model, digest = denoiser
+    model, _ = denoiser
     inspection, section = glance(origins[0]), plan.synthesise
     mesh, counts = inspection.mesh, _TIMED_FRAMES
     assert mesh is not None
@@ -225,6 +226,11 @@ def _costs_of_maps(plan: BatchPlan, folder: Path, title: str) -> tuple[Cost, Cos
     if section.tolerance is not None:
         choosing = Choosing(folder / "plan.json", (inspection.sensor,), mesh.frames)
     places = (VirtualSensor((1e-3 * number, 0.0, 0.0)) for number in itertools.count(1))
+    whole, clips = load_mesh(mesh.path), {}
+    for count in counts:
+        clip = folder / f"{count}.zarr"
+        save_mesh(whole.between(0, count), clip)
+        clips[count] = mesh_input_of(clip, "")
 
     def made(count: int) -> Path:
         return folder / f"{count}.npz"
@@ -234,10 +240,10 @@ def _costs_of_maps(plan: BatchPlan, folder: Path, title: str) -> tuple[Cost, Cos
 
     def make(count: int) -> None:
         # From another place each time: masks of a place are kept, and would cost nothing.
-        synthesise(mesh, next(places), section, (0, count), choosing, [made(count)])
+        synthesise(clips[count], next(places), section, choosing, [made(count)])
 
     def clean(count: int) -> None:
-        denoise([made(count)], model, digest, [denoised(count)])
+        denoise(made(count), model, denoised(count))
 
     for count in counts:  # what is opened and chosen once is not counted
         make(count)

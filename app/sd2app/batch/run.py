@@ -254,7 +254,7 @@ _LINE = TypeAdapter(Result)
 
 
 class BatchResults(RecordTableModel[Result]):
-    """Reads ``results.jsonl`` in the background; one row per map, however many stretches."""
+    """Reads ``results.jsonl`` in the background; one row per map."""
 
     changed = Signal()
 

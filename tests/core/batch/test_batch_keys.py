@@ -82,7 +82,7 @@ def test_maps_that_are_asked_for_otherwise_have_other_keys(more: str, tmp_path: 
         graph = TaskGraph(plan_from_text(text, tmp_path), BatchFolder(tmp_path), [])
         found = Inspection(VirtualSensor(), mesh)
         (planned,) = graph.maps_of(Origin("anna.npz", "anna", "anna"), found, mesh)
-        return planned.synthesis[0].key
+        return planned.synthesis.key
 
     assert key(more) != key("")
 

@@ -93,23 +93,6 @@ def test_without_a_data_set_maps_are_of_everybody(tmp_path: Path, scenes: Path) 
     assert "person" not in row
 
 
-def test_stretches_of_a_person_are_joined(
-    tmp_path: Path, scenes: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    scene(scenes / "duo.sd2")
-    whole, _ = run(tmp_path, PLAN + EXPORT)
-    with open_dataset(Path(whole.facts["dataset"])) as dataset:
-        known = {name: dataset[name][:] for name in COLUMNS}
-    monkeypatch.setattr(
-        "sd2core.batch.task_graph.stretches_of", lambda frames: [(0, 50), (50, frames)]
-    )
-    cut, pool = run(tmp_path, PLAN + EXPORT, "cut")
-    assert pool.submitted["synthesise"] == 2
-    with open_dataset(Path(cut.facts["dataset"])) as dataset:
-        for name, values in known.items():
-            np.testing.assert_allclose(dataset[name][:], values, rtol=1e-5, atol=1e-6)
-
-
 @pytest.mark.slow
 def test_whom_else_labels_name_is_denoised_alone(tmp_path: Path, scenes: Path) -> None:
     one = scene(scenes / "duo.sd2", WHO[:1])

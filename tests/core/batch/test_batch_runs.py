@@ -394,12 +394,10 @@ def test_limb_maps_are_exported_where_the_plan_says_so(run: Runs) -> None:
 
 
 @pytest.mark.slow
-def test_a_plan_exports_what_the_command_can(run: Runs, monkeypatch: pytest.MonkeyPatch) -> None:
-    from sd2core.batch import exporting
+def test_a_plan_exports_what_the_command_can(run: Runs) -> None:
     from sd2core.datasets.reading import open_dataset
     from sd2core.imu.virtual import imu_at_frames
 
-    monkeypatch.setattr(exporting, "LONGEST_FRAMES", 20)  # so that it is cut in parts
     (run.folder / "meshes").mkdir()
     mesh = load_mesh(resource_path("swipes.sd2") / "mesh.zarr").between(30, 70)
     save_mesh(mesh, run.folder / "mesh.npz")

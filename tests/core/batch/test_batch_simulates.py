@@ -18,12 +18,11 @@ from sd2core.batch.estimate import estimate, pace_kind
 from sd2core.batch.folder import BatchFolder
 from sd2core.batch.plan_file import plan_from_text, plan_text
 from sd2core.batch.run import BatchEnd, run_batch
-from sd2core.batch.synthesis import stretches_of
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.simulating import Simulation, simulated_map
 from sd2core.errors import Sd2Error
 from sd2core.io.mesh import load_mesh
-from sd2core.maps import DopplerMap, joined
+from sd2core.maps import DopplerMap
 from sd2core.radar_config import PAPER_RADAR
 from sd2core.radar_profiles import RADARS
 from sd2core.runs.pace import keep_pace
@@ -51,18 +50,15 @@ def rows_in(folder: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in lines]
 
 
-def test_every_place_gets_the_map_of_its_stretches(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(flow, "stretches_of", lambda frames: stretches_of(frames, 15))
+def test_every_place_gets_its_map(tmp_path: Path) -> None:
     (path,) = save_spheres(tmp_path / "meshes", 1)
     end, _ = run(tmp_path, SIMULATED)
-    assert end.facts["done"] == {"inspect": 1, "synthesise": 6, "simulate": 6}
+    assert end.facts["done"] == {"inspect": 1, "synthesise": 2, "simulate": 2}
     rows = rows_in(tmp_path)
-    for placement in (1, 2):
-        here = [row for row in rows if row["placement"] == placement]
-        found = joined([DopplerMap.load(tmp_path / "made" / row["simulated"]) for row in here])
-        sensor = VirtualSensor(**here[0]["sensor"])
+    assert [row["placement"] for row in rows] == [1, 2]
+    for row in rows:
+        found = DopplerMap.load(tmp_path / "made" / row["simulated"])
+        sensor = VirtualSensor(**row["sensor"])
         expected = simulated_map(load_mesh(path), sensor, Simulation(), VelocityAxis())
         np.testing.assert_allclose(found.values, expected.values, rtol=1e-6, atol=0)
         np.testing.assert_array_equal(found.times_s, expected.times_s)

@@ -174,10 +174,10 @@ def test_a_batch_takes_a_map_that_an_export_has_counted(
     made = synthetic(swinging.folder)
     mesh = known_mesh(swinging)
     out = tmp_path / "map.npz"
-    synthesise(mesh, swinging.sensor, Synthesis(), (0, FRAMES), None, [out])
+    synthesise(mesh, swinging.sensor, Synthesis(), None, [out])
     assert counted == [1]
     np.testing.assert_array_equal(DopplerMap.load(out).values, made.values)
-    synthesise(mesh, swinging.sensor, Synthesis(left_out=("walls",)), (0, FRAMES), None, [out])
+    synthesise(mesh, swinging.sensor, Synthesis(left_out=("walls",)), None, [out])
     assert counted == [1, 1]
     assert len([*kept_maps.user_cache("maps").iterdir()]) == 1  # it has a folder of its own
 

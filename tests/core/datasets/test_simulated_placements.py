@@ -89,15 +89,12 @@ def test_every_place_shows_what_a_radar_there_would_have_recorded(
 
 
 @pytest.mark.slow
-def test_frames_of_a_long_clip_are_columns_of_the_whole_map() -> None:
+def test_a_long_clip_has_nobody_where_nobody_is() -> None:
     mesh = _swaying_plate(620)
     simulation = Simulation(FEW_CHIRPS, seed=5)
     sensor, axis = VirtualSensor((0.2, 0.0, 0.0)), VelocityAxis()
     whole = simulated_map(mesh, sensor, simulation, axis)
-    for start, stop in ((0, 250), (250, 251), (251, 620)):
-        part = simulated_map(mesh, sensor, simulation, axis, (start, stop))
-        np.testing.assert_allclose(part.values, whole.values[:, start:stop], rtol=1e-6, atol=0)
-        np.testing.assert_array_equal(part.times_s, whole.times_s[start:stop])
+    np.testing.assert_array_equal(whole.times_s, mesh.times_s)
     assert whole.present is not None
     assert np.flatnonzero(~whole.present).tolist() == list(range(300, 320))
     assert "first_frame_s" not in whole.meta["simulation"]

@@ -179,15 +179,14 @@ def test_a_state_space_that_looks_both_ways_sees_the_whole_clip(tmp_path: Path) 
         assert denoiser.denoise_values(values[:frames]).shape == (frames, 32)
 
 
-def test_pieces_of_a_long_clip_are_those_of_the_whole(
+def test_pieces_of_a_long_clip_are_nearly_those_of_the_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     denoiser, values = looking_both_ways(tmp_path / "both.safetensors"), energies(700)
     at_once = denoiser.denoise_values(values)
     monkeypatch.setattr(live, "PIECE", 200)
-    whole = denoiser.denoise_values(values)
     # A border 36 frames away does not matter much.
-    assert np.abs(whole - at_once).max() < 0.02 * at_once.max()
+    assert np.abs(denoiser.denoise_values(values) - at_once).max() < 0.02 * at_once.max()
 
 
 @pytest.mark.parametrize("name", WINDOWED)
