@@ -1,4 +1,4 @@
-"""Arrays by name, in files of a folder from which stopped work goes on, or in memory."""
+"""Arrays by name, in files of a folder from which stopped work goes on."""
 
 from __future__ import annotations
 
@@ -18,45 +18,29 @@ _WHAT = "landmarks", "a file written by SD² Studio (.npz)"
 
 
 class ArrayStore:
-    """Arrays by name: files of a folder, made where it is missing, or without one in memory.
+    """Arrays by name in files of a folder, which is made where it is missing; without one, none.
 
     Files that are damaged, or were written with another key, are not there.
     """
 
     def __init__(self, folder: Path | None, key: str | None = None) -> None:
         self._folder, self._key = folder, key
-        self._in_memory: dict[str, dict[str, Any]] = {}
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
 
     def read(self, name: str) -> dict[str, Any] | None:
         """Arrays of a name, or None if they are not there."""
         if self._folder is None:
-            return self._in_memory.get(name)
+            return None
         try:
             arrays, meta = read_arrays(self._folder / name)
         except Sd2Error:
             return None
         return arrays if meta.get("key") == self._key else None
 
-    def needed(self, name: str, what: str) -> dict[str, Any]:
-        """Arrays of a name that this run wrote or read; Sd2Error if they have gone.
-
-        ``what`` is the beginning of the error's sentence: ``The landmarks have``.
-        """
-        arrays = self.read(name)
-        if arrays is None:
-            raise Sd2Error(
-                f"{what} gone from the folder of the work",
-                "a folder that no other program changes",
-                "Start the same command again; it goes on from what is there",
-            )
-        return arrays
-
     def write(self, name: str, arrays: Mapping[str, Any]) -> None:
         """Keep arrays under a name, in one step."""
         if self._folder is None:
-            self._in_memory[name] = dict(arrays)
             return
         named: dict[str, Any] = {"meta": np.array(json.dumps({"key": self._key})), **arrays}
         with atomic_write(self._folder / name) as stream:

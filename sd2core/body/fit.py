@@ -22,11 +22,11 @@ from sd2core.body.rotations import Floats
 from sd2core.body.shape import DEFAULT_STATURE_M, BodyShape, ShapeSpace, check_stature
 from sd2core.body.shaping import shape_of_lengths, shape_of_outlines
 from sd2core.body.solve import ROUNDS, solve, solve_stills
-from sd2core.body.track import LANDMARKS, PART_FRAMES, Landmarks, LandmarkTrack, parts
+from sd2core.body.track import LANDMARKS, PART_FRAMES, LandmarkTrack, parts
 from sd2core.errors import Sd2Error
 from sd2core.progress import Progress, silent
 
-Lift = Callable[[Landmarks, PinholeCamera], Lifted]
+Lift = Callable[[LandmarkTrack, PinholeCamera], Lifted]
 
 
 _SEEN = 0.5
@@ -41,22 +41,21 @@ _ACROSS_PER_S = 3.9
 
 
 def fit_motion(
-    track: Landmarks,
+    track: LandmarkTrack,
     camera: PinholeCamera,
     *,
     stature_m: float | None = None,
     workspace: Path,
     progress: Progress = silent,
 ) -> FittedMotion:
-    """Fit a body to a clip of any length; the poses stay in the workspace.
+    """Fit a body to a clip of any length.
 
     Parameters
     ----------
     stature_m : float, optional
         The person's height, which fixes the scale; :data:`DEFAULT_STATURE_M` without.
     workspace : Path
-        Existing folder in which finished stretches are kept, so that a stopped fit goes on there;
-        it must live as long as the poses are used.
+        Existing folder in which finished stretches are kept, so that a stopped fit goes on there.
     progress : Progress
         Counts steps of the solver, at most.
 
@@ -91,11 +90,11 @@ def fit_motion(
 
 
 class Fitting:
-    """Fit of one clip, with one window of frames in memory at a time."""
+    """Fit of one clip, window by window."""
 
     def __init__(
         self,
-        track: Landmarks,
+        track: LandmarkTrack,
         camera: PinholeCamera,
         stature_m: float | None,
         lift: Lift | None,
@@ -162,10 +161,10 @@ class Fitting:
     def _solve(self, rig: Rig, number: int, tick: Callable[[int], None]) -> None:
         start, stop, _ = self.windows.spans[number]
         part, track, _ = self._part(start, stop)
-        if self.windows.is_kept(number, part):
+        if self.windows.resumed(part):
             return
         first = initial_pose(rig, part.points_m, trust_of(track))
-        self.windows.keep(number, part, solve(rig, part, first, tick))
+        self.windows.keep(part, solve(rig, part, first, tick))
 
     def _shape(
         self, space: ShapeSpace, keypoints: KeypointSpace, looked: Callable[[int], None]
@@ -229,7 +228,7 @@ class Fitting:
         )
 
 
-def _outlined(track: Landmarks, present: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _outlined(track: LandmarkTrack, present: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Numbers of the outlines that the girth is taken from, evenly spread."""
     seen = (track.silhouettes >= _MASK_SURE).any(axis=(1, 2))
     return _thinned(np.flatnonzero(present[track.silhouette_frames] & seen), _OUTLINES)

@@ -26,7 +26,7 @@ from sd2core.body.person_selection import Rectangle
 from sd2core.body.roi import Sightings
 from sd2core.body.shape import DEFAULT_STATURE_M, check_stature
 from sd2core.body.solve import one_thread
-from sd2core.body.track import LANDMARK, Landmarks, parts
+from sd2core.body.track import LANDMARK, LandmarkTrack
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text, replace_folder
 from sd2core.files.lock import FileLock
@@ -244,15 +244,12 @@ def provenance(made: FittedVideo, path: Path, choices: FitChoices) -> dict[str, 
 
 
 def _fit_folder(
-    partial: Path, track: Landmarks, choices: FitChoices, camera: PinholeCamera
+    partial: Path, track: LandmarkTrack, choices: FitChoices, camera: PinholeCamera
 ) -> Path:
     """Folder of a fit, named by its landmarks and choices."""
     landmarks = hashlib.sha256()
-    for start, stop in parts(len(track)):
-        part = track.part(start, stop)
-        for each in (part.image_px, part.world_m, part.visibility):
-            landmarks.update(np.ascontiguousarray(each).tobytes())
-    landmarks.update(np.ascontiguousarray(track.silhouettes).tobytes())
+    for each in (track.image_px, track.world_m, track.visibility, track.silhouettes):
+        landmarks.update(np.ascontiguousarray(each).tobytes())
     about = {
         "choices": asdict(choices) | {"resolution": None},
         "camera": asdict(camera),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ _EVIDENCE = ("slopes", "depth_m", "trunk_m")
 
 
 class Windows:
-    """Poses of a clip, fitted window by window, in a store.
+    """Poses of a clip, fitted window by window, and kept in a store as they come.
 
     ``spans`` holds of each window its start, its stop and the frames shared with the one before.
     """
@@ -34,19 +33,23 @@ class Windows:
         self._known = np.flatnonzero(present)
         self._starts = np.array([start for start, _, _ in self.spans])
         self._store = store
-        self._recent = lru_cache(maxsize=2)(self._read)
+        self._poses: list[Pose] = []
 
-    def keep(self, number: int, part: Evidence, pose: Pose) -> None:
-        """Keep the pose that was found for a window's evidence."""
+    def keep(self, part: Evidence, pose: Pose) -> None:
+        """Keep the pose that was found for the next window's evidence."""
         evidence = {name: getattr(part, name) for name in _EVIDENCE}
-        self._store.write(_name(number), evidence | pose._asdict())
+        self._store.write(_name(len(self._poses)), evidence | pose._asdict())
+        self._poses.append(pose)
 
-    def is_kept(self, number: int, part: Evidence) -> bool:
-        """True if an earlier run has finished a window with the same evidence."""
-        kept = self._store.read(_name(number))
+    def resumed(self, part: Evidence) -> bool:
+        """True if an earlier run has finished the next window, with the same evidence."""
+        kept = self._store.read(_name(len(self._poses)))
         if kept is None or not {*_EVIDENCE, *Pose._fields} <= kept.keys():
             return False
-        return all(np.array_equal(kept[name], getattr(part, name)) for name in _EVIDENCE)
+        if not all(np.array_equal(kept[name], getattr(part, name)) for name in _EVIDENCE):
+            return False
+        self._poses.append(Pose(*(kept[name] for name in Pose._fields)))
+        return True
 
     def poses(self, frames: NDArray[np.intp]) -> Pose:
         """The pose in each of some frames (n,), of windows that are kept.
@@ -71,7 +74,7 @@ class Windows:
         low, middle, high = np.searchsorted(frames, [start, start + overlap, stop])
         if low == high:
             return
-        fitted = self._recent(number).at(frames[low:high] - start)
+        fitted = self._poses[number].at(frames[low:high] - start)
         if middle > low:
             shared = slice(int(low), int(middle))
             share = np.linspace(0.0, 1.0, overlap + 2)[1:-1][frames[shared] - start]
@@ -84,11 +87,6 @@ class Windows:
             )
         pose.turns[middle:high] = fitted.turns[middle - low :]
         pose.translation_m[middle:high] = fitted.translation_m[middle - low :]
-
-    def _read(self, number: int) -> Pose:
-        what = f"The pose of frame {self.spans[number][0]} and on has"
-        arrays = self._store.needed(_name(number), what)
-        return Pose(*(arrays[name] for name in Pose._fields))
 
 
 def _name(number: int) -> str:

@@ -16,7 +16,7 @@ from sd2core.body.evidence import evidence_of, sight_of
 from sd2core.body.lifter import FEET, LiftedInParts, Lifter
 from sd2core.body.rotations import Floats
 from sd2core.body.shape import DEFAULT_STATURE_M
-from sd2core.body.track import LANDMARK, Landmarks, parts
+from sd2core.body.track import LANDMARK, LandmarkTrack, parts
 
 _STANDING = 0.8
 _SEEN = 0.5
@@ -45,7 +45,7 @@ class StandingFeet:
     down: Floats  # (3,) from shoulders to ankles, while they stand; of length 1
 
 
-def standing_feet(track: Landmarks, camera: PinholeCamera) -> StandingFeet | None:
+def standing_feet(track: LandmarkTrack, camera: PinholeCamera) -> StandingFeet | None:
     """Places of the feet on the floor; None where they are hardly seen."""
     lifted = LiftedInParts(Lifter.load(), track, camera)
     points, downs = [], []

@@ -1,16 +1,13 @@
-"""Landmarks on disk: a whole track in a file, and a search in a folder, read part by part."""
+"""Landmarks on disk: a whole track in a file, and a search in a folder, from which it goes on."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import os
-import zipfile
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from dataclasses import fields
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +18,7 @@ from sd2core.body.person_selection import Rectangle
 from sd2core.body.raw_track import RawTrack
 from sd2core.body.refining import RefinedFrames
 from sd2core.body.roi import Sightings
-from sd2core.body.track import PER_FRAME, Landmarks, LandmarkTrack, parts
+from sd2core.body.track import PER_FRAME, LandmarkTrack
 from sd2core.files.atomic import atomic_write
 from sd2core.files.texts import check_version
 from sd2core.io.video import VideoReader
@@ -35,8 +32,8 @@ _ARRAYS = (*PER_FRAME, "silhouette_frames", "silhouettes")
 _PLACES = ("image_px", "depth_px", "world_m", "visibility")
 
 
-def save_track(track: Landmarks, path: Path | str) -> None:
-    """Write landmarks to one file (.npz), part by part and in one step."""
+def save_track(track: LandmarkTrack, path: Path | str) -> None:
+    """Write landmarks to one file (.npz) in one step."""
     meta = {
         "format": FORMAT,
         "version": VERSION,
@@ -44,33 +41,13 @@ def save_track(track: Landmarks, path: Path | str) -> None:
         "height": track.height,
         "notes": list(track.notes),
     }
-    small = {
-        "meta": np.array(json.dumps(meta, ensure_ascii=False)),
-        "times_s": track.timebase.times_s,
-        "silhouette_frames": track.silhouette_frames,
-        "silhouettes": track.silhouettes,
-    }
-    with (
-        atomic_write(Path(path)) as stream,
-        zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive,
-    ):
-        for name, array in small.items():
-            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-                np.lib.format.write_array(member, array, allow_pickle=False)
-        for name in PER_FRAME:
-            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-                _write_parts(member, track, name)
-
-
-def _write_parts(member: IO[bytes], track: Landmarks, name: str) -> None:
-    """One array of a track as ``.npy``."""
-    for start, stop in parts(len(track)):
-        values = track.rows(start, stop)[name]
-        if start == 0:
-            shape = (len(track), *values.shape[1:])
-            header = {"descr": values.dtype.str, "fortran_order": False, "shape": shape}
-            np.lib.format.write_array_header_1_0(member, header)
-        member.write(np.ascontiguousarray(values).tobytes())
+    with atomic_write(Path(path)) as stream:
+        np.savez_compressed(
+            stream,
+            meta=np.array(json.dumps(meta, ensure_ascii=False)),
+            times_s=track.timebase.times_s,
+            **{name: getattr(track, name) for name in _ARRAYS},
+        )
 
 
 def load_track(path: Path | str) -> LandmarkTrack:
@@ -111,7 +88,7 @@ def search_store(
     Parameters
     ----------
     folder : Path or None
-        Made where it is missing; None keeps the arrays in memory.
+        Made where it is missing; None keeps nothing.
     video : VideoReader
         Known by path, size, time of change, number of frames and size of the picture.
     person : Rectangle, Sightings or None
@@ -142,19 +119,16 @@ def _key_of(person: Rectangle | Sightings | None) -> list[Any] | str | None:
 
 
 def repaired_track(
-    store: ArrayStore,
     video: VideoReader,
     refined: RefinedStretches,
     max_gap_s: float,
     unclear: NDArray[np.bool_] | None = None,
     notes: tuple[str, ...] = (),
-) -> TrackInParts:
-    """Repair what was found, into a store; see :func:`repair_landmarks`.
+) -> LandmarkTrack:
+    """Repair what was found; see :func:`repair_landmarks`.
 
     Parameters
     ----------
-    store : ArrayStore
-        Repaired parts are written to it, and read from it by the track.
     video : VideoReader
         Searched for ``refined``.
     refined : RefinedStretches
@@ -166,112 +140,50 @@ def repaired_track(
     notes : tuple of str
         Sentences that the track has beside those about the repair.
     """
-    present, bridged = np.zeros((2, len(video)), bool)
-    written = 0
-
-    def write(part: RawTrack) -> None:
-        nonlocal written
-        frames = slice(written, written + len(part.present))
-        known = vars(part) | {"confidence": refined.confidence[frames]}
-        store.write(_name(written), {name: known[name] for name in PER_FRAME})
-        present[frames], bridged[frames] = part.present, part.bridged
-        written = frames.stop
-
-    times_s, seen = video.timebase.times_s, refined.confidence > 0.0
-    repairs = repair_landmarks(refined.raw_track, times_s, seen, max_gap_s, write, unclear)
-    silhouette_frames, silhouettes = refined.silhouettes()
-    return TrackInParts(
+    found = refined.joined()
+    raw = RawTrack(
+        times_s=video.timebase.times_s,
+        present=found["confidence"] > 0.0,
+        bridged=np.zeros(len(video), bool),
+        **{name: found[name] for name in _PLACES},
+    )
+    track, repairs = repair_landmarks(raw, max_gap_s, unclear)
+    arrays = {name: values for name, values in vars(track).items() if name != "times_s"}
+    return LandmarkTrack(
         timebase=video.timebase,
         width=video.width,
         height=video.height,
-        present=present,
-        bridged=bridged,
-        silhouette_frames=silhouette_frames,
-        silhouettes=silhouettes,
+        **found | arrays,
         notes=(*repairs, *notes),
-        store=store,
     )
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class TrackInParts(Landmarks):
-    """Landmarks in a store, repaired, a stretch at a time in memory."""
-
-    store: ArrayStore
-
-    def rows(self, start: int, stop: int) -> dict[str, NDArray[Any]]:
-        """Frames ``start`` to ``stop`` of the arrays of a track."""
-        starts = [first for first, _ in parts(len(self))]
-        first = int(np.searchsorted(starts, start, side="right")) - 1
-        last = max(int(np.searchsorted(starts, stop)), first + 1)
-        pieces = [self._kept(begin) for begin in starts[first:last]]
-        cut = slice(start - starts[first], stop - starts[first])
-        return {name: _joined(pieces, name)[cut] for name in PER_FRAME}
-
-    @cached_property
-    def _kept(self) -> Callable[[int], Mapping[str, NDArray[Any]]]:
-        return lru_cache(maxsize=2)(
-            lambda start: self.store.needed(
-                _name(start), f"The landmarks of frames {start} and on have"
-            )
-        )
-
-
 class RefinedStretches:
-    """Results of the second pass, stretch by stretch in a store."""
+    """Results of the second pass, stretch by stretch, kept in a store as they come."""
 
-    def __init__(self, store: ArrayStore, video: VideoReader, stretch_frames: int) -> None:
-        self._store, self._frames_each = store, stretch_frames
-        self._times_s = video.timebase.times_s
-        self.confidence = np.zeros(len(video), np.float32)
-        self._masks: list[tuple[NDArray[np.intp], NDArray[np.uint8]]] = []
+    def __init__(self, store: ArrayStore) -> None:
+        self._store = store
+        self._stretches: list[RefinedFrames] = []
 
     def add(self, start: int, stretch: RefinedFrames) -> None:
-        """Keep a stretch that has been looked at."""
+        """Keep the next stretch that has been looked at."""
         self._store.write(self._name(start), vars(stretch))
-        self._count(start, stretch)
+        self._stretches.append(stretch)
 
     def resumed(self, start: int) -> bool:
         """True if the stretch that begins with a frame is in the store already."""
         arrays = self._store.read(self._name(start))
         if arrays is not None:
-            self._count(start, RefinedFrames(**arrays))
+            self._stretches.append(RefinedFrames(**arrays))
         return arrays is not None
 
-    def silhouettes(self) -> tuple[NDArray[np.intp], NDArray[np.uint8]]:
-        """All frames with a mask, and the masks."""
-        frames, masks = zip(*self._masks, strict=True)
-        return np.concatenate(frames), np.concatenate(masks)
-
-    def raw_track(self, start: int, stop: int) -> RawTrack:
-        """Frames ``start`` to ``stop``, not repaired."""
-        step = self._frames_each
-        begin = start // step * step
-        stretches = []
-        for first in range(begin, stop, step):
-            what = f"What was found in frame {first} and on has"
-            stretches.append(self._store.needed(self._name(first), what))
-        cut = slice(start - begin, stop - begin)
-        return RawTrack(
-            times_s=self._times_s[start:stop],
-            present=self.confidence[start:stop] > 0.0,
-            bridged=np.zeros(stop - start, bool),
-            **{name: _joined(stretches, name)[cut] for name in _PLACES},
-        )
-
-    def _count(self, start: int, stretch: RefinedFrames) -> None:
-        """Note what has to be known of the whole clip."""
-        self.confidence[start : start + len(stretch.confidence)] = stretch.confidence
-        self._masks.append((stretch.silhouette_frames, stretch.silhouettes))
+    def joined(self) -> dict[str, NDArray[Any]]:
+        """Arrays of :class:`~sd2core.body.refining.RefinedFrames`, of all stretches."""
+        return {
+            one.name: np.concatenate([getattr(each, one.name) for each in self._stretches])
+            for one in fields(RefinedFrames)
+        }
 
     @staticmethod
     def _name(start: int) -> str:
         return f"refined-{start:07d}.npz"
-
-
-def _name(start: int) -> str:
-    return f"mended-{start:07d}.npz"
-
-
-def _joined(pieces: Sequence[Mapping[str, NDArray[Any]]], name: str) -> NDArray[Any]:
-    return np.concatenate([piece[name] for piece in pieces])

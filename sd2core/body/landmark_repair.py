@@ -7,8 +7,7 @@ is repaired in parts, each with a margin on both sides.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from sd2core.body.raw_track import SCALE_S, RawTrack, pixels_per_metre, place_m
 from sd2core.body.roi import PLACES, Sightings
-from sd2core.body.sides import Read, find_side_swaps, swap_sides
+from sd2core.body.sides import find_side_swaps, swap_sides
 from sd2core.body.track import LANDMARKS, parts, with_margin
 from sd2core.mesh.presence import runs
 
@@ -182,42 +181,34 @@ def bridge_gaps(track: RawTrack, max_gap_s: float) -> RawTrack:
 
 
 def repair_landmarks(
-    read: Read,
-    times_s: Floats,
-    seen: NDArray[np.bool_],
-    max_gap_s: float,
-    write: Callable[[RawTrack], None],
-    unclear: NDArray[np.bool_] | None = None,
-) -> tuple[str, ...]:
-    """Repair a whole clip part by part; return sentences about it.
+    found: RawTrack, max_gap_s: float, unclear: NDArray[np.bool_] | None = None
+) -> tuple[RawTrack, tuple[str, ...]]:
+    """Repair a whole clip part by part; return it, and sentences about the repair.
 
     Parameters
     ----------
-    read : callable
-        ``read(start, stop)`` gives what was found in these frames.
-    times_s : float64 ndarray, (T,)
-        Times of all frames.
-    seen : bool ndarray, (T,)
-        Frames in which the person was found.
+    found : RawTrack
+        What was found in all frames.
     max_gap_s : float
         Longest gap that is bridged, from the last frame before to the first after.
-    write : callable
-        Called with the repaired parts, in order.
     unclear : bool ndarray, (T,), optional
         Frames in which whoever is there may be another person; None: in none.
     """
-    swapped = find_side_swaps(read, len(seen))
-    counts = _Counts(swapped)
-    for start, stop in parts(len(times_s)):
-        first, last = _around(start, stop, times_s, seen, max_gap_s)
-        track = read(first, last)
+    swapped = find_side_swaps(found)
+    whole = RawTrack(**{name: values.copy() for name, values in vars(found).items()})
+    replaced = np.zeros(found.visibility.shape, bool)
+    for start, stop in parts(len(found.times_s)):
+        first, last = _around(start, stop, found.times_s, found.present, max_gap_s)
+        track = found.part(first, last)
         for part, frames in swapped.items():
             track = swap_sides(track, part, frames[first:last])
-        track, replaced = replace_outliers(track)
-        track = bridge_gaps(track, max_gap_s).part(start - first, stop - first)
-        counts.add(track, replaced[start - first : stop - first])
-        write(track)
-    return counts.sentences(max_gap_s, np.zeros(len(seen), bool) if unclear is None else unclear)
+        track, outlying = replace_outliers(track)
+        replaced[start:stop] = outlying[start - first : stop - first]
+        mended = bridge_gaps(track, max_gap_s).part(start - first, stop - first)
+        for name, values in vars(mended).items():
+            getattr(whole, name)[start:stop] = values
+    unclear = np.zeros(len(replaced), bool) if unclear is None else unclear
+    return whole, _sentences(whole, swapped, replaced, max_gap_s, unclear)
 
 
 def _around(
@@ -245,47 +236,39 @@ def _around(
     return with_margin(start, stop, len(times_s))
 
 
-@dataclass
-class _Counts:
-    """Counts of repairs."""
-
-    swapped: dict[str, NDArray[np.bool_]]  # frames of each part of the body
-    missing: list[NDArray[np.bool_]] = field(default_factory=list)
-    landmarks: int = 0
-    outlying: int = 0
-    bridged: list[NDArray[np.bool_]] = field(default_factory=list)
-
-    def add(self, track: RawTrack, replaced: NDArray[np.bool_]) -> None:
-        self.landmarks += int(replaced.sum())
-        self.outlying += int(replaced.any(axis=1).sum())
-        self.bridged.append(track.bridged)
-        self.missing.append(~track.present)
-
-    def sentences(self, max_gap_s: float, unclear: NDArray[np.bool_]) -> tuple[str, ...]:
-        notes = [
-            f"Left and right of {part} swapped back in {_which(frames)}."
-            for part, frames in self.swapped.items()
-            if frames.any()
-        ]
-        if self.landmarks:
-            notes.append(
-                "Replaced from the frames around them:"
-                f" {_count(self.landmarks, 'outlying landmark')} in {_count(self.outlying)}."
-            )
-        missing, bridged = np.concatenate(self.missing), np.concatenate(self.bridged)
-        if bridged.any():
-            notes.append(
-                f"Interpolated, in gaps of up to {max_gap_s:g} s without the person:"
-                f" {_count(int(bridged.sum()))}."
-            )
-        for which, why in (
-            (missing & ~unclear, "Left empty, without the person"),
-            (missing & unclear, "Left empty, because whoever is seen may be somebody else"),
-            (~missing & ~bridged & unclear, "Found again elsewhere and known by their looks alone"),
-        ):
-            if which.any():
-                notes.append(f"{why}: {_which(which)}.")
-        return tuple(notes)
+def _sentences(
+    track: RawTrack,
+    swapped: dict[str, NDArray[np.bool_]],
+    replaced: NDArray[np.bool_],
+    max_gap_s: float,
+    unclear: NDArray[np.bool_],
+) -> tuple[str, ...]:
+    """Sentences on a repaired clip: frames of parts that were swapped, and outliers (T, 33)."""
+    notes = [
+        f"Left and right of {part} swapped back in {_which(frames)}."
+        for part, frames in swapped.items()
+        if frames.any()
+    ]
+    if replaced.any():
+        notes.append(
+            "Replaced from the frames around them:"
+            f" {_count(int(replaced.sum()), 'outlying landmark')} in"
+            f" {_count(int(replaced.any(axis=1).sum()))}."
+        )
+    missing, bridged = ~track.present, track.bridged
+    if bridged.any():
+        notes.append(
+            f"Interpolated, in gaps of up to {max_gap_s:g} s without the person:"
+            f" {_count(int(bridged.sum()))}."
+        )
+    for which, why in (
+        (missing & ~unclear, "Left empty, without the person"),
+        (missing & unclear, "Left empty, because whoever is seen may be somebody else"),
+        (~missing & ~bridged & unclear, "Found again elsewhere and known by their looks alone"),
+    ):
+        if which.any():
+            notes.append(f"{why}: {_which(which)}.")
+    return tuple(notes)
 
 
 def who_else(sightings: Sightings, times_s: Floats) -> tuple[str, ...]:

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from sd2core.body.array_store import ArrayStore
 from sd2core.body.blazepose import Pose, PoseDetector, PoseLandmarker
-from sd2core.body.landmark_files import RefinedStretches, TrackInParts, repaired_track, search_store
+from sd2core.body.landmark_files import RefinedStretches, repaired_track, search_store
 from sd2core.body.landmark_models import LandmarkModels
 from sd2core.body.landmark_repair import who_else
 from sd2core.body.person_selection import Rectangle, Start, find_person_in, find_prominent_person
 from sd2core.body.person_tracker import PersonTracker
 from sd2core.body.refining import Refiner
 from sd2core.body.roi import Roi, Sightings, roi_numbers, roi_of, roi_path
+from sd2core.body.track import LandmarkTrack
 from sd2core.body.tracking import Search
 from sd2core.errors import Sd2Error
 from sd2core.io.video import VideoReader
@@ -52,7 +53,7 @@ def find_landmarks(
     progress_of: Callable[[SearchStage], Progress] = lambda stage: silent,
     on_frame: OnFrame = lambda *_: None,
     workspace: Path | None = None,
-) -> TrackInParts:
+) -> LandmarkTrack:
     """Find the landmarks of one person in every frame.
 
     The person is followed from a first frame both ways; the path of the square around them
@@ -79,7 +80,7 @@ def find_landmarks(
         Called with the findings of each stage in a frame; may raise ``Cancelled``.
     workspace : Path, optional
         Folder from which a stopped search can go on. Results of another video or other options
-        in it are not used. Without it the track is in memory.
+        in it are not used.
 
     Raises
     ------
@@ -102,15 +103,16 @@ def find_landmarks(
         sightings = _sighted(video, models, person, threads, progress_of("find"), on_frame, store)
     progress = progress_of("refine")
     refined = _refined(video, models, sightings, silhouettes, threads, progress, on_frame, store)
-    if not refined.confidence.any():
+    unclear = sightings.unclear_frames(len(video))
+    others = who_else(sightings, video.timebase.times_s)
+    track = repaired_track(video, refined, max_gap_s, unclear, others)
+    if not track.confidence.any():
         raise Sd2Error(
             f"No person could be followed through {video.path}",
             "a person who is seen in some frames in succession",
             "Mark the person in one frame (--person-box X,Y,WIDTH,HEIGHT --person-frame FRAME)",
         )
-    unclear = sightings.unclear_frames(len(video))
-    others = who_else(sightings, video.timebase.times_s)
-    return repaired_track(store, video, refined, max_gap_s, unclear, others)
+    return track
 
 
 def _sighted(
@@ -173,7 +175,7 @@ def _refined(
         _show("refine", frame, pose, on_frame)
         progress(frame + 1, frames)
 
-    refined = RefinedStretches(store, video, _STRETCH_FRAMES)
+    refined = RefinedStretches(store)
     landmarkers = [PoseLandmarker(models.landmarker) for _ in range(threads)]
     with Refiner(landmarkers) as refiner:
         for start in range(0, frames, _STRETCH_FRAMES):

@@ -35,7 +35,6 @@ from sd2core.body.track import (
     LANDMARKS,
     MIRRORED,
     PART_FRAMES,
-    Landmarks,
     LandmarkTrack,
     parts,
 )
@@ -223,7 +222,7 @@ class LiftedInParts:
     Raises Sd2Error if the camera's picture has another size than the track's.
     """
 
-    def __init__(self, lifter: Lifter, track: Landmarks, camera: PinholeCamera) -> None:
+    def __init__(self, lifter: Lifter, track: LandmarkTrack, camera: PinholeCamera) -> None:
         if (camera.width, camera.height) != (track.width, track.height):
             raise Sd2Error(
                 f"The camera takes pictures of {camera.width} × {camera.height}",

@@ -6,7 +6,6 @@ A small network sees the whole body move and tells how likely each part of it is
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -50,16 +49,14 @@ _ODDS_M2 = 0.03
 """Squared distance from a smooth path that outweighs one unit of log odds, per landmark."""
 _LONGEST_GAP_S = 0.5
 
-Read = Callable[[int, int], RawTrack]
-"""Function that gives what was found in frames ``start`` to ``stop``."""
 
-
-def find_side_swaps(read: Read, frames: int) -> dict[str, NDArray[np.bool_]]:
+def find_side_swaps(track: RawTrack) -> dict[str, NDArray[np.bool_]]:
     """Frames (T,) of a clip in which left and right of each part are to be swapped back."""
+    frames = len(track.times_s)
     swapped = {part: np.zeros(frames, bool) for part in SIDED_PARTS}
     for start, stop in parts(frames):
         first, last = with_margin(start, stop, frames)
-        for part, here in undo_side_swaps(read(first, last))[1].items():
+        for part, here in undo_side_swaps(track.part(first, last))[1].items():
             swapped[part][start:stop] = here[start - first : stop - first]
     return swapped
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,12 +85,24 @@ def with_margin(start: int, stop: int, frames: int) -> tuple[int, int]:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Landmarks(ABC):
-    """33 landmarks of one person in T frames of a video; not all need be in memory."""
+class LandmarkTrack:
+    """33 landmarks of one person in T frames of a video."""
 
     timebase: Timebase
     width: int  # of the upright picture, in pixels
     height: int
+    image_px: NDArray[np.float32]
+    """Landmarks in the picture (also outside it), (T, 33, 2); NaN in empty frames."""
+    depth_px: NDArray[np.float32]
+    """The landmark model's own depth behind the hips at the scale of the picture, (T, 33), in
+    pixels; weak. NaN in empty frames."""
+    world_m: NDArray[np.float32]
+    """The landmark model's own place from the middle of the hips, x right, y down, z away, (T, 33,
+    3); its depth is weak. NaN in empty frames."""
+    visibility: NDArray[np.float32]
+    """From 0 (hidden or outside the picture) to 1, (T, 33); 0 in empty frames."""
+    confidence: NDArray[np.float32]
+    """Of the model that there is a person, (T,); 0 where it found none."""
     present: NDArray[np.bool_]
     """False in empty frames, (T,): no person, and the gap too long to be bridged."""
     bridged: NDArray[np.bool_]
@@ -116,31 +126,5 @@ class Landmarks(ABC):
             silhouette_frames=self.silhouette_frames[kept] - start,
             silhouettes=self.silhouettes[kept],
             notes=self.notes,
-            **self.rows(start, stop),
+            **{name: getattr(self, name)[start:stop] for name in PER_FRAME},
         )
-
-    @abstractmethod
-    def rows(self, start: int, stop: int) -> dict[str, NDArray[Any]]:
-        """Frames ``start`` to ``stop`` of the arrays :data:`PER_FRAME`."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class LandmarkTrack(Landmarks):
-    """Landmarks in memory."""
-
-    image_px: NDArray[np.float32]
-    """Landmarks in the picture (also outside it), (T, 33, 2); NaN in empty frames."""
-    depth_px: NDArray[np.float32]
-    """The landmark model's own depth behind the hips at the scale of the picture, (T, 33), in
-    pixels; weak. NaN in empty frames."""
-    world_m: NDArray[np.float32]
-    """The landmark model's own place from the middle of the hips, x right, y down, z away, (T, 33,
-    3); its depth is weak. NaN in empty frames."""
-    visibility: NDArray[np.float32]
-    """From 0 (hidden or outside the picture) to 1, (T, 33); 0 in empty frames."""
-    confidence: NDArray[np.float32]
-    """Of the model that there is a person, (T,); 0 where it found none."""
-
-    def rows(self, start: int, stop: int) -> dict[str, NDArray[Any]]:
-        """Frames ``start`` to ``stop`` of the arrays :data:`PER_FRAME`."""
-        return {name: getattr(self, name)[start:stop] for name in PER_FRAME}

@@ -41,7 +41,7 @@ from sd2core.body.refining import RefinedFrames
 from sd2core.body.roi import Sightings
 from sd2core.body.track import LandmarkTrack
 from sd2core.files.resources import resource_path
-from sd2core.io.video import VideoReader, open_video
+from sd2core.io.video import open_video
 from sd2core.io.video_writing import write_video
 from sd2core.processes import ONE_THREAD
 from tools.fitting.error_measurement import fit_body, mesh_of
@@ -77,8 +77,7 @@ def sample_landmarks(folder: Path, frames: int | None = None) -> LandmarkTrack:
             path = folder / "short.mp4"
             write_video(path, video.frames(0, frames), _RATE_HZ, size, preset="ultrafast")
     with open_video(path) as video:
-        track = find_landmarks(video, landmark_models())
-        return track.part(0, len(track))
+        return find_landmarks(video, landmark_models())
 
 
 def long_fit(track: LandmarkTrack, frames: int, folder: Path) -> LongFit:
@@ -98,11 +97,8 @@ def long_fit(track: LandmarkTrack, frames: int, folder: Path) -> LongFit:
     partial.mkdir()
     (partial / MARKER).write_text("{}")
     with open_video(path) as video:
-        _fill(
-            search_store(partial / LANDMARKS, video, None, DEFAULT_SILHOUETTES, DEFAULT_MODEL),
-            video,
-            track,
-        )
+        store = search_store(partial / LANDMARKS, video, None, DEFAULT_SILHOUETTES, DEFAULT_MODEL)
+        _fill(store, len(video), track)
     told = subprocess.run(
         [sys.executable, __file__, "fit", str(path), str(out)],
         env=os.environ | ONE_THREAD,
@@ -168,9 +164,9 @@ def there_and_back(count: int, frames: int) -> NDArray[np.intp]:
     return np.minimum(place, 2 * count - 2 - place)
 
 
-def _fill(store: ArrayStore, video: VideoReader, track: LandmarkTrack) -> None:
+def _fill(store: ArrayStore, frames: int, track: LandmarkTrack) -> None:
     """As if they had been found."""
-    rows = there_and_back(len(track), len(video))
+    rows = there_and_back(len(track), frames)
     sightings = Sightings(  # of the first frame, where alone somebody was searched for
         np.zeros(1, np.intp),
         np.array([[0.0, 0.0, 1.0, 0.0]]),
@@ -180,9 +176,9 @@ def _fill(store: ArrayStore, video: VideoReader, track: LandmarkTrack) -> None:
     )
     store.write(SIGHTINGS, vars(sightings))
     drawn = track.silhouette_frames[:8]
-    drawn = drawn[drawn < len(video)]
-    refined = RefinedStretches(store, video, _STRETCH_FRAMES)
-    for start in range(0, len(video), _STRETCH_FRAMES):
+    drawn = drawn[drawn < frames]
+    refined = RefinedStretches(store)
+    for start in range(0, frames, _STRETCH_FRAMES):
         part = rows[start : start + _STRETCH_FRAMES]
         refined.add(
             start,

@@ -18,7 +18,7 @@ from sd2core.body.model import Resolution
 from sd2core.body.rig import KeypointSpace
 from sd2core.body.rotations import Floats, applied, product, to_vector, transposed
 from sd2core.body.shape import ShapeSpace
-from sd2core.body.track import Landmarks
+from sd2core.body.track import LandmarkTrack
 from sd2core.errors import Sd2Error
 from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
@@ -30,7 +30,7 @@ from tools.fitting.truth import Truth
 
 
 def fit_body(
-    track: Landmarks,
+    track: LandmarkTrack,
     camera: PinholeCamera,
     *,
     stature_m: float | None = None,

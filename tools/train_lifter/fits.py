@@ -69,9 +69,7 @@ def track_of(take: Take) -> LandmarkTrack:
         },
         visibility=np.where(present[:, None], take.visibility, 0.0).astype(np.float32),
     )
-    repaired: list[RawTrack] = []
-    notes = repair_landmarks(raw.part, raw.times_s, present, DEFAULT_MAX_GAP_S, repaired.append)
-    (done,) = repaired
+    done, notes = repair_landmarks(raw, DEFAULT_MAX_GAP_S)
     arrays = {name: value for name, value in vars(done).items() if name != "times_s"}
     return LandmarkTrack(
         timebase=Timebase(raw.times_s),

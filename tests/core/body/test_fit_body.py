@@ -16,7 +16,7 @@ from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import BodyShape, ShapeSpace
 from sd2core.body.shaping import overlap, silhouette
 from sd2core.body.skinning import pose_vertices
-from sd2core.body.track import LANDMARKS, TORSO_CORNERS, Landmarks, LandmarkTrack
+from sd2core.body.track import LANDMARKS, TORSO_CORNERS, LandmarkTrack
 from sd2core.errors import Sd2Error
 from sd2core.progress import Cancelled
 from sd2core.timebase import Timebase
@@ -48,7 +48,7 @@ class Known:
             standing=np.zeros((len(depth), len(FEET))),
         )
 
-    def __call__(self, track: Landmarks, camera: PinholeCamera) -> LiftedTrack:
+    def __call__(self, track: LandmarkTrack, camera: PinholeCamera) -> LiftedTrack:
         return self.lifted
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,25 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sd2core.body import fit as fitting
-from sd2core.body import fit_windows, landmark_repair, lifter, sides, track
+from sd2core.body import fit_windows, landmark_repair, sides, track
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.fit import fit_motion
-from sd2core.body.landmark_files import (
-    RefinedStretches,
-    TrackInParts,
-    load_track,
-    repaired_track,
-    save_track,
-    search_store,
-)
+from sd2core.body.landmark_files import load_track, save_track
 from sd2core.body.lifter import LiftedInParts, Lifter
 from sd2core.body.raw_track import RawTrack
-from sd2core.body.refining import RefinedFrames
 from sd2core.body.rig import KeypointSpace
 from sd2core.body.shape import ShapeSpace
 from sd2core.body.sides import swap_sides
 from sd2core.body.track import LANDMARKS, PER_FRAME, LandmarkTrack
-from sd2core.errors import Sd2Error
 from sd2core.timebase import Timebase
 from tools.build_sample.swipes import swipes
 from tools.fitting.error_measurement import fit_body, mesh_of
@@ -84,39 +74,6 @@ def without(known: LandmarkTrack, *gaps: tuple[int, int]) -> LandmarkTrack:
     return replace(known, **arrays)
 
 
-@dataclass
-class Video:
-    """What of a video is needed when all has been looked at."""
-
-    timebase: Timebase
-    width: int
-    height: int
-    path: Path
-
-    def __len__(self) -> int:
-        return len(self.timebase)
-
-
-def stored(known: LandmarkTrack, folder: Path | None, max_gap_s: float = 0.5) -> TrackInParts:
-    """These landmarks as a search leaves them, and mended."""
-    path = Path(__file__)  # any file
-    video: Any = Video(known.timebase, known.width, known.height, path)
-    store = search_store(folder, video, None, None, "full")
-    refined = RefinedStretches(store, video, 32)
-    for start in range(0, len(known), 32):
-        part = known.part(start, min(start + 32, len(known)))
-        names = ("image_px", "depth_px", "world_m", "visibility", "confidence")
-        refined.add(
-            start,
-            RefinedFrames(
-                **{name: getattr(part, name) for name in names},
-                silhouette_frames=part.silhouette_frames + start,
-                silhouettes=part.silhouettes,
-            ),
-        )
-    return repaired_track(store, video, refined, max_gap_s)
-
-
 @pytest.fixture
 def short_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(track, "PART_FRAMES", 50)
@@ -153,16 +110,11 @@ class TestMending:
         """Mended as a whole, and in parts of 50 frames."""
         outcomes = []
         for part_frames in (self.FRAMES, 50):
-            parts: list[RawTrack] = []
             with pytest.MonkeyPatch.context() as patch:
                 patch.setattr(track, "PART_FRAMES", part_frames)
                 patch.setattr(track, "_MARGIN_FRAMES", 30)
                 patch.setattr(sides, "swap_odds", odds_by_place)
-                notes = landmark_repair.repair_landmarks(
-                    spoilt.part, spoilt.times_s, spoilt.present, max_gap_s, parts.append
-                )
-            joined = {n: np.concatenate([getattr(p, n) for p in parts]) for n in vars(spoilt)}
-            outcomes.append((RawTrack(**joined), notes))
+                outcomes.append(landmark_repair.repair_landmarks(spoilt, max_gap_s))
         return outcomes
 
     def found(self, known: LandmarkTrack) -> RawTrack:
@@ -223,37 +175,13 @@ class TestMending:
         np.testing.assert_allclose(parts.image_px, whole.image_px, atol=1e-3)
 
 
-class TestTrack:
-    @pytest.mark.one_in(2)
-    @pytest.mark.usefixtures("short_parts")
-    @pytest.mark.parametrize("on_disk", [True, False])
-    def test_any_part_is_that_of_the_whole(self, tmp_path: Path, on_disk: bool) -> None:
-        known = without(swiping(170), (40, 61))
-        kept = stored(known, tmp_path if on_disk else None)
-        whole = kept.part(0, 170)
-        assert whole.notes == ("Left empty, without the person: 21 frames (40 to 60).",)
-        np.testing.assert_array_equal(kept.present, known.present)
-        for start, stop in ((0, 1), (30, 90), (49, 50), (101, 170)):
-            part, cut = kept.part(start, stop), whole.part(start, stop)
-            np.testing.assert_array_equal(part.timebase.times_s, cut.timebase.times_s)
-            for name in PER_FRAME:
-                np.testing.assert_array_equal(getattr(part, name), getattr(cut, name))
-
-    @pytest.mark.usefixtures("short_parts")
-    def test_it_is_saved_as_a_whole(self, tmp_path: Path) -> None:
-        kept = stored(without(swiping(170), (40, 61)), None)
-        save_track(kept, tmp_path / "track.npz")
-        loaded, whole = load_track(tmp_path / "track.npz"), kept.part(0, 170)
-        for name in PER_FRAME:
-            np.testing.assert_array_equal(getattr(loaded, name), getattr(whole, name))
-        assert loaded.notes == whole.notes
-
-    def test_a_part_that_has_gone(self, tmp_path: Path) -> None:
-        kept = stored(swiping(40), tmp_path)
-        for path in tmp_path.glob("mended-*"):
-            path.unlink()
-        with pytest.raises(Sd2Error, match="have gone from the folder of the work"):
-            kept.part(0, 10)
+@pytest.mark.usefixtures("short_parts")
+def test_a_track_is_saved_part_by_part_or_whole(tmp_path: Path) -> None:
+    known = without(swiping(170), (40, 61))
+    save_track(known, tmp_path / "track.npz")
+    loaded = load_track(tmp_path / "track.npz").part(30, 90)
+    for name in PER_FRAME:
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(known, name)[30:90])
 
 
 @pytest.mark.slow
@@ -353,50 +281,3 @@ class TestMotion:
         assert motion.quality == pytest.approx(whole.quality[known.present].mean())
         assert reports == sorted(reports)
         assert reports[-1][0] == reports[-1][1]
-
-    @pytest.mark.slow
-    @pytest.mark.usefixtures("short_parts")
-    def test_no_more_than_a_part_is_in_memory(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        """From landmarks on disk to a mesh that is read through; the solver is left out."""
-        for name, frames in (("_WINDOW_FRAMES", 50), ("_OVERLAP_FRAMES", 10)):
-            monkeypatch.setattr(fit_windows, name, frames)
-        for module, name in ((fitting, "_FINISHED_FRAMES"), (fitting, "PART_FRAMES")):
-            monkeypatch.setattr(module, name, 50)
-        monkeypatch.setattr(lifter, "PART_FRAMES", 50)
-        monkeypatch.setattr(fitting, "solve", lambda rig, part, start, tick: start)
-        longest: dict[str, int] = {}
-
-        def watched(owner: Any, name: str) -> None:
-            real = getattr(owner, name)
-
-            def watching(*arguments: Any, **named: Any) -> Any:
-                made = real(*arguments, **named)
-                arrays = vars(made) if hasattr(made, "__dict__") else made._asdict()
-                rows = [len(each) for each in arrays.values() if isinstance(each, np.ndarray)]
-                longest[name] = max(longest.get(name, 0), *rows)
-                return made
-
-            monkeypatch.setattr(owner, name, watching)
-
-        watched(TrackInParts, "part")
-        watched(RefinedStretches, "raw_track")
-        watched(LiftedInParts, "part")
-        watched(LiftedInParts, "_sampled")
-        watched(fit_windows.Windows, "poses")
-        watched(fitting, "evidence_of")
-        known = swiping(400)
-        kept = stored(known, tmp_path)
-        motion = fit_motion(kept, CAMERA, stature_m=STATURE_M, workspace=tmp_path)
-        mesh = motion.mesh("low")
-        for start in range(0, 400, 50):
-            mesh.read(start, start + 50)
-        assert set(longest) == {"part", "raw_track", "_sampled", "poses", "evidence_of"}
-        # A part, and what around it matters.
-        around = max(30, Lifter.load().network.reach + 3)
-        assert max(longest.values()) <= 50 + 2 * around
-        # What is left is small: a number or two per frame and limb.
-        held = [each for each in vars(kept).values() if isinstance(each, np.ndarray)]
-        held += [motion.along_sd_mps, motion.across_sd_mps]
-        assert sum(each.nbytes for each in held) / 400 < 200

@@ -174,7 +174,7 @@ def filmed(path: Path, meeting: str, *, red: bool) -> Path:
 def followed(path: Path, models: LandmarkModels, own: np.ndarray) -> LandmarkTrack:
     left = CAMERA.width // 2 + int(own[0]) - 45
     with open_video(path) as video:
-        return find_landmarks(video, models, person=Rectangle(left, 20, 90, 215)).part(0, FRAMES)
+        return find_landmarks(video, models, person=Rectangle(left, 20, 90, 215))
 
 
 def taken_over(track: LandmarkTrack, own: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -212,7 +212,7 @@ def test_another_one_who_comes_when_the_person_has_gone_is_not_taken_for_them(
         for here, there in zip(own, other, strict=True)
     ]
     with open_video(film(tmp_path / "one-after-another.mp4", pictures, frames_per_s=10)) as video:
-        track = find_landmarks(video, models, person=Rectangle(115, 20, 90, 215)).part(0, 26)
+        track = find_landmarks(video, models, person=Rectangle(115, 20, 90, 215))
     assert track.present[:7].all()
     assert not track.present[16:].any()
     assert "whoever is seen may be somebody else" in " ".join(track.notes)

@@ -74,10 +74,7 @@ def waving(times_s: NDArray[np.float64]) -> RawTrack:
 
 def repaired(found: RawTrack, max_gap_s: float) -> tuple[RawTrack, tuple[str, ...]]:
     """Everything mended, and the sentences about it."""
-    parts: list[RawTrack] = []
-    notes = repair_landmarks(found.part, found.times_s, found.present, max_gap_s, parts.append)
-    arrays = {name: [getattr(part, name) for part in parts] for name in vars(found)}
-    return RawTrack(**{name: np.concatenate(each) for name, each in arrays.items()}), notes
+    return repair_landmarks(found, max_gap_s)
 
 
 def same(one: RawTrack, two: RawTrack) -> bool:

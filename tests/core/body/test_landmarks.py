@@ -34,8 +34,7 @@ PERSON_PX = 230
 
 def found(path: Path, models: LandmarkModels, **options: object) -> LandmarkTrack:
     with open_video(path) as video:
-        track = find_landmarks(video, models, **options)  # type: ignore[arg-type]
-        return track.part(0, len(track))
+        return find_landmarks(video, models, **options)  # type: ignore[arg-type]
 
 
 def off_px(track: LandmarkTrack, frames: list[int] | slice = slice(None)) -> np.ndarray:

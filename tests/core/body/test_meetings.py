@@ -50,7 +50,7 @@ def followed(
     with open_video(
         film(path, (picture for picture, _ in scenes(people)), frames_per_s=FRAMES_PER_S)
     ) as video:
-        return find_landmarks(video, models, person=around).part(0, len(video))
+        return find_landmarks(video, models, person=around)
 
 
 def off(track: LandmarkTrack, person: Actor) -> np.ndarray:
