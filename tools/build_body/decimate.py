@@ -8,6 +8,7 @@ end of an edge onto the other, so that every vertex keeps its place and its skin
 from __future__ import annotations
 
 import heapq
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +18,6 @@ _TURN = 0.3
 
 _LENGTH_SHARE = 1e-2
 """Weight of the edge's length beside the quadric: flat parts stay evenly meshed."""
-
-Quadric = tuple[float, ...]
-Point = tuple[float, float, float]
 
 
 def decimate(
@@ -31,61 +29,74 @@ def decimate(
     the surface stays a closed manifold.
     """
     surface = _Surface(vertices_m, faces)
-    while surface.left > count and surface.collapse_cheapest():
+    while len(surface.around) > count and surface.collapse_cheapest():
         pass
-    rows = np.flatnonzero(surface.alive)
-    number = np.full(len(vertices_m), -1, dtype=np.int32)
-    number[rows] = np.arange(len(rows), dtype=np.int32)
-    kept = np.array([face for face in surface.faces if face is not None], dtype=np.int32)
-    return rows, number[kept]
+    rows = np.array(sorted(surface.around))
+    return rows, np.searchsorted(rows, list(surface.faces.values())).astype(np.int32)
 
 
 class _Surface:
     """Triangles around every vertex, and a heap of collapses with their cost."""
 
     def __init__(self, vertices_m: NDArray[np.float64], faces: NDArray[np.int32]) -> None:
-        self.points: list[Point] = [tuple(p) for p in vertices_m.tolist()]
-        self.faces: list[tuple[int, int, int] | None] = [tuple(f) for f in faces.tolist()]
-        self.around: list[set[int]] = [set() for _ in self.points]
-        for number, face in enumerate(faces.tolist()):
+        self.points = vertices_m
+        self.faces = dict(enumerate(map(tuple, faces.tolist())))
+        self.around: dict[int, set[int]] = {vertex: set() for vertex in range(len(vertices_m))}
+        for number, face in self.faces.items():
             for vertex in face:
                 self.around[vertex].add(number)
-        self.alive = np.ones(len(self.points), dtype=np.bool_)
-        self.left = len(self.points)
-        self.quadrics = _quadrics(vertices_m, faces)
-        self.version = [0] * len(self.points)
+        self.quadrics = self._quadrics(faces)
+        self.version = [0] * len(vertices_m)
         self.heap: list[tuple[float, int, int, int, int]] = []
-        for vertex in range(len(self.points)):
-            self._offer(vertex)
+        for vertex in self.around:
+            self._offer(vertex, self._neighbours(vertex))
 
     def collapse_cheapest(self) -> bool:
         """Take the cheapest collapse that keeps the surface closed; False when none is left."""
         while self.heap:
-            _, gone, onto, version_gone, version_onto = heapq.heappop(self.heap)
-            fresh = self.version[gone] == version_gone and self.version[onto] == version_onto
+            _, gone, onto, *versions = heapq.heappop(self.heap)
+            fresh = versions == [self.version[gone], self.version[onto]]
             if fresh and self._allowed(gone, onto):
                 self._collapse(gone, onto)
                 return True
         return False
 
     def _neighbours(self, vertex: int) -> set[int]:
-        return {v for f in self.around[vertex] for v in self._face(f)} - {vertex}
+        return {other for face in self.around[vertex] for other in self.faces[face]} - {vertex}
 
-    def _face(self, number: int) -> tuple[int, int, int]:
-        face = self.faces[number]
-        if face is None:
-            raise ValueError(f"face {number} is gone")
-        return face
+    def _normals(self, faces: NDArray[np.int32]) -> NDArray[np.float64]:
+        first, second, third = np.moveaxis(self.points[faces], 1, 0)
+        return np.cross(second - first, third - first)
 
-    def _offer(self, gone: int) -> None:
-        """Put every collapse of one vertex onto a neighbour on the heap."""
-        for onto in self._neighbours(gone):
-            self._offer_edge(gone, onto)
+    def _quadrics(self, faces: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Sum over each vertex's triangles of area times squared distance to their planes."""
+        normals = self._normals(faces)
+        sizes = np.linalg.norm(normals, axis=1)[:, None]
+        np.divide(normals, sizes, out=normals, where=sizes > 0)
+        away = -(normals * self.points[faces[:, 0]]).sum(axis=1, keepdims=True)
+        planes = np.concatenate([normals, away], axis=1)
+        i, j = np.triu_indices(4)
+        products = 0.5 * sizes * planes[:, i] * planes[:, j]  # (F, 10)
+        quadrics = np.zeros((len(self.points), 10))
+        for corners in faces.T:
+            np.add.at(quadrics, corners, products)
+        return quadrics
 
-    def _offer_edge(self, gone: int, onto: int) -> None:
-        cost = _cost(self.quadrics[gone], self.quadrics[onto], self.points[onto])
-        cost += _LENGTH_SHARE * _squared(self.points[gone], self.points[onto]) ** 2
-        heapq.heappush(self.heap, (cost, gone, onto, self.version[gone], self.version[onto]))
+    def _offer(self, gone: int, others: Iterable[int]) -> None:
+        """Put the collapses of a vertex onto others on the heap."""
+        for onto in others:
+            both = self.quadrics[gone] + self.quadrics[onto]
+            xx, xy, xz, xd, yy, yz, yd, zz, zd, dd = both.tolist()
+            x, y, z = self.points[onto].tolist()
+            cost = (
+                x * (xx * x + 2.0 * (xy * y + xz * z + xd))
+                + y * (yy * y + 2.0 * (yz * z + yd))
+                + z * (zz * z + 2.0 * zd)
+                + dd
+            )
+            cost += _LENGTH_SHARE * float(((self.points[gone] - self.points[onto]) ** 2).sum()) ** 2
+            versions = self.version[gone], self.version[onto]
+            heapq.heappush(self.heap, (cost, gone, onto, *versions))
 
     def _allowed(self, gone: int, onto: int) -> bool:
         # Link condition: an edge of a closed surface has two triangles and, when its
@@ -94,77 +105,30 @@ class _Surface:
         beside_gone, beside_onto = self._neighbours(gone), self._neighbours(onto)
         if len(beside_gone & beside_onto) != 2 or len(beside_gone | beside_onto) <= 4:
             return False
-        for number in self.around[gone] - self.around[onto]:
-            face = self._face(number)
-            before = _normal(*(self.points[v] for v in face))
-            after = _normal(*(self.points[onto if v == gone else v] for v in face))
-            dot = sum(a * b for a, b in zip(before, after, strict=True))
-            sizes = _squared(before, (0.0, 0.0, 0.0)) * _squared(after, (0.0, 0.0, 0.0))
-            if dot <= 0.0 or dot * dot < _TURN * _TURN * sizes:
-                return False
-        return True
+        turned = np.array([self.faces[face] for face in self.around[gone] - self.around[onto]])
+        before, after = self._normals(turned), self._normals(np.where(turned == gone, onto, turned))
+        dots = (before * after).sum(axis=1)
+        sizes = (before**2).sum(axis=1) * (after**2).sum(axis=1)
+        return bool(((dots > 0.0) & (dots**2 >= _TURN**2 * sizes)).all())
 
     def _collapse(self, gone: int, onto: int) -> None:
         touched = self._neighbours(gone)
-        for number in self.around[gone] & self.around[onto]:
-            for vertex in self._face(number):
-                self.around[vertex].discard(number)
-            self.faces[number] = None
-        for number in self.around[gone]:
-            a, b, c = (onto if v == gone else v for v in self._face(number))
-            self.faces[number] = (a, b, c)
-            self.around[onto].add(number)
-        self.around[gone] = set()
-        self.alive[gone] = False
-        self.left -= 1
+        for number in self.around.pop(gone):
+            if onto in self.faces[number]:
+                for vertex in set(self.faces.pop(number)) - {gone}:
+                    self.around[vertex].remove(number)
+            else:
+                a, b, c = (onto if vertex == gone else vertex for vertex in self.faces[number])
+                self.faces[number] = (a, b, c)
+                self.around[onto].add(number)
         self.version[gone] += 1
-        self.quadrics[onto] = tuple(
-            a + b for a, b in zip(self.quadrics[onto], self.quadrics[gone], strict=True)
-        )
         self.version[onto] += 1
-        self._offer(onto)
+        self.quadrics[onto] += self.quadrics[gone]
+        self._offer(onto, self._neighbours(onto))
         for vertex in touched - {onto}:
             # The edges towards the changed vertex cost something else now.
             self.version[vertex] += 1
-            self._offer(vertex)
-        for vertex in touched - {onto}:
+            self._offer(vertex, self._neighbours(vertex))
+        for vertex in [*(touched - {onto}), onto]:
             for other in self._neighbours(vertex) - touched:
-                self._offer_edge(other, vertex)
-        for other in self._neighbours(onto) - touched:
-            self._offer_edge(other, onto)
-
-
-def _quadrics(vertices_m: NDArray[np.float64], faces: NDArray[np.int32]) -> list[Quadric]:
-    """Sum over each vertex's triangles of area times squared distance to their planes."""
-    corners = vertices_m[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = 0.5 * np.linalg.norm(normal, axis=1)
-    normal = np.divide(normal, 2.0 * area[:, None], out=normal, where=area[:, None] > 0)
-    plane = np.concatenate([normal, -(normal * corners[:, 0]).sum(axis=1)[:, None]], axis=1)
-    i, j = np.triu_indices(4)
-    products = area[:, None] * plane[:, i] * plane[:, j]  # (F, 10)
-    quadrics = np.zeros((len(vertices_m), 10))
-    for corner in range(3):
-        np.add.at(quadrics, faces[:, corner], products)
-    return [tuple(row) for row in quadrics.tolist()]
-
-
-def _cost(first: Quadric, second: Quadric, point: Point) -> float:
-    xx, xy, xz, xd, yy, yz, yd, zz, zd, dd = (a + b for a, b in zip(first, second, strict=True))
-    x, y, z = point
-    return (
-        x * (xx * x + 2.0 * (xy * y + xz * z + xd))
-        + y * (yy * y + 2.0 * (yz * z + yd))
-        + z * (zz * z + 2.0 * zd)
-        + dd
-    )
-
-
-def _normal(a: Point, b: Point, c: Point) -> Point:
-    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    return (uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
-
-
-def _squared(a: Point, b: Point) -> float:
-    return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
+                self._offer(other, [vertex])

@@ -1,9 +1,19 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import trimesh
 
+from sd2core.body.model import Body
 from tools.build_body.decimate import decimate
+
+
+@pytest.mark.slow
+def test_the_bundled_surface_comes_out_again() -> None:
+    fine, coarse = Body.load("high"), Body.load("medium")
+    rows, faces = decimate(fine.vertices_m, fine.faces, len(coarse.vertices_m))
+    np.testing.assert_array_equal(fine.vertices_m[rows], coarse.vertices_m)
+    np.testing.assert_array_equal(faces, coarse.faces)
 
 
 def test_a_sphere_stays_closed_and_round() -> None:
