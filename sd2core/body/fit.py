@@ -45,7 +45,7 @@ def fit_motion(
     camera: PinholeCamera,
     *,
     stature_m: float | None = None,
-    workspace: Path,
+    workspace: Path | None = None,
     progress: Progress = silent,
 ) -> FittedMotion:
     """Fit a body to a clip of any length.
@@ -54,7 +54,7 @@ def fit_motion(
     ----------
     stature_m : float, optional
         The person's height, which fixes the scale; :data:`DEFAULT_STATURE_M` without.
-    workspace : Path
+    workspace : Path, optional
         Existing folder in which finished stretches are kept, so that a stopped fit goes on there.
     progress : Progress
         Counts steps of the solver, at most.

@@ -24,17 +24,6 @@ from sd2core.timebase import Timebase
 Poses = Callable[[NDArray[np.intp]], Pose]
 """Gives the pose in each of some frames (n,)."""
 
-PER_FRAME = (
-    "turns",
-    "translation_m",
-    "present",
-    "keypoints_m",
-    "residual_m",
-    "along_sd_mps",
-    "across_sd_mps",
-)
-"""Arrays of a fit that have a row for every frame, besides its times."""
-
 
 @dataclass(frozen=True, eq=False)
 class BodyFit:

@@ -44,7 +44,6 @@ from sd2core.files.resources import resource_path
 from sd2core.io.video import open_video
 from sd2core.io.video_writing import write_video
 from sd2core.processes import ONE_THREAD
-from tools.fitting.error_measurement import fit_body, mesh_of
 
 _RATE_HZ = 30
 _STRETCH_FRAMES = 256
@@ -140,7 +139,7 @@ def seams(track: LandmarkTrack, part_frames: int, window_frames: int) -> Apart:
                 stack.enter_context(patch.object(module, "PART_FRAMES", part))
             stack.enter_context(patch.object(fit_windows, "_WINDOW_FRAMES", window))
             spans = fit_windows.Windows(track.present, None).spans
-            mesh = mesh_of(fit_body(track, camera), "low")
+            mesh = fitting.fit_motion(track, camera).mesh("low")
         velocities.append(np.gradient(mesh.read(0, frames), mesh.times_s, axis=0))
     shared = np.zeros(frames, bool)
     for start, _, overlap in spans:

@@ -5,72 +5,22 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sd2core.body.camera import PinholeCamera
-from sd2core.body.fit import Fitting, Lift
-from sd2core.body.fitted import PER_FRAME, BodyFit, FittedMotion, Pose, mean_over_limbs
+from sd2core.body.fit import fit_motion
 from sd2core.body.landmark_files import load_track
-from sd2core.body.model import Resolution
 from sd2core.body.rig import KeypointSpace
 from sd2core.body.rotations import Floats, applied, product, to_vector, transposed
 from sd2core.body.shape import ShapeSpace
-from sd2core.body.track import LandmarkTrack
 from sd2core.errors import Sd2Error
-from sd2core.mesh.sequence import MeshSequence
 from sd2core.progress import Progress, silent
 from sd2core.simulate.campaign.fit_errors import FitErrors, GroupErrors
 from sd2core.simulate.campaign.posture import Group, Posture, all_groups, posture
 from sd2core.version import __version__
 from tools.fitting.clips import clip_named, scene
 from tools.fitting.truth import Truth
-
-
-def fit_body(
-    track: LandmarkTrack,
-    camera: PinholeCamera,
-    *,
-    stature_m: float | None = None,
-    lift: Lift | None = None,
-    workspace: Path | None = None,
-    progress: Progress = silent,
-) -> BodyFit:
-    """Fit a body to landmarks, with everything in memory.
-
-    ``lift`` gives the landmarks their depth, by default the bundled lifter; the rest is as in
-    :func:`~sd2core.body.fit.fit_motion`.
-    """
-    fitting = Fitting(track, camera, stature_m, lift, workspace)
-    parts = list(fitting.finished(progress))
-
-    def joined(name: str) -> NDArray[Any]:
-        return np.concatenate([getattr(part, name) for part in parts])
-
-    return BodyFit(
-        timebase=track.timebase,
-        shape=parts[0].shape,
-        **{name: joined(name) for name in PER_FRAME},
-    )
-
-
-def mesh_of(fit: BodyFit, resolution: Resolution) -> MeshSequence:
-    """The moving surface, posed where it is read."""
-    motion = FittedMotion(
-        timebase=fit.timebase,
-        shape=fit.shape,
-        poses=Pose(fit.turns, fit.translation_m).at,
-        present=fit.present,
-        along_sd_mps=mean_over_limbs(fit.along_sd_mps),
-        across_sd_mps=mean_over_limbs(fit.across_sd_mps),
-        seen=np.isfinite(fit.residual_m).mean(axis=0),
-        residual_m=float(np.nanmean(fit.residual_m)),
-        quality=float(fit.quality.mean()),
-    )
-    return motion.mesh(resolution)
-
 
 _LAGS = (1, 2, 3, 4, 6, 9, 13, 19, 28, 42)
 """Frames apart."""
@@ -133,15 +83,16 @@ def _compared(
             f"Make them: python -m tools.fitting score CLIPS --keep {fits}",
         )
     known = scene(clip_named(truth.name), space)
-    fit = fit_body(load_track(landmarks), truth.camera, stature_m=truth.stature_m)
-    if len(fit) != len(known.times_s) or not fit.present.all():
+    fit = fit_motion(load_track(landmarks), truth.camera, stature_m=truth.stature_m)
+    if len(fit.timebase) != len(known.times_s) or not fit.present.all():
         raise Sd2Error(
             f"{truth.name}: the fit has {int(fit.present.sum())} frames with a person",
             f"all {len(known.times_s)} of the clip",
         )
     skeleton = space.skeleton(fit.shape)
     rig = KeypointSpace(space).rig(fit.shape)
-    transforms = skeleton.transforms(rig.body_rotations(fit.turns), fit.translation_m)
+    pose = fit.poses(np.arange(len(known.times_s)))
+    transforms = skeleton.transforms(rig.body_rotations(pose.turns), pose.translation_m)
     true = posture(known.skeleton, known.transforms)
     fitted = posture(skeleton, transforms, true.axes)
     samples = {

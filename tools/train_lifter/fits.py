@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sd2core import PAPER_RADAR, MeshSequence, Sd2Error, Synthesizer, VirtualSensor
-from sd2core.body.fit import speed_mps
-from sd2core.body.fitted import BodyFit
+from sd2core.body.fit import Fitting, fit_motion, speed_mps
 from sd2core.body.landmark_repair import repair_landmarks
 from sd2core.body.landmarks import DEFAULT_MAX_GAP_S
 from sd2core.body.lifter import LiftedInParts, Lifter, fit_law_terms
@@ -35,7 +34,6 @@ from sd2core.simulate.campaign.radar import TargetOptions, radar_target
 from sd2core.simulate.campaign.scene import RANGES_M
 from sd2core.simulate.campaign.takes import FITTED, OPTIONS, TRUE
 from sd2core.timebase import Timebase
-from tools.fitting.error_measurement import fit_body, mesh_of
 from tools.train_lifter.takes import Motion, Stage, Take, load_takes
 
 Floats = NDArray[np.float64]
@@ -46,10 +44,10 @@ _WITHIN = 0.68
 
 
 class FittedTake(NamedTuple):
-    """Velocities of the 33 landmarks of one take along the line of sight, (T, 33)."""
+    """Velocities of the 33 landmarks of one take, (T, 33)."""
 
-    fit: BodyFit
-    track: LandmarkTrack
+    speed_mps: Floats  # in space, of the fitted ones
+    # Along the line of sight.
     fitted_mps: Floats
     true_mps: Floats
     lifted_sd_mps: Floats  # deviations of the lifter's
@@ -109,16 +107,16 @@ def fitted_takes(
         if not track.present.all():
             continue
         lifted = LiftedInParts(lifter, track, take.camera)
-        fit = fit_body(
-            track, take.camera, stature_m=take.stature_m, lift=lambda *_, lifted=lifted: lifted
-        )
+        fit = Fitting(track, take.camera, take.stature_m, lambda *_, lifted=lifted: lifted, None)
+        fitted_m = np.concatenate([part.keypoints_m for part in fit.finished(silent)])
         times_s = track.timebase.times_s
         fitted_mps, true_mps = (
             line_of_sight_velocity(points_m, times_s)
-            for points_m in (fit.keypoints_m, take.keypoints_m.astype(np.float64))
+            for points_m in (fitted_m, take.keypoints_m.astype(np.float64))
         )
         lifted_mps = take.stature_m * lifted.part(0, len(track)).velocity_sigma
-        fitted.append(FittedTake(fit, track, fitted_mps, true_mps, lifted_mps))
+        fast_mps = speed_mps(fitted_m, times_s)
+        fitted.append(FittedTake(fast_mps, fitted_mps, true_mps, lifted_mps))
     return fitted
 
 
@@ -131,14 +129,7 @@ def fit_law(takes: Sequence[Take], lifter: Lifter, progress: Progress = silent) 
     fits = fitted_takes(takes, lifter, progress)
     errors = np.concatenate([np.abs(fit.fitted_mps - fit.true_mps) for fit in fits])
     terms = np.concatenate(
-        [
-            np.log(
-                fit_law_terms(
-                    fit.lifted_sd_mps, speed_mps(fit.fit.keypoints_m, fit.track.timebase.times_s)
-                )
-            )
-            for fit in fits
-        ]
+        [np.log(fit_law_terms(fit.lifted_sd_mps, fit.speed_mps)) for fit in fits]
     )
     logarithms = np.log(errors + _MIN_MPS)
     centred = (terms - terms.mean(axis=0)).reshape(-1, 2)
@@ -207,7 +198,7 @@ def make_pairs(options: Pairs, progress: Progress = silent) -> int:
         track = track_of(take)
         if not track.present.all():
             continue
-        fitted = mesh_of(fit_body(track, take.camera, stature_m=take.stature_m), FITTED)
+        fitted = fit_motion(track, take.camera, stature_m=take.stature_m).mesh(FITTED)
         body = stage.space.load(TRUE, scene.shape)
         vertices = pose_vertices(body, scene.transforms)
         true = MeshSequence(vertices, body.faces, fitted.timebase, source="simulated body")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from whole_fits import fit_body, mesh_of
 
 from sd2core.body import fit as fitting
 from sd2core.body import fit_windows
@@ -21,7 +22,6 @@ from sd2core.errors import Sd2Error
 from sd2core.progress import Cancelled
 from sd2core.timebase import Timebase
 from tools.build_sample.swipes import swipes
-from tools.fitting.error_measurement import fit_body, mesh_of
 
 SPACE = ShapeSpace()
 CAMERA = PinholeCamera()

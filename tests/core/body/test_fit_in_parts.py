@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from whole_fits import fit_body, mesh_of
 
 from sd2core.body import fit as fitting
 from sd2core.body import fit_windows, landmark_repair, sides, track
@@ -25,7 +26,6 @@ from sd2core.body.sides import swap_sides
 from sd2core.body.track import LANDMARKS, PER_FRAME, LandmarkTrack
 from sd2core.timebase import Timebase
 from tools.build_sample.swipes import swipes
-from tools.fitting.error_measurement import fit_body, mesh_of
 
 CAMERA = PinholeCamera()
 HIPS = [LANDMARKS.index(f"hip.{side}") for side in "LR"]

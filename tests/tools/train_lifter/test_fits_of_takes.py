@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sd2core.body.fit import speed_mps
 from sd2core.body.lifter import Lifter, fit_law_terms
 from tools.train_lifter.fits import fit_law, fitted_takes, repaired
 from tools.train_lifter.takes import Take
@@ -40,9 +39,7 @@ def test_the_law_of_fits_covers_the_errors_it_was_learnt_from(takes: list[Take])
     errors = np.concatenate([np.abs(fit.fitted_mps - fit.true_mps) for fit in fits])
     stated = np.concatenate(
         [
-            replace(lifter, fit_law=law).fit_sigma_mps(
-                fit.lifted_sd_mps, speed_mps(fit.fit.keypoints_m, fit.track.timebase.times_s)
-            )
+            replace(lifter, fit_law=law).fit_sigma_mps(fit.lifted_sd_mps, fit.speed_mps)
             for fit in fits
         ]
     )
