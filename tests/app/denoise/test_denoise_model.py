@@ -156,6 +156,15 @@ def test_the_map_is_drawn_as_the_radar_would_show_it_and_the_mean_again(
     drawn = law.drawn(np.ascontiguousarray(mean.T), (0,)).T
     np.testing.assert_allclose(context.denoised.map.values, drawn, rtol=1e-4, atol=1e-9)
     assert "drawn" in context.denoised.status
+    context.edits.begin_sensor_drag()
+    context.edits.drag_sensor((0.3, 0.0, 0.0))
+    qtbot.waitUntil(lambda: not context.synthesis.busy, timeout=10_000)
+    swept = fading(context.synthetic.map.values, np.float32(2.0))
+    drawn = law.drawn(np.ascontiguousarray(swept.T), (0,)).T
+    np.testing.assert_allclose(context.denoised.map.values, drawn, rtol=1e-4, atol=1e-9)
+    context.edits.end_drag()
+    context.document.undo_stack.undo()
+    rest(context, qtbot)
     context.denoise.export(tmp_path / "drawn.npz")
     assert DopplerMap.load(tmp_path / "drawn.npz").meta["texture"] == {"seed": 0}
     context.denoise.set_textured(False)
