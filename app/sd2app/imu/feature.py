@@ -124,7 +124,6 @@ class InertialTrack(TrackMouse):
     def __init__(self, session: Session, model: ImuModel, overlays: Sequence[Overlay]) -> None:
         super().__init__(session, overlays)
         self._model = model
-        self._followed: list[InertialSignals] = []
         self._extents: dict[str, tuple[float, float]] = {}  # of the lanes, by what they show
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
@@ -135,9 +134,7 @@ class InertialTrack(TrackMouse):
 
     def _follow(self) -> None:
         model, signals = self._model, [one for one, *_ in self._curves()]
-        if signals != self._followed or not self._extents:
-            self._followed = signals
-            self._extents = {name: extent(signals, name) for name in LANES}
+        self._extents = {name: extent(signals, name) for name in LANES}
         self.setVisible(model.visible)
         lanes_px = len(LANES) * (_LANE_PX + _GAP_PX) - _GAP_PX + BELOW_PX
         self.setFixedHeight(HEADER_PX + (0 if model.folded else lanes_px))
@@ -376,7 +373,7 @@ class ImuFeature(Feature):
     def _save(self) -> None:
         window, name = self._shell.dialog_parent, self.model.file_name
         if path := ask_new(window, "Save inertial signals", name, _FILES, ".csv", SUFFIXES):
-            self.model.save(path)
+            self._shell.attempt(lambda: self.model.save(path))
 
     def track(self, overlays: Sequence[Overlay]) -> InertialTrack:
         """The track below the maps, with what other features draw over it."""

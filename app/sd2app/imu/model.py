@@ -12,7 +12,6 @@ from PySide6.QtCore import QObject, Signal
 
 from sd2app.background.latest import Emit, LatestRunner, ReportingModel
 from sd2app.session.session import Session
-from sd2app.session.tasks import ListedRunner
 from sd2app.widgets.time_axis import clock_text
 from sd2core.errors import Sd2Error
 from sd2core.imu.files import read_signals, write_signals
@@ -24,7 +23,6 @@ from sd2core.plausibility.samples import judge_inertial
 from sd2core.recording.recording import Recording
 
 _FOLDED = "inertial/folded"
-_STOPPED = "stopped: choose the sensor again in the context menu"
 
 
 def place_words(place: str) -> str:
@@ -59,14 +57,10 @@ class ImuModel(ReportingModel):
         self._request = _Request(None, (), None)
         self._known: dict[str, InertialSignals] = {}
         self._read: Path | None = None  # file that is read, or being read
-        self._runner = ListedRunner("inertial sensor", session.jobs, self, self._receive)
-        self._runner.failed.connect(lambda error: self._say_problem(str(error)))
+        self._runner = LatestRunner("inertial sensor", self, self._receive, self._refuse)
         self._runner.partial.connect(self._take_seats)
-        self._runner.cancelled.connect(lambda: self._say_problem(_STOPPED))
         self._reader = LatestRunner("inertial file", self, self._take_file, self._refuse_file)
         self._adder = LatestRunner("added inertial file", self, self._add, self._fail)
-        self._writer = ListedRunner("inertial samples", session.jobs, self, refuse=self._fail)
-        self._writer.finished.connect(lambda path: self.noted.emit(f"The samples are in {path}."))
         self._document.opened.connect(session.placing.end)
         self._document.opened.connect(self._follow)
         self._document.changed.connect(self._follow)
@@ -161,8 +155,6 @@ class ImuModel(ReportingModel):
     def show(self, place: str) -> None:
         """Show another sensor of the recording."""
         self._chosen = place
-        if self.signals is None:
-            self._request = self._request._replace(current=None)  # once more where it was stopped
         self._follow()
 
     def set_folded(self, folded: bool) -> None:
@@ -179,16 +171,10 @@ class ImuModel(ReportingModel):
             self._adder.submit(lambda emit: (recording, path, read_signals(path)))
 
     def save(self, path: Path) -> None:
-        """Write the signals that are shown, in the background."""
-        signals = self.signals
-        if signals is None:
-            return
-
-        def write(emit: Emit) -> Path:
-            write_signals(path, signals)
-            return path
-
-        self._writer.submit(write, f"Writing {path.name}")
+        """Write the signals that are shown; OSError or Sd2Error where that fails."""
+        assert self.signals is not None
+        write_signals(path, self.signals)
+        self.noted.emit(f"The samples are in {path}.")
 
     # --- following ------------------------------------------------------------------------
 
@@ -207,22 +193,20 @@ class ImuModel(ReportingModel):
             self._runner.cancel()
             self.problem = "" if request.current is None else self.why_not
         else:
-            title = f"Moving the sensor at {place_words(request.current)}" if known is None else ""
-            self._runner.submit(lambda emit: _feel(mesh, request, known, emit), title)
+            self._runner.submit(lambda emit: _feel(mesh, request, known, emit))
         self.changed.emit()
 
-    def _take_seats(self, result: object) -> None:
-        if isinstance(result, dict):
-            self.vertices = result
-            self.changed.emit()
+    def _take_seats(self, vertices: Mapping[str, int]) -> None:
+        self.vertices = vertices
+        self.changed.emit()
 
     def _receive(self, signals: InertialSignals) -> None:
         if self._request.current is not None:
             self._known[self._request.current] = self.signals = signals
             self.changed.emit()
 
-    def _say_problem(self, problem: str) -> None:
-        self.problem = problem
+    def _refuse(self, error: Exception) -> None:
+        self.problem = str(error)
         self.changed.emit()
 
     # --- the real sensor ------------------------------------------------------------------
@@ -285,7 +269,7 @@ def _feel(
     if known is not None:
         return known
     assert request.current is not None
-    return virtual_imu(mesh, request.current, progress=lambda done, total: emit((done, total)))
+    return virtual_imu(mesh, request.current, progress=lambda *_: emit(None))
 
 
 AXES = ("x", "y", "z")

@@ -120,19 +120,13 @@ class PlaybackModel(QObject):
         """Go ``seconds`` on (or back)."""
         self.seek(self.time_s + seconds)
 
-    def set_speed(self, speed: float) -> None:
-        """Set seconds of recording per second (one of :data:`SPEEDS`)."""
-        if speed not in SPEEDS:
-            raise ValueError(f"speed {speed} is not one of {SPEEDS}")
-        if speed != self.speed:
-            self.speed = speed
-            self._restart_clock()
-            self.speed_changed.emit(speed)
-
     def change_speed(self, steps: int) -> None:
         """Go ``steps`` along :data:`SPEEDS`."""
-        index = SPEEDS.index(self.speed) + steps
-        self.set_speed(SPEEDS[min(max(index, 0), len(SPEEDS) - 1)])
+        index = min(max(SPEEDS.index(self.speed) + steps, 0), len(SPEEDS) - 1)
+        if SPEEDS[index] != self.speed:
+            self.speed = SPEEDS[index]
+            self._restart_clock()
+            self.speed_changed.emit(self.speed)
 
     def set_loop(self, loop: bool) -> None:
         """Start again at the end, or stop there."""

@@ -161,36 +161,12 @@ def test_what_is_stale_is_left_off(desk: Desk, walk: Path, monkeypatch: pytest.M
     model = desk.open(walk).model
     model.place(desk.seat("head"))
     desk.qtbot.waitUntil(lambda: asked == ["head"], timeout=20_000)
-    assert [job.title for job in desk.session.jobs.jobs] == ["Moving the sensor at head"]
     model.place(desk.seat("chest"))
     gate.set()
     desk.settle()
     assert asked == ["head", "chest", "chest done"]
     assert model.signals is not None
     assert model.signals.meta["at"] == "chest"
-    assert not desk.session.jobs.jobs
-
-
-def test_one_that_the_user_stopped_is_computed_when_chosen_again(
-    desk: Desk, walk: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    gate = threading.Event()
-
-    def slow(mesh: MeshSequence, at: str, progress: Any) -> InertialSignals:
-        gate.wait(20.0)
-        return virtual_imu(mesh, at, progress=progress)
-
-    monkeypatch.setattr(module, "virtual_imu", slow)
-    model = desk.open(walk).model
-    model.place(desk.seat("head"))
-    (job,) = desk.session.jobs.jobs
-    desk.session.jobs.cancel(job)
-    gate.set()
-    assert model.signals is None
-    assert status_parts(model)[0].startswith("stopped")
-    model.show("head")
-    desk.settle()
-    assert model.signals is not None
 
 
 def test_a_sensor_that_does_not_fit_the_mesh_hinders_no_other(desk: Desk, walk: Path) -> None:
@@ -320,7 +296,6 @@ def test_what_is_shown_is_written(desk: Desk, walk: Path, tmp_path: Path, ending
     desk.settle()
     assert model.file_name == "walk-left-wrist.csv"
     model.save(tmp_path / f"out{ending}")
-    desk.qtbot.waitUntil(lambda: bool(desk.said), timeout=20_000)
     assert desk.said == [f"The samples are in {tmp_path / f'out{ending}'}."]
     assert model.signals is not None
     again = read_signals(tmp_path / f"out{ending}")

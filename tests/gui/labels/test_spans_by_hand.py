@@ -52,7 +52,7 @@ def steps(window) -> list[str]:
 @pytest.mark.slow
 def test_a_double_click_plays_the_span_again_and_again(labelled, qtbot) -> None:
     playback = models_of(labelled).playback
-    playback.set_speed(4.0)
+    playback.change_speed(9)
     frames = []
     playback.frame_changed.connect(frames.append)
     QTest.mouseDClick(timeline(labelled), LEFT, NONE, at(labelled, 0.5))
@@ -227,7 +227,7 @@ def test_marks_go_back_by_the_reaction_time_while_it_plays(labelled, qtbot) -> N
     key(labelled, "A", CONTROL)
     key(labelled, "Backspace")
     c.settings.set_value(REACTION, 200)
-    c.playback.set_speed(0.1)
+    c.playback.change_speed(-9)
     c.playback.play()
     # At a tenth of the speed 200 ms are 20 ms of the recording: into the frame before.
     pressed = []
