@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,7 @@ COMMAND = (sys.executable, "-m", "sd2app.background.model_worker.server")
 class ModelProcess:
     """Started with the first model and again when it dies; one request at a time.
 
-    Its methods wait for the answer: they belong into background threads. ``generation``
-    counts the starts: a new process has none of the models that earlier ones had loaded.
+    Its methods wait for the answer: they belong into background threads.
     """
 
     def __init__(self, command: Sequence[str] = COMMAND) -> None:
@@ -40,7 +39,6 @@ class ModelProcess:
         self._process: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
         self._closed = False
-        self.generation = 0
 
     @property
     def running(self) -> bool:
@@ -97,7 +95,6 @@ class ModelProcess:
                 env=os.environ | ONE_THREAD,
                 creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
             )
-            self.generation += 1
         return self._process
 
 
@@ -114,32 +111,24 @@ def _let_go(process: subprocess.Popen[bytes]) -> None:
 class _Remote:
     """Stand-in for a model in the model process, or Sd2Error; the first one loads torch there."""
 
+    kind: ClassVar[str]
+    equals_batch: bool  # frame by frame a denoiser gives the whole map
+
     def __init__(self, process: ModelProcess, path: Path) -> None:
         self._process = process
-        self._path = path
-        self._number = self._load()
-        self._generation = process.generation
+        # A file that is written anew is another model.
+        self._file = self.kind, path, path.stat().st_mtime_ns
+        self.equals_batch = process.ask("load", self._file)
 
     def live(self) -> RemoteSession:
         """Session for the frames of a clip; those of a classifier all have a person in."""
-        return RemoteSession(self._process, self._ready())
-
-    def _load(self) -> int:
-        """Load the model and return its number."""
-        raise NotImplementedError
-
-    def _ready(self) -> int:
-        """Number of the model, loaded again if its process has died."""
-        if not self._process.running or self._process.generation != self._generation:
-            self._number = self._load()
-            self._generation = self._process.generation
-        return self._number
+        return RemoteSession(self._process, self._file)
 
 
 class RemoteDenoiser(_Remote):
     """Stand-in for a ``TrainedDenoiser`` that works in the model process."""
 
-    equals_batch: bool  # frame by frame it gives the whole map
+    kind = "denoiser"
 
     def __init__(self, process: ModelProcess, path: Path) -> None:
         self.card = describe_model(path)
@@ -149,16 +138,14 @@ class RemoteDenoiser(_Remote):
         """Denoised map: an estimate of a radar's map from a synthetic one."""
         # What the model does not take need not travel.
         given = replace(doppler, uncertainty=None, limbs=doppler.limbs if self.card.parts else None)
-        denoised: DopplerMap = self._process.ask("call", self._ready(), "denoise", given)
+        denoised: DopplerMap = self._process.ask("call", self._file, "denoise", given)
         return replace(denoised, timebase=doppler.timebase)
-
-    def _load(self) -> int:
-        number, self.equals_batch = self._process.ask("load", self._path)
-        return int(number)
 
 
 class RemoteClassifier(_Remote):
     """Stand-in for a ``TrainedClassifier`` that works in the model process."""
+
+    kind = "classifier"
 
     def __init__(self, process: ModelProcess, path: Path) -> None:
         self.card = describe_classifier(path)
@@ -167,19 +154,15 @@ class RemoteClassifier(_Remote):
     def probabilities(self, doppler: DopplerMap) -> NDArray[np.float32]:
         """Class probabilities of every frame of a map, (frames, classes)."""
         given = replace(doppler, uncertainty=None)
-        return self._process.ask("call", self._ready(), "probabilities", given)
-
-    def _load(self) -> int:
-        return int(self._process.ask("load_classifier", self._path))
+        return self._process.ask("call", self._file, "probabilities", given)
 
 
 class RemoteSession:
     """A clip whose frames come one after another."""
 
-    def __init__(self, process: ModelProcess, model: int) -> None:
+    def __init__(self, process: ModelProcess, file: tuple[str, Path, int]) -> None:
         self._process = process
-        self._clip = process.ask("begin", model)
-        self._generation = process.generation
+        self._clip = process.ask("begin", file)
 
     def advance(
         self, energies: NDArray[np.float32], *present: NDArray[np.bool_]
@@ -189,22 +172,14 @@ class RemoteSession:
         A denoiser is told in which of them a person is. A classifier answers with probabilities of
         its classes, as late as its card says.
         """
-        return self._ask("advance", energies, *present)
+        return self._process.ask("go_on", self._clip, "advance", energies, *present)
 
     def finish(self) -> NDArray[np.float32]:
         """Outstanding answers of a classifier, as if nothing moved from now on.
 
         The session stays usable.
         """
-        return self._ask("finish")
-
-    def _ask(self, do: str, *arguments: Any) -> NDArray[np.float32]:
-        if self._process.generation != self._generation:
-            raise Sd2Error(
-                "The process in which the models work was started again",
-                remedy="Choose the model again",
-            )
-        return self._process.ask("call", self._clip, do, *arguments)
+        return self._process.ask("go_on", self._clip, "finish")
 
 
 Card = TypeVar("Card", bound=Any)

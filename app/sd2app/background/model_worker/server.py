@@ -12,6 +12,8 @@ import os
 import pickle
 import sys
 import time
+import uuid
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -27,52 +29,53 @@ _LONG_S = 0.03
 between those about single frames."""
 
 
-class Worker:
-    """Holds models, and what they remember of frames that come one by one.
+@lru_cache(maxsize=_KEPT)
+def _model(kind: str, path: Path, changed_ns: int) -> Any:
+    """Load a model, once as long as its file stays as it is."""
+    if kind == "denoiser":
+        from sd2core.denoise.files import load_model
 
-    Errors that a user can cause are raised as Sd2Error.
+        return load_model(path)
+    from sd2core.classify.files import load_classifier
+
+    return load_classifier(path)
+
+
+class Worker:
+    """Answers about models, and what they remember of frames that come one by one.
+
+    A model is named by its kind, its file and when that was changed. Errors that a user can cause
+    are raised as Sd2Error.
     """
 
     def __init__(self) -> None:
-        self._models: dict[int, Any] = {}
-        self._live: dict[int, Any] = {}
-        self._next = 0
+        self._live: dict[str, Any] = {}
 
-    def load(self, path: Path) -> tuple[int, bool]:
-        """Number of a denoiser, and if frame by frame it gives what it gives of a whole map."""
-        from sd2core.denoise.files import load_model
+    def load(self, file: tuple[str, Path, int]) -> bool:
+        """Load a model; True if frame by frame it gives what it gives of a whole map."""
+        return bool(getattr(_model(*file).network, "causal", True))
 
-        model = load_model(path)
-        return self._keep(self._models, model), model.live().equals_batch
+    def call(self, file: tuple[str, Path, int], method: str, *arguments: Any) -> Any:
+        """Result of a method of a model."""
+        return getattr(_model(*file), method)(*arguments)
 
-    def load_classifier(self, path: Path) -> int:
-        """Number of a classifier."""
-        from sd2core.classify.files import load_classifier
+    def begin(self, file: tuple[str, Path, int]) -> str:
+        """Name of a new clip whose frames come one after another."""
+        name = uuid.uuid4().hex
+        self._live[name] = _model(*file).live()
+        while len(self._live) > _KEPT:
+            self._live.pop(next(iter(self._live)))
+        return name
 
-        return self._keep(self._models, load_classifier(path))
-
-    def begin(self, model: int) -> int:
-        """Number of a new clip whose frames come one after another."""
-        return self._keep(self._live, self._newest(model).live())
-
-    def call(self, number: int, method: str, *arguments: Any) -> Any:
-        """Result of a method of a model, or of a clip."""
-        return getattr(self._newest(number), method)(*arguments)
-
-    def _keep(self, kept: dict[int, Any], one: Any) -> int:
-        self._next += 1
-        kept[self._next] = one
-        while len(kept) > _KEPT:
-            kept.pop(next(iter(kept)))
-        return self._next
-
-    def _newest(self, number: int) -> Any:
-        """Return what has a number, and put it last: what is forgotten goes first."""
-        kept = self._models if number in self._models else self._live
-        if number not in kept:
-            raise Sd2Error("The model is no longer loaded", remedy="Choose it again")
-        kept[number] = kept.pop(number)
-        return kept[number]
+    def go_on(self, clip: str, method: str, *arguments: Any) -> Any:
+        """Result of a method of a clip; the one that was not asked for longest is forgotten."""
+        if clip not in self._live:
+            raise Sd2Error(
+                "The process in which the models work was started again",
+                remedy="Choose the model again",
+            )
+        self._live[clip] = self._live.pop(clip)
+        return getattr(self._live[clip], method)(*arguments)
 
 
 def serve(source: BinaryIO, sink: BinaryIO) -> None:
