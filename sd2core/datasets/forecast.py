@@ -10,7 +10,7 @@ from sd2core.datasets.cutting import count_segments
 from sd2core.datasets.index import empty_header
 from sd2core.datasets.layout import bytes_per_segment
 from sd2core.datasets.options import dataset_options
-from sd2core.datasets.source import KINDS, LazySource, Outline, Source, SourceKey, each_once
+from sd2core.datasets.source import KINDS, LazySource, Outline, SourceKey, each_once
 from sd2core.datasets.splitting import named_splits, split_people
 from sd2core.errors import Sd2Error
 from sd2core.maps import MapKind
@@ -53,15 +53,14 @@ class Counting:
     failed: list[str] = field(default_factory=list)
 
     @classmethod
-    def of(cls, sources: Iterable[Source | LazySource], progress: Progress = silent) -> Counting:
-        """Read the outlines of sources; those without one are refused."""
+    def of(cls, sources: Iterable[LazySource], progress: Progress = silent) -> Counting:
+        """Read the outlines of sources."""
         counting = cls()
-        sources = list(each_once(sources))
+        sources = each_once(sources)
         for number, one in enumerate(sources):
             progress(number, len(sources))
+            assert one.outline is not None
             try:
-                if one.outline is None:
-                    raise Sd2Error(f"{one.key.title} does not say what it holds", "an outline")
                 counting.outlines.append((one.key, one.outline()))
             except Sd2Error as error:
                 counting.failed.append(f"{one.key.title}: {error}")

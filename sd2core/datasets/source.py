@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -189,28 +187,6 @@ class Source:
         imu = {name: _short(one.meta) for name, one in self.imu.items()}
         return _short(self.provenance) | {"maps": maps} | ({"imu": imu} if imu else {})
 
-    def fingerprint(self) -> str:
-        """Return a hash of maps, labels and sensor."""
-        sums = hashlib.blake2b(digest_size=16)
-        metadata = [self.sensor.as_dict(), self.labels, dict(self.classes)]
-        sums.update(json.dumps(metadata).encode())
-        sums.update(np.ascontiguousarray(self.label, np.int16).data)
-        if self.spans != runs_of(self.label, self.times_s):
-            sums.update(json.dumps(self.spans).encode())
-        sums.update(np.ascontiguousarray(self.times_s).data)
-        for kind in KINDS:
-            if kind in self.maps:
-                sums.update(kind.encode())
-                sums.update(self.maps[kind].values.data)
-                limbs = self.maps[kind].limbs
-                for values in () if limbs is None else (limbs.values, limbs.kinematics):
-                    sums.update(b"" if values is None else np.ascontiguousarray(values).data)
-                sums.update(self.known[kind].tobytes())
-        for name, signals in self.imu.items():
-            sums.update(name.encode())
-            sums.update(signals.channels.data)
-        return sums.hexdigest()
-
 
 @dataclass(frozen=True, eq=False)
 class LazySource:
@@ -219,13 +195,13 @@ class LazySource:
     ``load`` makes the source; it may raise ``Sd2Error``, which leaves out this source alone.
     ``fingerprint`` gives a hash of everything that the source is made of and of the settings, and
     may read files and raise ``Sd2Error``; a data set that holds a source of this key and of another
-    fingerprint is not continued. Empty: not compared. ``outline`` foretells the content cheaply;
-    needed for a dry run. ``remarks`` say what of its files is taken and what not.
+    fingerprint is not continued. ``outline`` foretells the content cheaply; needed for a dry run.
+    ``remarks`` say what of its files is taken and what not.
     """
 
     key: SourceKey
     load: Callable[[Progress], Source]
-    fingerprint: Callable[[], str] = str
+    fingerprint: Callable[[], str]
     outline: Callable[[], Outline] | None = None
     remarks: tuple[str, ...] = ()
 
@@ -277,10 +253,10 @@ def _short(value: Any) -> Any:
     return value
 
 
-def each_once(sources: Iterable[Source | LazySource]) -> Iterator[Source | LazySource]:
-    """Yield sources; Sd2Error for two of one key, which nothing would tell apart."""
-    seen: set[SourceKey] = set()
-    for one in sources:
+def each_once(sources: Iterable[LazySource]) -> list[LazySource]:
+    """Return all sources; Sd2Error for two of one key, which nothing would tell apart."""
+    listed, seen = [*sources], set[SourceKey]()
+    for one in listed:
         if one.key in seen:
             raise Sd2Error(
                 f"Two sources are {one.key.title}",
@@ -288,4 +264,4 @@ def each_once(sources: Iterable[Source | LazySource]) -> Iterator[Source | LazyS
                 "Say whom each shows, as by --subjects anna,ben, or rename one of the files",
             )
         seen.add(one.key)
-        yield one
+    return listed

@@ -17,7 +17,7 @@ from sd2core.datasets.index import Names, check_fits, entry_of, header_of, refus
 from sd2core.datasets.layout import SPLITS, FileFormat, Header, format_of
 from sd2core.datasets.options import dataset_options
 from sd2core.datasets.reading import Dataset, open_dataset
-from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey, each_once
+from sd2core.datasets.source import KINDS, LazySource, SourceKey, each_once
 from sd2core.datasets.splitting import named_splits, split_people
 from sd2core.datasets.store import LOCK_NAME, SOURCES_NAME, SegmentStore, is_begun, open_arrays
 from sd2core.errors import Sd2Error
@@ -49,7 +49,7 @@ class Written:
 
 def write_dataset(
     out: Path,
-    sources: Iterable[Source | LazySource],
+    sources: Iterable[LazySource],
     options: Exporting | None = None,
     progress: Progress = silent,
     *,
@@ -57,18 +57,17 @@ def write_dataset(
 ) -> Written:
     """Write segments of all sources, or continue a data set that was begun.
 
-    One source is in memory at a time. A source that is there already is left alone and a
-    :class:`~sd2core.datasets.source.LazySource` not even loaded, so a writer that was
-    killed, or that gets more sources later, does only what is missing. Zarr grows in place;
-    HDF5 and NPZ grow in the folder ``OUT.partial`` and appear complete. The card is written
-    beside it.
+    One source is in memory at a time. A source that is there already is not even loaded, so a
+    writer that was killed, or that gets more sources later, does only what is missing. Zarr grows
+    in place; HDF5 and NPZ grow in the folder ``OUT.partial`` and appear complete. The card is
+    written beside it.
 
     Parameters
     ----------
     out : Path
         Its ending gives the format: ``.zarr``, ``.h5``, ``.hdf5`` or ``.npz``.
     progress : Progress
-        Of all sources where their number is known; it may raise ``Cancelled``.
+        Of all sources; it may raise ``Cancelled``.
     provenance : dict, optional
         Origin of a new data set; kept as JSON.
 
@@ -154,7 +153,7 @@ class _Writer:
         """True if there is a store without a segment."""
         return self._store is not None and self._store.rows == 0
 
-    def write(self, sources: Iterable[Source | LazySource], progress: Progress) -> Written:
+    def write(self, sources: Iterable[LazySource], progress: Progress) -> Written:
         try:
             added, failed, first_error = self._append_all(sources, progress)
         finally:
@@ -166,19 +165,18 @@ class _Writer:
         return Written(self._out, segments, count, added, tuple(failed))
 
     def _append_all(
-        self, sources: Iterable[Source | LazySource], progress: Progress
+        self, sources: Iterable[LazySource], progress: Progress
     ) -> tuple[int, list[Failed], Sd2Error | None]:
         """Append all sources: number added, failures, and first error."""
-        total = len(sources) if isinstance(sources, Sequence) else 0
-        if isinstance(sources, Sequence) and sources:  # a wrong name is known before the work
+        sources = each_once(sources)
+        if sources:  # a wrong name is known before the work
             names = [*self._names.subjects, *(one.key.subject for one in sources)]
             split_people(list(dict.fromkeys(names)), *self._kept_out)
-            list(each_once(sources))
         failed: list[Failed] = []
         first_error: Sd2Error | None = None
         added = 0
-        for number, one in enumerate(each_once(sources)):
-            report = part_of(progress, number, number + 1, total)
+        for number, one in enumerate(sources):
+            report = part_of(progress, number, number + 1, len(sources))
             report(0, 1)
             if self._is_there(one):
                 continue
@@ -195,7 +193,7 @@ class _Writer:
                 refuse_large_npz(self._out, self._store.rows, header)
         return added, failed, first_error
 
-    def _is_there(self, one: Source | LazySource) -> bool:
+    def _is_there(self, one: LazySource) -> bool:
         known = self._fingerprints.get(one.key)
         if known is None and not self._before:
             return False
@@ -208,7 +206,7 @@ class _Writer:
                     "Name it so, or write a new data set",
                 )
             return False
-        if known and now and known != now:
+        if known and known != now:
             raise Sd2Error(
                 f"{self._out} holds {one.key.title} already, made of something else",
                 "the same maps, labels and options as before",
@@ -216,13 +214,8 @@ class _Writer:
             )
         return True
 
-    def _append(self, one: Source | LazySource, progress: Progress) -> None:
-        if isinstance(one, Source):
-            source = one
-        else:
-            source = one.load(part_of(progress, 0.0, 0.9))
-            if source.key != one.key:
-                raise Sd2Error(f"{one.key.title} turned out to be {source.key.title}")
+    def _append(self, one: LazySource, progress: Progress) -> None:
+        source = one.load(part_of(progress, 0.0, 0.9))
         if self._store is None:
             if self._out.exists() and self._form != "zarr":
                 with open_dataset(self._out) as dataset:

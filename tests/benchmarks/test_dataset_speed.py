@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lazy_sources import write_dataset
 
 from sd2core.datasets import store
 from sd2core.datasets.source import Source
 from sd2core.datasets.torch_dataset import SegmentDataset
-from sd2core.datasets.writing import write_dataset
 from sd2core.maps import DopplerMap, MapKind
 from sd2core.options.exporting import Exporting
 from sd2core.sensor import VelocityAxis, VirtualSensor

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lazy_sources import write_dataset
 from pools import SerialPool
 from scenes_of_people import WHO, scene
 
@@ -20,7 +21,6 @@ from sd2core.datasets.card import describe_dataset
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.sources import gather
-from sd2core.datasets.writing import write_dataset
 from sd2core.doppler import PRESETS, Synthesizer
 from sd2core.maps import DopplerMap
 from sd2core.options.exporting import Exporting

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from lazy_sources import write_dataset
 from made_sources import source
 
 from sd2core.datasets.card import card_paths, write_card
-from sd2core.datasets.writing import write_dataset
 from sd2core.options.exporting import Exporting
 
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lazy_sources import write_dataset
 from made_sources import AXIS, source
 
 from sd2core.cli.classify.data import clips_of, split_of
 from sd2core.datasets.clips import clips_of_dataset
 from sd2core.datasets.labelled_source import LabelledSource
 from sd2core.datasets.reading import open_dataset
-from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
 from sd2core.options.exporting import Exporting
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from lazy_sources import write_dataset
 from made_sources import source
 from test_dataset_writing import OPTIONS, contents, several, tree
 
@@ -19,7 +20,6 @@ from sd2core.datasets import store
 from sd2core.datasets.index import header_of
 from sd2core.datasets.layout import row_shapes
 from sd2core.datasets.reading import open_dataset
-from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
 from tests.damaged_files import change, cut, lose, states_of
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lazy_sources import write_dataset
 from made_sources import LABELS, source
 
 from sd2core.datasets.preview import draw_preview, examples_of
 from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS
-from sd2core.datasets.writing import write_dataset
 from sd2core.options.exporting import Exporting
 
 

@@ -10,11 +10,13 @@ import sys
 import tracemalloc
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from lazy_sources import lazily, write_dataset
 from made_sources import AXIS, CLASSES, LABELS, source
 
 from sd2core.datasets import card, formats, store
@@ -25,7 +27,6 @@ from sd2core.datasets.options import dataset_options
 from sd2core.datasets.preview import write_preview
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.source import KINDS, LazySource, Source, SourceKey
-from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
 from sd2core.io.kinds import kind_of
 from sd2core.maps import LimbMaps
@@ -135,14 +136,14 @@ def test_writing_again_adds_only_what_is_new(
     assert write_dataset(grown, sources[:2], OPTIONS).added == 0
     loaded: list[SourceKey] = []
 
-    def lazily(one: Source) -> LazySource:
+    def noted(one: Source) -> LazySource:
         def load(progress: Progress) -> Source:
             loaded.append(one.key)
             return one
 
-        return LazySource(one.key, load, one.fingerprint)
+        return replace(lazily(one), load=load)
 
-    assert write_dataset(grown, [lazily(one) for one in sources], OPTIONS).added == 3
+    assert write_dataset(grown, [noted(one) for one in sources], OPTIONS).added == 3
     assert loaded == [one.key for one in sources[2:]]
     found = contents(grown)
     for name, values in contents(whole(ending)).items():
@@ -153,8 +154,9 @@ def test_writing_again_adds_only_what_is_new(
 KILLED = """
 import os, signal, sys
 from pathlib import Path
+from lazy_sources import write_dataset
 from test_dataset_writing import OPTIONS, several
-from sd2core.datasets import store, writing
+from sd2core.datasets import store
 
 calls = 0
 put = store.put_rows
@@ -168,7 +170,7 @@ def put_or_die(*arguments):
 
 store.put_rows = put_or_die
 store.FLUSH_EVERY_S = float(sys.argv[3])
-writing.write_dataset(Path(sys.argv[1]), several(), OPTIONS)
+write_dataset(Path(sys.argv[1]), several(), OPTIONS)
 """
 
 
@@ -188,7 +190,7 @@ def test_a_killed_writer_goes_on_to_the_same_data_set(
 ) -> None:
     out = tmp_path / f"killed{ending}"
     here = Path(__file__).parent
-    paths = os.pathsep.join([str(here), str(here.parents[2])])
+    paths = os.pathsep.join(map(str, [here, here.parents[1], here.parents[2]]))
     ended = subprocess.run(
         [sys.executable, "-c", KILLED, str(out), str(call), str(flush_s)],
         env={**os.environ, "PYTHONPATH": paths},
@@ -262,7 +264,7 @@ def test_one_bad_source_does_not_stop_the_others(tmp_path: Path) -> None:
     wide = source("r4", rate_hz=200.0)
     sources = [
         source("r1"),
-        LazySource(SourceKey("ben", "b", 0), broken),
+        LazySource(SourceKey("ben", "b", 0), broken, str),
         source("r3", null_bins=(3, 4)),
         wide,
         source("r2"),
@@ -480,7 +482,7 @@ def test_what_cannot_be_is_refused_in_words(
         write_dataset(tmp_path / "twice.zarr", [source(), source()], OPTIONS)
     assert not (tmp_path / "twice.zarr").exists()
     with pytest.raises(Sd2Error, match=r"Two sources are r1 of anna\. .*--subjects"):
-        Counting.of([source(), source()])
+        Counting.of([lazily(source()), lazily(source())])
     renamed = replace(several()[0], subject="anne")
     with pytest.raises(Sd2Error, match=r"r1 of anne is in .*set.zarr already, as r1 of anna"):
         write_dataset(out, [renamed], OPTIONS)
@@ -516,9 +518,11 @@ def test_memory_does_not_grow_with_the_number_of_sources(
     monkeypatch.setattr(store, "_TOGETHER", 64)
     monkeypatch.setattr(card, "_ROWS", 256)  # fewer than any of these data sets has
 
-    def many(count: int) -> Iterator[Source]:
+    def many(count: int) -> Iterator[LazySource]:
         for number in range(count):
-            yield source(f"r{number}", f"s{number % 4}", frames=1500)
+            name, who = f"r{number}", f"s{number % 4}"
+            made = partial(source, name, who, frames=1500)
+            yield LazySource(SourceKey(who, name, 0), lambda _, made=made: made(), str)
 
     def peak(count: int, ending: str) -> int:
         tracemalloc.start()

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lazy_sources import write_dataset
 from made_sources import source
 
 from sd2core.cli.classify.data import clips_of
@@ -17,7 +18,6 @@ from sd2core.datasets.labelled import (
     unfolded,
 )
 from sd2core.datasets.labelled_source import LabelledSource
-from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.options.exporting import Exporting

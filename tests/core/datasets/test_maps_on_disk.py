@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lazy_sources import write_dataset
 from swinging_recordings import FRAMES, recording
 
 from sd2core.batch.folder import BatchFolder
@@ -18,7 +19,6 @@ from sd2core.cli.recording_maps import MapName, maps_of
 from sd2core.datasets import kept_maps
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.recording_sources import Making, recording_sources
-from sd2core.datasets.writing import write_dataset
 from sd2core.doppler import Synthesizer
 from sd2core.maps import DopplerMap
 from sd2core.mesh.walls import Wall

@@ -11,6 +11,7 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
+from lazy_sources import write_dataset
 from made_sources import LABELS, source
 
 from sd2core.datasets.clips import clips_of_dataset
@@ -20,7 +21,6 @@ from sd2core.datasets.recording_sources import Making
 from sd2core.datasets.source import LabelledSpan, Source
 from sd2core.datasets.sources import gather
 from sd2core.datasets.torch_dataset import NOT_LEARNT, SegmentDataset
-from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
 from sd2core.files.resources import resource_path
 from sd2core.labels.statistics import label_statistics

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from lazy_sources import write_dataset
 from made_sources import LABELS, source
 from torch.utils.data import DataLoader
 
 from sd2core.datasets.reading import open_dataset
 from sd2core.datasets.torch_dataset import NOT_LEARNT, SegmentDataset
-from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
 from sd2core.options.exporting import Exporting
 

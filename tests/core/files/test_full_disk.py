@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from full_disk import full_disk
+from lazy_sources import write_dataset
 
 from sd2core.datasets.source import Source
-from sd2core.datasets.writing import write_dataset
 from sd2core.files.figure_files import save_figure
 from sd2core.files.resources import resource_path
 from sd2core.io.mesh import save_mesh

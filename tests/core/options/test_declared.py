@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 import zarr
+from lazy_sources import write_dataset
 
 from sd2core.datasets.card import describe_dataset
 from sd2core.datasets.clips import clips_of_dataset
 from sd2core.datasets.reading import open_dataset
-from sd2core.datasets.writing import write_dataset
 from sd2core.errors import Sd2Error
 from sd2core.files.stores import array_in, open_group
 from sd2core.maps import DopplerMap
