@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator
-from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from sd2core.files.limits import open_regular
 from sd2core.files.numpy_files import open_npz_file
 from sd2core.files.texts import check_version, errors_in, lines_of
 from sd2core.imu.signals import InertialSignals
-from sd2core.imu.tables import AccelerationUnit, TurnRateUnit, meta_of, read_table, text_of
+from sd2core.imu.tables import meta_of, read_table, text_of
 
 SUFFIXES = (".csv", ".sto", ".npz")
 FORMAT, VERSION = "sd2-imu", 1
@@ -59,36 +58,15 @@ def write_signals(path: Path, signals: InertialSignals) -> None:
     write(path, signals)
 
 
-def read_signals(
-    path: Path,
-    *,
-    rate_hz: float | None = None,
-    acceleration_unit: AccelerationUnit | None = None,
-    turn_rate_unit: TurnRateUnit | None = None,
-) -> InertialSignals:
-    """Read samples of a virtual sensor, or the CSV of a real one.
+def read_signals(path: Path) -> InertialSignals:
+    """Read what :func:`write_signals` wrote, or the CSV of a real sensor; see :mod:`.tables`.
 
-    Parameters
-    ----------
-    path : Path
-        What :func:`write_signals` wrote, or another ``.csv``: see
-        :func:`sd2core.imu.tables.read_table`, also for the other parameters, which are for a CSV.
-
-    Raises
-    ------
-    Sd2Error
-        When the file is no such file or damaged.
+    Raises Sd2Error when the file is no such file or damaged.
     """
     path = Path(path)
     if not path.exists():
         raise Sd2Error(f"{path} does not exist", "samples of an inertial sensor", "Check the path")
-    read_csv = partial(
-        read_table,
-        rate_hz=rate_hz,
-        acceleration_unit=acceleration_unit,
-        turn_rate_unit=turn_rate_unit,
-    )
-    read = _of_suffix(path, {".csv": read_csv, ".sto": _read_sto, ".npz": _read_npz})
+    read = _of_suffix(path, {".csv": read_table, ".sto": _read_sto, ".npz": _read_npz})
     try:
         return read(path)
     except OSError as error:

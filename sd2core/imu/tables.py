@@ -11,7 +11,7 @@ import re
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,6 @@ from sd2core.files.limits import open_regular
 from sd2core.files.texts import errors_in, lines_of
 from sd2core.imu.signals import InertialSignals
 from sd2core.io.imu_columns import AXES, UNITS, Column, cell_text, column_of, titles_of
-
-AccelerationUnit = Literal["m/s²", "g"]
-TurnRateUnit = Literal["rad/s", "°/s"]
 
 EXPECTED = (
     "a table of an inertial sensor: a heading with acc_x, acc_y, acc_z and gyr_x, gyr_y, gyr_z,"
@@ -36,47 +33,28 @@ _LONGEST_HEADING = 10_000
 _MOST_FACTS = 200
 
 
-def read_table(
-    path: Path,
-    *,
-    rate_hz: float | None = None,
-    acceleration_unit: AccelerationUnit | None = None,
-    turn_rate_unit: TurnRateUnit | None = None,
-) -> InertialSignals:
+def read_table(path: Path) -> InertialSignals:
     """Read a table of a real or virtual sensor: separated by commas, semicolons, tabs or spaces.
 
     Lines that begin with ``#`` are skipped; those before the heading of the form ``# name: value``
     are metadata, of which ``# rate_hz: 100`` stands for a column of times. An empty cell or NaN is
-    a value that is not known.
+    a value that is not known. Times are in the unit that their column states, otherwise in seconds.
 
-    Parameters
-    ----------
-    path : Path
-        Times are in the unit that their column states, otherwise in seconds.
-    rate_hz : float, optional
-        Samples per second of a table without times.
-    acceleration_unit, turn_rate_unit : str, optional
-        Of columns that do not state it.
-
-    Raises
-    ------
-    Sd2Error
-        When the file is no such table, a column or a unit is missing or there twice, a value is no
-        number, or times do not increase or come at a rate that no sensor has.
+    Raises Sd2Error when the file is no such table, a column or a unit is missing or there twice, a
+    value is no number, or times do not increase or come at a rate that no sensor has.
     """
-    given: dict[str, str] = {"acc": acceleration_unit or "", "gyr": turn_rate_unit or ""}
     with open_regular(path) as stream:
         facts, heading, lines = _heading(path, lines_of(stream))
         separator, titles = titles_of(heading)
         columns = _columns_of(path, titles)
-        factors = _factors(path, columns, given)
+        factors = _factors(path, columns)
         values = _numbers(path, lines, separator, columns)  # (N, 6 or 7)
     with np.errstate(over="ignore"):  # what becomes infinite is refused
         values *= factors
     if values.shape[1] == 7:
         times_s = values[:, 6]
     else:
-        rate_hz = _rate(path, facts.get("rate_hz", "")) if rate_hz is None else rate_hz
+        rate_hz = _rate(path, facts.get("rate_hz", ""))
         times_s = np.arange(len(values)) / _plausible(path, rate_hz)
     meta = {"source": path.name, **meta_of(facts), "columns": [one.title for one in columns]}
     with errors_in(path, remedy=""):
@@ -159,12 +137,12 @@ def _columns_of(path: Path, titles: Sequence[str]) -> list[Column]:
     return [columns[one] for one in AXES] + ([time] if time else [])
 
 
-def _factors(path: Path, columns: list[Column], given: dict[str, str]) -> NDArray[np.float64]:
+def _factors(path: Path, columns: list[Column]) -> NDArray[np.float64]:
     """Factors that make m/s², rad/s and s of the columns' values."""
     factors = []
     for column in columns:
         known = UNITS[column.quantity]
-        unit = column.unit or given.get(column.quantity, "s")
+        unit = column.unit or ("s" if column.quantity == "time" else "")
         if unit not in known:
             stated = f"the unit {unit!r}" if unit else "no unit"
             raise Sd2Error(
