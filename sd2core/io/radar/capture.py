@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,21 +20,6 @@ _LARGEST = 1e9
 """What is larger, or infinite, is no sample in any unit."""
 
 
-class Samples(Protocol):
-    """Array that is read by frames, which may lie in files."""
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """(frames, channels, chirps, samples)."""
-
-    @property
-    def dtype(self) -> np.dtype[Any]:
-        """Type of what is read: uint16 counts around mid-scale, or float32 or complex64."""
-
-    def __getitem__(self, frames: slice) -> NDArray[Any]:
-        """Read some frames."""
-
-
 @dataclass(frozen=True, eq=False)
 class LazySamples:
     """Samples that a function reads, and brings into this shape and type, some frames at a time."""
@@ -45,6 +30,11 @@ class LazySamples:
 
     def __getitem__(self, frames: slice) -> NDArray[Any]:
         return self.read(frames)
+
+
+Samples = NDArray[Any] | LazySamples
+"""Array (frames, channels, chirps, samples), of uint16 counts around mid-scale, or of float32 or
+complex64; it may be read by frames, as they are asked for."""
 
 
 def by_transmitter(samples: Samples, transmitters: int) -> LazySamples:
