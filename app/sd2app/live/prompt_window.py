@@ -178,11 +178,6 @@ def _sample() -> tuple[MeshSequence, dict[str, tuple[float, float]]]:
     return recording.load_mesh(), spans
 
 
-def prepare_pictures() -> None:
-    """Read the body, which takes a second, before it is wanted."""
-    _sample()
-
-
 def has_picture(gesture: str) -> bool:
     """True if a body can be shown that makes a gesture."""
     return bool(gesture) and gesture in _sample()[1]
@@ -260,8 +255,6 @@ class PromptWindow(QWidget):
             self.setGeometry(others[0].availableGeometry())
         self.show()
         self.activateWindow()
-        # While camera and radar are opened in the process, nobody waits for it.
-        QTimer.singleShot(0, self, prepare_pictures)
 
     def _refresh(self) -> None:
         words = [progress_text(self._model), headline(self._model), detail(self._model)]
