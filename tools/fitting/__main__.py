@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import sys
-from contextlib import nullcontext
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated
 
 from sd2core.cli.output import progress_bar
-from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_write_text
-from sd2core.options.kinds import Names
 from sd2core.options.records import ARGUMENT, OptionRecord, Place
 from tools.command_line import tool
-from tools.fitting.clips import CLIPS, REAL_MOTION, TUNING, clip_named, make_fit_truth
+from tools.fitting.clips import CLIPS, REAL_MOTION, TUNING, make_fit_truth
 from tools.fitting.error_measurement import measure_errors
-from tools.fitting.people import OTHERS, as_table, measure_people, meetings
+from tools.fitting.people import as_table, measure_people
 from tools.fitting.report import as_csv, as_markdown
 from tools.fitting.scoring import Fits
-from tools.fitting.truth import read_truth, truth_folders
+from tools.fitting.truth import truths_in
 
 
 class Clips(OptionRecord):
@@ -29,16 +25,15 @@ class Clips(OptionRecord):
     ----------
     out : OUT
         the folder to fill
-    clips : NAMES
-        only these, separated by commas, or `tuning`: other clips by which the weights of the fit
-        were chosen (default: all but those)
+    tuning
+        make the other clips, by which the weights of the fit were chosen
     motions : FOLDER
         also clips with the motion of real people, from the folder that
         `python -m tools.motion_capture drive` made
     """
 
     out: Annotated[Path, ARGUMENT]
-    clips: Names = ()
+    tuning: bool = False
     motions: Path | None = None
 
 
@@ -48,9 +43,7 @@ class Score(OptionRecord):
     Parameters
     ----------
     truth : TRUTH
-        a folder of clips, or one clip
-    clips : NAMES
-        only these, separated by commas (default: all)
+        a folder of clips
     keep : FOLDER
         keep what is fitted as NAME.zarr in FOLDER, and its landmarks as NAME.landmarks.npz; what
         is there is not fitted again
@@ -62,8 +55,7 @@ class Score(OptionRecord):
     """
 
     truth: Annotated[Path, ARGUMENT]
-    clips: Names = ()
-    keep: Path | None = None
+    keep: Path
     real: Annotated[tuple[Path, ...], Place(many="together")] = ()
     markdown: Annotated[Path | None, Place(endings=(".md",))] = None
 
@@ -86,32 +78,13 @@ class Errors(OptionRecord):
     out: Annotated[Path, Place(endings=(".json",))]
 
 
-class People(OptionRecord):
-    """Options of ``people``.
-
-    Parameters
-    ----------
-    only : TEXT
-        only meetings with this in their name
-    """
-
-    only: str = ""
-
-
-def _people(options: People) -> None:
+def _people(options: OptionRecord) -> None:
     """Measure how well two people who meet are told apart, and what that costs their fits.
 
     Prints a table; docs/how-to/correct-a-body-fit.md tells what it says.
     """
-    chosen = [
-        (meeting, clothes)
-        for meeting in meetings()
-        for clothes in OTHERS
-        if options.only in f"{meeting.name} {meeting.apart_m:g} {clothes}"
-    ]
     with progress_bar("Meeting", unit="meeting") as progress:
-        outcomes = measure_people(chosen, progress)
-    print(as_table(outcomes))
+        print(as_table(measure_people(progress)))
 
 
 def _clips(options: Clips) -> None:
@@ -121,8 +94,7 @@ def _clips(options: Clips) -> None:
     kept, so a run that was stopped goes on where it was.
     """
     standard = CLIPS if options.motions is None else (*CLIPS, *REAL_MOTION)
-    clips = [clip_named(name) for name in options.clips if options.clips != ("tuning",)]
-    chosen = TUNING if options.clips == ("tuning",) else clips or standard
+    chosen = TUNING if options.tuning else standard
     with progress_bar("Simulating", unit="frame") as progress:
         made = make_fit_truth(options.out, chosen, progress, options.motions)
     print(f"{len(made)} clips in {options.out}")
@@ -134,19 +106,11 @@ def _score(options: Score) -> None:
     Runs `sd2 fit` on every clip and prints the tables of docs/fitting.md. The fit is given the
     camera's focal length and the person's height.
     """
-    truths = [read_truth(folder) for folder in truth_folders(options.truth)]
-    if options.clips:
-        known = {truth.name: truth for truth in truths}
-        for name in options.clips:
-            if name not in known:
-                raise Sd2Error(f"There is no clip {name!r}", ", ".join(known))
-        truths = [known[name] for name in options.clips]
-    if options.keep is not None:
-        options.keep.mkdir(exist_ok=True)
-    with TemporaryDirectory() if options.keep is None else nullcontext(options.keep) as folder:
-        fits = Fits(Path(folder))
-        scores = [fits.score(truth) for truth in truths]
-        real = [fits.score_real(video) for video in options.real]
+    truths = truths_in(options.truth)
+    options.keep.mkdir(exist_ok=True)
+    fits = Fits(options.keep)
+    scores = [fits.score(truth) for truth in truths]
+    real = [fits.score_real(video) for video in options.real]
     tables = as_markdown(scores, real)
     if options.markdown is not None:
         atomic_write_text(options.markdown, tables)
@@ -160,7 +124,7 @@ def _errors(options: Errors) -> None:
     Compares fits of the clips with the true bodies: place, turns of the trunk, directions of
     the limbs, shape.
     """
-    truths = [read_truth(folder) for folder in truth_folders(options.truth)]
+    truths = truths_in(options.truth)
     with progress_bar("Measuring", unit="clip") as progress:
         errors = measure_errors(truths, options.fits, progress)
     errors.save(options.out)

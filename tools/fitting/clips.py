@@ -162,7 +162,7 @@ TUNING = (
     Clip("tune-19", _real("17_03", 0.0, 3.6, -90.0), "dora", "studio", 4.2, 1.0, 119),
     Clip("tune-20", _real("131_02", 3.0, 5.0, 170.0), "emil", "office", 4.0, 1.2, 120),
 )
-"""Other clips, by which the weights of the fit and its statements are chosen (``--clips tuning``);
+"""Other clips, by which the weights of the fit and its statements are chosen (``--tuning``);
 those with the motion of real people are of the persons whose errors calibrate."""
 
 

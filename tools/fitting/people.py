@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -216,16 +217,15 @@ class Outcome:
         return 1.0 - self.wrong / max(self.seen, 1)
 
 
-def measure_people(
-    chosen: Sequence[tuple[Meeting, str]], progress: Progress = silent
-) -> list[Outcome]:
-    """Outcomes of meetings, each with the clothes of the other one."""
+def measure_people(progress: Progress) -> list[Outcome]:
+    """Outcomes of all meetings, the other one in either clothes."""
     outcomes = []
+    wanted = list(product(meetings(), OTHERS))
     with TemporaryDirectory() as folder:
-        for number, (meeting, clothes) in enumerate(chosen):
-            progress(number, len(chosen))
+        for number, (meeting, clothes) in enumerate(wanted):
+            progress(number, len(wanted))
             outcomes.append(_measured(meeting, clothes, Path(folder)))
-        progress(len(chosen), len(chosen))
+        progress(len(wanted), len(wanted))
     return outcomes
 
 

@@ -65,17 +65,13 @@ def read_truth(folder: Path) -> Truth:
         raise Sd2Error(f"{path} cannot be read ({error})", _EXPECTED) from error
 
 
-def truth_folders(folder: Path) -> list[Path]:
-    """Clips in a folder by name, or the folder itself if it is one; Sd2Error if there is none."""
-    folder = Path(folder)
-    if (folder / "truth.json").is_file():
-        return [folder]
-    clips = sorted(path.parent for path in folder.glob("*/truth.json"))
-    clips = [path for path in clips if not path.name.startswith(".")]
-    if not clips:
+def truths_in(folder: Path) -> list[Truth]:
+    """Clips in a folder by name; Sd2Error if there is none, or one cannot be read."""
+    paths = sorted(folder.glob("[!.]*/truth.json"))
+    if not paths:
         raise Sd2Error(
             f"{folder} holds no clip of known motion",
             "a folder made by `python -m tools.fitting clips`",
             f"Make it: python -m tools.fitting clips {folder}",
         )
-    return clips
+    return [read_truth(path.parent) for path in paths]

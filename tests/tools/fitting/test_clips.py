@@ -19,7 +19,7 @@ from tools.build_sample.clothing import Clothes, Outfit
 from tools.build_sample.render import Renderer, Studio
 from tools.fitting import clips as clip_module
 from tools.fitting.clips import clip_named, make_fit_truth, scene
-from tools.fitting.truth import read_truth, truth_folders
+from tools.fitting.truth import read_truth, truths_in
 
 FRAMES = 4
 
@@ -52,7 +52,7 @@ def test_a_clip_is_complete_and_on_one_clock(made: Path) -> None:
         np.testing.assert_allclose(video.timebase.times_s, mesh.times_s, atol=1e-6)
     assert json.loads((made / "truth.json").read_text("utf-8"))["simulated"] is True
     assert (truth.kind, truth.strokes, truth.camera.focal_px) == ("still", (), 600.0)
-    assert truth_folders(made) == truth_folders(made.parent) == [made]
+    assert [one.name for one in truths_in(made.parent)] == [truth.name]
 
 
 def test_the_picture_shows_the_mesh(made: Path) -> None:
@@ -123,7 +123,7 @@ def test_a_cancelled_clip_leaves_nothing(tmp_path: Path, short: None) -> None:
 
 def test_what_is_no_clip_is_explained(tmp_path: Path) -> None:
     with pytest.raises(Sd2Error, match="no clip of known motion"):
-        truth_folders(tmp_path)
+        truths_in(tmp_path)
     with pytest.raises(Sd2Error, match="no clip 'ballet'"):
         clip_named("ballet")
     (tmp_path / "truth.json").write_text(json.dumps({"format": "sd2-fit-truth", "version": 99}))
