@@ -11,7 +11,6 @@ import numpy as np
 
 from sd2app.session.display import COLOUR_MAPS
 from sd2core.cli.output import progress_bar
-from sd2core.options.kinds import Positive
 from sd2core.options.records import ARGUMENT, OptionRecord
 from sd2core.simulate.campaign.making import make_campaign
 from sd2core.simulate.campaign.protocol import PAPER
@@ -21,8 +20,8 @@ from tools.build_body.export_body import export_body
 from tools.build_sample.sample import make_sample
 from tools.command_line import tool
 
-SEED, PEOPLE = 61, 8
-"""Of the pairs that the bundled gesture classifier learns from."""
+SEED, PEOPLE, MINUTES = 61, 8, 14.0
+"""Of the pairs that the bundled gesture classifier learns from; minutes of all together."""
 
 
 class Bundled(OptionRecord):
@@ -35,18 +34,6 @@ class Bundled(OptionRecord):
     """
 
     out: Annotated[Path, ARGUMENT]
-
-
-class Gestures(Bundled):
-    """Options of ``gestures``.
-
-    Parameters
-    ----------
-    minutes : MIN
-        of all people together
-    """
-
-    minutes: Positive = 14.0
 
 
 def _body(options: Bundled) -> None:
@@ -69,7 +56,7 @@ def _sample(options: Bundled) -> None:
     print(f"Made {made}")
 
 
-def _gestures(options: Gestures) -> None:
+def _gestures(options: Bundled) -> None:
     """Make the pairs (.zarr) that the bundled gesture classifier learns from.
 
     Simulated people face a camera and a radar 2.2 m ahead, as in the sample, and swipe in random
@@ -83,7 +70,7 @@ def _gestures(options: Gestures) -> None:
             options.out,
             campaign,
             subjects=PEOPLE,
-            minutes=options.minutes,
+            minutes=MINUTES,
             processes=1,
             progress=progress,
         )

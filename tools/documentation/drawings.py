@@ -1,4 +1,4 @@
-"""Draw the figures of the concept pages: `python -m tools.documentation.drawings [NAME ...]`.
+"""Draw the figures of the concept pages: `python -m tools.documentation.drawings`.
 
 Writes docs/images/concepts/NAME.svg. What they show is computed by the library, from the
 bundled sample (simulated) or from a plate that moves as stated. `uncertainty` fits a body to
@@ -8,9 +8,7 @@ drawings read alike on light and dark pages.
 
 from __future__ import annotations
 
-import argparse
 import tempfile
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -352,21 +350,12 @@ def _swinging_plate(peak_mps: float) -> tuple[sd2.MeshSequence, Array]:
     return sd2.MeshSequence(vertices_m, faces, times), velocity_mps
 
 
-DRAWINGS: dict[str, Callable[[], Figure]] = {
-    function.__name__.replace("_", "-"): function
-    for function in (what_doppler_shows, aliasing, emptied_bins, tolerance, uncertainty, simulated)
-}
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Draw the named figures, or all."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(DRAWINGS))
-    names = parser.parse_args(arguments).names or list(DRAWINGS)
+def main() -> None:
+    """Draw them all."""
     CONCEPTS.mkdir(exist_ok=True)
-    for name in names:
-        path = CONCEPTS / f"{name}.svg"
-        save_figure(DRAWINGS[name](), path, {"made by": "tools.documentation.drawings"})
+    for drawn in (what_doppler_shows, aliasing, emptied_bins, tolerance, uncertainty, simulated):
+        path = CONCEPTS / f"{drawn.__name__.replace('_', '-')}.svg"
+        save_figure(drawn(), path, {"made by": "tools.documentation.drawings"})
         print(path.relative_to(REPOSITORY))
 
 

@@ -60,16 +60,6 @@ def beside(window: MainWindow) -> None:
     window.session.edits.place_sensor(aimed_at(sensor, torso_m))
 
 
-def far_in_the_dark(window: MainWindow) -> None:
-    """The sensor moved aside to 6 m, range colours, dark theme."""
-    window.features.program.set_dark(True)
-    window.session.playback.seek(2.0)
-    sensor = VirtualSensor(position_m=(2.6, -0.6, -2.8))
-    window.session.edits.place_sensor(aimed_at(sensor, window.features.maps.synthesis.torso_m))
-    window.features.scene.view.set_view("overview")
-    window.session.display.set_mesh_colour("range")
-
-
 def accuracy(window: MainWindow) -> None:
     """The Accuracy panel on the sample, measured, for a tolerance of 2 %."""
     window.resize(*TALL)
@@ -319,7 +309,6 @@ def main() -> None:
     strip()
     take("sample.png", [SAMPLE], sample)
     take("beside.png", [SAMPLE], beside)
-    take("dark.png", [SAMPLE], far_in_the_dark)
     take("accuracy.png", [SAMPLE], accuracy)
     room()
     sizes()
