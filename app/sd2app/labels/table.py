@@ -88,9 +88,7 @@ class SpanTable(CellTable):
         self.clicked.connect(self._go)
         edits.labels.selection_changed.connect(self.mirror)
         edits.labels.changed.connect(self.mirror)
-        for signal in (edits.labels.changed, session.document.changed):
-            signal.connect(self._follow_persons)
-        self._follow_persons()
+        session.document.changed.connect(self._follow_persons)
 
     # --- columns --------------------------------------------------------------------------
 
@@ -196,6 +194,7 @@ class SpanTable(CellTable):
         """Select the rows of the spans selected elsewhere."""
         if not self.isVisible():
             return
+        self._follow_persons()
         rows = sorted(
             row for one in self._labels.selected if (row := self._model.row_of(one.id)) is not None
         )
