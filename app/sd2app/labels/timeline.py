@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QPointF, QRect, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QAction, QColor, QMouseEvent, QPainter, QResizeEvent
-from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QScrollBar, QSizePolicy, QToolTip
+from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QSizePolicy, QToolTip
 
 from sd2app.labels.dragging import MOVED_PX, LabelDragging, attraction_s
 from sd2app.labels.edits import LabelEdits
@@ -316,49 +316,37 @@ _HIGHEST_PX = round(8.5 * ROW_PX)
 class LabelArea(QScrollArea):
     """Scroll area for many tracks; keeps the track for new spans in view.
 
-    The scroll bar stands in the margin beside the tracks, so the time axis keeps its width.
+    The scroll bar covers the margin beside the tracks, so the time axis keeps its width.
     """
 
     def __init__(self, timeline: LabelTimeline, labels: LabelsModel) -> None:
         super().__init__()
         self._timeline, self._labels = timeline, labels
         self.setFrameShape(QFrame.Shape.NoFrame)
-        self.setWidgetResizable(True)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setWidget(timeline)
-        hidden = self.verticalScrollBar()
-        self._bar = QScrollBar(Qt.Orientation.Vertical, self)
-        self._bar.setAccessibleName("Scroll the tracks of labels")
-        self._bar.valueChanged.connect(hidden.setValue)
-        hidden.valueChanged.connect(self._bar.setValue)
-        hidden.rangeChanged.connect(self._fit)
-        timeline.installEventFilter(self)
+        bar, across = self.verticalScrollBar(), self.horizontalScrollBar()
+        across.rangeChanged.connect(lambda *_: across.setRange(0, 0))  # the margin stays covered
+        bar.setAccessibleName("Scroll the tracks of labels")
+        bar.setFixedWidth(MARGIN_PX)
+        bar.setSingleStep(round(ROW_PX))
         labels.selection_changed.connect(self._show_track)
         self._fit()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Follow the height of the tracks."""
-        if watched is self._timeline and event.type() == QEvent.Type.Resize:
+        if event.type() == QEvent.Type.Resize:
             self._fit()
         return super().eventFilter(watched, event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Keep the scroll bar in its place."""
+        """Give the tracks the whole width."""
         super().resizeEvent(event)
-        self._fit()
+        self._timeline.setFixedWidth(self.width())
 
     def _fit(self) -> None:
-        needed_px = self._timeline.sizeHint().height()
-        self.setFixedHeight(min(needed_px, _HIGHEST_PX))
-        hidden = self.verticalScrollBar()
-        self._bar.setRange(hidden.minimum(), hidden.maximum())
-        self._bar.setPageStep(self.height())
-        self._bar.setSingleStep(round(ROW_PX))
-        self._bar.setGeometry(self.width() - MARGIN_PX, 0, MARGIN_PX, self.height())
-        self._bar.setVisible(needed_px > _HIGHEST_PX)
-        self._bar.raise_()
+        self.setFixedHeight(min(self._timeline.sizeHint().height(), _HIGHEST_PX))
 
     def _show_track(self) -> None:
         if self._labels.track:

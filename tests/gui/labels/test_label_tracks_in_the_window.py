@@ -176,7 +176,8 @@ def test_many_tracks_are_scrolled_and_the_chosen_one_is_in_view(labelled, qtbot)
         c.label_tracks.add(f"Track {number}", "exclusive")
     area = labelled.findChild(LabelArea)
     assert view.height() > 2 * area.height()
-    assert view.width() == width_px
+    assert view.width() == width_px == area.width()
+    assert area.horizontalScrollBar().maximum() == 0
     for track in ("Gestures", "Track 19", "Track 9"):
         c.labels.set_track(track)
         row = view.rows.row_of(track)
