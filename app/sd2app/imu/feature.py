@@ -204,12 +204,8 @@ class InertialTrack(TrackMouse):
         left = HANDLE_PX + paint_title(painter, box, self.title, colours.text) + 12
         room = self.width() - 2 * MARGIN_PX - left - self._paint_legend(painter, box, left)
         painter.setPen(QColor(colours.muted))
-        metrics, parts = painter.fontMetrics(), status_parts(self._model)
-        words = [" · ".join(parts[:count]) for count in range(len(parts), 1, -1)]
-        status = next(
-            (one for one in words if metrics.horizontalAdvance(one) <= room),
-            metrics.elidedText("".join(parts[:1]), Qt.TextElideMode.ElideRight, int(max(room, 40))),
-        )
+        metrics, words = painter.fontMetrics(), " · ".join(status_parts(self._model))
+        status = metrics.elidedText(words, Qt.TextElideMode.ElideRight, int(max(room, 40)))
         painter.drawText(QRectF(left, 0, self.width(), HEADER_PX), AT_LEFT, status)
 
     def _paint_legend(self, painter: QPainter, box: QRectF, left: float) -> float:

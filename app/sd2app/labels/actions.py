@@ -7,13 +7,14 @@ from dataclasses import replace
 from typing import Literal
 
 from PySide6.QtGui import QAction, QActionGroup, QKeySequence
-from PySide6.QtWidgets import QCheckBox, QFormLayout, QInputDialog, QLineEdit, QMenu, QWidget
+from PySide6.QtWidgets import QCheckBox, QInputDialog, QLineEdit, QMenu, QWidget
 
 from sd2app.feature import Action, Shell
 from sd2app.labels.edits import LabelEdits
 from sd2app.labels.model import LabelsModel
 from sd2app.widgets.dialogs import Dialog, accepted, accepting
 from sd2app.widgets.icons import swatch_icon
+from sd2app.widgets.layouts import column_of, form_of
 from sd2app.widgets.text import canonical, counted, native
 from sd2core.labels import field_edits
 from sd2core.labels.label_set import Label, LabelSet
@@ -172,10 +173,7 @@ class TrackDialog(Dialog):
         self._free = QCheckBox("Spans may overlap, e.g. of two hands", self)
         buttons, accept = accepting(self, "Add track")
         self._name.textChanged.connect(lambda text: accept.setEnabled(bool(text.strip())))
-        layout = QFormLayout(self)
-        layout.addRow("Name", self._name)
-        layout.addRow("", self._free)
-        layout.addRow(buttons)
+        self.setLayout(column_of(form_of(("Name", self._name), ("", self._free)), buttons))
 
     @property
     def name(self) -> str:

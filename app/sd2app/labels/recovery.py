@@ -5,9 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import (
     QDialogButtonBox,
-    QHeaderView,
     QMessageBox,
-    QTreeWidget,
     QTreeWidgetItem,
     QWidget,
 )
@@ -21,6 +19,7 @@ from sd2app.widgets.dialogs import Dialog, accepted, ask_new, closing, may_delet
 from sd2app.widgets.layouts import column_of
 from sd2app.widgets.notices import Notice
 from sd2app.widgets.panel import sentence, show_words
+from sd2app.widgets.table import entry_list
 from sd2app.widgets.text import clock_text, counted
 from sd2core.errors import Sd2Error
 from sd2core.labels.comparison import compare
@@ -127,13 +126,8 @@ class RecoverLabelsDialog(Dialog):
         self._autosave = autosave
         self._about, self._notes = sentence(""), sentence("", "warning")
         self._about.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self._list = QTreeWidget(self)
-        self._list.setHeaderLabels(_HEADINGS)
-        self._list.setAccessibleName("Labels that can be recovered")
-        self._list.setRootIsDecorated(False)
-        self._list.setUniformRowHeights(True)
+        self._list = entry_list("Labels that can be recovered", _HEADINGS, 1, self)
         self._list.setAllColumnsShowFocus(True)
-        self._list.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self._list.currentItemChanged.connect(self._follow)
         buttons = closing(self)
         roles = QDialogButtonBox.ButtonRole
