@@ -49,7 +49,7 @@ class InertialHand:
 
     def sensor_at(self, x_px: float, y_px: float) -> str | None:
         """Place of the sensor whose marker is under the pointer, the nearest to it."""
-        points, places = self._scene.inertial.points_m, list(self._model.vertices)
+        points, places = self._scene.inertial.points, list(self._model.vertices)
         if not self._scene.mesh_shown or not len(points) or len(points) != len(places):
             return None
         pose = self._scene.pose

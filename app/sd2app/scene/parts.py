@@ -10,8 +10,8 @@ from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
-from vtkmodules.vtkFiltersCore import vtkTriangleMeshPointNormals
-from vtkmodules.vtkFiltersSources import vtkSphereSource
+from vtkmodules.vtkFiltersCore import vtkGlyph3D, vtkTriangleMeshPointNormals
+from vtkmodules.vtkFiltersSources import vtkPlatonicSolidSource, vtkSphereSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
 from sd2app.scene import shapes
@@ -26,8 +26,6 @@ _MARKER_M = 0.10
 _MARKER_MIN_PX = 7.0
 _INERTIAL_M = 0.028
 _INERTIAL_MIN_PX = 5.5
-_MARKER_STEP = 1.15
-"""Relative change of size from which markers are rebuilt."""
 
 
 def _actor(renderer: vtkRenderer) -> vtkActor:
@@ -312,7 +310,7 @@ class Markers(Shape):
         super().__init__(renderer, lit=True)
         self._theme = colours
         self.positions_m = np.zeros((0, 3))
-        self._directions = np.zeros((0, 3))
+        self._axes = np.zeros((0, 3, 3))
         self._range_m = np.zeros(0)
         self._beyond: NDArray[np.bool_] | None = None
         self._length_m = _MARKER_M
@@ -335,7 +333,7 @@ class Markers(Shape):
         (N,), marks those that a radar would see folded.
         """
         self.positions_m = np.array([one.position_m for one in sensors]).reshape(-1, 3)
-        self._directions = np.array([one.boresight for one in sensors]).reshape(-1, 3)
+        self._axes = np.array([sensor_axes(one) for one in sensors]).reshape(-1, 3, 3)
         self._range_m, self._beyond = np.asarray(range_m), beyond
         self.show(bool(sensors))
         self._build()
@@ -351,13 +349,13 @@ class Markers(Shape):
     def set_pixel(self, metres: float) -> None:
         """Size of a pixel where the body is; markers are never too small to be clicked."""
         length_m = max(_MARKER_M, _MARKER_MIN_PX * metres)
-        if not 1 / _MARKER_STEP < length_m / self._length_m < _MARKER_STEP:
+        if length_m != self._length_m:
             self._length_m = length_m
             self._build()
 
     def _build(self) -> None:
         if len(self.positions_m):
-            points, triangles = shapes.pyramids(self.positions_m, self._directions, self._length_m)
+            points, triangles = shapes.pyramids(self.positions_m, self._axes, self._length_m)
             self.set_shape(points, triangles=triangles)
             self.set_colours(self._theme)
 
@@ -367,7 +365,14 @@ class InertialMarkers(Shape):
 
     def __init__(self, renderer: vtkRenderer) -> None:
         super().__init__(renderer, lit=True)
-        self.points_m: NDArray[np.floating] = np.zeros((0, 3))
+        solid = vtkPlatonicSolidSource()
+        solid.SetSolidTypeToOctahedron()
+        self._solids = vtkGlyph3D()
+        self._solids.SetSourceConnection(solid.GetOutputPort())
+        self._solids.SetInputData(self.data)
+        mapper = self.actor.GetMapper()
+        mapper.SetInputConnection(self._solids.GetOutputPort())
+        mapper.ScalarVisibilityOff()  # which number the faces
         self.look.SetInterpolationToFlat()
         self.look.SetAmbient(0.6)
         self.look.SetDiffuse(0.4)
@@ -376,12 +381,9 @@ class InertialMarkers(Shape):
 
     def set_points(self, points_m: NDArray[np.floating], metres_per_px: float) -> None:
         """Show sensors at N points, (N, 3), as large as can be seen."""
-        self.points_m = points_m
+        self.set_shape(points_m)
         self.show(len(points_m) > 0)
-        if len(points_m):
-            radius_m = max(_INERTIAL_M, _INERTIAL_MIN_PX * metres_per_px)
-            points, triangles = shapes.octahedra(points_m, radius_m)
-            self.set_shape(points, triangles=triangles)
+        self._solids.SetScaleFactor(max(_INERTIAL_M, _INERTIAL_MIN_PX * metres_per_px))
 
     def set_colours(self, colours: SceneColours) -> None:
         """Colours of the theme."""

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from sd2core.mesh.sequence import MeshSequence
 
@@ -77,46 +77,22 @@ def frustum(length: float) -> tuple[NDArray, NDArray]:
 
 
 def pyramids(
-    positions: NDArray[np.floating], directions: NDArray[np.floating], length: float
+    positions: NDArray[np.floating], axes: NDArray[np.floating], length: float
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """Points (5 N, 3) and triangles (6 N, 3) of pyramids whose tips point along N unit vectors.
+    """Points (5 N, 3) and triangles (6 N, 3) of pyramids whose tips point ahead.
 
-    Each has its tip first, then its base, with the given position in the middle.
+    ``axes``, (N, 3, 3), has the rows right, down and ahead of each, with its tip first, then its
+    base, with the given position in the middle.
     """
     half = _PYRAMID_WIDTH / 2
     one = np.array(
         [(0, 0, 1), (-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)]
     )
-    points = positions[:, None] + length * (one @ np.swapaxes(rotation_to(directions), 1, 2))
+    points = positions[:, None] + length * (one @ axes)
     sides = np.array([(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 1), (1, 3, 2), (1, 4, 3)], np.int32)
     first = PYRAMID_POINTS * np.arange(len(positions), dtype=np.int32)
     triangles = (first[:, None, None] + sides).reshape(-1, 3)
     return points.reshape(-1, 3).astype(np.float32), triangles
-
-
-def octahedra(
-    positions: NDArray[np.floating], radius: float
-) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """Points (6 N, 3) and triangles (8 N, 3) of octahedra around N positions."""
-    one = radius * np.concatenate([np.eye(3), -np.eye(3)])
-    points = positions[:, None] + one
-    sides = np.array(
-        [(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)],
-        np.int32,
-    )
-    first = len(one) * np.arange(len(positions), dtype=np.int32)
-    triangles = (first[:, None, None] + sides).reshape(-1, 3)
-    return points.reshape(-1, 3).astype(np.float32), triangles
-
-
-def rotation_to(directions: ArrayLike) -> NDArray[np.float64]:
-    """Rotations (..., 3, 3) that turn +z into ``directions``, (..., 3), and keep the horizon."""
-    forward = np.asarray(directions, np.float64)
-    forward = forward / np.linalg.norm(forward, axis=-1, keepdims=True)
-    level = np.stack([forward[..., 2], 0 * forward[..., 0], -forward[..., 0]], axis=-1)
-    length = np.linalg.norm(level, axis=-1, keepdims=True)
-    right = np.where(length > 1e-9, level / np.maximum(length, 1e-9), (1.0, 0.0, 0.0))
-    return np.stack([right, np.cross(forward, right), forward], axis=-1)
 
 
 def grid_rectangle(low_xz: NDArray[np.float64], high_xz: NDArray[np.float64]) -> GridRectangle:

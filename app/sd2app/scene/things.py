@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from vtkmodules.vtkFiltersCore import vtkFeatureEdges
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from sd2app.scene.camera import EyePose, Surface
@@ -17,7 +18,7 @@ from sd2core.mesh.things import Thing
 from sd2core.mesh.walls import Wall
 
 _OPACITY = 0.38
-_SHARP_COSINE = 0.9
+_SHARP_DEG = 25.0
 
 
 class ThingShapes:
@@ -30,7 +31,12 @@ class ThingShapes:
         self._face = Shape(renderer, vertices, triangles=faces, lit=True)
         self._face.look.SetInterpolationToFlat()
         self._face.look.SetOpacity(_OPACITY)
-        self._edge = Shape(renderer, vertices, segments=sharp_edges(vertices, faces))
+        sharp = vtkFeatureEdges()  # where it bends or ends
+        sharp.SetInputData(self._face.data)
+        sharp.SetFeatureAngle(_SHARP_DEG)
+        sharp.ColoringOff()
+        self._edge = Shape(renderer)
+        self._edge.actor.GetMapper().SetInputConnection(sharp.GetOutputPort())
         self.shapes = self._face, self._edge
         self.actors = tuple(shape.actor for shape in self.shapes)
 
@@ -124,21 +130,6 @@ class Movables:
         self._colours = colours
         for number, one in enumerate(self._all):
             one.set_colours(colours, number == self._hot)
-
-
-def sharp_edges(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> NDArray[np.int32]:
-    """Edges (n, 2) of a surface where it bends or ends, without those within a plane."""
-    corners = np.asarray(vertices, np.float64)[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    owner = np.tile(np.arange(len(faces)), 3)
-    unique, which, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
-    total = np.zeros((len(unique), 3))
-    np.add.at(total, which.ravel(), normals[owner])
-    # Two unit normals add up to 2 cos(half the angle between them).
-    sharp = np.linalg.norm(total, axis=1) < 2.0 * np.sqrt(0.5 * (1.0 + _SHARP_COSINE))
-    return unique[sharp | (counts != 2)].astype(np.int32)
 
 
 PERSON_COLOURS = ("#d08a3c", "#5f9e6e", "#9b74b3", "#c4627c", "#4f98ad")

@@ -15,10 +15,9 @@ from sd2app.scene.shapes import (
     ground,
     is_closed_outward,
     pyramids,
-    rotation_to,
 )
 from sd2core.placements.placements import Place
-from sd2core.scattering.beam import half_power_rim
+from sd2core.scattering.beam import half_power_rim, sensor_axes
 from sd2core.sensor import Beam, VirtualSensor, direction_from_angles
 
 TETRAHEDRON = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
@@ -36,8 +35,7 @@ def test_the_rim_of_the_cone_is_half_the_width_of_the_beam_off_axis(angle_deg: f
 
 @pytest.mark.parametrize("angles", [(0, 0), (40, 0), (0, 30), (-120, -50), (10, 90)])
 def test_glyphs_turn_to_the_boresight_and_keep_the_horizon(angles: tuple[float, float]) -> None:
-    boresight = VirtualSensor(azimuth_deg=angles[0], elevation_deg=angles[1]).boresight
-    turn = rotation_to(boresight)
+    turn = sensor_axes(VirtualSensor(azimuth_deg=angles[0], elevation_deg=angles[1])).T
     np.testing.assert_allclose(turn @ [0, 0, 1], direction_from_angles(*angles), atol=1e-12)
     np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(turn) == pytest.approx(1.0)
@@ -99,7 +97,7 @@ def test_pyramids_point_where_their_sensors_look() -> None:
     ]
     positions = np.array([one.position_m for one in sensors])
     directions = np.array([one.boresight for one in sensors])
-    points, triangles = pyramids(positions, directions, 0.1)
+    points, triangles = pyramids(positions, np.array([sensor_axes(one) for one in sensors]), 0.1)
     each = points.reshape(-1, PYRAMID_POINTS, 3)
     np.testing.assert_allclose(each[:, 0], positions + 0.1 * directions, atol=1e-6)
     np.testing.assert_allclose(each[:, 1:].mean(axis=1), positions, atol=1e-6)

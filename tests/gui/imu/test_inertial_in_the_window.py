@@ -112,7 +112,7 @@ def test_a_key_and_a_click_place_a_sensor_and_undo_takes_it_away(window, track, 
     # A marker sits on the vertex.
     view = window.features.scene.view
     view.grab()
-    np.testing.assert_allclose(view.scene.inertial.points_m, view.scene.body.points[[vertex]])
+    np.testing.assert_allclose(view.scene.inertial.points, view.scene.body.points[[vertex]])
 
     qtbot.keyClick(window, Qt.Key.Key_Z, CTRL)
     assert models.document.recording.imu_places == ()
