@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import tempfile
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 
 from sd2core.errors import Sd2Error
+from sd2core.files.atomic import atomic_folder
 from sd2core.files.numpy_files import NpzArrays, open_npz_file, read_array_header
 from sd2core.files.stores import create_array, create_group
 from sd2core.io.mesh_arrays import VERTEX_NAMES, create_vertices, frames_per_chunk, is_small
@@ -38,22 +36,16 @@ def unpack_npz(path: Path, out: Path) -> None:
     Nothing is checked, completed or placed: that is done when the store is read. Raises
     Sd2Error if it cannot be read.
     """
-    workspace = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".tmp", dir=out.parent))
-    try:
-        with open_npz_file(path, ".npz", _EXPECTED) as arrays:
-            group = create_group(workspace / "new")
-            with _vertices(arrays, path) as stream:
-                _copy_vertices(stream, group, path)
-            for name in filter(is_small, arrays):
-                if name == "limbs":
-                    group.attrs[name] = [str(one) for one in np.atleast_1d(arrays[name])]
-                else:
-                    name, array = _storable(name, arrays[name])
-                    create_array(group, name, data=array)
-        if not out.exists():
-            os.rename(workspace / "new", out)
-    finally:
-        shutil.rmtree(workspace, ignore_errors=True)
+    with atomic_folder(out) as folder, open_npz_file(path, ".npz", _EXPECTED) as arrays:
+        group = create_group(folder)
+        with _vertices(arrays, path) as stream:
+            _copy_vertices(stream, group, path)
+        for name in filter(is_small, arrays):
+            if name == "limbs":
+                group.attrs[name] = [str(one) for one in np.atleast_1d(arrays[name])]
+            else:
+                name, array = _storable(name, arrays[name])
+                create_array(group, name, data=array)
 
 
 def _storable(name: str, array: np.ndarray) -> tuple[str, np.ndarray]:
