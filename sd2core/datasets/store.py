@@ -8,7 +8,6 @@ what the killed one left.
 from __future__ import annotations
 
 import json
-import shutil
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -29,11 +28,12 @@ from sd2core.datasets.layout import (
 )
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write, atomic_write_text, is_leftover
+from sd2core.files.atomic import atomic_folder, atomic_write
 from sd2core.files.stores import (
     StoredArray,
     array_in,
     create_array,
+    create_group,
     growing,
     open_group,
     put_rows,
@@ -43,15 +43,12 @@ from sd2core.files.texts import append_lines, drop_torn_line, whole_lines
 from sd2core.io.kinds import is_dataset
 
 SOURCES_NAME = "sources.jsonl"
-LOCK_NAME = ".sd2-lock"
 FLUSH_EVERY_S = 2.0
 """Time of work that a killed writer may lose; a source that takes longer is written at once."""
 _TOGETHER = 16 * CHUNK_SEGMENTS
 """Segments that are written together."""
 _TORN = "*.partial"
 """Files that a killed Zarr leaves of a chunk that it was writing."""
-_BEGUN = f"{FORMAT}-begun"
-"""Format of a store that does not have all its arrays yet."""
 _DESCRIPTION = "zarr.json"
 
 
@@ -87,7 +84,7 @@ class SegmentStore:
     @classmethod
     def begin(cls, path: Path, header: Header) -> SegmentStore:
         """Make an empty store in a folder; an earlier store there is deleted."""
-        with _new_group(path, header) as group:
+        with _new_group(path, header) as (_, group):
             for name, (kind, row) in row_shapes(header).items():
                 _create(group, name, kind, row, 0)
         return cls(path)
@@ -109,14 +106,14 @@ class SegmentStore:
         sources : iterable of dict
             Lines of the sources in the file.
         """
-        with _new_group(path, header) as group:
+        with _new_group(path, header) as (folder, group):
             for name, (kind, row) in row_shapes(header).items():
                 rows = arrays[name].shape[0]
                 target: Any = _create(group, name, kind, row, rows)
                 step = 16 * chunk_of(row)[0]
                 for start in range(0, rows, step):
                     target[start : start + step] = arrays[name][start : start + step]
-            with atomic_write(path / SOURCES_NAME) as index:
+            with atomic_write(folder / SOURCES_NAME) as index:
                 for entry in sources:
                     index.write(_line(entry).encode("utf-8"))
         return cls(path)
@@ -252,31 +249,18 @@ def count_sources(path: Path) -> int:
 
 
 @contextmanager
-def _new_group(path: Path, header: Header) -> Iterator[Any]:
-    """Make a group in place of all but the lock; until the block ends :func:`is_begun` knows it."""
-    path.mkdir(exist_ok=True)
-    begun = {"zarr_format": 3, "node_type": "group", "attributes": {"format": _BEGUN}}
-    atomic_write_text(path / _DESCRIPTION, json.dumps(begun))
-    for left in path.iterdir():
-        if left.name in (LOCK_NAME, _DESCRIPTION):
-            continue
-        if left.is_dir():
-            shutil.rmtree(left)
-        else:
-            left.unlink()
-    group = open_group(path, "r+")
-    yield group
-    group.attrs.put(header.as_dict() | {"complete": False})
+def _new_group(path: Path, header: Header) -> Iterator[tuple[Path, Any]]:
+    """Folder and group of a store that takes its place when the block ends."""
+    with atomic_folder(path) as folder:
+        yield folder, create_group(folder, header.as_dict() | {"complete": False})
 
 
 def is_begun(path: Path) -> bool:
-    """True for a folder that is empty, or of a store whose writer ended before it was whole."""
+    """True for a folder that is empty, or that an earlier version left before it was a store."""
     if not path.is_dir():
         return False
-    names = {one.name for one in path.iterdir()} - {LOCK_NAME}
-    if _DESCRIPTION not in names:
-        return all(map(is_leftover, names))
-    return bool(read_attributes(path).get("format") == _BEGUN)
+    of_a_store = read_attributes(path).get("format") == f"{FORMAT}-begun"
+    return of_a_store or {one.name for one in path.iterdir()} <= {".sd2-lock"}
 
 
 def _line(entry: dict[str, Any]) -> str:

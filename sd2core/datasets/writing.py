@@ -19,7 +19,7 @@ from sd2core.datasets.options import dataset_options
 from sd2core.datasets.reading import Dataset, open_dataset
 from sd2core.datasets.source import KINDS, LazySource, SourceKey, each_once
 from sd2core.datasets.splitting import named_splits, split_people
-from sd2core.datasets.store import LOCK_NAME, SOURCES_NAME, SegmentStore, is_begun, open_arrays
+from sd2core.datasets.store import SOURCES_NAME, SegmentStore, is_begun, open_arrays
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import full_disk_named
 from sd2core.files.lock import FileLock
@@ -89,8 +89,7 @@ def write_dataset(
     if not out.absolute().parent.is_dir():
         raise Sd2Error(f"The folder {out.absolute().parent} does not exist", "an existing folder")
     _refuse_other(out, form)
-    work.mkdir(exist_ok=True)
-    lock = FileLock(work / LOCK_NAME)
+    lock = FileLock(out.with_name(f".{out.name}.lock"))
     if not lock.take():
         raise Sd2Error(f"A process is writing to {out}", "one at a time", "Wait until it ends")
     writer: _Writer | None = None
@@ -99,7 +98,7 @@ def write_dataset(
             writer = _Writer(out, work, form, options, provenance or {})
             written = writer.write(sources, progress)
     finally:
-        lock.release()
+        lock.release(delete=True)
         # A store without a segment would only be in the way of other settings.
         if not is_dataset(work) or (writer is not None and writer.empty):
             shutil.rmtree(work, ignore_errors=True)

@@ -130,11 +130,6 @@ def replace_folder(new: Path, path: Path, aside: Path) -> None:
         raise
 
 
-def is_leftover(name: str) -> bool:
-    """True for the name of a temporary file of a write that was killed, or that still runs."""
-    return name.startswith(_PREFIX) and name.endswith(_SUFFIX)
-
-
 def remove_leftovers(folder: Path) -> None:
     """Delete temporary files of killed writes in a folder; no process may be writing there."""
     for path in Path(folder).glob(f"{_PREFIX}*{_SUFFIX}"):

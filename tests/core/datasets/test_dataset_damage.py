@@ -53,7 +53,7 @@ def test_what_an_earlier_version_left_half_made_is_begun_anew(tmp_path: Path) ->
     sources = [source("r1", "anna")]
     out = tmp_path / "set.zarr"
     store.SegmentStore.begin(out, header_of(sources[0], OPTIONS))
-    (out / store.LOCK_NAME).touch()
+    (out / ".sd2-lock").touch()
     shutil.rmtree(out / "subject")
     shutil.rmtree(out / "available")
     assert write_dataset(out, sources, OPTIONS).added == 1
@@ -86,7 +86,7 @@ def test_a_full_disk_at_the_start_leaves_nothing_in_the_way(
 def test_a_folder_with_other_files_is_not_begun_anew(tmp_path: Path) -> None:
     out = tmp_path / "set.zarr"
     out.mkdir()
-    (out / store.LOCK_NAME).touch()
+    (out / ".sd2-lock").touch()
     (out / "thesis.tex").write_text("years of work")
     with pytest.raises(Sd2Error, match="holds no data set"):
         write_dataset(out, several(), OPTIONS)
