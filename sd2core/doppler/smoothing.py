@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,53 +112,16 @@ def smooth_time(
     """
     if sigma_s == 0:
         return values[..., start - first : stop - first].copy()
-    clock = _Clock(times_s, first, first + values.shape[-1], start, stop, sigma_s, presence)
-    neighbours, weights = _bells(clock)
-    total = np.zeros((*values.shape[:-1], stop - start))
-    occupied = values.any(axis=-1)
-    some, sums = values[occupied], total[occupied]
-    for inside, from_frame, bell in neighbours:
-        sums[..., inside] += bell * some[..., from_frame : from_frame + len(bell)]
-    sums /= weights
-    total[occupied] = sums
-    return total
-
-
-class _Clock(NamedTuple):
-    """Clock of a map, on which the Gaussian on time depends."""
-
-    times_s: NDArray[np.float64]
-    first: int
-    last: int
-    start: int
-    stop: int
-    sigma_s: float
-    presence: Presence | None
-
-
-_Bells = tuple[list[tuple[slice, int, NDArray[np.float64]]], NDArray[np.float64]]
-
-_known: deque[tuple[_Clock, _Bells]] = deque(maxlen=4)
-"""Of the newest clocks: while a sensor is dragged it stays the same."""
-
-
-def _bells(clock: _Clock) -> _Bells:
-    """Weights of the neighbours of frames, offset by offset, and their sums (n,).
-
-    Each with the frames whose neighbours they are, and the first of these in the map.
-    """
-    times_s, first, last, start, stop, sigma_s, presence = clock
-    for other, bells in tuple(_known):
-        same_clip = other.times_s is times_s and other.presence is presence
-        if same_clip and other[1:-1] == clock[1:-1]:
-            return bells
+    last = first + values.shape[-1]
     frames = np.arange(start, stop)
     centres = times_s[frames]
     reach = REACH * sigma_s + SLACK_S
     slack = reach + SLACK_S
     before = int((frames - np.searchsorted(times_s, centres - slack)).max())
     after = int((np.searchsorted(times_s, centres + slack, side="right") - frames).max())
-    neighbours, weights = [], np.zeros(len(frames))
+    total, weights = np.zeros((*values.shape[:-1], len(frames))), np.zeros(len(frames))
+    occupied = values.any(axis=-1)
+    some, sums = values[occupied], total[occupied]
     for offset in range(-before, after):
         inside = slice(max(0, first - start - offset), min(len(frames), last - start - offset))
         neighbour = frames[inside] + offset
@@ -169,7 +130,9 @@ def _bells(clock: _Clock) -> _Bells:
         bell[np.abs(distance) > reach] = 0
         if presence is not None and not presence.whole:
             bell[presence.first[neighbour] != presence.first[frames[inside]]] = 0
-        neighbours.append((inside, inside.start + start + offset - first, bell))
+        from_frame = inside.start + start + offset - first
+        sums[..., inside] += bell * some[..., from_frame : from_frame + len(bell)]
         weights[inside] += bell
-    _known.append((clock, (neighbours, weights)))
-    return neighbours, weights
+    sums /= weights
+    total[occupied] = sums
+    return total
