@@ -71,8 +71,8 @@ def reasons_for(
             sight = f"{between} modelled by a depth buffer of {pixels} pixels, off by {apart}"
         occluded, kept_m = plan.visibility in ("depth", "exact"), plan.mask_reuse_m
         less: Visibility = "facing" if facing <= every else "none"
-        without = {"visibility": less, "mask_stride": 1, "mask_reuse_m": 0.0}
-        add("occlusion", occluded, needed, sight, **without)
+        without = {"visibility": less, "depth_resolution": base.depth_resolution}
+        add("occlusion", occluded, needed, sight, mask_stride=1, mask_reuse_m=0.0, **without)
         if occluded and not kept_m:
             stride = max(plan.mask_stride, 2)
             off = alone(mask_stride=stride)

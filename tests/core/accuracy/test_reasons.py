@@ -10,6 +10,8 @@ import trimesh
 from accuracy_scenes import FPS, FRAMES, ball, moving, plate, steady, swinging, together
 
 from sd2core.accuracy.choosing import choose
+from sd2core.accuracy.plans import counting_plans
+from sd2core.accuracy.reasons import reasons_for
 from sd2core.accuracy.results import Choice, Reason
 from sd2core.accuracy.survey import survey_scene
 from sd2core.doppler import PRESETS
@@ -43,6 +45,13 @@ def test_a_body_half_behind_a_plate_requires_occlusion() -> None:
     assert found.value > 0.3
     assert choice.plan.visibility in ("depth", "exact")
     assert "%" in found.text
+
+
+def test_there_are_reasons_for_every_plan() -> None:
+    survey = survey_scene(ball(APPROACHING, fineness=2), CAMERA, PAPER)
+    errors = survey.trial.errors(survey.base, survey.trial.sample.chosen_on)
+    for plan in counting_plans(vertices_kept=survey.trial.vertices_kept):
+        assert reasons_for(survey, plan, {plan: errors}, tolerance=0.9)
 
 
 @pytest.mark.slow
