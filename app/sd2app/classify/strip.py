@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from sd2app.classify.model import ClassifyModel, ago_text, delay_text, reading_text
 from sd2app.classify.track import ClassReading
 from sd2app.labels.model import LabelsModel
+from sd2app.maps.heatmap_image import Columns
 from sd2app.maps.track_mouse import SeekingPlot, ZoomedPlot
 from sd2app.session.display import DisplayModel
 from sd2app.session.session import Session
@@ -193,11 +194,13 @@ class ClassPlot(ZoomedPlot, SeekingPlot):
         painter.drawText(gutter, right | Qt.AlignmentFlag.AlignTop, "1")
         painter.drawText(gutter, right | Qt.AlignmentFlag.AlignBottom, "0")
         track, source = self._classify.track, self._classify.track.source
-        if track.card is None or source is None or not track.done.size:
+        if track.card is None or source is None or source.map is None or not track.done.size:
             return
         ratio = painter.device().devicePixelRatioF()
         columns = max(round(plot.width() * ratio), 1)
-        frames = self._frames(columns)
+        in_view = Columns.of(source, self._span.start_s, self._span.end_s, columns)
+        frames = np.full(columns, -1, np.int64)
+        frames[in_view.filled] = in_view.begin + in_view.starts
         offered = self._labels.labels.label_set
         colours = [QColor(offered.colour_of(name)).rgb() for name in track.card.classes]
         done = track.done if track.current else np.zeros_like(track.done)
@@ -209,18 +212,6 @@ class ClassPlot(ZoomedPlot, SeekingPlot):
                 box = QRectF(left, plot.top(), max(end - left, 1.0), plot.height())
                 painter.fillRect(box, QColor(palette.well))
                 painter.fillRect(box, QBrush(QColor(palette.hatch), Qt.BrushStyle.FDiagPattern))
-
-    def _frames(self, columns: int) -> NDArray[np.int64]:
-        """Frame of the map in every column; −1 where there is none."""
-        source = self._classify.track.source
-        assert source is not None
-        assert source.map is not None
-        edges_s = np.linspace(self._span.start_s, self._span.end_s, columns + 1)
-        middles_s = 0.5 * (edges_s[:-1] + edges_s[1:]) - source.offset_s
-        timebase = source.map.timebase
-        frames = np.searchsorted(timebase.times_s, middles_s, side="right") - 1
-        outside = (middles_s < timebase.start_s) | (middles_s >= timebase.end_s)
-        return np.where(outside, -1, np.clip(frames, 0, len(timebase) - 1))
 
 
 def stacked_image(

@@ -301,10 +301,8 @@ def reading_lines(model: ImuModel, time_s: float) -> tuple[str, ...]:
 
 def _values_at(name: str, signals: InertialSignals, time_s: float) -> list[str]:
     """Acceleration and turn rate of the sample nearest to a time, if one is near."""
-    times_s, after = signals.times_s, int(np.searchsorted(signals.times_s, time_s))
-    beside = [at for at in (after - 1, after) if 0 <= at < len(times_s)]
-    nearest = min(beside, key=lambda at: abs(times_s[at] - time_s))
-    if abs(times_s[nearest] - time_s) > _NEAR_S:
+    nearest = int(np.abs(signals.times_s - time_s).argmin())
+    if abs(signals.times_s[nearest] - time_s) > _NEAR_S:
         return []
     acceleration, turn_rate = signals.acceleration_mps2[nearest], signals.turn_rate_radps[nearest]
     if not np.isfinite([acceleration, turn_rate]).all():
