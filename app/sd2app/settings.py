@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -128,7 +128,7 @@ class StoredChoices:
         settings: Settings,
         place: str,
         defaults: Mapping[str, Any],
-        known: Mapping[str, Sequence[Any]] | None = None,
+        known: Mapping[str, Container[Any]] | None = None,
     ) -> None:
         self._settings, self._place = settings, place
         self.defaults = dict(defaults)

@@ -15,7 +15,7 @@ from sd2app.background.runs import Runs, RunSetup, Source, free_folder
 from sd2app.settings import Settings, StoredChoices
 from sd2app.training.run import StepHistory
 from sd2app.widgets.text import counted, duration_text, quoted
-from sd2core.classify.defaults import CLASSIFIERS, DELAYS_S, MODELS, FeatureKind, pace_kind
+from sd2core.classify.defaults import DELAYS_S, FeatureKind, model_names, pace_kind
 from sd2core.classify.files import user_classifiers_folder
 from sd2core.cli.classify.comparison import Table
 from sd2core.cli.classify.train import Train
@@ -37,7 +37,6 @@ _NETWORK = ("model", "features", "width", "delay_s")
 _DEFAULTS = {name: getattr(Train, name) for name in (*_NETWORK, "maps", "seed")} | {"steps": 300}
 """Defaults of ``sd2 classify train``."""
 _DATA, _PEOPLE = "classify/train/data", "classify/train/people"
-_CHOICES = {"features": get_args(FeatureKind)}
 
 
 @dataclass(frozen=True)
@@ -92,11 +91,8 @@ class ClassSetup(RunSetup[DataSource]):
     kind = DataSource
 
     def __init__(self, settings: Settings, parent: QObject) -> None:
-        values = StoredChoices(settings, "classify/train", _DEFAULTS, _CHOICES)
-        if values["model"] not in MODELS and CLASSIFIERS.find(values["model"]) is None:
-            values.set("model", _DEFAULTS["model"])
-        if values["delay_s"] not in DELAYS_S:
-            values.set("delay_s", _DEFAULTS["delay_s"])
+        known = {"features": get_args(FeatureKind), "model": model_names(), "delay_s": DELAYS_S}
+        values = StoredChoices(settings, "classify/train", _DEFAULTS, known)
         people = settings.table(_PEOPLE)
         data = [DataSource(path, str(people.get(str(path), ""))) for path in settings.paths(_DATA)]
         self._told: tuple[object, list[LabelledFacts]] = None, []
