@@ -49,7 +49,7 @@ class Player:
         window = self.scene.renderer.GetRenderWindow()
         spent = []
         for _ in range(rounds):
-            self.scene.body.moved()
+            self.scene.body.set_points(self.scene.body.points)
             start = time.perf_counter()
             window.Render()
             spent.append(time.perf_counter() - start)

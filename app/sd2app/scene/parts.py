@@ -1,8 +1,6 @@
-"""VTK actors of the scene; each keeps its arrays and changes them in place."""
+"""VTK actors of the scene, over copies of their arrays."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,8 +76,6 @@ class Shape:
         self.look = self.actor.GetProperty()
         self.look.SetLighting(lit)
         self._line_px = line_px
-        self._colours: NDArray[np.uint8] | None = None
-        self._colour_array: Any = None
         if points is not None:
             self.set_shape(points, triangles=triangles, segments=segments)
 
@@ -91,36 +87,26 @@ class Shape:
         segments: NDArray[np.integer] | None = None,
     ) -> None:
         """Replace points and cells; colours have to be given again."""
-        self.points = np.array(points, np.float32, order="C")
-        self._point_array = numpy_to_vtk(self.points)
-        self._points.SetData(self._point_array)
+        self.set_points(points)
         self.data.SetPolys(_cells(triangles))
         self.data.SetLines(_cells(segments))
         self.data.SetVerts(_cells(None))
         self.clear_point_colours()
-        self.moved()
+
+    def set_points(self, points: NDArray[np.floating]) -> None:
+        """Move its points, of which there are as many as before."""
+        self.points = np.array(points, np.float32, order="C")
+        self._points.SetData(numpy_to_vtk(self.points, deep=True))
+        self.data.Modified()
 
     def clear_point_colours(self) -> None:
         """Draw all of it in one colour."""
         self.data.GetPointData().SetScalars(None)
-        self._colours = None
-
-    def moved(self) -> None:
-        """Tell VTK that ``points`` changed."""
-        self._point_array.Modified()
-        self._points.Modified()
-        self.data.Modified()
 
     def set_point_colours(self, colours: NDArray[np.uint8]) -> None:
         """Set one colour per point, (n, 3) or with opacity (n, 4)."""
-        if self._colours is None or self._colours.shape != colours.shape:
-            self._colours = np.ascontiguousarray(colours).copy()
-            self._colour_array = numpy_to_vtk(self._colours)
-            self.data.GetPointData().SetScalars(self._colour_array)
-        else:
-            self._colours[:] = colours
-        self._colour_array.Modified()
-        self.data.Modified()
+        scalars = numpy_to_vtk(np.ascontiguousarray(colours), deep=True)
+        self.data.GetPointData().SetScalars(scalars)
 
     def set_colour(self, colour: str) -> None:
         """Set one colour for all of it."""
@@ -168,16 +154,6 @@ class Body(Shape):
             self._shadow_data.SetPolys(_cells(coarse_faces(vertices, faces)))
             self.look.SetBackfaceCulling(is_closed_outward(vertices, faces))
         self.set_as_dots(self._dots)
-
-    def set_vertices(self, vertices: NDArray[np.floating]) -> None:
-        """Move the vertices of the same mesh."""
-        self.points[:] = vertices
-        self.moved()
-
-    def moved(self) -> None:
-        """Tell VTK that ``points`` changed."""
-        super().moved()
-        self._shadow_data.Modified()
 
     @property
     def drawn_as_dots(self) -> bool:
@@ -243,8 +219,7 @@ class SensorGlyph:
             if sensor.beam is not None:
                 points, _, _ = shapes.cone(half_power_rim(sensor.beam))
                 for shape in (self.cone, self.edges):
-                    shape.points[:] = points
-                    shape.moved()
+                    shape.set_points(points)
             self.show(self._shown)
         position = np.asarray(sensor.position_m)
         turn = sensor_axes(sensor).T
@@ -379,7 +354,7 @@ class InertialMarkers(Shape):
         self.look.EdgeVisibilityOn()
         self.look.SetEdgeColor(0.0, 0.0, 0.0)
 
-    def set_points(self, points_m: NDArray[np.floating], metres_per_px: float) -> None:
+    def mark(self, points_m: NDArray[np.floating], metres_per_px: float) -> None:
         """Show sensors at N points, (N, 3), as large as can be seen."""
         self.set_shape(points_m)
         self.show(len(points_m) > 0)

@@ -101,7 +101,7 @@ class Scene:
 
     def set_vertices(self, vertices: NDArray[np.floating]) -> None:
         """Move the mesh to another frame."""
-        self.body.set_vertices(vertices)
+        self.body.set_points(vertices)
         self._stale_colours = True
 
     def change_colours(self, **changes: object) -> None:
@@ -308,7 +308,7 @@ class Scene:
         self.markers.set_pixel(pixel if np.isfinite(pixel) else 0.0)
         rows = self._inertial_rows if self.mesh_shown else self._inertial_rows[:0]
         rows = rows[rows < len(self.body.points)]  # the mesh may be another already
-        self.inertial.set_points(self.body.points[rows], pixel if np.isfinite(pixel) else 0.0)
+        self.inertial.mark(self.body.points[rows], pixel if np.isfinite(pixel) else 0.0)
         self.sensor_glyph.sphere.SetScale(self.sensor_radius_m)
         self.sensor_glyph.show(self.sensor_shown)
         self.camera_glyph.show(self.camera_shown)

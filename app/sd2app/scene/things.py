@@ -164,7 +164,7 @@ class Person(Body):
         self.present = shown and bool(self.mesh.presence.present[frame])
         self.show(self.present)
         if self.present and frame != self._frame:
-            self.set_vertices(self.mesh.frame(frame))
+            self.set_points(self.mesh.frame(frame))
         self._frame = frame if shown else None
 
     def set_limbs(self, colours: Sequence[str], limb: NDArray[np.intp] | None) -> None:
