@@ -57,7 +57,7 @@ def long_sequences(folder: Path, minutes: float) -> str:
             took = f"{1e6 * _frame_s(run, data):.0f} µs"
             rows.append([model, f"{length:,}", *_errors(score), memory, took])
     _draw(curves)
-    return filled("long-sequences.md", first=_first(curves), minutes=minutes, table=table(rows))
+    return filled("long-sequences.md", nearest=_nearest(curves), minutes=minutes, table=table(rows))
 
 
 def _errors(score: dict[str, Any]) -> list[str]:
@@ -89,16 +89,13 @@ def _frame_s(run: Path, data: Path) -> float:
     return (time.perf_counter() - began) / len(values)
 
 
-def _first(curves: dict[str, dict[tuple[str, int], dict[str, Any]]]) -> str:
-    """Sentence on whether a state space leads, and where."""
-    leads = []
+def _nearest(curves: dict[str, dict[tuple[str, int], dict[str, Any]]]) -> str:
+    """Network and segment with the nearest mean velocity, of each setting."""
+    words = []
     for title, scores in curves.items():
-        best = min(scores, key=lambda run: scores[run]["mean"]["mae_mps"])
-        leads.append((title, *best))
-    where = [f"{title} ({model} at {length:,} frames)" for title, model, length in leads]
-    if all(model in ("s4", "s4d") for _, model, _ in leads):
-        return f"A state space has the nearest mean velocity at {' and '.join(where)}."
-    return f"**A state space does not lead everywhere**: nearest are, at {' and '.join(where)}."
+        model, length = min(scores, key=lambda run: scores[run]["mean"]["mae_mps"])
+        words.append(f"{model} of {length:,} frames at {title}")
+    return "; ".join(words)
 
 
 def _draw(curves: dict[str, dict[tuple[str, int], dict[str, Any]]]) -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 import statistics
-import subprocess
 import sys
 import tempfile
 import timeit
@@ -95,7 +94,7 @@ def _measured(root: Path) -> dict[str, object]:
     """Tables and figures of the page."""
 
     def folder(what: str) -> Path:
-        _say(what)
+        print(what, file=sys.stderr, flush=True)
         made = root / what.replace(" ", "-")
         made.mkdir()
         return made
@@ -108,8 +107,8 @@ def _measured(root: Path) -> dict[str, object]:
     used.append(memory(place, _MEMORY_MIN[0], 20, 1229, "facing"))
     used.append(memory(place, _MEMORY_MIN[0], 1, 13348, ""))
     fits = _fits(folder("fits"))
-    long = _long_fits(folder("long fits")) if fits else []
-    costs = _costs(folder("costs"), fits)
+    long = _long_fits(folder("long fits"))
+    costs = _costs(folder("costs"), fits[-1])
     files_per_s = files_per_second(folder("files"))[0]
     own_s = statistics.median(ten.own_s) / ten.tasks
     return {
@@ -145,8 +144,6 @@ def _memory(used: list[Memory]) -> str:
 
 def _fit_memory(fits: list[Fitted], long: list[LongFit]) -> str:
     """Real fits, and long ones whose landmarks are there already."""
-    if not long:
-        return ""
     sizes = ", ".join(f"{one.peak_mb:.0f} MB with {one.frames:,} frames" for one in fits)
     few, many = (max(one.peak_mb.values()) for one in (long[0], long[-1]))
     each_mb = (many - few) / (long[-1].frames - long[0].frames)
@@ -157,7 +154,7 @@ def _fit_memory(fits: list[Fitted], long: list[LongFit]) -> str:
     return (
         f"A fit of the sample's video takes {sizes}; of landmarks that are there already,"
         f" {few:.0f} MB with {long[0].frames:,} and {many:.0f} MB with {long[-1].frames:,}"
-        f"{reached}.\n\n"
+        f"{reached}."
     )
 
 
@@ -165,7 +162,6 @@ def _million(costs: list[Cost], own_s: float, files_per_s: float) -> dict[str, o
     """Tables and figures of the estimated batch."""
     by_step = {one.step: one for one in costs}
     count = {"fit": RECORDINGS, "synthesise": RECORDINGS * PLACES, "denoise": RECORDINGS * PLACES}
-    count = {step: tasks for step, tasks in count.items() if step in by_step}
     seconds = {step: tasks * by_step[step].seconds(FRAMES) for step, tasks in count.items()}
     size = {step: tasks * by_step[step].bytes(FRAMES) for step, tasks in count.items()}
     tasks, total_s = RECORDINGS + sum(count.values()), sum(seconds.values())
@@ -194,16 +190,11 @@ def _million(costs: list[Cost], own_s: float, files_per_s: float) -> dict[str, o
     }
 
 
-def _costs(folder: Path, fits: list[Fitted]) -> list[Cost]:
-    sample = SAMPLE
-    costs = []
-    if fits:
-        longest = fits[-1]
-        each_s, each_bytes = longest.seconds / longest.frames, longest.bytes / longest.frames
-        costs.append(Cost("fit", each_s, 0.0, each_bytes, 0.0))
+def _costs(folder: Path, fit: Fitted) -> list[Cost]:
+    costs = [Cost("fit", fit.seconds / fit.frames, 0.0, fit.bytes / fit.frames, 0.0)]
     for title, how in (("synthesise", ""), (CHOSEN, "tolerance = 0.02")):
         text = (
-            f'out = "{folder / "made"}"\n[recordings]\nfiles = ["{sample}"]\n'
+            f'out = "{folder / "made"}"\n[recordings]\nfiles = ["{SAMPLE}"]\n'
             f"[synthesise]\n{how}\n[denoise]\n"
         )
         made, denoised = _costs_of_maps(plan_from_text(text, folder), folder / title, title)
@@ -222,9 +213,8 @@ def _costs_of_maps(plan: BatchPlan, folder: Path, title: str) -> tuple[Cost, Cos
     mesh, counts = inspection.mesh, _TIMED_FRAMES
     assert mesh is not None
     assert section is not None
-    choosing = None
-    if section.tolerance is not None:
-        choosing = Choosing(folder / "plan.json", (inspection.sensor,), mesh.frames)
+    chosen = Choosing(folder / "plan.json", (inspection.sensor,), mesh.frames)
+    choosing = None if section.tolerance is None else chosen
     places = (VirtualSensor((1e-3 * number, 0.0, 0.0)) for number in itertools.count(1))
     whole, clips = load_mesh(mesh.path), {}
     for count in counts:
@@ -265,28 +255,19 @@ def _cost(title: str, work: Callable[[int], None], out: Callable[[int], Path]) -
 
 
 def _fits(folder: Path) -> list[Fitted]:
-    """Fits of the sample's video; none where the landmark models are missing."""
+    """Fits of the sample's video."""
     video = open_recording(SAMPLE).video
     assert video is not None
     fits = []
     for count in _FIT_FRAMES:
-        try:
-            seconds, peak_mb = fit_of(video, count, folder)
-        except subprocess.CalledProcessError as error:
-            _say(f"no fit: {error.stderr}")
-            return []
-        mesh = folder / f"{count}.zarr"
-        fits.append(Fitted(count, seconds, peak_mb, size_bytes(mesh)))
+        seconds, peak_mb = fit_of(video, count, folder)
+        fits.append(Fitted(count, seconds, peak_mb, size_bytes(folder / f"{count}.zarr")))
     return fits
 
 
 def _long_fits(folder: Path) -> list[LongFit]:
     track = sample_landmarks(folder)
     return [long_fit(track, count, folder) for count in _LONG_FRAMES]
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
@@ -102,25 +101,12 @@ def placements(window: MainWindow) -> None:
     )
 
 
-def stepping_back(window: MainWindow) -> None:
-    """The real person, who steps back."""
-    window.session.playback.seek(2.7)
-
-
 def real() -> None:
-    """A real person with the body that `sd2 fit` makes of the video."""
+    """A real person who steps back, with the body that `sd2 fit` makes of the video."""
     with tempfile.TemporaryDirectory() as folder:
-        video, mesh = WALK, Path(folder) / "walk.zarr"
-        if fitted(video, mesh):
-            take("real-video.png", [video, mesh], stepping_back)
-        else:
-            print("real-video.png is left as it is: the fit failed", file=sys.stderr)
-
-
-def fitted(video: Path, mesh: Path) -> bool:
-    """Run `sd2 fit`; True if there is a mesh."""
-    command = ["sd2app.command_line", "fit", str(video), "--out", str(mesh)]
-    return subprocess.run([sys.executable, "-m", *command], check=False).returncode == 0
+        mesh = Path(folder) / "walk.zarr"
+        sd2("fit", WALK, "--out", mesh)
+        take("real-video.png", [WALK, mesh], lambda window: window.session.playback.seek(2.7))
 
 
 def strip() -> None:
@@ -147,10 +133,9 @@ def fitting() -> None:
                 return not fit.busy or (second_pass and progress.done > 0.55 * progress.total)
 
             wait_for(far_enough)
-            if fit.busy:
-                save(window, "fitting.png")
-            else:
-                print(f"fitting.png is left as it is: {fit.text}", file=sys.stderr)
+            if not fit.busy:
+                sys.exit(f"The fit ended: {fit.text}")
+            save(window, "fitting.png")
             fit.cancel()
             wait_for(lambda: not fit.busy)
 
@@ -159,9 +144,7 @@ def comparison() -> None:
     """The sample's mesh, which is the truth, beside the body that is fitted to its video."""
     with tempfile.TemporaryDirectory() as folder:
         mesh = Path(folder) / "sd2 fit.zarr"
-        if not fitted(SAMPLE / "video.mp4", mesh):
-            print("comparison.png is left as it is: the fit failed", file=sys.stderr)
-            return
+        sd2("fit", SAMPLE / "video.mp4", "--out", mesh)
         with opened([SAMPLE]) as window:
             window.session.playback.seek(2.1)
             window.features.mesh_comparison.compare(mesh)
