@@ -1,92 +1,58 @@
 """Makes ``real-pairs.md``: ``python -m tools.documentation.real_pairs``, from MARS recordings.
 
-Ways to turn the Kinect's skeleton into synthetic Doppler are compared by the mean velocity per
-frame with that of the radar's points, before any denoising. Then the least denoiser learns from the
-pairs: a linear map of five frames, of the whole body or of its parts. At last, how far the radar's
-own points agree with one another, which no denoiser can exceed. The pairs stay in
-``build/real-pairs``; what is there is not made again.
+Ways of `sd2 pairs mars` to turn the Kinect's skeleton into synthetic Doppler are compared by the
+mean velocity per frame with that of the radar's points, before any denoising. Then the least
+denoiser learns from the pairs: a linear map of five frames, of the whole body or of its parts. At
+last, how far the radar's own points agree with one another, which no denoiser can exceed. The pairs
+stay in ``build/real-pairs``; what is there is not made again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sd2core import MeshSequence, Synthesizer, Timebase, VirtualSensor
 from sd2core.denoise.card import DENOISER_PARTS
-from sd2core.io.radar.mars import MarsPart, MarsStretch, mars_parts, read_mars
+from sd2core.io.radar.mars import MarsStretch, mars_parts, read_mars
 from sd2core.mesh.vertex_parts import PARTS
-from sd2core.mocap.driving import KINECT_MARKERS, DrivenClip, puppet_of
-from sd2core.mocap.mars_pairs import (
-    MarsChoices,
-    body_doppler,
-    radar_doppler,
-    seen_of,
-    skeleton_clip,
-)
-from sd2core.mocap.radar_place import RadarPlace, estimate_place
 from sd2core.pairs.store import PairSet, read_pairs
+from sd2core.sensor import VelocityAxis
 from tools.documentation.measured import BUILD, SHARED, table, write_filled
 from tools.documentation.runs import sd2
 
-Maps = list[NDArray[np.float32]]
 Floats = NDArray[np.float64]
-Parts = list[MarsPart]
-"""Recordings of one person."""
 
 FOLDER = BUILD / "real-pairs"
-DEFAULT = MarsChoices()
+CENTRES_MPS = VelocityAxis().centres_mps
 RIDGE = 10.0
 HALVINGS = 8
 _POINT_ARRAYS = ("point_rows", "point_mps", "point_intensity")
 MARS = [SHARED / "paired" / name for name in ("mars_subject1", "mars_subject4")]
-
-
-def changed(**options: object) -> MarsChoices:
-    """The default with other options of synthesis."""
-    return replace(DEFAULT, synthesis=replace(DEFAULT.synthesis, **options))
-
-
 WAYS = {
-    "body, facing, count (default)": DEFAULT,
-    "body, exact, count": changed(visibility="exact"),
-    "body, facing, area": changed(weight="area"),
-    "body, 5,000 vertices": replace(DEFAULT, resolution="medium"),
-    "body, bins 14–16 nulled": changed(null_bins=(14, 15, 16)),
+    "facing, count (default)": ("--limbs",),
+    "--sensor 0,0,0": ("--sensor", "0,0,0"),
+    "--visibility exact": ("--visibility", "exact"),
+    "--weight area": ("--weight", "area"),
+    "--null-bins 14,15,16": ("--null-bins", "14,15,16"),
 }
 
 
-def cloud_maps(part: MarsPart) -> Maps:
-    """Synthetic Doppler of the joints as a cloud of points."""
-    options, maps = replace(DEFAULT.synthesis, visibility="none"), []
-    for clip in map(skeleton_clip, part.stretches):
-        joints_m = clip.joints_m.astype(np.float32)
-        cloud = MeshSequence(joints_m, None, Timebase(clip.times_s), "joints of a skeleton")
-        maps.append(Synthesizer(cloud, options).map(VirtualSensor()).values.T)
-    return maps
-
-
-def body_maps(driven: list[DrivenClip], choices: MarsChoices, place: RadarPlace) -> Maps:
-    """Synthetic Doppler of a body."""
-    return [body_doppler(clip, choices, place).values.T for clip in driven]
+def pairs_of(number: int) -> PairSet:
+    """Pairs made in one of :data:`WAYS`, unless they are there."""
+    path = FOLDER / f"mars-{number}.zarr"
+    sd2("pairs", "mars", *MARS, *list(WAYS.values())[number], "--out", path)
+    return read_pairs(path)
 
 
 def mean_mps(maps: Iterable[NDArray[np.float32]]) -> Floats:
-    """Mean velocity of every frame, one stretch after the other; an empty one is at rest."""
+    """Mean velocity of every frame, one take after the other; an empty one is at rest."""
     values = np.concatenate(list(maps)).astype(np.float64)
-    total = values.sum(axis=1)
-    moment = values @ DEFAULT.synthesis.axis.centres_mps
+    total, moment = values.sum(axis=1), values @ CENTRES_MPS
     return np.divide(moment, total, out=np.zeros(len(total)), where=total > 0)
-
-
-def errors(maps: Maps, radar: Maps) -> list[str]:
-    """Cells on the mean velocities of an input: their correlation with the radar's, their MAE."""
-    seen = np.concatenate(radar).sum(axis=1) > 0
-    estimate, truth = mean_mps(maps)[seen], mean_mps(radar)[seen]
-    return agreement_cells(estimate, truth)
 
 
 def agreement_cells(estimate: Floats, truth: Floats) -> list[str]:
@@ -95,49 +61,26 @@ def agreement_cells(estimate: Floats, truth: Floats) -> list[str]:
     return [alike, f"{np.abs(estimate - truth).mean():.3f}"]
 
 
-def drive(part: MarsPart) -> list[DrivenClip]:
-    """One part's body in the poses of all its stretches."""
-    clips = [skeleton_clip(stretch) for stretch in part.stretches]
-    puppet = puppet_of(clips, KINECT_MARKERS)
-    return [puppet.pose(clip) for clip in clips]
+def heading(pairs: PairSet) -> list[str]:
+    """Of a table with the cells of each person."""
+    each = ((f"person {subject}: corr.", "MAE m/s") for subject in pairs.subjects)
+    return ["input", *chain.from_iterable(each)]
 
 
-def inputs(people: Sequence[Parts]) -> tuple[str, str]:
-    """Table of ways to make the input, and where the radar stands."""
-    nothing, joints, at_kinect = (
-        "nothing moves",
-        "25 joints, from the Kinect",
-        "body, from the Kinect",
-    )
-    rows = {name: [name] for name in (nothing, joints, at_kinect, *WAYS)}
-    head, notes = ["input"], []
-    for parts in people:
-        driven = [drive(part) for part in parts]
-        each = [
-            [seen_of(*one) for one in zip(clips, part.stretches, strict=True)]
-            for clips, part in zip(driven, parts, strict=True)
-        ]
-        place = estimate_place([one for part in each for one in part])
-        alone = [place_words(estimate_place(seen)) for seen in each] if len(each) > 1 else []
-        notes.append(
-            f"- person {parts[0].subject}: {place_words(place)}"
-            + "".join(f"; by one part alone {words}" for words in alone)
-        )
-        for part, clips in zip(parts, driven, strict=True):
-            head += [f"{part.subject}-{part.name}: corr.", "MAE m/s"]
-            radar = [radar_doppler(stretch, DEFAULT.synthesis.axis) for stretch in part.stretches]
-            rows[nothing] += errors([0.0 * values for values in radar], radar)
-            rows[joints] += errors(cloud_maps(part), radar)
-            rows[at_kinect] += errors(body_maps(clips, DEFAULT, RadarPlace()), radar)
-            for name, choices in WAYS.items():
-                rows[name] += errors(body_maps(clips, choices, place), radar)
-    return table([head, *rows.values()]), "\n".join(notes)
-
-
-def place_words(place: RadarPlace) -> str:
-    """Place and clock of a radar that was found."""
-    right, down, _ = place.position_m
-    return f"{right:+.2f} m right, {down:+.2f} m below, clock {1e3 * place.offset_s:+.0f} ms"
+def inputs(default: PairSet) -> str:
+    """Table of ways to make the input, beside the radar as by default."""
+    rows = {name: [name] for name in ("nothing moves", *WAYS)}
+    for number, name in enumerate(WAYS):
+        made = pairs_of(number) if number else default
+        for subject in default.subjects:
+            radar = np.concatenate([take.radar for take in default.of([subject]).takes])
+            seen = radar.sum(axis=1) > 0
+            truth = mean_mps([radar[seen]])
+            if not number:
+                rows["nothing moves"] += agreement_cells(0.0 * truth, truth)
+            estimate = mean_mps(take.synthetic for take in made.of([subject]).takes)[seen]
+            rows[name] += agreement_cells(estimate, truth)
+    return table([heading(default), *rows.values()])
 
 
 def features(values: NDArray[np.float32]) -> Floats:
@@ -185,9 +128,7 @@ def linear(pairs: PairSet) -> str:
                 rows[none] += agreement_cells(before, truth)
             rows[name] += agreement_cells(ridge_map(x, y, unseen), truth)
         rows[alone] += agreement_cells(*own_minutes(own))
-    head = [f"person {test}: corr." for test in pairs.subjects]
-    columns = (cell for one in head for cell in (one, "MAE m/s"))
-    return table([["input", *columns], *rows.values()])
+    return table([heading(pairs), *rows.values()])
 
 
 def own_minutes(pairs: PairSet) -> tuple[Floats, Floats]:
@@ -229,10 +170,11 @@ def agreement(stretches: Iterable[MarsStretch]) -> tuple[float, float, float]:
     return float(halves), float(whole), float(np.sqrt(max(whole, 0.0)))
 
 
-def ceiling(people: Sequence[Parts]) -> str:
+def ceiling() -> str:
     """Table of how far the radar's points of a frame agree, person by person."""
     rows = [["person", "takes", "halves", "all points", "at most", "at most, takes"]]
-    for parts in people:
+    for folder in MARS:
+        parts = [read_mars(folder, name) for name in mars_parts(folder)]
         every = [stretch for part in parts for stretch in part.stretches]
         of_takes = sorted(agreement([one])[2] for one in every)
         values = (f"{value:.2f}" for value in agreement(every))
@@ -242,19 +184,10 @@ def ceiling(people: Sequence[Parts]) -> str:
 
 
 def main() -> None:
-    """Make the pairs if they are missing, measure and write the page."""
+    """Make the pairs that are missing, measure and write the page."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    pairs = FOLDER / "mars.zarr"
-    sd2("pairs", "mars", *MARS, "--limbs", "--out", pairs)
-    people = [[read_mars(folder, name) for name in mars_parts(folder)] for folder in MARS]
-    of_inputs, places = inputs(people)
-    write_filled(
-        "real-pairs.md",
-        inputs=of_inputs,
-        places=places,
-        linear=linear(read_pairs(pairs)),
-        ceiling=ceiling(people),
-    )
+    pairs = pairs_of(0)
+    write_filled("real-pairs.md", inputs=inputs(pairs), linear=linear(pairs), ceiling=ceiling())
 
 
 if __name__ == "__main__":
