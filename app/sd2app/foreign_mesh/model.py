@@ -39,11 +39,7 @@ class MeshPreview(VideoFrames):
         self.mesh: MeshSequence | None = None  # as it is read now; None while it cannot be
         self.mesh_problem = ""
         self.offers: tuple[OfferedCure, ...] = ()
-        self._lister = LatestRunner("persons", self, self._take_persons)
         self._loader = LatestRunner("mesh to look at", self, self._take_mesh, self._refuse)
-        path = recording.mesh
-        assert path is not None
-        self._lister.submit(lambda emit: persons_in(path))
         self._read()
         if recording.video is not None:
             self.open_video(recording.video)
@@ -110,16 +106,13 @@ class MeshPreview(VideoFrames):
         self._read()
 
     def _read(self) -> None:
-        asked = replace(self.recording)
-        self._loader.submit(lambda emit: (asked, read_mesh(asked, emit)))
+        asked, path, known = replace(self.recording), self.recording.mesh, self.persons
+        assert path is not None
+        self._loader.submit(lambda emit: (asked, known or persons_in(path), read_mesh(asked, emit)))
         self.changed.emit()
 
-    def _take_persons(self, persons: dict[str, int]) -> None:
-        self.persons = persons
-        self.changed.emit()
-
-    def _take_mesh(self, seen: tuple[Recording, ReadMesh]) -> None:
-        asked, self._seen = seen
+    def _take_mesh(self, seen: tuple[Recording, dict[str, int], ReadMesh]) -> None:
+        asked, self.persons, self._seen = seen
         self.mesh, self.mesh_problem = self._seen.mesh, self._seen.problem
         self.offers = self._seen.offers
         if self.mesh is not None:
