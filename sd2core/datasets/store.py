@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,7 @@ from sd2core.datasets.layout import (
 )
 from sd2core.datasets.source import KINDS
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_folder, atomic_write
+from sd2core.files.atomic import atomic_folder
 from sd2core.files.stores import (
     StoredArray,
     array_in,
@@ -82,40 +81,35 @@ class SegmentStore:
             self.sources += 1
 
     @classmethod
-    def begin(cls, path: Path, header: Header) -> SegmentStore:
-        """Make an empty store in a folder; an earlier store there is deleted."""
-        with _new_group(path, header) as (_, group):
-            for name, (kind, row) in row_shapes(header).items():
-                _create(group, name, kind, row, 0)
-        return cls(path)
-
-    @classmethod
-    def unpack(
-        cls, path: Path, header: Header, arrays: Any, sources: Iterable[dict[str, Any]]
+    def begin(
+        cls,
+        path: Path,
+        header: Header,
+        arrays: Mapping[str, Any] | None = None,
+        sources: Iterable[dict[str, Any]] = (),
     ) -> SegmentStore:
-        """Rebuild the store that a file was packed from.
+        """Make an empty store, or the one that a file was packed from.
 
         Parameters
         ----------
         path : Path
             Folder of the store; an earlier store there is deleted.
         header : Header
-            Description in the file.
-        arrays : mapping
-            Arrays by name, (segments, …), read in parts.
+        arrays : mapping, optional
+            Arrays of the file by name, (segments, …), read in parts.
         sources : iterable of dict
             Lines of the sources in the file.
         """
-        with _new_group(path, header) as (folder, group):
+        with atomic_folder(path) as folder:
+            group = create_group(folder, header.as_dict() | {"complete": False})
             for name, (kind, row) in row_shapes(header).items():
-                rows = arrays[name].shape[0]
-                target: Any = _create(group, name, kind, row, rows)
+                packed: Any = np.empty((0, *row), kind) if arrays is None else arrays[name]
+                target: Any = _create(group, name, kind, row, packed.shape[0])
                 step = 16 * chunk_of(row)[0]
-                for start in range(0, rows, step):
-                    target[start : start + step] = arrays[name][start : start + step]
-            with atomic_write(folder / SOURCES_NAME) as index:
-                for entry in sources:
-                    index.write(_line(entry).encode("utf-8"))
+                for start in range(0, packed.shape[0], step):
+                    target[start : start + step] = packed[start : start + step]
+            if arrays is not None:
+                append_lines(folder / SOURCES_NAME, map(_line, sources))
         return cls(path)
 
     @property
@@ -246,13 +240,6 @@ def count_sources(path: Path) -> int:
         return 0
     with path.open("rb") as stream:
         return sum(1 for _ in whole_lines(stream))
-
-
-@contextmanager
-def _new_group(path: Path, header: Header) -> Iterator[tuple[Path, Any]]:
-    """Folder and group of a store that takes its place when the block ends."""
-    with atomic_folder(path) as folder:
-        yield folder, create_group(folder, header.as_dict() | {"complete": False})
 
 
 def is_begun(path: Path) -> bool:

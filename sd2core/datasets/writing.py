@@ -260,7 +260,7 @@ class _Writer:
         progress(1, 1)
 
     def _unpacked(self, dataset: Dataset) -> SegmentStore:
-        return SegmentStore.unpack(self._work, dataset.header, dataset.arrays, dataset.sources())
+        return SegmentStore.begin(self._work, dataset.header, dataset.arrays, dataset.sources())
 
     def _finish(self, progress: Progress) -> tuple[int, int]:
         store = self._store
