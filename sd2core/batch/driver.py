@@ -24,7 +24,6 @@ submission costs some milliseconds."""
 
 _POLL_S = 0.2
 _MAX_RESUBMISSIONS = 20
-_REMEMBERED_HOMES = 1000
 
 
 @dataclass
@@ -159,22 +158,16 @@ class Driver:
         """Submit to the worker that has the recording open, else to the one just freed."""
         home = self._homes.get(bundle[0].group, self._freed)
         if home is not None:
-            self._remember_home(bundle[0].group, home)
+            self._homes[bundle[0].group] = home
         assert self._pool is not None
         self._pool.submit(bundle, home)
         self._bundles += 1
-
-    def _remember_home(self, group: str, worker: str) -> None:
-        self._homes.pop(group, None)
-        self._homes[group] = worker
-        if len(self._homes) > _REMEMBERED_HOMES:
-            del self._homes[next(iter(self._homes))]
 
     def _take(self, ending: Ending) -> None:
         self._bundles -= 1
         if ending.worker is not None:
             self._freed = ending.worker
-            self._remember_home(ending.tasks[0].group, ending.worker)
+            self._homes[ending.tasks[0].group] = ending.worker
         outcomes: Sequence[Outcome | None] = ending.outcomes or [
             self._lost(task, ending) for task in ending.tasks
         ]

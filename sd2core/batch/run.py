@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack, suppress
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -23,7 +22,7 @@ from sd2core.batch.pool import Pool, opened_pool
 from sd2core.batch.task_graph import TaskGraph
 from sd2core.batch.tasks import BEGUN, Task
 from sd2core.errors import Sd2Error
-from sd2core.files.atomic import atomic_write, atomic_write_text
+from sd2core.files.atomic import atomic_write, atomic_write_json, atomic_write_text
 from sd2core.files.paths import remove
 from sd2core.files.tables import counted
 from sd2core.runs.control import Control, signals_kept, write_control
@@ -100,8 +99,7 @@ def run_batch(
             remove_old_leftovers(folder.path)
             pool = pool or opened_pool(folder, processes, scheduler)
             with ProgressWriter(folder.progress, watch) as lines:
-                run = _Run(graph, lines, control, scheduler)
-                return run.through(pool, source)
+                return _Run(graph, lines, control, scheduler, pool).through(source)
     except BaseException:
         folder.set_state("failed")
         raise
@@ -114,7 +112,12 @@ class _Run:
     """Progress and report of a running batch."""
 
     def __init__(
-        self, graph: TaskGraph, lines: ProgressWriter, control: Control, scheduler: str | None
+        self,
+        graph: TaskGraph,
+        lines: ProgressWriter,
+        control: Control,
+        scheduler: str | None,
+        pool: AbstractContextManager[Pool],
     ) -> None:
         self._graph, self._lines, self._control = graph, lines, control
         self._scheduler = scheduler
@@ -122,22 +125,23 @@ class _Run:
         self._begun_s = time.monotonic()
         self._reported_s = float("-inf")
         self._workers = -1
-        self._driver: Driver | None = None
+        self._failures: list[dict[str, Any]] = []
+        self._opened = ExitStack()
+        self._driver = Driver(
+            graph,
+            lambda: self._opened.enter_context(pool),
+            on_failure=self._failed,
+            on_note=self._note,
+            tick=self._tick,
+        )
 
-    def through(self, pool: AbstractContextManager[Pool], source: Path | None) -> BatchEnd:
+    def through(self, source: Path | None) -> BatchEnd:
         """Run all tasks and report the end."""
         self._start(source)
         self._folder.report.unlink(missing_ok=True)
         try:
-            with self._failures_path.open("w", encoding="utf-8") as failures, ExitStack() as stack:
-                self._driver = Driver(
-                    self._graph,
-                    lambda: stack.enter_context(pool),
-                    on_failure=partial(self._failed, failures),
-                    on_note=self._note,
-                    tick=self._tick,
-                )
-                outcome = self._drive(self._driver)
+            with self._opened:
+                outcome = self._drive()
         except Sd2Error as error:
             self._end("failed", error)
             raise
@@ -149,11 +153,11 @@ class _Run:
         facts = self._end(outcome, None)
         return BatchEnd(outcome, facts["failed"], facts)
 
-    def _drive(self, driver: Driver) -> Outcome:
+    def _drive(self) -> Outcome:
         try:
-            driver.run(self._graph.first())
+            self._driver.run(self._graph.first())
             self._write_results()
-            driver.run(self._graph.last())
+            self._driver.run(self._graph.last())
         except Stopped:
             return "stopped"
         return "finished"
@@ -175,7 +179,6 @@ class _Run:
     def _tick(self) -> None:
         if self._control.word() == "stop":
             raise Stopped
-        assert self._driver is not None
         workers = self._driver.workers
         if workers != self._workers:
             self._workers = workers
@@ -194,18 +197,13 @@ class _Run:
             )
 
     def _counts(self) -> dict[str, Any]:
-        counts = None if self._driver is None else self._driver.counts
-        steps = self._graph.steps
-
-        def of(by_step: Any) -> dict[str, int]:
-            return {step: by_step[step] if by_step else 0 for step in steps}
-
+        counts, steps = self._driver.counts, self._graph.steps
         return {
-            "total": of(self._graph.total),
-            "there": of(counts and counts.made_before),
-            "done": of(counts and counts.done),
-            "failed": sum(counts.failed.values()) if counts else 0,
-            "waiting": sum(counts.waiting.values()) if counts else 0,
+            "total": {step: self._graph.total[step] for step in steps},
+            "there": {step: counts.made_before[step] for step in steps},
+            "done": {step: counts.done[step] for step in steps},
+            "failed": counts.failed.total(),
+            "waiting": counts.waiting.total(),
             "elapsed_s": time.monotonic() - self._begun_s,
         }
 
@@ -213,29 +211,23 @@ class _Run:
         self._lines.say("note", text=text)
         self._log(text)
 
-    def _failed(self, failures: Any, task: Task, error: dict[str, Any], worker_died: bool) -> None:
+    def _failed(self, task: Task, error: dict[str, Any], worker_died: bool) -> None:
         about = event_of(task, self._folder.path)
         del about["out"]
         about |= {"error": error, "worker_died": worker_died}
         self._lines.say("failed", **about)
         self._log(f"{about['recording']}: {about['step']}: {Sd2Error(**error)}")
-        failures.write(json.dumps(about, ensure_ascii=False) + "\n")
+        self._failures.append(about)
 
     def _log(self, text: str) -> None:
         with self._folder.log.open("a", encoding="utf-8") as stream:
             stream.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {text}\n")
 
-    @property
-    def _failures_path(self) -> Path:
-        return self._folder.path / BEGUN / "failures.jsonl"
-
     def _write_results(self) -> None:
         """Write a line for every map, by recording, in the order of the plan."""
         root, damaged = self._folder.path, dict[str, int]()
         with atomic_write(self._folder.results) as stream:
-            for number, (origin, about, mesh, planned) in enumerate(self._graph.all_maps()):
-                if number % 256 == 0:
-                    self._tick()
+            for origin, about, mesh, planned in self._graph.all_maps():
                 damaged[origin.name] = mesh.damaged
                 of_all, simulation = planned.synthesis.out, planned.simulation
                 for share in planned.shares:
@@ -277,7 +269,7 @@ class _Run:
             "error": None if error is None else error.arguments,
         }
         # The pace of other machines is of no use here.
-        if self._driver is not None and self._scheduler is None:
+        if self._scheduler is None:
             graph, counts = self._graph, self._driver.counts
             for step in graph.steps:
                 keep_pace(pace_kind(graph.plan, step), counts.seconds[step], counts.work[step])
@@ -287,21 +279,14 @@ class _Run:
         return facts
 
     def _write_report(self, facts: dict[str, Any]) -> None:
-        """Write all facts, then one failure after the other, as there may be many."""
-        head = {
+        content = {
             "format": "sd2-batch-report",
             "version": 1,
             "made_by": f"SD² Studio {__version__}",
             **facts,
+            "failures": self._failures,
         }
-        text = json.dumps(head, indent=2, ensure_ascii=False)
-        with atomic_write(self._folder.report) as stream:
-            stream.write(text.removesuffix("\n}").encode() + b',\n  "failures": [')
-            if self._failures_path.exists():
-                with self._failures_path.open("rb") as failures:
-                    for number, line in enumerate(failures):
-                        stream.write((b",\n    " if number else b"\n    ") + line.rstrip(b"\n"))
-            stream.write(b"\n  ]\n}\n")
+        atomic_write_json(self._folder.report, content)
 
 
 def _if_there(out: str | Path | None, root: Path) -> str | None:
