@@ -375,7 +375,7 @@ class LabelsPanel(QWidget):
             beside=self._count,
         )
         self.setLayout(column_of(self._pages, margins_px=(8, 6, 8, 6)))
-        for signal in (model.layoutChanged, self._pages.turned):
+        for signal in (model.layoutChanged, model.dataChanged, self._pages.turned):
             signal.connect(self._show_count)
 
     @property

@@ -254,6 +254,10 @@ class SpanTableModel(RecordTableModel[Span]):
 
     def _show(self, rows: list[Span]) -> None:
         """Show spans; what points at one of them goes along."""
+        if rows and [span.id for span in rows] == [*self._row_of]:  # in the same order
+            self.rows = rows
+            self.dataChanged.emit(self.index(0, 0), self.index(len(rows) - 1, len(COLUMNS) - 1))
+            return
         self.layoutAboutToBeChanged.emit()
         held = self.persistentIndexList()
         ids = [self.rows[index.row()].id for index in held]

@@ -9,7 +9,7 @@ from finding import splitter_around
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLineEdit, QMessageBox, QTableView, QToolButton
+from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QMessageBox, QTableView, QToolButton
 from window_models import models_of
 
 from sd2app.labels.panel import LabelSetTable, LabelsPanel, StatisticsPage
@@ -280,6 +280,11 @@ def test_search_filters_and_escape_leaves(labelled) -> None:
     QTest.keyClicks(search, "bac")
     assert [span.label for span in table(labelled).model().rows] == ["back"]
     assert table(labelled).model().words == "1 of 2 spans"
+    edits = models_of(labelled).label_edits
+    edits.apply(lambda now: now.create("Gestures", 0.85, 0.95, "there"))
+    shown = {one.text() for one in labelled.findChild(LabelsPanel).findChildren(QLabel)}
+    assert "1 of 3 spans" in shown
+    edits.undo_stack.undo()
     press(labelled, "Escape")
     assert len(table(labelled).model().rows) == 2
     press(labelled, "Escape")
