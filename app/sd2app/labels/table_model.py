@@ -261,9 +261,10 @@ class SpanTableModel(RecordTableModel[Span]):
         self.layoutAboutToBeChanged.emit()
         held = self.persistentIndexList()
         ids = [self.rows[index.row()].id for index in held]
-        self.rows, self._row_of = rows, {span.id: row for row, span in enumerate(rows)}
+        at = {span.id: row for row, span in enumerate(rows)}
+        self.rows, self._row_of = rows, at
         moved = [
-            QModelIndex() if (row := self.row_of(one)) is None else self.index(row, index.column())
+            QModelIndex() if (row := at.get(one)) is None else self.createIndex(row, index.column())
             for one, index in zip(ids, held, strict=True)
         ]
         self.changePersistentIndexList(held, moved)
