@@ -45,6 +45,14 @@ class Palette:
     axis_y = _Colour("#00786b", "#46e0b0")
     axis_z = _Colour("#4b3bc8", "#9a9cff")
     inertial = _Colour("#ffd21f", "#ffd21f")
+    # Of the 3D view.
+    backdrop = _Colour("#f6f7f9", "#1b1d21")
+    grid = _Colour("#bbbfc5", "#53575e")
+    shadow = _Colour("#d6d7d9", "#121416")
+    plain = _Colour("#c3c9d1", "#aab1bb")
+    hidden = _Colour("#8b929c", "#5f6670")
+    visible = _Colour("#5e91de", "#79b0ff")
+    accent_hot = _Colour("#6d9ce1", "#a8ccff")
 
 
 LIGHT, DARK = Palette(False), Palette(True)

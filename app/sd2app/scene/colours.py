@@ -26,52 +26,13 @@ def mixed(colour: str, other: str, share: float) -> str:
     return "#" + np.rint(blend).astype(np.uint8).tobytes().hex()
 
 
-@dataclass(frozen=True)
-class SceneColours:
-    """Colours of the scene in one theme, as ``#rrggbb``."""
-
-    background: str
-    grid: str
-    shadow: str
-    plain: str
-    hidden: str
-    visible: str
-    sensor: str
-    sensor_hot: str
-    camera: str
-    text: str
-    muted: str
-    warning: str
-    inertial: str
-
-    @classmethod
-    def of(cls, palette: Palette, dark: bool) -> SceneColours:
-        """Colours of the scene for a theme of the window."""
-        background = "#1b1d21" if dark else "#f6f7f9"
-        return cls(
-            background=background,
-            grid=mixed(background, palette.muted, 0.42 if dark else 0.38),
-            shadow=mixed(background, "#000000", 0.32 if dark else 0.13),
-            plain="#aab1bb" if dark else "#c3c9d1",
-            hidden="#5f6670" if dark else "#8b929c",
-            visible=palette.accent if dark else mixed(palette.accent, "#ffffff", 0.28),
-            sensor=palette.accent,
-            sensor_hot=mixed(palette.accent, "#ffffff", 0.35),
-            camera=palette.muted,
-            text=palette.text,
-            muted=palette.muted,
-            warning=palette.warning,
-            inertial=palette.inertial,
-        )
-
-
 def range_colours(range_m: NDArray[np.floating], limits_m: tuple[float, float]) -> Rgb:
     """Sequential colours of ranges between two limits; (V, 3)."""
     return look_up(SEQUENTIAL, range_m, *limits_m)
 
 
 def marker_colours(
-    range_m: NDArray[np.floating], beyond: NDArray[np.bool_] | None, colours: SceneColours
+    range_m: NDArray[np.floating], beyond: NDArray[np.bool_] | None, colours: Palette
 ) -> Rgb:
     """Colours of places by their range, nearest to farthest; (N, 3).
 
@@ -111,7 +72,7 @@ class Colouring:
     vertex_limb: NDArray[np.intp] | None = None  # of these, from 1; 0: none of them
 
 
-def mesh_colours(colouring: Colouring, colours: SceneColours, count: int) -> Rgb:
+def mesh_colours(colouring: Colouring, colours: Palette, count: int) -> Rgb:
     """Colours of ``count`` vertices, shape (count, 3).
 
     What is not known yet is drawn plain. Hidden vertices are muted in every
@@ -134,12 +95,12 @@ def mesh_colours(colouring: Colouring, colours: SceneColours, count: int) -> Rgb
     else:
         result, visible = np.tile(rgb(colours.plain), (count, 1)), None
     # Dots have no shading: on a light ground the pale middle would vanish.
-    if as_dots and rgb(colours.background).mean() >= 128:
+    if as_dots and rgb(colours.backdrop).mean() >= 128:
         result = (0.76 * result).astype(np.uint8)
     if visible is None:
         return result
     # Dots do not cover one another: what is hidden has to step back further.
-    hidden = mixed(colours.hidden, colours.background, 0.7) if as_dots else colours.hidden
+    hidden = mixed(colours.hidden, colours.backdrop, 0.7) if as_dots else colours.hidden
     if mode == "range" and not as_dots:
         muted = (0.3 * result + 0.7 * rgb(hidden)).astype(np.uint8)
         return np.where(visible[:, None], result, muted)

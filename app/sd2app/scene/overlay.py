@@ -13,10 +13,11 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter, QPen
 from PySide6.QtWidgets import QWidget
 
-from sd2app.scene.colours import Colouring, SceneColours
+from sd2app.palette import Palette
+from sd2app.scene.colours import Colouring
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.scene import Scene
-from sd2app.widgets.canvas import AT_RIGHT, Canvas, Themed
+from sd2app.widgets.canvas import AT_RIGHT, Canvas
 from sd2app.widgets.time_axis import paint_readout, tick_step, ticks
 from sd2core.figures.colours import DIVERGING, SEQUENTIAL, Rgb
 
@@ -64,9 +65,8 @@ class _Bar:
 class Overlay(Canvas):
     """Colour bar, metre labels, axes and the sensor's coordinates."""
 
-    def __init__(self, scene: Scene, navigator: Navigator, theme: Themed, parent: QWidget) -> None:
+    def __init__(self, scene: Scene, navigator: Navigator, parent: QWidget) -> None:
         super().__init__(parent)
-        self._theme = theme
         self.reading, self._read_at = "", QPointF()
         self._scene = scene
         self._navigator = navigator
@@ -80,7 +80,7 @@ class Overlay(Canvas):
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
     @property
-    def _colours(self) -> SceneColours:
+    def _colours(self) -> Palette:
         return self._scene.colours
 
     @property
@@ -108,8 +108,8 @@ class Overlay(Canvas):
         self.paint_kept(painter, self._paint_legend)
         self.paint_kept(painter, self._paint_rest)
         if self.reading:
-            area, colours = QRectF(self.rect()), self._theme.palette
-            paint_readout(painter, area, self._read_at, (self.reading,), colours)
+            area = QRectF(self.rect())
+            paint_readout(painter, area, self._read_at, (self.reading,), self._colours)
 
     def show_reading(self, place_px: tuple[float, float], text: str) -> None:
         """Show what is read of the mesh beside the pointer; an empty text ends it."""
@@ -300,7 +300,7 @@ class Overlay(Canvas):
         row.translate(0.0, line + _GAP)
 
     def _chip(self, painter: QPainter, box: QRectF) -> None:
-        colour = QColor(self._colours.background)
+        colour = QColor(self._colours.backdrop)
         colour.setAlphaF(0.72)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(colour)
@@ -342,7 +342,7 @@ class Overlay(Canvas):
         self._write(painter, words, text, colour=self._colours.text)
         middle, along = QPointF(box.left() + _ARROW_PX + 4.0, box.center().y()), QPointF(*towards)
         across = QPointF(-along.y(), along.x())
-        painter.setBrush(QColor(self._colours.sensor))
+        painter.setBrush(QColor(self._colours.accent))
         painter.setPen(Qt.PenStyle.NoPen)
         tip, back = middle + along * _ARROW_PX, middle - along * (0.6 * _ARROW_PX)
         painter.drawPolygon([tip, back + across * 5.0, back - across * 5.0])

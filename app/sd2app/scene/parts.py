@@ -12,8 +12,9 @@ from vtkmodules.vtkFiltersCore import vtkGlyph3D, vtkTriangleMeshPointNormals
 from vtkmodules.vtkFiltersSources import vtkPlatonicSolidSource, vtkSphereSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
+from sd2app.palette import Palette
 from sd2app.scene import shapes
-from sd2app.scene.colours import SceneColours, fractions, marker_colours, mixed
+from sd2app.scene.colours import fractions, marker_colours, mixed
 from sd2app.scene.shapes import coarse_faces, is_closed_outward
 from sd2core.figures.colours import rgb
 from sd2core.scattering.beam import half_power_rim, sensor_axes
@@ -232,19 +233,19 @@ class SensorGlyph:
         self.foot.place(0.06 * np.eye(3), on_floor)
         self.sphere.SetPosition(*position)
 
-    def set_colours(self, colours: SceneColours, hot: bool) -> None:
+    def set_colours(self, colours: Palette, hot: bool) -> None:
         """Colours of the theme; ``hot`` while the pointer is on it or drags it."""
-        colour = colours.sensor_hot if hot else colours.sensor
+        colour = colours.accent_hot if hot else colours.accent
         self.sphere.GetProperty().SetColor(*fractions(colour))
         fade = np.zeros((len(self.cone.points), 4), np.uint8)
-        fade[:, :3] = rgb(colours.sensor)
+        fade[:, :3] = rgb(colours.accent)
         fade[0, 3] = 92
         fade[1:, 3] = 14
         self.cone.set_point_colours(fade)
-        self.edges.set_colour(mixed(colours.sensor, colours.background, 0.45))
-        self.axis.set_colour(colours.sensor)
+        self.edges.set_colour(mixed(colours.accent, colours.backdrop, 0.45))
+        self.axis.set_colour(colours.accent)
         for quiet in (self.plumb, self.foot):
-            quiet.set_colour(mixed(colours.sensor, colours.background, 0.55))
+            quiet.set_colour(mixed(colours.accent, colours.backdrop, 0.55))
 
     def show(self, visible: bool) -> None:
         """Show or hide it (the eye may be inside it)."""
@@ -263,25 +264,25 @@ class GroundGrid:
         self.shapes = (Shape(renderer), Shape(renderer))
         self._opacity = np.zeros(0, np.float32)
 
-    def set_ground(self, ground: shapes.Ground, colours: SceneColours) -> None:
+    def set_ground(self, ground: shapes.Ground, colours: Palette) -> None:
         """Take over other lines."""
         self._opacity = ground.opacity
         for shape, segments in zip(self.shapes, (ground.minor, ground.major), strict=True):
             shape.set_shape(ground.points, segments=segments)
         self.set_colours(colours)
 
-    def set_colours(self, colours: SceneColours) -> None:
+    def set_colours(self, colours: Palette) -> None:
         """Colours of the theme."""
         for shape, strength in zip(self.shapes, (0.42, 1.0), strict=True):
             share = (strength * self._opacity)[:, None]
-            blend = (1 - share) * rgb(colours.background) + share * rgb(colours.grid)
+            blend = (1 - share) * rgb(colours.backdrop) + share * rgb(colours.grid)
             shape.set_point_colours(np.rint(blend).astype(np.uint8))
 
 
 class Markers(Shape):
     """Planned places of sensors: a small pyramid each, whose tip points where the sensor looks."""
 
-    def __init__(self, renderer: vtkRenderer, colours: SceneColours) -> None:
+    def __init__(self, renderer: vtkRenderer, colours: Palette) -> None:
         super().__init__(renderer, lit=True)
         self._theme = colours
         self.positions_m = np.zeros((0, 3))
@@ -313,10 +314,10 @@ class Markers(Shape):
         self.show(bool(sensors))
         self._build()
 
-    def set_colours(self, colours: SceneColours) -> None:
+    def set_colours(self, colours: Palette) -> None:
         """Colours of the theme."""
         self._theme = colours
-        self.look.SetEdgeColor(*fractions(mixed(colours.text, colours.background, 0.35)))
+        self.look.SetEdgeColor(*fractions(mixed(colours.text, colours.backdrop, 0.35)))
         if len(self.positions_m):
             shades = marker_colours(self._range_m, self._beyond, colours)
             self.set_point_colours(np.repeat(shades, shapes.PYRAMID_POINTS, axis=0))
@@ -360,6 +361,6 @@ class InertialMarkers(Shape):
         self.show(len(points_m) > 0)
         self._solids.SetScaleFactor(max(_INERTIAL_M, _INERTIAL_MIN_PX * metres_per_px))
 
-    def set_colours(self, colours: SceneColours) -> None:
+    def set_colours(self, colours: Palette) -> None:
         """Colours of the theme."""
         self.set_colour(colours.inertial)

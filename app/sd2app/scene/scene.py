@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer
 
-from sd2app.palette import palette_for
+from sd2app.palette import LIGHT, Palette
 from sd2app.scene import shapes
 from sd2app.scene.camera import EyePose, Margins, Preset, triple
-from sd2app.scene.colours import Colouring, SceneColours, fractions, mesh_colours, range_limits
+from sd2app.scene.colours import Colouring, fractions, mesh_colours, range_limits
 from sd2app.scene.parts import Body, GroundGrid, InertialMarkers, Markers, SensorGlyph, Shape
 from sd2app.scene.shapes import Extent
 from sd2app.scene.things import Movables, Walls
@@ -39,7 +39,7 @@ class Scene:
 
     def __init__(self, renderer: vtkRenderer) -> None:
         self.renderer = renderer
-        self.colours = SceneColours.of(palette_for(False), False)
+        self.colours = LIGHT
         self.pose = EyePose()
         self.preset: Preset | None = None  # ready-made view that is kept when the size changes
         self.margins = Margins(left=64.0, top=28.0, right=144.0, bottom=28.0)
@@ -177,12 +177,12 @@ class Scene:
             self._hot = hot
             self.sensor_glyph.set_colours(self.colours, hot)
 
-    def set_colours(self, colours: SceneColours) -> None:
+    def set_colours(self, colours: Palette) -> None:
         """Change the theme."""
         self.colours = colours
-        self.renderer.SetBackground(*fractions(colours.background))
+        self.renderer.SetBackground(*fractions(colours.backdrop))
         self.ground.set_colours(colours)
-        self.camera_glyph.set_colour(colours.camera)
+        self.camera_glyph.set_colour(colours.muted)
         self.sensor_glyph.set_colours(colours, self._hot)
         self.markers.set_colours(colours)
         self.inertial.set_colours(colours)

@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkFiltersCore import vtkFeatureEdges
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
+from sd2app.palette import Palette
 from sd2app.scene.camera import EyePose, Surface
-from sd2app.scene.colours import SceneColours, fractions, mixed
+from sd2app.scene.colours import fractions, mixed
 from sd2app.scene.parts import Body, Shape
 from sd2core.figures.colours import rgb
 from sd2core.mesh.sequence import MeshSequence
@@ -45,11 +46,11 @@ class ThingShapes:
         for shape in self.shapes:
             shape.place(linear, offset)
 
-    def set_colours(self, colours: SceneColours, hot: bool) -> None:
+    def set_colours(self, colours: Palette, hot: bool) -> None:
         """Colours of the theme; ``hot`` while the pointer is on it or drags it."""
-        self._face.set_colour(mixed(colours.plain, colours.sensor, 0.35 if hot else 0.0))
-        faint = mixed(colours.muted, colours.background, 0.2)
-        self._edge.set_colour(colours.sensor if hot else faint)
+        self._face.set_colour(mixed(colours.plain, colours.accent, 0.35 if hot else 0.0))
+        faint = mixed(colours.muted, colours.backdrop, 0.2)
+        self._edge.set_colour(colours.accent if hot else faint)
 
 
 class Movables:
@@ -58,7 +59,7 @@ class Movables:
     The pointer finds one, which is lit up while it is on it or drags it.
     """
 
-    def __init__(self, renderer: vtkRenderer, colours: SceneColours) -> None:
+    def __init__(self, renderer: vtkRenderer, colours: Palette) -> None:
         self._renderer, self._colours = renderer, colours
         self.things: tuple[ThingShapes, ...] = ()
         self.people: tuple[Person, ...] = ()
@@ -125,7 +126,7 @@ class Movables:
             self._hot = number
             self.set_colours(self._colours)
 
-    def set_colours(self, colours: SceneColours) -> None:
+    def set_colours(self, colours: Palette) -> None:
         """Colours of the theme."""
         self._colours = colours
         for number, one in enumerate(self._all):
@@ -171,9 +172,9 @@ class Person(Body):
         """Colour limbs: the number of a colour by vertex, from 1, or 0; None: no limb."""
         self._limb_colours, self._limb = colours, limb
 
-    def set_colours(self, colours: SceneColours, hot: bool) -> None:
+    def set_colours(self, colours: Palette, hot: bool) -> None:
         """Colours of the theme; ``hot`` while the pointer is on it or drags it."""
-        own = mixed(self._own_colour, colours.sensor, 0.4 if hot else 0.0)
+        own = mixed(self._own_colour, colours.accent, 0.4 if hot else 0.0)
         self.set_colour(own)
         if self._limb is not None and len(self._limb) == len(self.points):
             shades = np.stack([rgb(shade) for shade in (own, *self._limb_colours)])
@@ -190,7 +191,7 @@ _CELLS, _CELL_M = 8, 0.5
 class Walls:
     """Pieces of planes; nothing is picked of them."""
 
-    def __init__(self, renderer: vtkRenderer, colours: SceneColours) -> None:
+    def __init__(self, renderer: vtkRenderer, colours: Palette) -> None:
         self._renderer, self._colours = renderer, colours
         self.shapes: list[Shape] = []
 
@@ -209,11 +210,11 @@ class Walls:
             self.shapes += [face, lines]
         self.set_colours(self._colours)
 
-    def set_colours(self, colours: SceneColours) -> None:
+    def set_colours(self, colours: Palette) -> None:
         """Colours of the theme."""
         self._colours = colours
         for shape in self.shapes:
-            shape.set_colour(mixed(colours.muted, colours.sensor, 0.25))
+            shape.set_colour(mixed(colours.muted, colours.accent, 0.25))
 
 
 def grid_on(

@@ -13,7 +13,6 @@ from PySide6.QtGui import QCloseEvent, QGuiApplication, QMouseEvent, QResizeEven
 from PySide6.QtWidgets import QMenu, QWidget
 
 from sd2app.scene.camera import Preset
-from sd2app.scene.colours import SceneColours
 from sd2app.scene.inertial import LIMB_HINT, PLACING_HINT, InertialHand, LimbHand
 from sd2app.scene.navigation import Navigator
 from sd2app.scene.offscreen_backend import ImageBackend, NoOpenGL
@@ -77,7 +76,7 @@ class SceneView(QWidget):
             return
         self.scene = Scene(self._backend.renderer)
         self.navigator = Navigator(self.scene, session.edits, placements.use, self.request_render)
-        self.overlay = Overlay(self.scene, self.navigator, session.display, self)
+        self.overlay = Overlay(self.scene, self.navigator, self)
         self.inertial_hand = InertialHand(self.scene, session, inertial)
         self.limb_hand = LimbHand(self.scene, self.navigator, self.inertial_hand, limbs)
         self.setAccessibleName("Scene")
@@ -271,8 +270,7 @@ class SceneView(QWidget):
         self._follow_scattering()
 
     def _follow_theme(self) -> None:
-        display = self._session.display
-        self.scene.set_colours(SceneColours.of(display.palette, display.dark))
+        self.scene.set_colours(self._session.display.palette)
         self.request_render()
 
     def _follow_placements(self) -> None:

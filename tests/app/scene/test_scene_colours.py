@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sd2app.palette import palette_for
+from sd2app.palette import LIGHT
 from sd2app.scene.colours import (
     Colouring,
-    SceneColours,
     marker_colours,
     mesh_colours,
     range_colours,
@@ -20,8 +19,6 @@ from sd2app.scene.colours import (
 )
 from sd2app.widgets.time_axis import tick_step
 from sd2core.figures.colours import DIVERGING, SEQUENTIAL, rgb, velocity_colours
-
-LIGHT = SceneColours.of(palette_for(False), False)
 
 
 def luminance(colours: np.ndarray) -> np.ndarray:
@@ -108,7 +105,7 @@ def test_hidden_dots_step_back_towards_the_background() -> None:
     still = Colouring(velocity_mps=np.array([0.0]), visible=np.array([False]))
     surface = mesh_colours(still, LIGHT, 1)
     dots = mesh_colours(replace(still, as_dots=True), LIGHT, 1)
-    ground = rgb(LIGHT.background).astype(int)
+    ground = rgb(LIGHT.backdrop).astype(int)
     assert abs(dots.astype(int) - ground).sum() < abs(surface.astype(int) - ground).sum()
 
 

@@ -6,16 +6,15 @@ import numpy as np
 import pytest
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
-from sd2app.palette import palette_for
+from sd2app.palette import LIGHT
 from sd2app.scene.camera import EyePose, drag_level
-from sd2app.scene.colours import SceneColours
 from sd2app.scene.things import Movables
 from sd2core.mesh.things import SHELF, Thing
 
 
 def edges_of(vertices: np.ndarray, faces: np.ndarray) -> int:
     """Number of edges that are drawn of a thing."""
-    things = Movables(vtkRenderer(), SceneColours.of(palette_for(False), False))
+    things = Movables(vtkRenderer(), LIGHT)
     things.set_things([(vertices, faces)], [Thing("box", (0, 1, 2))])
     _, edge = things.things[0].shapes
     edge.actor.GetMapper().Update()
@@ -34,7 +33,7 @@ def test_an_open_surface_ends_in_edges() -> None:
 
 
 def test_a_ray_meets_the_nearest_thing_before_the_eye() -> None:
-    things = Movables(vtkRenderer(), SceneColours.of(palette_for(False), False))
+    things = Movables(vtkRenderer(), LIGHT)
     pose = EyePose((0.0, 0.0, 5.0))  # it looks ahead from the origin
     x, y = np.divide(pose.size_px, 2)
     assert things.under(pose, x, y) is None

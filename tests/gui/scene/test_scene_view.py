@@ -19,7 +19,6 @@ from PySide6.QtWidgets import QLabel, QMenu
 from scene_stage import LEFT, RIGHT, Stage, two_plates
 
 from sd2app.scene import offscreen_backend as image_backend
-from sd2app.scene.colours import SceneColours
 from sd2app.scene.navigation import Target
 from sd2app.session.maps import LIMB_COLOURS
 from sd2core.mesh.sequence import MeshSequence
@@ -93,7 +92,7 @@ def test_visibility_is_the_accent_or_grey(stage: Stage) -> None:
 
 
 def test_dots_leave_gaps_that_the_surface_fills(stage: Stage) -> None:
-    ground = QColor(stage.view.scene.colours.background)
+    ground = QColor(stage.view.scene.colours.backdrop)
     assert stage.colour_at(LEFT) != ground
     stage.display.set_as_dots(True)
     assert stage.colour_at(LEFT) == ground
@@ -106,7 +105,7 @@ def test_a_point_cloud_is_drawn_as_dots(stage: Stage) -> None:
     plates = two_plates()
     stage.open(MeshSequence(plates.vertices, None, plates.timebase))
     stage.view.set_view("camera")
-    ground = QColor(stage.view.scene.colours.background)
+    ground = QColor(stage.view.scene.colours.backdrop)
     assert stage.colour_at(LEFT) == ground
     assert stage.colour_at((-0.65, -0.25, 2.0)) != ground
 
@@ -115,7 +114,7 @@ def test_both_themes_have_their_ground(stage: Stage) -> None:
     for dark in (True, False):
         stage.display.set_dark(dark)
         ground = stage.view.grab().toImage().pixelColor(300, 20)
-        expected = SceneColours.of(stage.display.palette, dark).background
+        expected = stage.display.palette.backdrop
         assert ground.name() == expected
 
 
@@ -357,7 +356,7 @@ def test_odd_places_are_drawn_without_complaint(
     stage.scatter(np.zeros(len(points)), np.ones(len(points), bool))
     stage.view.set_view(preset)
     picture = as_array(stage.view.grab().toImage())
-    ground = QColor(stage.view.scene.colours.background)
+    ground = QColor(stage.view.scene.colours.backdrop)
     assert (picture[2, 2] == (ground.red(), ground.green(), ground.blue())).all()
     assert np.isfinite(stage.view.scene.pose.position).all()
 
@@ -495,7 +494,7 @@ def test_planned_places_are_drawn_in_the_colour_of_their_range(stage: Stage) -> 
     assert far.blue() > far.green() + 10
     stage.placements.shown = False
     stage.placements.changed.emit()
-    ground = stage.view.scene.colours.background
+    ground = stage.view.scene.colours.backdrop
     assert greyness(stage.colour_at(stage.marker_middles_m()[1])) <= greyness(QColor(ground)) + 6
 
 

@@ -31,7 +31,7 @@ def arrow_shown(stage: Stage) -> bool:
     overlay = stage.view.overlay
     picture = overlay.grab().toImage()
     wanted = np.array(
-        [int(overlay._colours.sensor[at : at + 2], 16) for at in (1, 3, 5)]
+        [int(overlay._colours.accent[at : at + 2], 16) for at in (1, 3, 5)]
     )  # fmt: skip
     data = np.frombuffer(picture.constBits(), np.uint8).reshape(picture.height(), -1, 4)
     return bool((np.abs(data[..., 2::-1].astype(int) - wanted).max(axis=2) < 4).sum() > 20)
