@@ -76,7 +76,7 @@ class LiveFeature(Feature):
         self.model.warned.connect(shell.warn)
         self.guided = GuidedModel(session.parent, command or COMMAND)
         self.guided.warned.connect(shell.warn)
-        self.changing = (self.model.state_changed, self.guided.state_changed)
+        self.changing = (self.model.changed, self.guided.changed)
         self.closing = (self.model, self.guided)
 
     def actions(self) -> Sequence[Action]:

@@ -218,7 +218,6 @@ class SteeredCommand(ClosingModel):
     """
 
     changed = Signal()
-    state_changed = Signal()
     warned = Signal(str)
 
     first_event: ClassVar[str]
@@ -317,7 +316,6 @@ class SteeredCommand(ClosingModel):
     def _set_state(self, state: State) -> None:
         if state != self.state:
             self.state = state
-            self.state_changed.emit()
             self.changed.emit()
 
 

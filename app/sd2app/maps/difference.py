@@ -22,15 +22,13 @@ class DifferenceModel(QObject):
     On a linear scale it is the difference of shares of the other's reference.
     """
 
-    changed = Signal()  # values
-    state_changed = Signal()  # existence or visibility
+    changed = Signal()
 
     def __init__(self, session: Session, parent: QObject) -> None:
         super().__init__(parent)
         self.denoised, self.real = session.maps.denoised, session.maps.real
         self._session = session
         self.wanted = session.settings.stored(_SHOWN, False)  # by the user
-        self._state = self.wanted, self.why_not
         self._gain: float | None = None
         for signal in (self.denoised.changed, self.real.changed, session.display.levels_changed):
             signal.connect(self._follow)
@@ -38,10 +36,6 @@ class DifferenceModel(QObject):
     def _follow(self) -> None:
         self._gain = None
         self.changed.emit()
-        state = self.wanted, self.why_not
-        if state != self._state:
-            self._state = state
-            self.state_changed.emit()
 
     @property
     def why_not(self) -> str:

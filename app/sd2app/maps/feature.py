@@ -186,7 +186,7 @@ class MapsFeature(Feature):
         session.document.changed.connect(session.follow_capture)
         for model in (self.synthesis, self.uncertainty, self.limbs):
             model.failed.connect(shell.warn)
-        shown = self.uncertainty.changed, self.difference.state_changed
+        shown = self.uncertainty.changed, self.difference.changed
         self.changing = *self.synthesis.completeness, *shown
         self.closing = (self.uncertainty, self.limbs, self.synthesis)
         self.working = (self.synthesis,)

@@ -155,7 +155,7 @@ class MapStack(QScrollArea):
         self.verticalScrollBar().valueChanged.connect(lambda _: self.arranged.emit())
         for track in maps.all:
             track.changed.connect(self.refresh)
-        difference.state_changed.connect(self.refresh)
+        difference.changed.connect(self.refresh)
         self.refresh()
 
     @property
