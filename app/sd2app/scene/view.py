@@ -87,7 +87,7 @@ class SceneView(QWidget):
         self._around: Surroundings | None = None
         self._others: tuple[MeshSequence, ...] = ()
         self._backend.installEventFilter(self)
-        self._followed = (
+        for signal, slot in (
             (session.display.theme_changed, self._follow_theme),
             (session.display.mesh_changed, self._follow_colour),
             (session.document.opened, self._attach),
@@ -101,8 +101,7 @@ class SceneView(QWidget):
             (inertial.changed, self._follow_inertial),
             (limbs.changed, self._follow_limbs),
             (session.placing.changed, self._follow_placing),
-        )
-        for signal, slot in self._followed:
+        ):
             signal.connect(slot)
             slot()
         self._lay_out()
@@ -131,8 +130,6 @@ class SceneView(QWidget):
         event.accept()
         backend, self._backend = self._backend, None
         if backend is not None:
-            for signal, slot in self._followed:
-                signal.disconnect(slot)
             backend.removeEventFilter(self)
             backend.shut_down()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, get_args
 
 from PySide6.QtCore import QObject, Signal
 
@@ -41,11 +41,6 @@ class Planned:
     coverage: SensorCoverage | None = None  # what each sees; None while it is computed
 
 
-class _Request(NamedTuple):
-    mesh: MeshSequence
-    plan: Placements
-
-
 class PlacementsModel(ReportingModel):
     """Plan of the open recording; its placements are computed in the background."""
 
@@ -59,7 +54,7 @@ class PlacementsModel(ReportingModel):
         self.edits = session.edits
         self.planned = Planned()  # empty until the places are computed
         self.shown = True  # in the scene
-        self._request: _Request | None = None
+        self._asked: tuple[MeshSequence, Placements] | None = None
         self._extent_of = lru_cache(maxsize=1)(BodyExtent.of)
         self._runner = LatestRunner("placements", self, self._receive, self._fail)
         self._runner.partial.connect(self._receive)
@@ -128,21 +123,21 @@ class PlacementsModel(ReportingModel):
 
     def _follow(self) -> None:
         mesh, plan = self._document.mesh, self.plan
-        request = _Request(mesh, plan) if mesh is not None and plan is not None else None
-        if request == self._request:
+        before, asked = self._asked, (mesh, plan) if mesh is not None and plan is not None else None
+        if asked == before:
             return
-        if request is None or self._request is None or request.mesh is not self._request.mesh:
+        self._asked = asked
+        if asked is None or before is None or asked[0] is not before[0]:
             self.planned = Planned()  # places of another body say nothing of this one
-        self._request = request
-        if request is None:
+        if asked is None:
             self._runner.cancel()
         else:
-            self._runner.submit(lambda emit: self._plan_around(request, emit))
+            self._runner.submit(lambda emit: self._plan_around(*asked, emit))
         self.changed.emit()
 
-    def _plan_around(self, request: _Request, emit: Emit) -> Planned:
+    def _plan_around(self, mesh: MeshSequence, plan: Placements, emit: Emit) -> Planned:
         """Compute in the background: the places first, then what they see."""
-        body, places = self._extent_of(request.mesh), request.plan.places()
+        body, places = self._extent_of(mesh), plan.places()
         sensors = tuple(place.sensor(body.target_m) for place in places)
         emit(Planned(places, sensors))
         coverage = body.coverage(sensors, lambda done, total: emit(None))
