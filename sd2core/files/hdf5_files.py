@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-import os
-import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from sd2core.errors import Sd2Error
 from sd2core.files.limits import (
@@ -73,49 +71,26 @@ def member_of(file: Any, path: Path, name: str) -> Any:
 
 
 def text_of(array: Any, path: Path, name: str) -> str:
-    """Text of a dataset that holds one, of fixed or of variable length.
+    """Text of a dataset that holds one, of fixed or of variable length; Sd2Error if it cannot be.
 
-    The HDF5 library believes any length that stands in a file, and any size of a heap, and takes
-    memory or time without end. So the few bytes of a heap are read here (HDF5 File Format
-    Specification 3.0, section III.E, global heap). Raises Sd2Error if they cannot be.
+    The HDF5 library takes as much memory as the length says that stands in a file: so that is read
+    here first (HDF5 File Format Specification 3.0, section IV.B, variable-length data).
     """
-    if array.dtype.kind == "S":
-        return str(array[()].decode("utf-8", "replace"))
     place, expected = f"{name} of {path}", "a text of HDF5's default layout"
-    start = array.id.get_offset()
-    file_plan = array.file.id.get_create_plist()
-    if start is None or file_plan.get_userblock() or file_plan.get_sizes() != (8, 8):
-        raise Sd2Error(f"{place} is stored in an unusual way", expected)
-    with open_regular(path) as stream:
-        length, address, number = struct.unpack("<IQI", _exactly(stream, start, 16, place))
-        if not length:
-            return ""
-        head = _exactly(stream, address, 16, place)
-        size = int.from_bytes(head[8:], "little")
-        check_size(place, size)
-        if head[:4] != b"GCOL" or length * _TEXT_PART > read_limit_bytes():
+    if array.dtype.kind != "S":
+        start, plan = array.id.get_offset(), array.file.id.get_create_plist()
+        if start is None or plan.get_userblock():
+            raise Sd2Error(f"{place} is stored in an unusual way", expected)
+        with open_regular(path) as stream:
+            stream.seek(start)
+            length = int.from_bytes(stream.read(4), "little")
+        if length * _TEXT_PART > read_limit_bytes():
             raise Sd2Error(f"{place} has {length:,} bytes, in a damaged heap", expected)
-        at, end = 16, size
-        heap = head + _exactly(stream, address + 16, max(size - 16, 0), place)
-    while at + 16 <= end:
-        index, _, _, stored = struct.unpack_from("<HHIQ", heap, at)
-        if index == number and index:
-            if length > stored or at + 16 + length > end:
-                break
-            return heap[at + 16 : at + 16 + length].decode("utf-8", "replace")
-        at += 16 + -(-stored // 8) * 8
-    raise Sd2Error(f"{place} is not in its heap", expected, "Copy or download it again")
-
-
-def _exactly(stream: BinaryIO, start: int, count: int, place: str) -> bytes:
-    """Bytes at a place in a file; Sd2Error if they are not all there."""
-    size = stream.seek(0, os.SEEK_END)
-    if start + count > size:
-        raise Sd2Error(
-            f"{place} lies beyond the end of the file", "a whole file", "Copy or download it again"
-        )
-    stream.seek(start)
-    return stream.read(count)
+    try:
+        return str(array[()].decode("utf-8", "replace"))
+    except OSError as error:
+        found = f"{place} is not in its heap ({error})"
+        raise Sd2Error(found, expected, "Copy or download it again") from error
 
 
 def _check_array(array: Any, path: Path, name: str) -> None:

@@ -45,10 +45,7 @@ def compare(before: Labels, after: Labels) -> Comparison:
 
 def changed_stretch(before: Labels, after: Labels) -> tuple[float, float] | None:
     """Return the earliest start and latest end of spans that differ; None where none does."""
-    first, stop = same_ends(before.spans, after.spans)
-    old = before.spans[first : len(before.spans) - stop]
-    new = after.spans[first : len(after.spans) - stop]
-    differ = set(old) ^ set(new)
+    differ = set(before.spans) ^ set(after.spans)
     if not differ:
         return None
     return min(span.start_s for span in differ), max(span.end_s for span in differ)
