@@ -11,7 +11,6 @@ A recording is a folder, usually called ``RadarIfxAvian_00``::
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -23,9 +22,9 @@ from pydantic import AliasPath, BaseModel, ConfigDict, Field
 from sd2core.errors import Sd2Error
 from sd2core.files.atomic import atomic_folder, atomic_write, atomic_write_json, atomic_write_text
 from sd2core.files.limits import open_regular
-from sd2core.files.numpy_files import open_npy_file, read_words
 from sd2core.files.texts import errors_in, faults_in, lines_of, read_json
 from sd2core.io.radar.capture import LazySamples, RadarCapture, Samples, by_transmitter, check_cube
+from sd2core.io.radar.stored_arrays import stored_npy
 from sd2core.radar_config import RadarConfig
 from sd2core.timebase import Timebase
 
@@ -102,7 +101,8 @@ def load_infineon(path: Path) -> RadarCapture:
     config = _read_config(folder / _CONFIG, meta)
     _check_exists(folder / _DATA)
     expected = "the whole radar.npy as recorded, uint16 (frames, receivers, chirps, samples)"
-    counts = _by_rows(folder / _DATA, expected)
+    stored = stored_npy(folder / _DATA, expected)
+    counts = LazySamples(stored.shape, stored.dtype, lambda some: stored.read((some,)))
     samples, config, about_turns = _in_turns(counts, config, folder)
     check_cube(samples, config, str(folder / _DATA))
     timebase, start_unix_s, notes = _read_times(folder / _TIMES, samples.shape[0], config)
@@ -261,19 +261,6 @@ def _read_config(path: Path, meta: _Meta) -> RadarConfig:
             name=meta.description,
             transmitters=transmitters,
         )
-
-
-def _by_rows(path: Path, expected: str) -> Samples:
-    """Array of an .npy, which is read from its file each time."""
-    mapped: Any = open_npy_file(path, expected, "It may be cut off: copy it again")
-    each, skipped = math.prod(mapped.shape[1:]), mapped.offset // mapped.itemsize
-
-    def read(some: slice) -> NDArray[Any]:
-        start, stop, _ = some.indices(len(mapped))
-        place = slice(skipped + start * each, skipped + stop * each)
-        return read_words(path, mapped.dtype, place).reshape(-1, *mapped.shape[1:])
-
-    return LazySamples(mapped.shape, mapped.dtype, read) if mapped.flags.c_contiguous else mapped
 
 
 def _in_turns(

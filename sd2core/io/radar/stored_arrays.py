@@ -37,6 +37,9 @@ _MATLAB_NUMBERS = frozenset(
 )
 """Classes of MATLAB."""
 
+_BLOCK_BYTES = 32 << 20
+"""Of an .npy that are read at once, though a part of each row may be wanted."""
+
 
 class SigmfMeta(NamedTuple):
     """Layout of a SigMF recording: a stream of samples."""
@@ -114,8 +117,29 @@ def open_stored(path: Path, dataset: str | None) -> StoredArray:
         )
     if suffix in (META, DATA):
         return _sigmf(path)
-    array = open_npy_file(path, "a whole .npy of numbers", "It may be cut off: copy it again")
-    return StoredArray(array.shape, array.dtype, array.__getitem__)
+    return stored_npy(path, "a whole .npy of numbers")
+
+
+def stored_npy(path: Path, expected: str) -> StoredArray:
+    """Array of an .npy, which is read from its file each time, some rows of its order at once."""
+    mapped: Any = open_npy_file(path, expected, "It may be cut off: copy it again")
+    dtype, by_column = mapped.dtype, not mapped.flags.c_contiguous
+    shape = mapped.shape[::-1] if by_column else mapped.shape
+    each, skipped = math.prod(shape[1:]), mapped.offset // max(dtype.itemsize, 1)
+    at_once = max(_BLOCK_BYTES // max(each * dtype.itemsize, 1), 1)
+
+    def read(place: tuple[slice, ...]) -> NDArray[Any]:
+        first, *others = place[::-1] if by_column else place
+        start, stop, _ = first.indices(shape[0])
+        blocks = []
+        for low in range(start, stop, at_once):
+            words = slice(skipped + low * each, skipped + min(low + at_once, stop) * each)
+            rows = read_words(path, dtype, words).reshape(-1, *shape[1:])
+            blocks.append(rows[(slice(None), *others)])
+        values = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+        return values.T if by_column else values
+
+    return StoredArray(mapped.shape, dtype, read)
 
 
 def array_names(path: Path) -> list[str]:

@@ -332,6 +332,25 @@ def test_a_sample_that_is_no_number_is_refused_when_it_is_read(tmp_path: Path) -
         doppler_map(capture)
 
 
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("axes", ["frame chirp sample", "sample frame chirp"])
+def test_a_npy_that_is_cut_off_while_it_is_open_is_refused(
+    tmp_path: Path, order: str, axes: str
+) -> None:
+    """It was mapped, and the program ended by a bus error."""
+    names = axes.split()
+    cube = np.arange(3 * 64 * 128, dtype=np.float32).reshape(3, 64, 128)
+    turned = cube.transpose([PLAIN.index(name) for name in names])
+    path = _described(
+        tmp_path / "a.npy", np.array(turned, order=order), axes=tuple(names), frame_repetition_s=1.0
+    )
+    capture = load_capture(path)
+    np.testing.assert_array_equal(capture.read(1, 3)[:, 0], cube[1:3])
+    os.truncate(path, 300)
+    with pytest.raises(Sd2Error, match=r"a\.npy has become shorter"):
+        capture.read(1, 2)
+
+
 def test_what_has_no_description_is_told_how_to_get_one(tmp_path: Path) -> None:
     np.save(tmp_path / "mine.npy", CUBE)
     with pytest.raises(Sd2Error, match=r"sd2 radar describe mine\.npy"):
