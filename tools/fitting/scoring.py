@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import NamedTuple
 
-from sd2core import Sd2Error, load_mesh, open_video
+from sd2core import load_mesh, open_video
 from sd2core.body.camera import PinholeCamera
 from sd2core.body.landmark_files import load_track
 from sd2core.body.landmark_models import landmark_models
 from sd2core.body.landmarks import find_landmarks
 from sd2core.cli.output import progress_bar
+from tools.documentation.runs import sd2
 from tools.fitting.clip_score import ClipScore, RealScore, score_clip, score_real
 from tools.fitting.truth import Truth
 
@@ -47,24 +46,15 @@ class Fits(NamedTuple):
         return score_real(name, load_mesh(path), track, camera)
 
     def _fitted(self, name: str, video: Path, known: list[str]) -> tuple[Path, float | None]:
-        """Path of the mesh, and the seconds its fit took if it was made now."""
+        """Path of the mesh, and the seconds its fit took, as a user does it, if it was made now."""
         path = self.folder / f"{name}.zarr"
         if path.exists():
             return path, None
-        return path, _fit(name, video, path, [*known, "--landmarks", str(landmarks_of(path))])
+        started = time.perf_counter()
+        sd2("fit", video, "--out", path, *known, "--landmarks", landmarks_of(path))
+        return path, time.perf_counter() - started
 
 
 def landmarks_of(mesh: Path) -> Path:
     """Path of the landmarks that a mesh was fitted to."""
     return mesh.with_name(f"{mesh.stem}.landmarks.npz")
-
-
-def _fit(name: str, video: Path, out: Path, known: list[str]) -> float:
-    """Fit one video in a process of its own, as a user does; the seconds that it takes."""
-    command = [sys.executable, "-m", "sd2core.cli", "fit", str(video), "--out", str(out), *known]
-    started = time.perf_counter()
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        lines = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
-        raise Sd2Error(f"{name} could not be fitted: {lines[0].removeprefix('sd2: ')}")
-    return time.perf_counter() - started

@@ -93,16 +93,13 @@ def test_clips_are_fitted_with_what_is_known(
     assert len(asked) == 1
 
 
-def test_a_fit_that_fails_says_why(
-    fitting: Tool, truth: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_fit_that_fails_says_why_and_ends_all(
+    truth: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    def fit(command: list[str], **_: Any) -> subprocess.CompletedProcess[str]:
-        return subprocess.CompletedProcess(command, 1, "", "sd2: There is nobody in the video.\n")
-
-    monkeypatch.setattr(subprocess, "run", fit)
-    outcome = fitting("score", truth, "--keep", tmp_path / "kept")
-    assert outcome.code == 1
-    assert "still could not be fitted: There is nobody in the video" in outcome.err
+    (truth / "still" / "video.mp4").write_text("no video")
+    with pytest.raises(SystemExit, match="1"):
+        main(["score", str(truth), "--keep", str(tmp_path / "kept")])
+    assert "video.mp4" in capfd.readouterr().err
 
 
 @pytest.mark.slow
